@@ -1,0 +1,109 @@
+"""Rotations as unit quaternions (w, x, y, z), on scipy where it is fast enough.
+
+`a_from_b` takes vectors of frame b into frame a, so products read by adjacency:
+`a_from_c = multiply(a_from_b, b_from_c)`. All functions broadcast over leading axes.
+"""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from harness.core.arrays import Floats
+
+IDENTITY: Floats = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def multiply(a_from_b: Floats, b_from_c: Floats) -> Floats:
+    """Hamilton product, (..., 4)."""
+    w1, x1, y1, z1 = np.moveaxis(np.asarray(a_from_b, dtype=float), -1, 0)
+    w2, x2, y2, z2 = np.moveaxis(np.asarray(b_from_c, dtype=float), -1, 0)
+    return np.stack(
+        [
+            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
+            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
+            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
+            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
+        ],
+        axis=-1,
+    )
+
+
+def inverse(a_from_b: Floats) -> Floats:
+    """`b_from_a`, (..., 4); of a unit quaternion."""
+    return np.asarray(a_from_b, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotate(a_from_b: Floats, v_b: Floats) -> Floats:
+    """Vectors (..., 3) of frame b in frame a."""
+    q, v = np.asarray(a_from_b, dtype=float), np.asarray(v_b, dtype=float)
+    w, u = q[..., :1], q[..., 1:]
+    t = 2.0 * np.cross(u, v)
+    return v + w * t + np.cross(u, t)
+
+
+def exp(rotation_vector_rad: Floats) -> Floats:
+    """Unit quaternion of a rotation vector (..., 3) [rad]."""
+    v = np.asarray(rotation_vector_rad, dtype=float)
+    half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
+
+
+def log(quaternion: Floats) -> Floats:
+    """Rotation vector (..., 3) [rad] of the shorter turn; the inverse of `exp` below pi."""
+    q = np.asarray(quaternion, dtype=float)
+    q = np.where(q[..., :1] < 0.0, -q, q)
+    s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
+    angle = 2.0 * np.arctan2(s, q[..., :1])
+    small = s < 1e-9
+    return np.where(small, 2.0, angle / np.where(small, 1.0, s)) * q[..., 1:]
+
+
+def angle_between_rad(p: Floats, q: Floats) -> Floats:
+    """Geodesic distance of two unit quaternions (...,) in 0..pi; accurate near 0 and near pi."""
+    turn = multiply(inverse(p), q)
+    return 2.0 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
+
+
+def to_matrix(quaternion: Floats) -> Floats:
+    """Rotation matrices (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_matrix(matrix: Floats) -> Floats:
+    """Unit quaternions (..., 4), w >= 0, of rotation matrices (..., 3, 3)."""
+    m = np.asarray(matrix, dtype=float)
+    q = Rotation.from_matrix(m.reshape(-1, 3, 3)).as_quat(canonical=True, scalar_first=True)
+    return np.asarray(q, dtype=float).reshape(*m.shape[:-2], 4)
+
+
+def continuous(quaternions: Floats) -> Floats:
+    """The same rotations (T, ..., 4) with signs such that neighbours along the first axis never flip."""
+    q = np.array(quaternions, dtype=float)
+    if len(q) > 1:
+        flips = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
+        q[1:][np.cumsum(flips, axis=0) % 2 == 1] *= -1.0
+    return q
+
+
+def slerp(p: Floats, q: Floats, share: float | Floats) -> Floats:
+    """`share` of the way from p to q along the shorter arc; `share` broadcasts against (...,)."""
+    turn = log(multiply(inverse(p), q))
+    return multiply(p, exp(np.asarray(share)[..., None] * turn))
+
+
+def yaw_rad(world_from_body: Floats) -> Floats:
+    """Heading (...,) about the world's z of the body's x axis (forward) [rad]."""
+    w, x, y, z = np.moveaxis(np.asarray(world_from_body, dtype=float), -1, 0)
+    return np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+def about_z(angle_rad: float | Floats) -> Floats:
+    """Unit quaternion (..., 4) of a turn about z."""
+    half = 0.5 * np.asarray(angle_rad, dtype=float)
+    zero = np.zeros_like(half)
+    return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)

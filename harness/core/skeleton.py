@@ -1,0 +1,145 @@
+"""A skeleton of bones with hinge joints, and its forward kinematics in plain numpy.
+
+World axes everywhere: x forward, y left, z up, metres. In the rest pose (all angles zero, root unrotated)
+every bone's frame is parallel to the world. A bone's rotation relative to its parent is the product of its
+hinges, the last named one outermost: R = R(c) R(b) R(a) for hinges (a, b, c), as Acclaim files compose them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Ints, freeze
+from harness.errors import UnknownName
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """B bones, parents before children, with D hinges in bone order."""
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    """Index of each bone's parent; -1 is the root."""
+    bone_m: Floats
+    """(B, 3) from the bone's joint to its far end, in the rest pose [m]."""
+    hinges: tuple[tuple[str, ...], ...]
+    """Channel names of each bone, such as ("rx", "ry", "rz"), innermost first; () for a rigid bone."""
+    axes: Floats
+    """(D, 3) unit axis of each hinge in the rest pose."""
+
+    def __post_init__(self) -> None:
+        freeze(self, bone_m=("B", 3), axes=("D", 3))
+
+    @property
+    def bone_count(self) -> int:
+        return len(self.names)
+
+    @cached_property
+    def dof_bone(self) -> tuple[int, ...]:
+        """(D,) bone that each hinge turns."""
+        return tuple(b for b, channels in enumerate(self.hinges) for _ in channels)
+
+    @cached_property
+    def dof_names(self) -> tuple[str, ...]:
+        """(D,) such as "lfemur.rx"."""
+        return tuple(f"{n}.{c}" for n, channels in zip(self.names, self.hinges, strict=True) for c in channels)
+
+    @cached_property
+    def dof_of_bone(self) -> tuple[slice, ...]:
+        """(B,) where each bone's hinges lie among the D."""
+        ends = np.cumsum([len(channels) for channels in self.hinges])
+        return tuple(slice(int(e) - len(c), int(e)) for e, c in zip(ends, self.hinges, strict=True))
+
+    @cached_property
+    def length_m(self) -> Floats:
+        """(B,) bone lengths [m]."""
+        return np.sqrt(np.sum(self.bone_m**2, axis=1))
+
+    def index(self, bone: str) -> int:
+        if bone not in self.names:
+            raise UnknownName("bone", bone, self.names)
+        return self.names.index(bone)
+
+    def subset(self, names: Sequence[str]) -> tuple["Skeleton", Ints]:
+        """The skeleton with only these bones (closed under parents), and the (D',) hinges that it keeps."""
+        kept = [self.index(name) for name in names]
+        place = {-1: -1} | {old: new for new, old in enumerate(kept)}
+        dofs = np.array(
+            [d for b in kept for d in range(self.dof_of_bone[b].start, self.dof_of_bone[b].stop)], dtype=int
+        )
+        small = Skeleton(
+            names=tuple(names),
+            parents=tuple(place[self.parents[b]] for b in kept),
+            bone_m=self.bone_m[kept],
+            hinges=tuple(self.hinges[b] for b in kept),
+            axes=self.axes[dofs],
+        )
+        return small, dofs
+
+    def with_bones(self, bone_m: Floats) -> "Skeleton":
+        """The same joints with other bone vectors (B, 3) [m]."""
+        return Skeleton(self.names, self.parents, bone_m, self.hinges, self.axes)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose:
+    """Where the B bones of T frames are."""
+
+    start_m: Floats
+    """(T, B, 3) joint that each bone turns about [m]."""
+    end_m: Floats
+    """(T, B, 3) its far end [m]."""
+    world_from_bone: Floats
+    """(T, B, 3, 3) rotation matrices."""
+
+
+def forward(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, angles_rad: Floats) -> Pose:
+    """Forward kinematics of T frames: root position (T, 3), root quaternion (T, 4), hinge angles (T, D)."""
+    frames = len(angles_rad)
+    root = rotations.to_matrix(world_from_root)
+    start = np.empty((frames, skeleton.bone_count, 3))
+    end = np.empty_like(start)
+    turned = np.empty((frames, skeleton.bone_count, 3, 3))
+    for b, parent in enumerate(skeleton.parents):
+        above, at = (root, root_m) if parent < 0 else (turned[:, parent], end[:, parent])
+        turned[:, b] = above @ bone_rotation(skeleton, b, angles_rad)
+        start[:, b] = at
+        end[:, b] = at + turned[:, b] @ skeleton.bone_m[b]
+    return Pose(start, end, turned)
+
+
+def bone_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
+    """(T, 3, 3) rotation of one bone relative to its parent."""
+    turn = np.broadcast_to(np.eye(3), (len(angles_rad), 3, 3))
+    where = skeleton.dof_of_bone[bone]
+    for d in range(where.start, where.stop):
+        turn = rotations.to_matrix(rotations.exp(angles_rad[:, d, None] * skeleton.axes[d])) @ turn
+    return turn
+
+
+def unwrapped(skeleton: Skeleton, angles_rad: Floats) -> Floats:
+    """The same rotations (T, D) with each bone's angles as near as possible to the frame before.
+
+    Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi); the first frame takes
+    the representation nearest to zero (ALGORITHMS.md F9).
+    """
+    out = np.array(angles_rad, dtype=float)
+    for where in skeleton.dof_of_bone:
+        columns = out[:, where]
+        if columns.shape[1] == 3 and _is_gimbal(skeleton.axes[where]):
+            twin = columns * [1.0, -1.0, 1.0] + np.pi
+        else:
+            twin = columns
+        before = np.zeros(columns.shape[1])
+        for t in range(len(columns)):
+            choices = [c + 2 * np.pi * np.round((before - c) / (2 * np.pi)) for c in (columns[t], twin[t])]
+            before = min(choices, key=lambda c: float(np.sum((c - before) ** 2)))
+            columns[t] = before
+    return out
+
+
+def _is_gimbal(axes: Floats) -> bool:
+    return bool(np.allclose(axes @ axes.T, np.eye(3), atol=1e-9))

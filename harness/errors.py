@@ -1,0 +1,93 @@
+"""Everything this package raises on purpose, and the words and exit codes a command ends with.
+
+A type per thing the reader can do about it; the message names the culprit, where it stands and the choices.
+Fields, not text, go to `super().__init__`, so that an error survives the way out of a worker process.
+"""
+
+import difflib
+from collections.abc import Iterable
+from enum import Enum
+from pathlib import Path
+
+
+class Outcome(Enum):
+    """How a command ended: its word (last line, JSON) and its exit code."""
+
+    PASS = ("pass", 0)
+    REGRESSED = ("regressed", 1)
+    REFUSED = ("refused", 2)
+    NOT_COMPARABLE = ("not comparable", 3)
+    INCOMPLETE = ("incomplete", 4)
+    INTERRUPTED = ("interrupted", 130)
+
+    @property
+    def word(self) -> str:
+        return str(self.value[0])
+
+    @property
+    def exit_code(self) -> int:
+        return int(self.value[1])
+
+
+class HarnessError(Exception):
+    """Anything this package raises on purpose; the command line prints it without a traceback."""
+
+    outcome = Outcome.REFUSED
+
+
+class UnknownName(HarnessError):
+    """A station, bone, method, clip or scenario key that does not exist."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        super().__init__(kind, name, tuple(known))
+        self.kind, self.name, self.known = self.args
+
+    def __str__(self) -> str:
+        near = difflib.get_close_matches(self.name, self.known, n=1)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        return f"no {self.kind} called {self.name!r}.{hint} Known: {', '.join(self.known) or 'none'}."
+
+
+class ShapeError(HarnessError):
+    """Arrays of one record that disagree about their sizes."""
+
+    def __init__(self, record: str, field: str, found: tuple[int, ...], expected: str) -> None:
+        super().__init__(record, field, found, expected)
+        self.record, self.field, self.found, self.expected = self.args
+
+    def __str__(self) -> str:
+        return f"{self.record}.{self.field} has shape {self.found}, expected {self.expected}."
+
+
+class BadFile(HarnessError):
+    """A file that cannot be used: what was found, what was expected, and what to try."""
+
+    def __init__(self, path: Path | str, found: str, expected: str, advice: str, line: int | None = None) -> None:
+        super().__init__(str(path), found, expected, advice, line)
+        self.path, self.found, self.expected, self.advice, self.line = self.args
+
+    def __str__(self) -> str:
+        where = self.path if self.line is None else f"{self.path}, line {self.line}"
+        return f"{where}: {self.found}; expected {self.expected}. {self.advice}"
+
+
+class BadInput(HarnessError):
+    """An option, scenario value or combination that cannot be used, and what to do instead."""
+
+    def __init__(self, what: str, advice: str) -> None:
+        super().__init__(what, advice)
+        self.what, self.advice = self.args
+
+    def __str__(self) -> str:
+        return f"{self.what} {self.advice}"
+
+
+class MissingExtra(HarnessError):
+    """A part that needs a package of an optional extra."""
+
+    def __init__(self, what: str, package: str, extra: str) -> None:
+        super().__init__(what, package, extra)
+        self.what, self.package, self.extra = self.args
+
+    def __str__(self) -> str:
+        return f"{self.what} needs {self.package}; install it with: pip install 'tracker-harness[{self.extra}]'."

@@ -1,0 +1,53 @@
+"""The one interface: what a tracker reports, wherever the report comes from.
+
+Simulator, recording and serial port all yield these frames; the methods see nothing else.
+SI units; quaternions (w, x, y, z); `a_from_b` takes b into a.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from harness.core.arrays import Bools, Floats, freeze
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrackerFrame:
+    """One instant as the receiver saw it, S stations; ShapeError if the arrays disagree about S."""
+
+    received_s: float
+    """Host monotonic clock when the frame was complete [s]."""
+    measured_s: Floats
+    """(S,) device time of each station's measurement, unwrapped [s]; NaN where no record came."""
+    position_m: Floats
+    """(S, 3) station origin in the tracker frame [m]; NaN where not valid."""
+    tracker_from_station: Floats
+    """(S, 4) unit quaternion; NaN where not valid."""
+    position_valid: Bools
+    """(S,) False where no usable position came (lost, or a station that reports orientation only)."""
+    orientation_valid: Bools
+    """(S,) likewise for orientation."""
+    quality: Floats
+    """(S,) 0 lost to 1 best, from item 40."""
+    suspect: Bools
+    """(S,) True where station order, time or plausibility cast doubt on the record."""
+
+    def __post_init__(self) -> None:
+        stations = len(self.measured_s)
+        freeze(self, measured_s=(stations,), position_m=(stations, 3), tracker_from_station=(stations, 4))
+        freeze(self, quality=(stations,))
+        freeze(self, bool, position_valid=(stations,), orientation_valid=(stations,), suspect=(stations,))
+
+
+class TrackerStream(Protocol):
+    """Frames from anywhere.
+
+    Times strictly increase; stations and their order never change; a silent station is an
+    invalid row, never a repeated one; a frame closes when the station number does not increase, or
+    after 1.5 periods; closing ends the iteration quietly.
+    """
+
+    @property
+    def stations(self) -> tuple[str, ...]: ...
+    def __iter__(self) -> Iterator[TrackerFrame]: ...
+    def close(self) -> None: ...
