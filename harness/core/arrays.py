@@ -20,7 +20,7 @@ def freeze(record: Any, dtype: type = np.float64, **shapes: tuple[str | int, ...
     """
     sizes: dict[str, int] = {}
     for field, shape in shapes.items():
-        array = np.array(getattr(record, field), dtype=dtype, order="C")
+        array: NDArray[Any] = np.array(getattr(record, field), dtype=dtype, order="C")
         expected = "(" + ", ".join(str(sizes.get(s, s) if isinstance(s, str) else s) for s in shape) + ")"
         if array.ndim != len(shape):
             raise ShapeError(type(record).__name__, field, array.shape, expected)

@@ -231,4 +231,5 @@ def limits_rad() -> Floats:
 
 
 def _unit(rows: Floats) -> Floats:
-    return rows / np.sqrt(np.sum(rows**2, axis=1, keepdims=True))
+    out: Floats = rows / np.sqrt(np.sum(rows**2, axis=1, keepdims=True))
+    return out

@@ -29,7 +29,8 @@ def multiply(a_from_b: Floats, b_from_c: Floats) -> Floats:
 
 def inverse(a_from_b: Floats) -> Floats:
     """`b_from_a`, (..., 4); of a unit quaternion."""
-    return np.asarray(a_from_b, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+    out: Floats = np.asarray(a_from_b, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+    return out
 
 
 def rotate(a_from_b: Floats, v_b: Floats) -> Floats:
@@ -54,13 +55,15 @@ def log(quaternion: Floats) -> Floats:
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(s, q[..., :1])
     small = s < 1e-9
-    return np.where(small, 2.0, angle / np.where(small, 1.0, s)) * q[..., 1:]
+    out: Floats = np.where(small, 2.0, angle / np.where(small, 1.0, s)) * q[..., 1:]
+    return out
 
 
 def angle_between_rad(p: Floats, q: Floats) -> Floats:
     """Geodesic distance of two unit quaternions (...,) in 0..pi; accurate near 0 and near pi."""
     turn = multiply(inverse(p), q)
-    return 2.0 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
+    out: Floats = 2.0 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
+    return out
 
 
 def to_matrix(quaternion: Floats) -> Floats:
@@ -99,7 +102,8 @@ def slerp(p: Floats, q: Floats, share: float | Floats) -> Floats:
 def yaw_rad(world_from_body: Floats) -> Floats:
     """Heading (...,) about the world's z of the body's x axis (forward) [rad]."""
     w, x, y, z = np.moveaxis(np.asarray(world_from_body, dtype=float), -1, 0)
-    return np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    out: Floats = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return out
 
 
 def about_z(angle_rad: float | Floats) -> Floats:

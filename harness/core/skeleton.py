@@ -56,7 +56,8 @@ class Skeleton:
     @cached_property
     def length_m(self) -> Floats:
         """(B,) bone lengths [m]."""
-        return np.sqrt(np.sum(self.bone_m**2, axis=1))
+        out: Floats = np.sqrt(np.sum(self.bone_m**2, axis=1))
+        return out
 
     def index(self, bone: str) -> int:
         if bone not in self.names:
