@@ -5,13 +5,17 @@ are common to all of them. Limits are the envelope of 146 CMU clips, none of the
 files' own limits are broken by most recorded frames); angles were taken in principal form: each wrapped to
 +-180 deg, the middle one of three within +-90 deg. The data was obtained from mocap.cs.cmu.edu, created with
 funding from NSF EIA-0196217.
+
+A configuration `qpos` is MuJoCo's: root position, root quaternion, then the hinges of each bone outermost first,
+because MuJoCo composes the joints of a body in the order listed; the skeleton (and an AMC row) names them innermost
+first. `pack` and `unpack` are the one place that knows.
 """
 
 from functools import cache
 
 import numpy as np
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
 
 # bone, parent, vector [m] in the rest pose (x forward, y left, z up), hinges: (channel, axis, lowest, highest [deg])
@@ -215,7 +219,7 @@ BONES: tuple[str, ...] = tuple(bone for bone, *_ in _BONES)
 
 @cache
 def standard_skeleton() -> Skeleton:
-    """The mean CMU skeleton; its hinge order is the order of the body's `qpos[7:]`."""
+    """The mean CMU skeleton."""
     return Skeleton(
         names=BONES,
         parents=tuple(-1 if parent == "root" else BONES.index(parent) for _, parent, _, _ in _BONES),
@@ -230,6 +234,23 @@ def limits_rad() -> Floats:
     return np.deg2rad([[low, high] for *_, hinges in _BONES for _, _, low, high in hinges])
 
 
+def pack(root_m: Floats, world_from_root: Floats, angles_rad: Floats) -> Floats:
+    """Configurations (..., 55) of root positions (..., 3), quaternions (..., 4) and hinge angles (..., 48) [rad]."""
+    angles = np.asarray(angles_rad, dtype=float)[..., QPOS_OF_DOF]
+    return np.concatenate([np.asarray(root_m, dtype=float), np.asarray(world_from_root, dtype=float), angles], axis=-1)
+
+
+def unpack(qpos: Floats) -> tuple[Floats, Floats, Floats]:
+    """Root positions (..., 3), quaternions (..., 4) and hinge angles (..., 48) in the skeleton's order."""
+    return qpos[..., :3], qpos[..., 3:7], qpos[..., 7:][..., QPOS_OF_DOF]
+
+
 def _unit(rows: Floats) -> Floats:
     out: Floats = rows / np.sqrt(np.sum(rows**2, axis=1, keepdims=True))
     return out
+
+
+QPOS_OF_DOF: Ints = np.concatenate(
+    [np.arange(where.start, where.stop)[::-1] for where in standard_skeleton().dof_of_bone], dtype=np.int64
+)
+"""(48,) the place in `qpos[7:]` of each of the skeleton's hinges: each bone's run reversed, hence its own inverse."""
