@@ -1,0 +1,77 @@
+"""Which motion may be learnt from: a test clip is never among its own examples (ALGORITHMS.md F1)."""
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+from harness.errors import BadInput
+
+Protocol = Literal["block", "sequence", "subject"]
+
+GUARD_S = 1.0
+"""No example frame lies within this time of a tested block [s]."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A clip, or the share of it from `start` to `end`."""
+
+    clip: str
+    start: float = 0.0
+    end: float = 1.0
+
+    @classmethod
+    def parse(cls, text: str) -> "Part":
+        """From "13_17" or "13_17@0.20-0.40"."""
+        clip, at, share = text.partition("@")
+        if not at:
+            return cls(text)
+        found = re.fullmatch(r"([01]?\.?\d*)-([01]?\.?\d*)", share)
+        try:
+            start, end = (float(x) for x in found.groups()) if found else (1.0, 0.0)
+        except ValueError:
+            start, end = 1.0, 0.0
+        if not 0.0 <= start < end <= 1.0:
+            raise BadInput(f"{text!r} is no part of a clip.", "Write it as CLIP@0.20-0.40, shares of the take.")
+        return cls(clip, start, end)
+
+    def __str__(self) -> str:
+        return self.clip if (self.start, self.end) == (0.0, 1.0) else f"{self.clip}@{self.start:.2f}-{self.end:.2f}"
+
+    def frames(self, count: int) -> range:
+        """The frames of a take of `count` frames that lie in it."""
+        return range(round(self.start * count), round(self.end * count))
+
+
+def examples_of(test: Part, candidates: Iterable[str], protocol: Protocol, subjects: dict[str, str]) -> list[str]:
+    """The candidate clips that the protocol lets a method see; for `block` the test clip itself is among them."""
+    match protocol:
+        case "block":
+            return sorted({*candidates, test.clip})
+        case "sequence":
+            return sorted({name for name in candidates if name != test.clip})
+        case "subject":
+            return sorted({name for name in candidates if subjects[name] != subjects[test.clip]})
+
+
+def allowed_frames(test: Part, example: str, count: int, rate_hz: float) -> list[range]:
+    """The runs of frames of an example that may be learnt from: all, but for the guarded block of the test clip.
+
+    A test clip that is not cut into a block gives nothing, whatever the protocol.
+    """
+    if example != test.clip:
+        return [range(count)]
+    tested, guard = test.frames(count), round(GUARD_S * rate_hz)
+    return [run for run in (range(0, tested.start - guard), range(tested.stop + guard, count)) if len(run) > 1]
+
+
+def refuse_leak(test: Part, learnt: Iterable[tuple[str, range]], count: int, rate_hz: float) -> None:
+    """BadInput when any frame that was learnt from lies in the test part or within the guard time of it."""
+    tested, guard = test.frames(count), GUARD_S * rate_hz
+    for clip, run in learnt:
+        if clip == test.clip and run.start < tested.stop + guard - 0.5 and run.stop > tested.start - guard + 0.5:
+            raise BadInput(
+                f"{test} is judged, but frames {run.start} to {run.stop} of that take are among its examples.",
+                "A test clip can never be among its own examples: remove it, or use protocol block with a part.",
+            )

@@ -1,0 +1,75 @@
+"""Which readings a method is given: the input combinations of Liu et al. 2011 (ALGORITHMS.md A6)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from harness.core.arrays import Bools, freeze
+from harness.errors import BadInput, UnknownName
+from harness.stream.frame import TrackerFrame
+
+COMBINATIONS = ("pos+ori", "pos+torso_ori", "pos", "ori", "mixed")
+"""Names as they stand in tables.
+
+`pos+torso_ori` is the position of all and the orientation of the torso; `mixed` is the paper's fourth: position of
+torso and both ankles, orientation of torso, head and both hands (or wrists).
+"""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inputs:
+    """Per station, whether its position and its orientation are used."""
+
+    name: str
+    position: Bools
+    """(S,)"""
+    orientation: Bools
+    """(S,)"""
+
+    def __post_init__(self) -> None:
+        freeze(self, bool, position=("S",), orientation=("S",))
+
+    def masked(self, frame: TrackerFrame) -> TrackerFrame:
+        """The frame with everything else marked invalid and set to NaN."""
+        if self.position.all() and self.orientation.all():
+            return frame
+        return replace(
+            frame,
+            position_m=np.where(self.position[:, None], frame.position_m, np.nan),
+            tracker_from_station=np.where(self.orientation[:, None], frame.tracker_from_station, np.nan),
+            position_valid=frame.position_valid & self.position,
+            orientation_valid=frame.orientation_valid & self.orientation,
+        )
+
+
+def combination(name: str, stations: Sequence[str]) -> Inputs:
+    """The named combination for these stations; BadInput when a station that it is about is not worn."""
+    every, none = np.ones(len(stations), bool), np.zeros(len(stations), bool)
+    if name == "pos+ori":
+        return Inputs(name, every, every)
+    if name == "pos":
+        return Inputs(name, every, none)
+    if name == "ori":
+        return Inputs(name, none, every)
+    if name == "pos+torso_ori":
+        return Inputs(name, every, _named(name, stations, "torso"))
+    if name == "mixed":
+        legs_and_torso = _named(name, stations, "torso", "left_ankle", "right_ankle")
+        upper = _named(name, stations, "torso", "head", *_hands(stations))
+        return Inputs(name, legs_and_torso, upper)
+    raise UnknownName("input combination", name, COMBINATIONS)
+
+
+def _hands(stations: Sequence[str]) -> tuple[str, str]:
+    return ("left_wrist", "right_wrist") if "left_wrist" in stations else ("left_hand", "right_hand")
+
+
+def _named(combination_name: str, stations: Sequence[str], *wanted: str) -> Bools:
+    missing = [w for w in wanted if w not in stations]
+    if missing:
+        raise BadInput(
+            f"inputs {combination_name!r} need a station called {' and one called '.join(missing)}.",
+            f"Worn are: {', '.join(stations)}.",
+        )
+    return np.array([s in wanted for s in stations])

@@ -1,0 +1,53 @@
+"""A test clip is never among its own examples, under any protocol."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.errors import BadInput
+from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
+
+SUBJECTS = {"13_17": "13", "13_30": "13", "14_02": "14"}
+
+
+def test_a_sequence_is_left_out() -> None:
+    assert examples_of(Part("13_17"), SUBJECTS, "sequence", SUBJECTS) == ["13_30", "14_02"]
+
+
+def test_a_subject_is_left_out() -> None:
+    assert examples_of(Part("13_17"), SUBJECTS, "subject", SUBJECTS) == ["14_02"]
+
+
+def test_a_block_keeps_the_rest_of_its_take_a_second_away() -> None:
+    part = Part.parse("13_17@0.40-0.60")
+    runs = allowed_frames(part, "13_17", 1000, 40.0)
+    assert runs == [range(0, 360), range(640, 1000)]
+    refuse_leak(part, [("13_17", run) for run in runs], 1000, 40.0)
+
+
+@given(st.floats(0, 0.9), st.floats(0.01, 1.0), st.integers(2, 5000), st.integers(0, 5000), st.integers(1, 3000))
+def test_a_leak_is_refused(start: float, length: float, count: int, first: int, run: int) -> None:
+    part = Part("a_1", start, min(start + length, 1.0))
+    learnt = range(first, first + run)
+    tested = part.frames(count)
+    near = learnt.start < tested.stop + 40 and learnt.stop > tested.start - 40
+    if near:
+        with pytest.raises(BadInput, match="own examples"):
+            refuse_leak(part, [("a_1", learnt)], count, 40.0)
+    else:
+        refuse_leak(part, [("a_1", learnt)], count, 40.0)
+
+
+def test_a_whole_take_leaves_nothing_to_learn_from() -> None:
+    assert allowed_frames(Part("13_17"), "13_17", 1000, 40.0) == []
+
+
+@pytest.mark.parametrize("text", ["a@", "a@0.5", "a@0.6-0.4", "a@x-y", "a@0.5-1.5", "a@.-."])
+def test_a_part_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match="CLIP@"):
+        Part.parse(text)
+
+
+def test_a_part_prints_as_it_was_written() -> None:
+    for text in ("13_17", "13_17@0.20-0.40"):
+        assert str(Part.parse(text)) == text
