@@ -9,12 +9,14 @@ from harness.core.arrays import Bools, freeze
 from harness.errors import BadInput, UnknownName
 from harness.stream.frame import TrackerFrame
 
-COMBINATIONS = ("pos+ori", "pos+torso_ori", "pos", "ori", "mixed")
-"""Names as they stand in tables.
-
-`pos+torso_ori` is the position of all and the orientation of the torso; `mixed` is the paper's fourth: position of
-torso and both ankles, orientation of torso, head and both hands (or wrists).
-"""
+COMBINATIONS = {
+    "pos+ori": "position and orientation of every station",
+    "pos+torso_ori": "position of every station, orientation of the torso",
+    "pos": "position of every station",
+    "ori": "orientation of every station",
+    "mixed": "position of torso and both ankles, orientation of torso, head and both hands (or wrists)",
+}
+"""Names as they stand in tables, and what they mean."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

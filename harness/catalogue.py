@@ -1,0 +1,38 @@
+"""Everything that can be named on the command line or in a scenario, with a line about each."""
+
+from harness.config import load_scenario, shipped_scenarios
+from harness.mocap.sources import BUILT_IN_TITLE
+from harness.reconstruct import registry
+from harness.score.metrics import DEFINITIONS
+from harness.stream.inputs import COMBINATIONS
+
+
+def catalogue() -> dict[str, dict[str, str]]:
+    """Title -> name -> one line."""
+    from harness.mocap import performer
+
+    return {
+        "methods": {name: registry.summary(name) for name in registry.methods()},
+        "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
+        f"motion of the {BUILT_IN_TITLE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
+        "inputs": {name: text for name, text in COMBINATIONS.items()},
+        "noise": {
+            "clean": "what the tracker would say if it were perfect",
+            "noise": "white, slow and session errors, and the device's clock",
+            "default": "all of it: also excursions, echoes, short losses and the error of fast motion",
+        },
+        "metrics": {name: f"[{d.unit}] {d.text}" for name, d in DEFINITIONS.items()},
+    }
+
+
+def _line(name: str) -> str:
+    scenario = load_scenario(name)
+    motion = scenario.motion
+    return (
+        f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
+        f"{len(scenario.stations)} stations, noise {scenario.noise}; {', '.join(scenario.methods)}"
+    )
+
+
+def _range(names: tuple[str, ...]) -> str:
+    return f"{len(names)} takes, {names[0]} to {names[-1]}"
