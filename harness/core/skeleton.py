@@ -124,21 +124,44 @@ def bone_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
 def unwrapped(skeleton: Skeleton, angles_rad: Floats) -> Floats:
     """The same rotations (T, D) with each bone's angles as near as possible to the frame before.
 
-    Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi); the first frame takes
-    the representation nearest to zero (ALGORITHMS.md F9).
+    Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi) (ALGORITHMS.md F9). What that
+    leaves open is settled for the clip as a whole: each column's median lies in (-pi, pi], and of a bone's two twin
+    courses the one whose medians are nearer to zero is taken. A single frame takes what is nearest to zero.
     """
     out = np.array(angles_rad, dtype=float)
     for where in skeleton.dof_of_bone:
-        columns = out[:, where]
-        if columns.shape[1] == 3 and _is_gimbal(skeleton.axes[where]):
-            twin = columns * [1.0, -1.0, 1.0] + np.pi
+        column = out[:, where]
+        if column.size == 0:
+            continue
+        if column.shape[1] == 3 and _is_gimbal(skeleton.axes[where]):
+            # The distance between two frames is the same for both twins, so whether to change over does not depend
+            # on which of them the frame before took.
+            kept = _turn_squared(column[1:] - column[:-1])
+            changed = _turn_squared(_twin(column[1:]) - column[:-1])
+            over = np.concatenate([[False], np.cumsum(changed < kept) % 2 == 1])
+            column = np.where(over[:, None], _twin(column), column)
+            courses = [_near_zero(np.unwrap(c, axis=0)) for c in (column, _twin(column))]
+            column = min(courses, key=lambda c: float(np.sum(np.median(c, axis=0) ** 2)))
         else:
-            twin = columns
-        before = np.zeros(columns.shape[1])
-        for t in range(len(columns)):
-            choices = [c + 2 * np.pi * np.round((before - c) / (2 * np.pi)) for c in (columns[t], twin[t])]
-            before = min(choices, key=lambda c: float(np.sum((c - before) ** 2)))
-            columns[t] = before
+            column = _near_zero(np.unwrap(column, axis=0))
+        out[:, where] = column
+    return out
+
+
+def _twin(angles_rad: Floats) -> Floats:
+    """The other angles (..., 3) of three orthogonal hinges that give the same rotation."""
+    return angles_rad * [1.0, -1.0, 1.0] + np.pi
+
+
+def _turn_squared(difference_rad: Floats) -> Floats:
+    """Squared size (...,) of differences (..., 3) of angles, each taken the short way round."""
+    out: Floats = np.sum((difference_rad - 2 * np.pi * np.round(difference_rad / (2 * np.pi))) ** 2, axis=-1)
+    return out
+
+
+def _near_zero(angles_rad: Floats) -> Floats:
+    """Columns (T, N) shifted by whole turns so that each median lies in (-pi, pi]."""
+    out: Floats = angles_rad - 2 * np.pi * np.ceil(np.median(angles_rad, axis=0) / (2 * np.pi) - 0.5)
     return out
 
 

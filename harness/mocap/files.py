@@ -1,0 +1,57 @@
+"""Reading a motion file: refused before it is parsed when it is missing, empty, huge or not text."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from harness.errors import BadFile
+
+LIMIT_BYTES = 256 * 2**20
+"""Largest motion file that is read; about 330,000 AMC frames, or 46 minutes at 120 a second."""
+LARGEST = 1e6
+"""Numbers beyond this size [the file's own unit] are taken for damage."""
+
+
+def check_size(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> None:
+    """BadFile unless `path` is a file that is neither empty nor larger than the limit; reads nothing."""
+    if not path.is_file():
+        found = "a folder" if path.is_dir() else "no such file"
+        raise BadFile(path, found, expected, "Check the path.")
+    size = path.stat().st_size
+    if size == 0:
+        raise BadFile(path, "an empty file", expected, "Fetch or export it again.")
+    if size > limit_bytes:
+        advice = "Cut the clip into shorter ones."
+        raise BadFile(path, f"{size / 2**20:.0f} MB", f"{expected} of at most {limit_bytes / 2**20:.0f} MB", advice)
+
+
+def read_lines(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> list[str]:
+    """The lines of a text file; `expected` names what it should be, for the message of BadFile.
+
+    Latin-1, so that any byte of a capture machine's path in a comment is readable; a NUL byte is not text.
+    """
+    check_size(path, expected, limit_bytes)
+    data = path.read_bytes()
+    if b"\0" in data:
+        raise BadFile(path, "binary data", expected, "Is it another format under this name?")
+    if not data.strip():
+        raise BadFile(path, "blank lines only", expected, "Fetch or export it again.")
+    return data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def numbers(path: Path, words: Sequence[str], count: int, what: str, line: int) -> list[float]:
+    """`count` numbers of sensible size out of the words of a line; BadFile names the one that is not."""
+    if len(words) != count:
+        plural = "" if len(words) == 1 else "s"
+        raise BadFile(path, f"{len(words)} number{plural} for {what}", str(count), "Is the line whole?", line)
+    return [number(path, word, what, line) for word in words]
+
+
+def number(path: Path, word: str, what: str, line: int) -> float:
+    """One number between -1e6 and 1e6; BadFile otherwise."""
+    try:
+        value = float(word)
+    except ValueError:
+        value = float("nan")
+    if not abs(value) < LARGEST:
+        raise BadFile(path, f"{word[:40]!r} for {what}", "a finite number", "Fetch or export the file again.", line)
+    return value
