@@ -1,0 +1,157 @@
+"""The flesh on the bones: capsules and ellipsoids with masses, for any 24-bone skeleton.
+
+Masses are the segment shares of de Leva 1996 (Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters,
+J. Biomechanics 29, Table 4, men): head and neck 6.94 %, upper, middle and lower trunk 15.96, 16.33 and 11.17 %,
+upper arm 2.71, forearm 1.62, hand 0.61, thigh 14.16, shank 4.33, foot 1.37 %; how a segment is shared among its
+bones is ours. The whole weighs what a person of the body-mass index of his mean man (73.0 kg at 1.741 m) weighs.
+Girths are ours, set by eye against a person of the mean CMU skeleton; they grow with the body, not with each bone.
+Heads, hands and feet reach beyond their bones, whose far ends are joints (the ball of the foot, the knuckles).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core import humanoid24, rotations
+from harness.core.arrays import Floats, freeze
+from harness.core.skeleton import Skeleton
+
+_STANDARD_MASS_KG = 71.7
+"""BMI of de Leva's mean man (24.08 kg/m2) times the square of the standard body's height, 1.725 m."""
+
+# bone: share of the body's mass, radius [m], and which part of the bone the capsule covers
+_LIMBS: tuple[tuple[str, float, float, float, float], ...] = (
+    ("lowerneck", 0.0072, 0.058, 0.15, 0.9),
+    ("upperneck", 0.0072, 0.056, 0.0, 1.0),
+    ("clavicle", 0.0300, 0.056, 0.30, 0.92),
+    ("humerus", 0.0271, 0.047, 0.0, 1.0),
+    ("radius", 0.0118, 0.040, 0.0, 1.0),
+    ("wrist", 0.0044, 0.031, 0.0, 1.0),
+    ("hipjoint", 0.0300, 0.088, 0.35, 1.0),
+    ("femur", 0.1416, 0.074, 0.05, 1.0),
+    ("tibia", 0.0433, 0.050, 0.0, 0.95),
+)
+# bone, name, share of the mass, centre along the bone, then forward and up of it [m], half sizes (x, y, z) [m]
+_TRUNK: tuple[tuple[str, str, float, float, tuple[float, float], tuple[float, float, float]], ...] = (
+    ("root", "pelvis", 0.0517, 0.0, (0.0, -0.03), (0.108, 0.152, 0.110)),
+    ("lowerback", "lowerback", 0.0733, 0.6, (0.0, 0.0), (0.102, 0.138, 0.112)),
+    ("upperback", "upperback", 0.0900, 0.6, (0.005, 0.0), (0.110, 0.148, 0.115)),
+    ("thorax", "thorax", 0.0996, 0.6, (0.005, 0.0), (0.115, 0.158, 0.125)),
+    ("head", "head", 0.0550, 0.75, (0.022, 0.0), (0.098, 0.077, 0.118)),
+)
+_HAND_SHARE, _FOOT_SHARE = 0.0061, 0.0137
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """One geom in the frame of its bone."""
+
+    bone: str
+    """The bone, or "root"."""
+    name: str
+    kind: str
+    """`capsule` (along its z; size: radius, half length, 0) or `ellipsoid` (size: half axes)."""
+    centre_m: Floats
+    """(3,)"""
+    bone_from_shape: Floats
+    """(4,) unit quaternion."""
+    size_m: Floats
+    """(3,)"""
+    mass_kg: float
+
+    def __post_init__(self) -> None:
+        freeze(self, centre_m=(3,), bone_from_shape=(4,), size_m=(3,))
+
+
+def body_scale(skeleton: Skeleton) -> float:
+    """Size of the body relative to the standard one: legs and spine, the bones that make up the height."""
+    return _height_chain_m(skeleton) / _height_chain_m(humanoid24.standard_skeleton())
+
+
+def shapes(skeleton: Skeleton) -> tuple[Shape, ...]:
+    """The geoms of the 24 bones and the root, in the order of the bodies."""
+    scale = body_scale(skeleton)
+    mass_kg = _STANDARD_MASS_KG * scale**2
+    found = [_trunk(skeleton, row, scale, mass_kg) for row in _TRUNK]
+    for part, share, radius, start, stop in _LIMBS:
+        for bone in (part,) if part in skeleton.names else (f"l{part}", f"r{part}"):
+            vector = skeleton.bone_m[skeleton.index(bone)]
+            found.append(_capsule(bone, bone, start * vector, stop * vector, scale * radius, mass_kg * share))
+    for side in "lr":
+        found += [_hand(skeleton, side, scale, mass_kg), *_foot(skeleton, side, scale, mass_kg)]
+    order = ("root", *skeleton.names)
+    return tuple(sorted(found, key=lambda shape: order.index(shape.bone)))
+
+
+def sole_below_ankle_m(skeleton: Skeleton) -> float:
+    """Height of the ankle joint of a flat foot above the ground [m]."""
+    return (_SOLE_DROP_M + _SOLE_RADIUS_M) * body_scale(skeleton)
+
+
+# The foot stands 80 mm below the ankle: the median ankle height of eight CMU clips in stance lies at 76 to 80 mm.
+_SOLE_DROP_M, _SOLE_RADIUS_M, _HEEL_M, _TOE_M, _SOLE_HALF_WIDTH_M = 0.049, 0.031, -0.027, 0.172, 0.019
+
+
+def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[Shape]:
+    """A sole of two capsules from heel to toe, and an instep; down is along the shin of the rest pose."""
+    down = _unit(skeleton.bone_m[skeleton.index(f"{side}tibia")])
+    toes = skeleton.bone_m[skeleton.index(f"{side}foot")]
+    ahead = _unit(toes - (toes @ down) * down)
+    across = np.cross(ahead, down)
+    bone, share = f"{side}foot", mass_kg * _FOOT_SHARE / 3
+    ball = ahead * _TOE_M * 0.6 + down * _SOLE_DROP_M * 0.85
+    parts = [_capsule(bone, f"{bone}_instep", 0.0 * down, scale * ball, 0.034 * scale, share)]
+    for name, sign in (("inner", -1.0), ("outer", 1.0)):
+        sideways = sign * (1.0 if side == "r" else -1.0) * _SOLE_HALF_WIDTH_M * across
+        heel, toe = (scale * (x * ahead + _SOLE_DROP_M * down + sideways) for x in (_HEEL_M, _TOE_M))
+        parts.append(_capsule(bone, f"{bone}_{name}", heel, toe, _SOLE_RADIUS_M * scale, share))
+    return parts
+
+
+def _hand(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> Shape:
+    """A flat ellipsoid from the wrist to the finger tips, palm down in the rest pose."""
+    along = _unit(skeleton.bone_m[skeleton.index(f"{side}hand")])
+    across = _unit(np.array([1.0, 0.0, 0.0]) - along[0] * along)
+    frame = np.stack([across, np.cross(along, across), along], axis=1)
+    size = scale * np.array([0.043, 0.017, 0.092])
+    bone = f"{side}hand"
+    turn = rotations.from_matrix(frame)
+    return Shape(bone, bone, "ellipsoid", 0.085 * scale * along, turn, size, mass_kg * _HAND_SHARE)
+
+
+def _trunk(
+    skeleton: Skeleton,
+    row: tuple[str, str, float, float, tuple[float, float], tuple[float, float, float]],
+    scale: float,
+    mass_kg: float,
+) -> Shape:
+    bone, name, share, along, (forward, up), size = row
+    vector = np.zeros(3) if bone == "root" else skeleton.bone_m[skeleton.index(bone)]
+    centre = along * vector + scale * np.array([forward, 0.0, up])
+    return Shape(bone, name, "ellipsoid", centre, rotations.IDENTITY, scale * np.array(size), mass_kg * share)
+
+
+def _capsule(bone: str, name: str, start_m: Floats, stop_m: Floats, radius_m: float, mass_kg: float) -> Shape:
+    span = stop_m - start_m
+    length = float(np.sqrt(span @ span))
+    size = np.array([radius_m, 0.5 * length, 0.0])
+    return Shape(bone, name, "capsule", 0.5 * (start_m + stop_m), _turn_z_to(span / length), size, mass_kg)
+
+
+def _turn_z_to(direction: Floats) -> Floats:
+    """Quaternion of the shortest turn of z onto a unit vector."""
+    if direction[2] < -1.0 + 1e-12:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    return _unit(np.array([1.0 + direction[2], -direction[1], direction[0], 0.0]))
+
+
+def _unit(v: Floats) -> Floats:
+    out: Floats = v / np.sqrt(v @ v)
+    return out
+
+
+def _height_chain_m(skeleton: Skeleton) -> float:
+    spine = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
+    legs = ("lfemur", "ltibia", "rfemur", "rtibia")
+    length = skeleton.length_m
+    return float(sum(length[skeleton.index(b)] for b in spine) + 0.5 * sum(length[skeleton.index(b)] for b in legs))
