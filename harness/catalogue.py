@@ -15,7 +15,7 @@ def catalogue() -> dict[str, dict[str, str]]:
         "methods": {name: registry.summary(name) for name in registry.methods()},
         "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
         f"motion of the {BUILT_IN_TITLE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
-        "inputs": {name: text for name, text in COMBINATIONS.items()},
+        "inputs": dict(COMBINATIONS),
         "noise": {
             "clean": "what the tracker would say if it were perfect",
             "noise": "white, slow and session errors, and the device's clock",

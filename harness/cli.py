@@ -253,8 +253,7 @@ def run_bench(args: argparse.Namespace) -> Outcome:
 
 
 def add_doctor(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "doctor", "check this installation: scores, methods, pictures, real motion", run_doctor, "mocap")
-    verb.set_defaults()
+    add_verb(verbs, "doctor", "check this installation: scores, methods, pictures, motion", run_doctor, "mocap")
 
 
 def run_doctor(args: argparse.Namespace) -> Outcome:

@@ -195,7 +195,8 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         if args[-1] is not Ellipsis and len(args) != len(value):
             raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
-        return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in enumerate(zip(kinds, value, strict=True)))
+        pairs = enumerate(zip(kinds, value, strict=True))
+        return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
     if origin is dict:
         if not isinstance(value, Mapping):
             raise TypeError(f"{where}: expected a table, found {value!r}")

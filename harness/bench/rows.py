@@ -1,6 +1,7 @@
 """One line of `harness bench`: what was measured, beside what it is held to."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 
 
 @dataclass(frozen=True)
@@ -17,3 +18,20 @@ class Row:
     """What it was measured against in the same run, or "" when it stands alone."""
     target: str
     """What it is held to, such as ">= 1500"; "" when it is for information."""
+
+    def as_dict(self) -> dict[str, str | float]:
+        return asdict(self)
+
+
+def as_text(rows: Sequence[Row]) -> str:
+    """A table of rows, one a line."""
+    lines = [("what", "measured", "", "held to", "measured against, in the same run")]
+    lines += [
+        (r.name, f"{r.value:,.3g}" if r.value < 100 else f"{r.value:,.0f}", r.unit, r.target, r.reference) for r in rows
+    ]
+    widths = [max(len(line[i]) for line in lines) for i in range(5)]
+    aligned = [
+        f"{a:<{widths[0]}}  {b:>{widths[1]}} {c:<{widths[2]}}  {d:<{widths[3]}}  {e}".rstrip()
+        for a, b, c, d, e in lines
+    ]
+    return "\n".join(aligned)

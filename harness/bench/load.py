@@ -1,0 +1,56 @@
+"""How long a motion file of 5,000 frames takes to load, beside the mere splitting of its text into numbers."""
+
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from harness.bench.rows import Row
+from harness.core.humanoid24 import standard_skeleton
+from harness.core.seeds import generator
+from harness.core.skeleton import Skeleton
+from harness.mocap import amc
+
+FRAMES = 5000
+
+
+def bench_load(seed: int = 1, repeats: int = 5) -> list[Row]:
+    """Medians over `repeats` of reading one file of random angles, written for the purpose."""
+    skeleton = standard_skeleton()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "bench.amc"
+        path.write_text(amc_text(skeleton, generator(seed, "bench", "load")))
+        seconds = np.array([[_loading(path, skeleton), _splitting(path)] for _ in range(repeats)])
+    load_s, split_s = np.median(seconds, axis=0)
+    return [
+        Row(f"load a {FRAMES}-frame AMC", float(load_s), "s", f"splitting its text {split_s:.3f} s", "<= 1"),
+        Row("load / split", float(load_s / split_s), "x", "the same runs", ""),
+    ]
+
+
+def amc_text(skeleton: Skeleton, rng: np.random.Generator) -> str:
+    """An AMC of random angles with as many digits as CMU's files have."""
+    bones = [(n, len(c)) for n, c in zip(skeleton.names, skeleton.hinges, strict=True) if c]
+    rows = [":FULLY-SPECIFIED", ":DEGREES"]
+    for frame in range(1, FRAMES + 1):
+        rows.append(str(frame))
+        for name, count in [("root", 6), *bones]:
+            rows.append(" ".join([name, *(f"{x:.6g}" for x in rng.normal(0.0, 30.0, count))]))
+    return "\n".join(rows) + "\n"
+
+
+def _loading(path: Path, skeleton: Skeleton) -> float:
+    start = time.perf_counter()
+    clip = amc.read_amc(path, skeleton, rate_hz=120.0)
+    seconds = time.perf_counter() - start
+    if len(clip) != FRAMES:
+        raise RuntimeError(f"read {len(clip)} of {FRAMES} frames")
+    return seconds
+
+
+def _splitting(path: Path) -> float:
+    start = time.perf_counter()
+    for line in path.read_text().splitlines():
+        [float(word) for word in line.split()[1:] if word]
+    return time.perf_counter() - start

@@ -1,0 +1,27 @@
+"""How long `harness --help` takes, beside a bare interpreter."""
+
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+from harness.bench.rows import Row
+
+
+def bench_startup(repeats: int = 7) -> list[Row]:
+    """Medians of interleaved runs, so that a busy moment hits both alike."""
+    bare = [sys.executable, "-c", "pass"]
+    help_text = [sys.executable, "-m", "harness.cli", "--help"]
+    seconds = np.array([[_seconds(bare), _seconds(help_text)] for _ in range(repeats)])
+    bare_s, help_s = np.median(seconds, axis=0)
+    return [
+        Row("harness --help", float(help_s), "s", f"bare interpreter {bare_s:.3f} s", "< 0.3"),
+        Row("harness --help / bare interpreter", float(help_s / bare_s), "x", "the same runs", ""),
+    ]
+
+
+def _seconds(command: list[str]) -> float:
+    start = time.perf_counter()
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start
