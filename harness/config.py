@@ -28,6 +28,8 @@ class Motion:
     """What the clips show: one word for all of them, or one for each."""
     examples: tuple[str, ...] = ()
     """Clips that methods may learn from; what the protocol forbids is left out clip by clip."""
+    database: Literal["all", "behaviour"] = "all"
+    """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
     protocol: Literal["block", "sequence", "subject"] = "sequence"
     body: Literal["own", "standard"] = "own"
     """Judge on the performer's own proportions or on the mean skeleton."""

@@ -194,7 +194,10 @@ class Setting:
     def example_clips(self) -> list[Clip]:
         motion, test = self.scenario.motion, self.job.part
         subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
-        return [self.source.load(name) for name in examples_of(test, motion.examples, motion.protocol, subjects)]
+        names = examples_of(test, motion.examples, motion.protocol, subjects)
+        if motion.database == "behaviour":
+            names = [name for name in names if self.source.behaviour(name) == self.job.behaviour]
+        return [self.source.load(name) for name in names]
 
     @cached_property
     def examples(self) -> list[Take]:

@@ -6,8 +6,11 @@ from typing import Protocol
 
 from harness.core.motion import Clip
 from harness.errors import BadInput, UnknownName
+from harness.mocap import performer
+from harness.mocap.library import MotionLibrary
 
 VARIABLE = "HARNESS_MOCAP"
+BUILT_IN_TITLE = "built-in performer"
 
 
 class MotionSource(Protocol):
@@ -24,6 +27,10 @@ class MotionSource(Protocol):
         ...
 
     def subject(self, name: str) -> str: ...
+    def behaviour(self, name: str) -> str:
+        """What the clip shows, "" where nobody knows."""
+        ...
+
     def load(self, name: str) -> Clip: ...
 
 
@@ -33,9 +40,56 @@ def open_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | N
         return BuiltIn(seed)
     if kind != "cmu":
         raise UnknownName("motion source", kind, ("builtin", "cmu"))
-    from harness.mocap.library import MotionLibrary
+    return MotionFiles(MotionLibrary(library_folder(folder), rate_hz=rate_hz))
 
-    return Files(MotionLibrary(library_folder(folder), rate_hz=rate_hz))
+
+class BuiltIn:
+    """The built-in performer's takes; the seed is the scenario's."""
+
+    title = BUILT_IN_TITLE
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+
+    def names(self) -> tuple[str, ...]:
+        return tuple(name for behaviour in performer.BEHAVIOURS for name in performer.take_names(behaviour))
+
+    def check(self, name: str) -> None:
+        if name not in self.names():
+            raise UnknownName("built-in take", name, self.names())
+
+    def subject(self, name: str) -> str:
+        return performer.subject_of(name)
+
+    def behaviour(self, name: str) -> str:
+        return performer.behaviour_of(name)
+
+    def load(self, name: str) -> Clip:
+        return performer.generate_named(name, seed=self._seed)
+
+
+class MotionFiles:
+    """Clips of a library."""
+
+    title = "cmu"
+
+    def __init__(self, library: MotionLibrary) -> None:
+        self._library = library
+
+    def names(self) -> tuple[str, ...]:
+        return self._library.names()
+
+    def check(self, name: str) -> None:
+        self._library.entry(name)
+
+    def subject(self, name: str) -> str:
+        return self._library.entry(name).subject
+
+    def behaviour(self, name: str) -> str:
+        return self._library.entry(name).behaviour
+
+    def load(self, name: str) -> Clip:
+        return self._library.load(name)
 
 
 def library_folder(folder: Path | None) -> Path:

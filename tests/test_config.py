@@ -1,0 +1,103 @@
+"""Scenarios: what is shipped loads, what is wrong is named."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from harness.config import changed, load_scenario, shipped_scenarios
+from harness.core.protocol import Part
+from harness.errors import BadFile, HarnessError, UnknownName
+
+MINIMAL = """
+methods = ["ik"]
+[motion]
+source = "builtin"
+behaviours = ["walking"]
+test = ["walking_p1_01"]
+[stations]
+head = { bone = "head" }
+"""
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "mine.toml"
+    path.write_text(text)
+    return path
+
+
+@pytest.mark.parametrize("path", shipped_scenarios(), ids=lambda path: path.stem)
+def test_every_shipped_scenario_loads(path: Path) -> None:
+    scenario = load_scenario(path)
+    assert scenario.name == path.stem
+    assert scenario == load_scenario(path.stem)
+    for text in scenario.motion.test:
+        Part.parse(text)
+
+
+def test_there_is_one_for_each_behaviour_and_the_demo() -> None:
+    assert {"demo", "walking", "boxing", "jumping", "golf", "table_tennis"} <= {p.stem for p in shipped_scenarios()}
+
+
+def test_a_minimal_scenario_takes_its_name_from_the_file(tmp_path: Path) -> None:
+    scenario = load_scenario(written(tmp_path, MINIMAL))
+    assert (scenario.name, scenario.noise, scenario.stations["head"].bone) == ("mine", "default", "head")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('methods = ["ik"]', 'metods = ["ik"]', "methods"),
+        ("behaviours =", "behaviors =", "behaviours"),
+        ('"builtin"', '"built-in"', "builtin"),
+        ('bone = "head"', 'bone = "head", allong = 0.5', "along"),
+        ('bone = "head"', 'bone = "head", along = 1.5', "0 to 1"),
+        ('bone = "head"', 'bone = "head", along = "0.5"', "expected float"),
+        ('methods = ["ik"]', 'methods = "ik"', "expected a list"),
+        ('methods = ["ik"]', "methods = []", "no methods"),
+        ('methods = ["ik"]', 'methods = ["ik", "ik"]', "twice"),
+        ('methods = ["ik"]', 'methods = ["ik"]\nseed = true', "expected int"),
+        ('methods = ["ik"]', 'methods = ["ik"]\nschema = 2', "schema"),
+        ('["walking"]', '["walking", "boxing"]', "behaviours"),
+        ('["walking_p1_01"]', "[]", "no test clips"),
+        ("[stations]", "[tracker]\nrate_hz = 0.0\n[stations]", "1 to 1000"),
+        ("[motion]", "[motion", "not TOML"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in MINIMAL
+    with pytest.raises(HarnessError) as caught:
+        load_scenario(written(tmp_path, MINIMAL.replace(old, new)))
+    assert message in str(caught.value)
+
+
+def test_a_scenario_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'boxing'"):
+        load_scenario("boxin")
+    with pytest.raises(BadFile, match="no such file"):
+        load_scenario(tmp_path / "none.toml")
+
+
+def test_a_binary_file_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "binary.toml"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(BadFile, match="not TOML"):
+        load_scenario(path)
+
+
+@dataclass(frozen=True)
+class _Inner:
+    share: float = 0.03
+
+
+@dataclass(frozen=True)
+class _Outer:
+    echo: _Inner = field(default_factory=_Inner)
+    rate_hz: float = 40.0
+
+
+def test_single_values_of_a_record_can_be_changed() -> None:
+    assert changed(_Outer(), {"echo": {"share": 0.1}}, "components") == _Outer(_Inner(0.1))
+    assert changed(_Outer(), {"rate_hz": 60}, "tracker").rate_hz == 60.0
+    with pytest.raises(UnknownName, match="share"):
+        changed(_Outer(), {"echo": {"shar": 0.1}}, "components")
