@@ -1,0 +1,104 @@
+"""Feet against the ground, and how smoothly joints move; a `Pair` in, one number a frame out.
+
+Differences over time are taken only between frames that follow each other without a gap; the value stands at the
+last frame of each difference, NaN elsewhere. Contact is decided by the truth alone.
+"""
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.score.pair import Pair, Posed, bones_named
+
+FOOT_POINTS = ("ltibia", "lfoot", "rtibia", "rfoot")
+"""Their far ends: ankle and toe, left and right."""
+CONTACT_HEIGHT_M = 0.05
+CONTACT_SPEED_M_S = 0.15
+"""In contact: lower and slower than this (choice); an ankle's height less that of its rest pose over the toe."""
+GROUND_M = 0.0
+
+
+def mpjve_mm_s(pair: Pair) -> Floats:
+    """(F,) mean difference of the joint centres' velocities."""
+    error_m = pair.estimate.joints_m - pair.truth.joints_m
+    return pair.over_gaps(1e3 * pair.rate_hz * _length(np.diff(error_m, axis=0)).mean(axis=1), steps=1)
+
+
+def jitter_m_s3(pair: Pair) -> Floats:
+    """(F,) mean jerk of the estimate's joint centres, |p(t) - 3 p(t-1) + 3 p(t-2) - p(t-3)| rate^3."""
+    return _jerk(pair, pair.estimate)
+
+
+def jitter_true_m_s3(pair: Pair) -> Floats:
+    """(F,) the truth's own."""
+    return _jerk(pair, pair.truth)
+
+
+def foot_skate_mm_s(pair: Pair) -> Floats:
+    """(F,) mean horizontal speed of the ankles and toes that truly are in contact; NaN when none is."""
+    return _skate(pair, pair.estimate)
+
+
+def foot_skate_true_mm_s(pair: Pair) -> Floats:
+    """(F,) the truth's own."""
+    return _skate(pair, pair.truth)
+
+
+def penetration_mm(pair: Pair) -> Floats:
+    """(F,) depth of the lowest ankle or toe below the ground while any truly is in contact, else NaN."""
+    return np.maximum(-_lowest_mm(pair, pair.estimate), 0.0)
+
+
+def penetration_true_mm(pair: Pair) -> Floats:
+    """(F,) the truth's own."""
+    return np.maximum(-_lowest_mm(pair, pair.truth), 0.0)
+
+
+def float_mm(pair: Pair) -> Floats:
+    """(F,) height of the lowest ankle or toe above the ground while any truly is in contact, else NaN."""
+    return np.maximum(_lowest_mm(pair, pair.estimate), 0.0)
+
+
+def float_true_mm(pair: Pair) -> Floats:
+    """(F,) the truth's own: toes lie inside the foot, so it is not zero."""
+    return np.maximum(_lowest_mm(pair, pair.truth), 0.0)
+
+
+def in_contact(pair: Pair) -> Bools:
+    """(F, 4) which ankles and toes the truth has on the ground."""
+    points_m = _foot_points_m(pair.truth)
+    toe_drop_m = pair.skeleton.bone_m[bones_named(pair.skeleton, ("lfoot", "lfoot", "rfoot", "rfoot")), 2]
+    above_toe_m = np.where([True, False, True, False], -toe_drop_m, 0.0)
+    low = points_m[..., 2] - above_toe_m - GROUND_M < CONTACT_HEIGHT_M
+    slow = np.zeros_like(low)
+    slow[1:] = pair.rate_hz * _length(np.diff(points_m, axis=0)) < CONTACT_SPEED_M_S
+    out: Bools = low & slow & pair.unbroken(1)[:, None]
+    return out
+
+
+def _skate(pair: Pair, motion: Posed) -> Floats:
+    contact = in_contact(pair)
+    speed_mm_s = np.zeros(contact.shape)
+    speed_mm_s[1:] = 1e3 * pair.rate_hz * _length(np.diff(_foot_points_m(motion)[..., :2], axis=0))
+    touching = contact.sum(axis=1)
+    out: Floats = np.where(touching > 0, (speed_mm_s * contact).sum(axis=1) / np.maximum(touching, 1), np.nan)
+    return out
+
+
+def _lowest_mm(pair: Pair, motion: Posed) -> Floats:
+    lowest_mm = 1e3 * (_foot_points_m(motion)[..., 2].min(axis=1) - GROUND_M)
+    out: Floats = np.where(in_contact(pair).any(axis=1), lowest_mm, np.nan)
+    return out
+
+
+def _jerk(pair: Pair, motion: Posed) -> Floats:
+    return pair.over_gaps(pair.rate_hz**3 * _length(np.diff(motion.joints_m, n=3, axis=0)).mean(axis=1), steps=3)
+
+
+def _foot_points_m(motion: Posed) -> Floats:
+    out: Floats = motion.joints_m[:, 1 + bones_named(motion.skeleton, FOOT_POINTS)]
+    return out
+
+
+def _length(vectors: Floats) -> Floats:
+    out: Floats = np.sqrt(np.sum(vectors**2, axis=-1))
+    return out
