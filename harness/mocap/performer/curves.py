@@ -1,0 +1,97 @@
+"""Smooth curves of time: every joint speed and acceleration of the performer comes out of these, so none may jump.
+
+Each returns twice continuously differentiable functions of its argument.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.core.arrays import Floats
+
+GRAVITY_M_S2 = 9.81
+
+
+def ease(share: Floats) -> Floats:
+    """0 to 1 as `share` goes from 0 to 1, constant outside: the minimum-jerk step of Flash and Hogan (1985)."""
+    x = np.clip(share, 0.0, 1.0)
+    out: Floats = x**3 * (10.0 + x * (6.0 * x - 15.0))
+    return out
+
+
+def travel(share: Floats, ramp: float = 0.35) -> Floats:
+    """0 to 1 with eased ends and an even middle: speed peaks at 1 / (1 - ramp) of its mean, as a swinging foot's."""
+    x = np.clip(share, 0.0, 1.0)
+    out: Floats = (_ramp_area(x / ramp) - _ramp_area((x - 1.0 + ramp) / ramp)) * ramp / (1.0 - ramp)
+    return out
+
+
+def _ramp_area(x: Floats) -> Floats:
+    """Integral of `ease` from minus infinity."""
+    inside = np.clip(x, 0.0, 1.0)
+    out: Floats = inside**4 * (2.5 + inside * (inside - 3.0)) + np.maximum(x - 1.0, 0.0)
+    return out
+
+
+def pulse(share: Floats) -> Floats:
+    """0 to 1 and back to 0 as `share` goes from 0 to 1."""
+    x = np.clip(share, 0.0, 1.0)
+    out: Floats = 64.0 * (x * (1.0 - x)) ** 3
+    return out
+
+
+def through(t: Floats, key_s: Sequence[float] | Floats, key: Sequence[float] | Floats) -> Floats:
+    """A curve through keys at rising times that never overshoots them; constant before the first and after the last.
+
+    Quintic between keys, at rest at every extreme, with the slopes of Fritsch and Butland (1984) elsewhere.
+    """
+    at, value = np.asarray(key_s, dtype=float), np.asarray(key, dtype=float)
+    gap, rise = np.diff(at), np.diff(value) / np.diff(at)
+    slope = np.zeros(len(at))
+    same = rise[1:] * rise[:-1] > 0.0
+    left, right = rise[:-1][same], rise[1:][same]
+    w1, w2 = (2.0 * gap[1:] + gap[:-1])[same], (gap[1:] + 2.0 * gap[:-1])[same]
+    slope[1:-1][same] = (w1 + w2) / (w1 / left + w2 / right)
+    zero = np.zeros(len(at))
+    return quintics(t, at, value, slope, zero)
+
+
+def quintics(t: Floats, at: Floats, value: Floats, slope: Floats, bend: Floats) -> Floats:
+    """The curve with these values, first and second derivatives at the times `at`; held outside them."""
+    inside = np.clip(t, at[0], at[-1])
+    k = np.clip(np.searchsorted(at, inside, side="right") - 1, 0, len(at) - 2)
+    h = at[k + 1] - at[k]
+    x = (inside - at[k]) / h
+    x3, x4, x5 = x**3, x**4, x**5
+    up = 10.0 * x3 - 15.0 * x4 + 6.0 * x5
+    out: Floats = (
+        value[k] * (1.0 - up)
+        + value[k + 1] * up
+        + h * slope[k] * (x - 6.0 * x3 + 8.0 * x4 - 3.0 * x5)
+        + h * slope[k + 1] * (-4.0 * x3 + 7.0 * x4 - 3.0 * x5)
+        + h**2 * bend[k] * 0.5 * (x**2 - 3.0 * x3 + 3.0 * x4 - x5)
+        + h**2 * bend[k + 1] * 0.5 * (x3 - 2.0 * x4 + x5)
+    )
+    return out
+
+
+def wander(rng: np.random.Generator, t: Floats, period_s: float, rms: float) -> Floats:
+    """Smooth aimless drift of the given root mean square: waves with periods from half to three times `period_s`."""
+    waves = 6
+    turns = 1.0 / (period_s * np.geomspace(0.5, 3.0, waves) * rng.uniform(0.9, 1.1, waves))
+    weight = np.geomspace(0.5, 1.0, waves)
+    phase = rng.uniform(0.0, 2.0 * np.pi, waves)
+    sines = np.sin(2.0 * np.pi * turns[:, None] * t + phase[:, None])
+    out: Floats = rms * np.sqrt(2.0 / np.sum(weight**2)) * (weight @ sines)
+    return out
+
+
+def smaller(a: Floats, b: Floats, softness: float) -> Floats:
+    """A smooth lower envelope: below both everywhere, by at most half of `softness` where they meet."""
+    out: Floats = 0.5 * (a + b - np.sqrt((a - b) ** 2 + softness**2))
+    return out
+
+
+def larger(a: Floats, b: Floats, softness: float) -> Floats:
+    """A smooth upper envelope."""
+    return -smaller(-a, -b, softness)

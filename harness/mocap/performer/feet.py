@@ -1,0 +1,135 @@
+"""Feet that stand where they were put: trajectories of ankle and ball from a plan of plants.
+
+While it is planted a foot first turns about its heel (toes up), then lies flat, then turns about its ball (heel up);
+the ball does not move from the moment the foot lies flat until it leaves. Between plants the ball travels smoothly.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.performer.curves import ease, pulse, smaller, through, travel
+from harness.mocap.performer.figure import Foot
+
+ANKLE_M = 0.080
+"""Height of the ankle of a flat foot [m]; the balls of real clips stand at 0.03 and the ankles at 0.07 to 0.08."""
+BALL_M = 0.032
+HEEL_BEHIND_M = 0.045
+"""How far the heel's sole lies behind the ankle [m]."""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A foot on the floor."""
+
+    on_s: float
+    off_s: float
+    ball_m: tuple[float, float]
+    """Where the ball stands."""
+    yaw_rad: float
+    land_rad: float = 0.0
+    """How far the toes point up when the heel comes down."""
+    push_rad: float = 0.0
+    """How far the heel is up when the ball leaves."""
+    lift_m: float = 0.05
+    """How high the ball is carried to the next plant."""
+    lift_early: float = 1.0
+    """Below 1 the ball is highest before the middle of its way."""
+
+
+def flat_pitch_rad(skeleton: Skeleton, side: str) -> float:
+    """How far below the horizon the foot bone of a flat foot points."""
+    return float(np.arcsin((ANKLE_M - BALL_M) / skeleton.length_m[skeleton.index(f"{side}foot")]))
+
+
+def foot(
+    t: Floats,
+    skeleton: Skeleton,
+    side: str,
+    plants: Sequence[Plant],
+    knee_out_rad: float | Floats = 0.0,
+    heel_up: Floats | float = 0.0,
+) -> Foot:
+    """The foot's movement (T,) through its plants, in order of time; it rests on the first before and the last after.
+
+    `heel_up` adds to the pitch: a boxer's heel. `knee_out_rad` turns the knee outwards of the foot.
+    """
+    ball = np.empty((len(t), 3))
+    yaw = np.full(len(t), plants[0].yaw_rad)
+    pitch = through(t, *_pitch_keys(plants)) + heel_up
+    heel_first = np.zeros(len(t))
+    ball[:] = (*plants[0].ball_m, BALL_M)
+    for a, b in zip(plants, plants[1:], strict=False):
+        share = (t - a.off_s) / (b.on_s - a.off_s)
+        moving = share > 0.0
+        way = np.append(np.subtract(b.ball_m, a.ball_m), 0.0)
+        ball[moving] = (*a.ball_m, BALL_M) + travel(share[moving])[:, None] * way
+        ball[moving, 2] += a.lift_m * pulse(share[moving] ** a.lift_early)
+        yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease(share[moving])
+        heel_first[moving] = ease(share[moving]) if b.land_rad else 0.0
+        heel_first[t > 0.5 * (b.on_s + b.off_s)] = 0.0  # it lies flat there
+    return placed(skeleton, side, ball, yaw, pitch, heel_first, knee_out_rad)
+
+
+def placed(
+    skeleton: Skeleton,
+    side: str,
+    ball: Floats,
+    yaw: Floats,
+    pitch: Floats,
+    heel_first: Floats | float,
+    knee_out_rad: float | Floats = 0.0,
+) -> Foot:
+    """A foot of heel-up `pitch` about the ball (T, 3), or about the heel as far as `heel_first` says."""
+    ahead = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=-1)
+    up = np.array([0.0, 0.0, 1.0])
+    steep = flat_pitch_rad(skeleton, side)
+    x = HEEL_BEHIND_M + float(skeleton.length_m[skeleton.index(f"{side}foot")]) * np.cos(steep)
+    c, s = np.cos(pitch), np.sin(pitch)
+    toe = ball + (heel_first * ((c - 1.0) * x + s * BALL_M))[:, None] * ahead
+    toe = toe + (heel_first * ((c - 1.0) * BALL_M - s * x))[:, None] * up
+    direction = np.cos(steep + pitch)[:, None] * ahead - np.sin(steep + pitch)[:, None] * up
+    out = yaw + knee_out_rad * (1.0 if side == "l" else -1.0)
+    return Foot(toe, direction, np.stack([np.cos(out), np.sin(out), np.zeros_like(out)], axis=-1))
+
+
+def _pitch_keys(plants: Sequence[Plant]) -> tuple[list[float], list[float]]:
+    at: list[float] = []
+    value: list[float] = []
+    for k, plant in enumerate(plants):
+        stand = plant.off_s - plant.on_s
+        if k and plant.land_rad:
+            at += [plant.on_s - 0.25 * (plant.on_s - plants[k - 1].off_s), plant.on_s]
+            value += [-1.15 * plant.land_rad, -plant.land_rad]
+        at += [plant.on_s + (min(0.2 * stand, 0.15) if plant.land_rad else -0.01)]
+        value += [0.0]
+        if k + 1 < len(plants) and plant.push_rad:
+            swing = plants[k + 1].on_s - plant.off_s
+            at += [plant.off_s - 0.5 * stand, plant.off_s, plant.off_s + 0.12 * swing]
+            value += [0.0, 0.9 * plant.push_rad, plant.push_rad]
+        else:
+            at += [plant.off_s]
+            value += [0.0]
+    return at, value
+
+
+def standing_root_m(
+    root_m: Floats, hips: tuple[Floats, Floats], feet: tuple[Foot, Foot], skeleton: Skeleton, straightest: float = 0.992
+) -> Floats:
+    """The pelvis path (T, 3) lowered, smoothly, wherever a leg would be stretched beyond `straightest` of its length.
+
+    `hips` are the hip joints (T, 3) relative to the root, in the world's axes, left and right.
+    """
+    height = root_m[:, 2]
+    for side, hip, one in zip("lr", hips, feet, strict=True):
+        ankle = one.toe_m - float(skeleton.length_m[skeleton.index(f"{side}foot")]) * one.direction
+        long = straightest * float(
+            skeleton.length_m[skeleton.index(f"{side}femur")] + skeleton.length_m[skeleton.index(f"{side}tibia")]
+        )
+        flat = np.sum((root_m[:, :2] + hip[:, :2] - ankle[:, :2]) ** 2, axis=1)
+        top = ankle[:, 2] + np.sqrt(np.maximum(long**2 - flat, 0.04)) - hip[:, 2]
+        height = smaller(height, top, 0.02)
+    return np.concatenate([root_m[:, :2], height[:, None]], axis=1)

@@ -1,0 +1,165 @@
+"""From where the trunk, feet and hands should be to the 48 hinge angles, for all frames of a take at once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.performer import limbs
+from harness.mocap.performer.curves import larger, smaller
+from harness.mocap.performer.limbs import about, turned, unit
+
+Hand = tuple[Floats, Floats]
+SIDES = ("l", "r")
+LEFT = {"l": 1.0, "r": -1.0}
+"""Sign of a side along the world's y."""
+
+_SPINE = {"lowerback": (0.40, 0.25, 0.40), "upperback": (0.33, 0.40, 0.32), "thorax": (0.27, 0.35, 0.28)}
+"""Share of bend, twist and lean that each back bone takes; the low back bends most and twists least (White and Panjabi)."""
+_NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
+_NECK_BIAS_RAD = {"lowerneck": -0.26, "upperneck": 0.24, "head": 0.10}
+"""The neck's S-shape when looking straight ahead, about the medians of real clips."""
+_CLAVICLE_RAD = 0.16
+_HANGING = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""Frame of an upper arm that hangs with the elbow bending forward, in the chest's frame (either side)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Foot:
+    """Where a foot's bone should be."""
+
+    toe_m: Floats
+    """(T, 3) far end of the foot bone, the ball of the foot."""
+    direction: Floats
+    """(T, 3) unit vector from ankle to ball."""
+    knee: Floats
+    """(T, 3) direction the knee bends to."""
+
+
+class Figure:
+    """A moving body that is filled in from the trunk outwards; `angles_rad` (T, 48) is complete after two legs and arms."""
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        root_m: Floats,
+        pelvis: Floats,
+        spine: Floats,
+        gaze: Floats,
+        shoulders: Mapping[str, tuple[Floats, Floats]],
+    ) -> None:
+        """Pose the trunk of T frames.
+
+        `pelvis` (T, 3) yaw, pitch, roll [rad]; `spine` (T, 3) bend, twist and lean of the chest on the pelvis [rad];
+        `gaze` (T, 3) yaw, pitch and roll of the head in the world [rad]; `shoulders` lift and reach (T,) [rad].
+        """
+        self.skeleton, self.root_m = skeleton, root_m
+        self.angles_rad = np.zeros((len(root_m), len(skeleton.axes)))
+        self.pelvis = about(2, pelvis[:, 0]) @ about(1, pelvis[:, 1]) @ about(0, pelvis[:, 2])
+        self._world: dict[str, Floats] = {}
+        self._end: dict[str, Floats] = {}
+        above, at = self.pelvis, root_m
+        for bone, share in _SPINE.items():
+            above, at = self._put(bone, above, at, spine * share)
+        self.chest, self.chest_m = above, at
+        self._neck(gaze)
+        for side in SIDES:
+            lift, reach = (_CLAVICLE_RAD * np.tanh(x / _CLAVICLE_RAD) for x in shoulders[side])
+            sign = LEFT[side]
+            self._put(f"{side}clavicle", self.chest, self.chest_m, np.stack([-sign * reach, sign * lift], axis=-1))
+
+    def _put(self, bone: str, above: Floats, at: Floats, angles: Floats) -> tuple[Floats, Floats]:
+        """Set a trunk bone's hinges; returns its world rotation and far end."""
+        b = self.skeleton.index(bone)
+        where = self.skeleton.dof_of_bone[b]
+        self.angles_rad[:, where] = angles
+        for d in reversed(range(where.start, where.stop)):
+            axis = self.skeleton.axes[d]
+            above = above @ about(int(np.argmax(axis)), self.angles_rad[:, d])
+        self._world[bone] = above
+        self._end[bone] = at + above @ self.skeleton.bone_m[b]
+        return self._world[bone], self._end[bone]
+
+    def _neck(self, gaze: Floats) -> None:
+        head = about(2, gaze[:, 0]) @ about(1, gaze[:, 1]) @ about(0, gaze[:, 2])
+        rest = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # hinge axes y, z, x of the neck's bones
+        wanted = limbs.euler_xyz(rest.T @ np.swapaxes(self.chest, -1, -2) @ head @ rest)
+        for bone, share in _NECK.items():
+            where = self.skeleton.dof_of_bone[self.skeleton.index(bone)]
+            self.angles_rad[:, where] = wanted * share + [_NECK_BIAS_RAD[bone] - 0.03, 0.0, 0.0]
+
+    def shoulder_m(self, side: str) -> Floats:
+        """(T, 3) where the upper arm starts."""
+        return self._end[f"{side}clavicle"]
+
+    def hip_m(self, side: str) -> Floats:
+        """(T, 3) where the thigh starts."""
+        return self.root_m + self.pelvis @ self.skeleton.bone_m[self.skeleton.index(f"{side}hipjoint")]
+
+    def length_m(self, bone: str) -> float:
+        return float(self.skeleton.length_m[self.skeleton.index(bone)])
+
+    def _set(self, bone: str, *angles: Floats) -> None:
+        self.angles_rad[:, self.skeleton.dof_of_bone[self.skeleton.index(bone)]] = np.stack(angles, axis=-1)
+
+    def leg(self, side: str, foot: Foot) -> None:
+        """Reach the foot; the knee bends towards `foot.knee`."""
+        thigh, shank = self.length_m(f"{side}femur"), self.length_m(f"{side}tibia")
+        hip = self.hip_m(side)
+        ankle = foot.toe_m - self.length_m(f"{side}foot") * foot.direction
+        bend = foot.knee + 0.5 * self.pelvis[:, :, 0]  # a knee points between hip and foot
+        knee = limbs.middle_joint(hip, ankle, bend, thigh, shank)
+        left = unit(np.cross(hip - ankle, bend))
+        rest = limbs.frame_of(self.skeleton, f"{side}femur")
+        femur, flexion = limbs.hinged(unit(knee - hip), unit(ankle - knee), left, rest)
+        self._three(f"{side}femur", np.swapaxes(self.pelvis, -1, -2) @ femur, rest)
+        self._set(f"{side}tibia", flexion)
+        tibia = femur @ rest @ about(0, flexion)
+        a, c = limbs.pointing(
+            rest.T @ self.skeleton.bone_m[self.skeleton.index(f"{side}foot")],
+            turned(np.swapaxes(tibia, -1, -2), foot.direction),
+        )
+        self._set(f"{side}foot", a, c)
+
+    def _three(self, bone: str, relative: Floats, rest: Floats) -> None:
+        self._set(bone, *np.unwrap(limbs.euler_xyz(rest.T @ relative @ rest), axis=0).T)
+
+    def arm(self, side: str, upper: Floats, elbow: Floats, turn: Floats, hand: Hand) -> None:
+        """Set an arm from its upper bone's world rotation (T, 3, 3) and the elbow's flexion (T,) [rad].
+
+        `turn` is the forearm's pronation; `hand` the wrist's flexion (towards the palm) and deviation (towards the
+        thumb), all (T,) [rad].
+        """
+        sign = LEFT[side]
+        rest = limbs.frame_of(self.skeleton, f"{side}humerus")
+        above = self._world[f"{side}clavicle"]
+        self._three(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
+        self._set(f"{side}radius", elbow)
+        self._set(f"{side}wrist", turn)
+        self._set(f"{side}hand", hand[0], -sign * hand[1])
+
+    def hang(
+        self, side: str, swing: Floats, spread: Floats, twist: Floats, elbow: Floats, turn: Floats, hand: Hand
+    ) -> None:
+        """An arm that hangs from the chest: swung forward, spread sideways, twisted inward, elbow bent (T,) [rad]."""
+        sign = LEFT[side]
+        rest = limbs.frame_of(self.skeleton, f"{side}humerus")
+        placed = about(1, -swing) @ about(0, sign * spread) @ about(2, -sign * twist)
+        self.arm(side, self.chest @ placed @ _HANGING @ rest.T, elbow, turn, hand)
+
+    def reach(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: Hand) -> None:
+        """An arm whose wrist is at `wrist_m` (T, 3) in the world, drawn in if too far; the elbow points `towards`."""
+        first = self.length_m(f"{side}humerus")
+        second = self.length_m(f"{side}radius") + self.length_m(f"{side}wrist")
+        shoulder = self.shoulder_m(side)
+        line = wrist_m - shoulder
+        distance = np.sqrt(np.sum(line**2, axis=-1, keepdims=True))
+        longest, shortest = 0.985 * (first + second), 0.32 * (first + second)
+        near = larger(smaller(distance, np.array(longest), 0.02), np.array(shortest), 0.02)
+        wrist = shoulder + line * (near / distance)
+        bent = limbs.middle_joint(shoulder, wrist, towards, first, second)
+        normal = unit(np.cross(towards, line))
+        rest = limbs.frame_of(self.skeleton, f"{side}humerus")
+        self.arm(side, *limbs.hinged(unit(bent - shoulder), unit(wrist - bent), normal, rest), turn, hand)
