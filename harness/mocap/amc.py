@@ -19,7 +19,7 @@ from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput
 from harness.mocap.asf import INCH_M, ROOT_ORDER, WORLD_FROM_ASF, read_asf_file
-from harness.mocap.files import LARGEST, check_size, numbers
+from harness.mocap.files import LARGEST, check_last_line, check_size, numbers
 
 CMU_UNIT_M = INCH_M / 0.45
 """Length of 1 in every file of the CMU library, 0.056444 m."""
@@ -90,7 +90,7 @@ def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str,
         values.extend(row)
         expected += 1
         block = list(islice(lines, 1 + len(order)))
-    _check_end(path)
+    check_last_line(path)
     return order, np.frombuffer(values).reshape(expected - first, -1)
 
 
@@ -150,14 +150,6 @@ def _explain(
         seen.add(found)
     where = f"the end of the file inside frame {block[0][1]}"
     raise BadFile(path, where, f"{len(counts)} rows", _CUT, line)
-
-
-def _check_end(path: Path) -> None:
-    """A file cut inside its last number still parses; that it does not end its last line gives it away."""
-    with path.open("rb") as file:
-        file.seek(-1, 2)
-        if file.read(1) not in b"\r\n":
-            raise BadFile(path, "a last line without an end", "a line break", _CUT + " (Or add one, if it is whole.)")
 
 
 def _root_rotation(angles_rad: Floats) -> Floats:

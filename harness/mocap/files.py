@@ -24,6 +24,15 @@ def check_size(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> Non
         raise BadFile(path, f"{size / 2**20:.0f} MB", f"{expected} of at most {limit_bytes / 2**20:.0f} MB", advice)
 
 
+def check_last_line(path: Path) -> None:
+    """A file cut inside its last number still parses; that it does not end its last line gives it away."""
+    with path.open("rb") as file:
+        file.seek(-1, 2)
+        if file.read(1) not in b"\r\n":
+            advice = "The file may be cut: fetch it again, or add a line break if it is whole."
+            raise BadFile(path, "a last line without an end", "a line break at the end of the file", advice)
+
+
 def read_lines(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> list[str]:
     """The lines of a text file; `expected` names what it should be, for the message of BadFile.
 

@@ -90,13 +90,21 @@ class MotionLibrary:
             subject=entry.subject,
             source="cmu" if _CMU_NAME.fullmatch(entry.name) else self.folder.name,
             behaviour=entry.behaviour,
-            notes=(entry.note,) if entry.note else (),
         )
-        return replace(clip, angles_rad=unwrapped(clip.skeleton, clip.angles_rad))
+        notes = (entry.note, *clip.notes) if entry.note else clip.notes
+        return replace(clip, notes=notes, angles_rad=unwrapped(clip.skeleton, clip.angles_rad))
 
     def _read(self, entry: Entry) -> Clip:
         if entry.format == "c3d":
             raise BadInput(f"{entry.name} is a C3D file, which holds markers.", "Give its AMC, BVH or npz.")
+        if entry.format == "bvh":
+            from harness.mocap.bvh import read_clip as read_bvh_clip
+
+            return read_bvh_clip(entry.path)
+        if entry.format == "npz":
+            from harness.mocap.amass import read_clip as read_npz_clip
+
+            return read_npz_clip(entry.path)
         from harness.mocap.acclaim import read_clip
 
         rate_hz = entry.rate_hz or self._rate_hz
