@@ -18,25 +18,27 @@ from harness.core.skeleton import Skeleton
 
 _STANDARD_MASS_KG = 71.7
 """BMI of de Leva's mean man (24.08 kg/m2) times the square of the standard body's height, 1.725 m."""
+_LEAST_M = 1e-3
+"""Half length of the capsule of a bone without length (some BVH files leave bones out)."""
 
 # bone: share of the body's mass, radius [m], and which part of the bone the capsule covers
 _LIMBS: tuple[tuple[str, float, float, float, float], ...] = (
     ("lowerneck", 0.0072, 0.058, 0.15, 0.9),
     ("upperneck", 0.0072, 0.056, 0.0, 1.0),
-    ("clavicle", 0.0300, 0.056, 0.30, 0.92),
+    ("clavicle", 0.0300, 0.060, 0.25, 0.92),
     ("humerus", 0.0271, 0.047, 0.0, 1.0),
     ("radius", 0.0118, 0.040, 0.0, 1.0),
     ("wrist", 0.0044, 0.031, 0.0, 1.0),
-    ("hipjoint", 0.0300, 0.088, 0.35, 1.0),
+    ("hipjoint", 0.0300, 0.082, 0.35, 0.92),
     ("femur", 0.1416, 0.074, 0.05, 1.0),
     ("tibia", 0.0433, 0.050, 0.0, 0.95),
 )
 # bone, name, share of the mass, centre along the bone, then forward and up of it [m], half sizes (x, y, z) [m]
 _TRUNK: tuple[tuple[str, str, float, float, tuple[float, float], tuple[float, float, float]], ...] = (
-    ("root", "pelvis", 0.0517, 0.0, (0.0, -0.03), (0.108, 0.152, 0.110)),
-    ("lowerback", "lowerback", 0.0733, 0.6, (0.0, 0.0), (0.102, 0.138, 0.112)),
-    ("upperback", "upperback", 0.0900, 0.6, (0.005, 0.0), (0.110, 0.148, 0.115)),
-    ("thorax", "thorax", 0.0996, 0.6, (0.005, 0.0), (0.115, 0.158, 0.125)),
+    ("root", "pelvis", 0.0517, 0.0, (0.0, -0.035), (0.112, 0.160, 0.115)),
+    ("lowerback", "lowerback", 0.0733, 0.55, (0.0, 0.0), (0.106, 0.145, 0.135)),
+    ("upperback", "upperback", 0.0900, 0.6, (0.006, 0.0), (0.112, 0.152, 0.140)),
+    ("thorax", "thorax", 0.0996, 0.65, (0.008, 0.0), (0.117, 0.166, 0.140)),
     ("head", "head", 0.0550, 0.75, (0.022, 0.0), (0.098, 0.077, 0.118)),
 )
 _HAND_SHARE, _FOOT_SHARE = 0.0061, 0.0137
@@ -83,23 +85,41 @@ def shapes(skeleton: Skeleton) -> tuple[Shape, ...]:
     return tuple(sorted(found, key=lambda shape: order.index(shape.bone)))
 
 
+# The foot stands 80 mm below the ankle: the median ankle height of eight CMU clips in stance lies at 76 to 80 mm.
+_SOLE_DROP_M, _SOLE_RADIUS_M, _SOLE_HALF_WIDTH_M = 0.049, 0.031, 0.017
+_HEEL_M, _BALL_M, _TOE_M = -0.027, 0.118, 0.172
+"""Along the foot from the ankle [m]; toes bend at the ball, which the model's rigid foot cannot."""
+
+
 def sole_below_ankle_m(skeleton: Skeleton) -> float:
     """Height of the ankle joint of a flat foot above the ground [m]."""
     return (_SOLE_DROP_M + _SOLE_RADIUS_M) * body_scale(skeleton)
 
 
-# The foot stands 80 mm below the ankle: the median ankle height of eight CMU clips in stance lies at 76 to 80 mm.
-_SOLE_DROP_M, _SOLE_RADIUS_M, _HEEL_M, _TOE_M, _SOLE_HALF_WIDTH_M = 0.049, 0.031, -0.027, 0.172, 0.019
+def sole_points_m(skeleton: Skeleton) -> Floats:
+    """(2, 4, 3) heel and ball, inner and outer edge, of the left and right sole in the foot bone's frame [m]."""
+    scale, points = body_scale(skeleton), np.empty((2, 4, 3))
+    for side, name in enumerate("lr"):
+        ahead, down, across = _foot_axes(skeleton, name)
+        corners = [(x, y) for x in (_HEEL_M, _BALL_M) for y in (-_SOLE_HALF_WIDTH_M, _SOLE_HALF_WIDTH_M)]
+        for k, (x, y) in enumerate(corners):
+            points[side, k] = scale * (x * ahead + y * across) + sole_below_ankle_m(skeleton) * down
+    return points
 
 
-def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[Shape]:
-    """A sole of two capsules from heel to toe, and an instep; down is along the shin of the rest pose."""
+def _foot_axes(skeleton: Skeleton, side: str) -> tuple[Floats, Floats, Floats]:
+    """Ahead, down and across of a foot in its bone's frame; down is along the shin of the rest pose."""
     down = _unit(skeleton.bone_m[skeleton.index(f"{side}tibia")])
     toes = skeleton.bone_m[skeleton.index(f"{side}foot")]
     ahead = _unit(toes - (toes @ down) * down)
-    across = np.cross(ahead, down)
+    return ahead, down, np.cross(ahead, down)
+
+
+def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[Shape]:
+    """A sole of two capsules from heel to toe, and an instep."""
+    ahead, down, across = _foot_axes(skeleton, side)
     bone, share = f"{side}foot", mass_kg * _FOOT_SHARE / 3
-    ball = ahead * _TOE_M * 0.6 + down * _SOLE_DROP_M * 0.85
+    ball = ahead * _BALL_M + down * _SOLE_DROP_M
     parts = [_capsule(bone, f"{bone}_instep", 0.0 * down, scale * ball, 0.034 * scale, share)]
     for name, sign in (("inner", -1.0), ("outer", 1.0)):
         sideways = sign * (1.0 if side == "r" else -1.0) * _SOLE_HALF_WIDTH_M * across
@@ -134,8 +154,9 @@ def _trunk(
 def _capsule(bone: str, name: str, start_m: Floats, stop_m: Floats, radius_m: float, mass_kg: float) -> Shape:
     span = stop_m - start_m
     length = float(np.sqrt(span @ span))
-    size = np.array([radius_m, 0.5 * length, 0.0])
-    return Shape(bone, name, "capsule", 0.5 * (start_m + stop_m), _turn_z_to(span / length), size, mass_kg)
+    turn = _turn_z_to(span / length) if length > 0.0 else rotations.IDENTITY
+    size = np.array([radius_m, max(0.5 * length, _LEAST_M), 0.0])
+    return Shape(bone, name, "capsule", 0.5 * (start_m + stop_m), turn, size, mass_kg)
 
 
 def _turn_z_to(direction: Floats) -> Floats:

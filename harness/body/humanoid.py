@@ -117,7 +117,10 @@ def mjcf() -> str:
     ET.SubElement(world, "light", pos="0 0 4", dir="0 0 -1", type="directional")
     ET.SubElement(world, "camera", name="front", pos="3.6 1.3 1.3", mode="targetbody", target="upperback", fovy="36")
     ET.SubElement(
-        world, "geom", name="floor", type="plane", size="10 10 0.1", material="floor", contype="0", conaffinity="1"
+        world,
+        "geom",
+        {"name": "floor", "type": "plane", "size": "10 10 0.1", "material": "floor"}
+        | {"rgba": "1 1 1 1", "contype": "0", "conaffinity": "1"},
     )
     nodes = {"root": ET.SubElement(world, "body", name="root", pos="0 0 1")}
     ET.SubElement(nodes["root"], "freejoint", name="root")

@@ -70,6 +70,10 @@ def place(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     Raises UnknownName for the bone and BadInput where the bone has no flesh at that place.
     """
     bone = skeleton.index(mount.bone)
+    if not skeleton.length_m[bone] > 0.0:
+        raise BadInput(
+            f"Station {mount.station!r} cannot sit on {mount.bone}, which has no length.", "Choose a neighbouring bone."
+        )
     along = skeleton.bone_m[bone] / skeleton.length_m[bone]
     facing = _facing(along)
     outward = math.cos(mount.around_rad) * facing + math.sin(mount.around_rad) * np.cross(along, facing)

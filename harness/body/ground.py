@@ -1,0 +1,55 @@
+"""Feet and the floor: how high the soles are, and when they carry the body."""
+
+import numpy as np
+from scipy.ndimage import binary_opening, gaussian_filter1d
+
+from harness.body import anatomy
+from harness.core.arrays import Bools, Floats
+from harness.core.skeleton import Pose, Skeleton
+
+SLOW_M_S, STANCE_S = 0.3, 0.1
+"""A foot in stance is slower than this for at least this long; at the top of a jump it is not."""
+FLOOR_WITHIN_M = 0.08
+"""The floor of a clip is looked for within this distance of z = 0 (CMU's lie within 6 cm)."""
+SETTLE_S = 0.5
+"""Standard deviation of the window over which a height correction is smoothed."""
+
+
+def sole_heights_m(own: Skeleton, pose: Pose) -> Floats:
+    """(T, 2) height of the lowest point of the left and right sole, heel or ball of the foot [m]."""
+    heights = []
+    for bone, points_m in zip(("lfoot", "rfoot"), anatomy.sole_points_m(own), strict=True):
+        b = own.index(bone)
+        heights.append(np.min(pose.start_m[:, b, 2, None] + pose.world_from_bone[:, b, 2] @ points_m.T, axis=1))
+    return np.stack(heights, axis=1)
+
+
+def stance(own: Skeleton, pose: Pose, rate_hz: float) -> Bools:
+    """(T, 2) whether the left and right foot carries the body: it is the lower one, and slow for a while."""
+    if len(pose.end_m) < 2:
+        return np.zeros((len(pose.end_m), 2), dtype=bool)
+    heights_m = sole_heights_m(own, pose)
+    lower = heights_m <= np.min(heights_m, axis=1, keepdims=True) + 0.01
+    balls_m = pose.end_m[:, [own.index("lfoot"), own.index("rfoot")]]
+    slow = np.linalg.norm(np.gradient(balls_m, 1.0 / rate_hz, axis=0), axis=2) < SLOW_M_S
+    out: Bools = binary_opening(lower & slow, np.ones((max(1, round(STANCE_S * rate_hz)), 1), dtype=bool))
+    return out
+
+
+def floor_m(heights_m: Floats, standing: Bools) -> float:
+    """Height of the floor of a clip: the median sole height (T, 2) in stance near z = 0; 0 where there is none."""
+    near = heights_m[standing & (np.abs(heights_m) < FLOOR_WITHIN_M)]
+    return float(np.median(near)) if near.size else 0.0
+
+
+def settled(error_m: Floats, standing: Bools, rate_hz: float) -> Floats:
+    """(T,) slowly varying mean of a sole error (T, 2) over the frames in stance; 0 without any."""
+    share = np.sum(standing, axis=1).astype(float)
+    if not share.any():
+        return np.zeros(len(share))
+    total = np.sum(np.where(standing, error_m, 0.0), axis=1)
+    mean = float(np.sum(total) / np.sum(share))
+    width = SETTLE_S * rate_hz
+    near_total, near_share = (gaussian_filter1d(x, width, mode="constant") for x in (total - mean * share, share))
+    out: Floats = mean + near_total / (near_share + 1e-3)
+    return out

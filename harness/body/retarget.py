@@ -1,0 +1,122 @@
+"""Captured motion onto a body: the performer's own, exactly, or a common one, as closely as its proportions allow."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.body import ground, humanoid, refit
+from harness.body.humanoid import Body
+from harness.core import humanoid24, rotations, skeleton
+from harness.core.arrays import Floats
+from harness.core.motion import Clip, Take
+from harness.core.skeleton import Pose, Skeleton
+
+_LEGS = ("lfemur", "ltibia", "rfemur", "rtibia")
+
+
+@dataclass(frozen=True)
+class RetargetReport:
+    """What one clip lost on the way to a common body. Frames in stance decide about feet: NaN when there are none.
+
+    Deviation: distance of the 24 joint centres from those of the performer, enlarged by `leg_scale`. Float and sink:
+    how far soles in stance are above or below where the performer's, enlarged alike, stand over the clip's floor;
+    the 95th percentile of each. "Plain" is the root scaled and every angle kept.
+    """
+
+    clip: str
+    leg_scale: float
+    floor_m: float
+    """Height of the clip's floor that was taken out [m]."""
+    stance_share: float
+    """Frames with a foot in stance, of all."""
+    deviation_plain_mm: float
+    deviation_mm: float
+    deviation_p95_mm: float
+    proportions_mm: float
+    """The deviation that is left when every bone, hip bones too, points exactly as the performer's."""
+    float_plain_mm: float
+    sink_plain_mm: float
+    float_mm: float
+    sink_mm: float
+
+
+def to_own_body(clip: Clip) -> tuple[Body, Take]:
+    """The clip on the body scaled to its own skeleton: nothing is changed, fingers and toes are left out."""
+    own, dofs = clip.skeleton.subset(humanoid24.BONES)
+    qpos = humanoid24.pack(clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])
+    return humanoid.build(own), _take(clip, qpos)
+
+
+def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
+    """The clip on the body of another skeleton, and what that cost.
+
+    The root's path grows with the legs. Bones point as the performer's do where their hinges allow it. The root
+    then moves by one constant offset in its own frame, that of least squared joint deviation, and by a slowly
+    varying height that puts soles in stance where the performer's are, over a floor at z = 0.
+    """
+    own, dofs = clip.skeleton.subset(humanoid24.BONES)
+    turns, kept_rad = clip.world_from_root, clip.angles_rad[:, dofs]
+    seen = skeleton.forward(own, clip.root_m, turns, kept_rad)
+    soles_m, standing = ground.sole_heights_m(own, seen), ground.stance(own, seen, clip.rate_hz)
+    floor_m, scale = ground.floor_m(soles_m, standing), _leg_m(target) / _leg_m(own)
+    level_m = np.array([0.0, 0.0, floor_m])
+    meant_m, meant_soles_m = scale * (seen.end_m - level_m), scale * (soles_m - floor_m)
+
+    angles_rad = refit.pointing_alike(own, humanoid24.pack(clip.root_m, turns, kept_rad), target)
+    root_m = scale * (clip.root_m - level_m)
+    moved = skeleton.forward(target, root_m, turns, angles_rad)
+    root_m = root_m + _best_offset_m(meant_m - moved.end_m, turns)
+    moved = skeleton.forward(target, root_m, turns, angles_rad)
+    root_m[:, 2] += ground.settled(meant_soles_m - ground.sole_heights_m(target, moved), standing, clip.rate_hz)
+    moved = skeleton.forward(target, root_m, turns, angles_rad)
+
+    plain = skeleton.forward(target, scale * clip.root_m, turns, kept_rad)
+    deviation_mm = 1e3 * np.linalg.norm(moved.end_m - meant_m, axis=2)
+    feet_mm = 1e3 * (ground.sole_heights_m(target, moved) - meant_soles_m)[standing]
+    plain_feet_mm = 1e3 * (ground.sole_heights_m(target, plain) - meant_soles_m)[standing]
+    report = RetargetReport(
+        clip=clip.name,
+        leg_scale=scale,
+        floor_m=floor_m,
+        stance_share=float(np.mean(np.any(standing, axis=1))),
+        deviation_plain_mm=float(1e3 * np.mean(np.linalg.norm(plain.end_m - scale * seen.end_m, axis=2))),
+        deviation_mm=float(np.mean(deviation_mm)),
+        deviation_p95_mm=float(np.percentile(deviation_mm, 95)),
+        proportions_mm=_proportions_mm(own, seen, target, scale, clip),
+        float_plain_mm=_beyond(plain_feet_mm),
+        sink_plain_mm=_beyond(-plain_feet_mm),
+        float_mm=_beyond(feet_mm),
+        sink_mm=_beyond(-feet_mm),
+    )
+    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), report
+
+
+def _best_offset_m(residual_m: Floats, world_from_root: Floats) -> Floats:
+    """(T, 3) the move, constant in the root's frame, that leaves the least of residuals (T, B, 3) in square [m]."""
+    in_root = rotations.rotate(rotations.inverse(world_from_root), np.mean(residual_m, axis=1))
+    return rotations.rotate(world_from_root, np.mean(in_root, axis=0))
+
+
+def _proportions_mm(own: Skeleton, seen: Pose, target: Skeleton, scale: float, clip: Clip) -> float:
+    """Mean deviation if every bone, hip bones too, could point exactly as the performer's: lengths alone [mm]."""
+    ends_m = np.empty_like(seen.end_m)
+    for bone, parent in enumerate(target.parents):
+        at = scale * clip.root_m if parent < 0 else ends_m[:, parent]
+        stretch = target.length_m[bone] / own.length_m[bone] if own.length_m[bone] > 0.0 else 0.0
+        ends_m[:, bone] = at + stretch * (seen.end_m[:, bone] - seen.start_m[:, bone])
+    residual_m = scale * seen.end_m - ends_m
+    residual_m -= _best_offset_m(residual_m, clip.world_from_root)[:, None]
+    return float(1e3 * np.mean(np.linalg.norm(residual_m, axis=2)))
+
+
+def _beyond(error_mm: Floats) -> float:
+    """The 95th percentile, not below 0; NaN of nothing."""
+    return max(0.0, float(np.percentile(error_mm, 95))) if error_mm.size else float("nan")
+
+
+def _leg_m(own: Skeleton) -> float:
+    return float(sum(own.length_m[own.index(bone)] for bone in _LEGS) / 2)
+
+
+def _take(clip: Clip, qpos: Floats) -> Take:
+    return Take(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz, qpos)
