@@ -1,0 +1,174 @@
+"""One cell of a run: one method on one clip with one choice of inputs, as a record and as a folder.
+
+On disk a cell is `cells/<key>/cell.json` and `frames.npz`, written under another name and renamed when whole:
+a folder that is there is finished.
+"""
+
+import os
+import shutil
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.errors import BadFile, ShapeError
+from harness.score.files import TEMPORARY, plain, read_json, write_json
+from harness.score.metrics import FRAME_METRICS, VERSIONS
+from harness.score.score import Scores
+
+IDENTITY = (
+    "method",
+    "behaviour",
+    "clip",
+    "motion_source",
+    "stations",
+    "mount",
+    "rate_hz",
+    "inputs",
+    "protocol",
+    "calibration",
+    "noise",
+    "seed",
+)
+"""What a row of the summary says about its cell, in this order."""
+_TEXTS = (*IDENTITY, "key", "defined_by", "health", "bone_m", "source_hash", "reproduce", "notes")
+_FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "quality")
+_INTS = ("frame_index", "status")
+_BOOLS = ("position_valid", "orientation_valid", "suspect")
+_ERROR = "error."
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """F matched frames of S stations, and what they scored."""
+
+    key: str
+    """Hash of everything that defines the cell, see `results.cell_key`."""
+    method: str
+    behaviour: str
+    clip: str
+    motion_source: str
+    stations: tuple[str, ...]
+    mount: str
+    rate_hz: float
+    inputs: str
+    protocol: str
+    calibration: str
+    noise: str
+    seed: int
+    defined_by: Mapping[str, Any]
+    """Everything that two results must agree on to be comparable."""
+    scores: Scores
+    health: Mapping[str, Any]
+    """Counts of what the stream lost, repeated or doubted."""
+    bone_m: Floats
+    """(B, 3) bone vectors of the body, so that poses can be drawn again [m]."""
+    source_hash: str
+    """Of the package that computed it."""
+    reproduce: str
+    """Command line."""
+    notes: tuple[str, ...]
+    time_s: Floats
+    """(F,) time of the true frame that each estimate is of [s]."""
+    truth_qpos: Floats
+    """(F, 55)."""
+    estimate_qpos: Floats
+    """(F, 55)."""
+    frame_index: Ints
+    """(F,) which of the true frames."""
+    status: Ints
+    """(F,) see `core.estimate.Status`."""
+    step_ms: Floats
+    """(F,) wall time [ms]."""
+    quality: Floats
+    """(F, S) 0 lost to 1 best."""
+    position_valid: Bools
+    """(F, S)."""
+    orientation_valid: Bools
+    """(F, S)."""
+    suspect: Bools
+    """(F, S)."""
+
+    def __post_init__(self) -> None:
+        frames, stations = len(self.time_s), len(self.stations)
+        freeze(self, bone_m=("B", 3), time_s=(frames,), step_ms=(frames,), quality=(frames, stations))
+        freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
+        freeze(self, np.int64, frame_index=(frames,), status=(frames,))
+        freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))
+        for field in ("stations", "notes"):
+            object.__setattr__(self, field, tuple(getattr(self, field)))
+
+    @property
+    def metrics(self) -> Mapping[str, float | None]:
+        """By name; None is "not measured"."""
+        return self.scores.metrics
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+def cell_folder(out: Path, key: str) -> Path:
+    return out / "cells" / key
+
+
+def has_cell(out: Path, key: str) -> bool:
+    """Whether a run has finished this cell."""
+    return cell_folder(out, key).is_dir()
+
+
+def write_cell(out: Path, cell: Cell) -> Path:
+    """Add a finished cell to a run; one that is there already stays as it is."""
+    folder = cell_folder(out, cell.key)
+    beside = folder.with_name(f"{TEMPORARY}{os.getpid()}-{cell.key}")
+    shutil.rmtree(beside, ignore_errors=True)
+    beside.mkdir(parents=True)
+    content = {name: getattr(cell, name) for name in _TEXTS}
+    content |= {"metrics": cell.scores.metrics, "per_joint": cell.scores.per_joint, "metric_versions": VERSIONS}
+    write_json(beside / "cell.json", content)
+    columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
+    columns |= {_ERROR + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
+    with open(beside / "frames.npz", "wb") as file:
+        np.savez_compressed(file, allow_pickle=False, scored=cell.scores.scored, **columns)
+        file.flush()
+        os.fsync(file.fileno())
+    try:
+        os.rename(beside, folder)
+    except OSError:
+        if not folder.is_dir():
+            raise
+        shutil.rmtree(beside)  # another process finished the same cell first
+    return folder
+
+
+def read_cell(folder: Path) -> Cell:
+    """A finished cell; BadFile when a file of it is missing, cut or not what it should be."""
+    text, frames = folder / "cell.json", folder / "frames.npz"
+    content = read_json(text, "a cell of a run")
+    advice = "Delete the cell's folder and run again; finished cells are kept."
+    try:
+        with open(frames, "rb") as file, np.load(file, allow_pickle=False) as columns:
+            arrays = {name: columns[name] for name in columns.files}
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise BadFile(frames, f"cannot be read ({error})", "the frames of a cell", advice) from error
+    try:
+        per_frame = {name: arrays[_ERROR + name].astype(float) for name in FRAME_METRICS}
+        scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"])
+        return Cell(
+            scores=scores,
+            **{name: content[name] for name in _TEXTS},
+            **{name: arrays[name] for name in (*_FLOATS, *_INTS, *_BOOLS)},
+        )
+    except KeyError as error:
+        raise BadFile(folder, f"no {error}", "a cell of this version of the harness", advice) from error
+    except ShapeError as error:
+        raise BadFile(frames, str(error), "arrays that agree", advice) from error
+
+
+def as_row(cell: Cell) -> dict[str, Any]:
+    """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
+    row = {name: plain(getattr(cell, name)) for name in IDENTITY}
+    return {**row, **cell.metrics, "key": cell.key, "source_hash": cell.source_hash, "health": plain(cell.health)}

@@ -1,0 +1,121 @@
+"""The folder of a run: manifest.json, summary.json, summary.csv and atomic cells.
+
+Presence of a cell means that it is finished; the same run again goes on where it was. A cell's key holds its inputs,
+the method and the source of both, so edited code never meets stale results.
+"""
+
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from harness.errors import BadInput, Outcome
+from harness.score.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
+from harness.score.files import TEMPORARY, content_key, digest, read_json, write_json, write_text
+from harness.score.manifest import Manifest
+from harness.score.summary import GROUP, Tally, as_csv
+
+__all__ = [
+    "Cell",
+    "cell_key",
+    "digest",
+    "has_cell",
+    "open_run",
+    "read_cell",
+    "read_cells",
+    "read_summary",
+    "summary_rows",
+    "write_cell",
+    "write_summary",
+]
+
+
+def cell_key(inputs: Mapping[str, Any], method: Mapping[str, Any], source_hash: str) -> str:
+    """Name of a cell: a hash of all that defines it, so that equal keys mean equal results."""
+    return content_key({"inputs": inputs, "method": method, "source": source_hash})
+
+
+def open_run(out: Path, manifest: Manifest) -> None:
+    """Make the folder of a run, or go on with it; BadInput when it holds another run or other files.
+
+    Leftovers of a killed run are cleared away.
+    """
+    advice = "Name another folder with --out, or delete this one."
+    if out.exists() and not out.is_dir():
+        raise BadInput(f"{out} is a file.", "Name a folder with --out.")
+    held = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
+    if "manifest.json" in held:
+        found = Manifest.read(out / "manifest.json")
+        if differences := manifest.differences(found):
+            raise BadInput(f"{out} holds another run (differs in {', '.join(differences)}).", advice)
+    elif held:
+        raise BadInput(f"{out} holds files that are no run ({', '.join(sorted(held)[:3])}).", advice)
+    try:
+        (out / "cells").mkdir(parents=True, exist_ok=True)
+        _clear(out)
+        write_json(out / "manifest.json", manifest.as_dict())
+    except OSError as error:
+        raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
+
+
+def read_summary(out: Path) -> dict[str, Any]:
+    """What `write_summary` wrote; BadFile when there is none."""
+    return read_json(out / "summary.json", "the summary of a run")
+
+
+def read_cells(out: Path) -> Iterator[Cell]:
+    """The cells that the run's summary lists, one at a time; all finished ones while there is no summary yet.
+
+    Refuses a folder that holds no run at once (BadFile), not when the first cell is asked for.
+    """
+    if (out / "summary.json").is_file():
+        keys = [str(row["key"]) for row in read_summary(out)["cells"]]
+    else:
+        Manifest.read(out / "manifest.json")
+        keys = sorted(path.name for path in (out / "cells").iterdir() if not path.name.startswith(TEMPORARY))
+    return (read_cell(cell_folder(out, key)) for key in keys)
+
+
+def summary_rows(cells: Iterable[Cell]) -> list[dict[str, Any]]:
+    """A row for each cell: identity, then every metric (None: not measured)."""
+    return [as_row(cell) for cell in cells]
+
+
+def write_summary(
+    out: Path, *, keys: Iterable[str], planned: int, failures: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """Write summary.csv (a row for each cell) and summary.json, whose content is returned.
+
+    `keys` are the finished cells in the order of the table, `failures` cell -> what went wrong. summary.json has
+    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `Tally.rows`).
+    """
+    failures = dict(failures or {})
+    methods, behaviours = Tally(*GROUP), Tally(*GROUP, "behaviour")
+    rows = []
+    for key in keys:
+        cell = read_cell(cell_folder(out, key))
+        rows.append(as_row(cell))
+        methods.add(cell)
+        behaviours.add(cell)
+    whole = len(rows) == planned and not failures
+    content = {
+        "outcome": (Outcome.PASS if whole else Outcome.INCOMPLETE).word,
+        "cells_finished": len(rows),
+        "cells_planned": planned,
+        "failures": failures,
+        "methods": methods.rows(),
+        "behaviours": behaviours.rows(),
+        "cells": rows,
+    }
+    write_text(out / "summary.csv", as_csv(rows))
+    write_json(out / "summary.json", content)
+    return content
+
+
+def _clear(out: Path) -> None:
+    for folder in (out, out / "cells"):
+        for path in folder.glob(f"{TEMPORARY}*"):
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()

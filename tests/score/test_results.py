@@ -1,0 +1,204 @@
+"""The folder of a run: whole cells or none, the same run goes on, another is refused."""
+
+import csv
+import json
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.errors import BadFile, BadInput, ShapeError
+from harness.score import manifest as manifests
+from harness.score import results
+from harness.score.files import TEMPORARY, plain
+
+MakeCell = Callable[..., results.Cell]
+ISSUE_COLUMNS = (
+    "method,behaviour,clip,motion_source,stations,mount,rate_hz,inputs,protocol,calibration,noise,seed,"
+    "frames_matched,frames_expected,joint_angle_mean_deg,joint_angle_rms_deg,mpjre_deg,mpjpe_mm,mpjpe_root_mm,"
+    "jitter_m_s3,step_p50_ms,step_p99_ms,fps"
+)
+
+
+def manifest(**changes: object) -> manifests.Manifest:
+    scenario = {"name": "demo", "seed": 1, "motion": {"test": ["a", "b"]}, "methods": ["ik"], **changes}
+    return manifests.of_run(scenario, motion_source="built-in performer", command="harness run demo")
+
+
+def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCell) -> None:
+    cell = make_cell()
+    results.open_run(run_folder, manifest())
+    assert not results.has_cell(run_folder, cell.key)
+    back = results.read_cell(results.write_cell(run_folder, cell))
+    assert results.has_cell(run_folder, cell.key)
+    for name in results.Cell.__dataclass_fields__:
+        if name != "scores":
+            np.testing.assert_array_equal(getattr(back, name), getattr(cell, name), err_msg=name)
+    assert back.metrics == plain(cell.metrics)
+    assert back.scores.per_joint == cell.scores.per_joint
+    assert back.truth_qpos.dtype == np.float64
+    for name, values in cell.scores.per_frame.items():
+        np.testing.assert_allclose(back.scores.per_frame[name], values, rtol=1e-6, err_msg=name)
+
+
+def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:
+    with pytest.raises(ShapeError, match="quality"):
+        make_cell(quality=np.ones((3, 2)))
+
+
+def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: MakeCell) -> None:
+    results.open_run(run_folder, manifest())
+    cells = [make_cell(0.01), make_cell(0.03, clip="walk_02", stations=("head", "torso"))]
+    for cell in cells:
+        results.write_cell(run_folder, cell)
+    results.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
+    text = (run_folder / "summary.csv").read_text()
+    assert text.startswith(ISSUE_COLUMNS + ",")
+    rows = list(csv.reader(text.splitlines()))
+    first = dict(zip(rows[0], rows[1], strict=True))
+    assert first["stations"] == "head torso"
+    assert float(first["mpjpe_mm"]) == pytest.approx(10.0, abs=1e-6)
+    assert [row[2] for row in rows[1:]] == ["walk_01", "walk_02"]
+    assert [c.key for c in results.read_cells(run_folder)] == [c.key for c in cells]
+
+
+def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: Path, make_cell: MakeCell) -> None:
+    cells = [make_cell(0.01, frames=300), make_cell(0.05, frames=100, clip="walk_02")]
+    for cell in cells:
+        results.write_cell(run_folder, cell)
+    content = results.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
+    (method,) = content["methods"]
+    mpjpe = method["metrics"]["mpjpe_mm"]
+    assert mpjpe["mean"] == pytest.approx(30.0)
+    assert mpjpe["sd"] == pytest.approx(np.std([10.0, 50.0], ddof=1))
+    assert mpjpe["frame_weighted"] == pytest.approx((300 * 10.0 + 100 * 50.0) / 400, rel=1e-5)
+    assert method["metrics"]["step_p50_ms"]["frame_weighted"] == pytest.approx(2.0)
+    assert (method["frames_matched"], method["frames_expected"]) == (400, 800)
+    assert json.loads((run_folder / "summary.json").read_text()) == plain(content)
+
+
+def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, make_cell: MakeCell) -> None:
+    cell = make_cell()
+    uneven = {**cell.scores.per_frame, "joint_angle_rms_deg": np.where(np.arange(400) < 100, 2.0, 0.0)}
+    scores = type(cell.scores)(cell.metrics, uneven, cell.scores.per_joint, cell.scores.scored)
+    results.write_cell(run_folder, make_cell(scores=scores))
+    content = results.write_summary(run_folder, keys=[cell.key], planned=1)
+    assert content["methods"][0]["metrics"]["joint_angle_rms_deg"]["frame_weighted"] == pytest.approx(1.0)
+
+
+def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: MakeCell) -> None:
+    cells = [make_cell(0.01 * n, clip=f"c{n}", inputs=i, protocol=p) for n, (i, p) in
+             enumerate([("pos", "block"), ("pos", "subject"), ("pos+ori", "block")])]  # fmt: skip
+    for cell in cells:
+        results.write_cell(run_folder, cell)
+    content = results.write_summary(run_folder, keys=[c.key for c in cells], planned=4, failures={"ik on d": "boom"})
+    assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
+    assert content["outcome"] == "incomplete"
+    assert (content["cells_finished"], content["cells_planned"]) == (3, 4)
+    assert content["failures"] == {"ik on d": "boom"}
+
+
+def test_a_run_goes_on_where_it_was_and_clears_what_a_kill_left(run_folder: Path, make_cell: MakeCell) -> None:
+    results.open_run(run_folder, manifest())
+    cell = make_cell()
+    results.write_cell(run_folder, cell)
+    half = run_folder / "cells" / f"{TEMPORARY}1-abc"
+    half.mkdir()
+    (half / "cell.json").write_text("{")
+    (run_folder / f"{TEMPORARY}1-summary.json").write_text("{")
+    results.open_run(run_folder, manifest(methods=["ik", "local_pca"]))
+    assert sorted(os.listdir(run_folder)) == ["cells", "manifest.json"]
+    assert os.listdir(run_folder / "cells") == [cell.key]
+    assert results.has_cell(run_folder, cell.key)
+
+
+def test_writing_a_finished_cell_again_keeps_the_first(run_folder: Path, make_cell: MakeCell) -> None:
+    folder = results.write_cell(run_folder, make_cell())
+    before = (folder / "cell.json").stat().st_mtime_ns
+    results.write_cell(run_folder, make_cell())
+    assert (folder / "cell.json").stat().st_mtime_ns == before
+    assert os.listdir(run_folder / "cells") == [folder.name]
+
+
+def test_another_run_is_refused_and_says_in_what_it_differs(run_folder: Path) -> None:
+    results.open_run(run_folder, manifest())
+    before = (run_folder / "manifest.json").read_bytes()
+    with pytest.raises(BadInput, match=r"motion\.test.*--out"):
+        results.open_run(run_folder, manifest(motion={"test": ["a"]}))
+    with pytest.raises(BadInput, match="seed"):
+        results.open_run(run_folder, manifest(seed=2))
+    assert (run_folder / "manifest.json").read_bytes() == before
+
+
+def test_a_folder_of_other_files_is_refused_untouched(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(BadInput, match=r"thesis\.tex"):
+        results.open_run(tmp_path, manifest())
+    assert os.listdir(tmp_path) == ["thesis.tex"]
+    with pytest.raises(BadInput, match="is a file"):
+        results.open_run(tmp_path / "thesis.tex", manifest())
+
+
+@pytest.mark.parametrize(
+    ("file", "content"),
+    [
+        ("cell.json", b""),
+        ("cell.json", b"[1]"),
+        ("cell.json", b"{}"),
+        ("cell.json", b"\xff\xfe"),
+        ("frames.npz", b""),
+        ("frames.npz", b"PK\x03\x04cut"),
+        ("frames.npz", None),
+    ],
+)
+def test_a_broken_cell_is_a_clear_refusal(
+    run_folder: Path, make_cell: MakeCell, file: str, content: bytes | None
+) -> None:
+    folder = results.write_cell(run_folder, make_cell())
+    if content is None:
+        (folder / file).unlink()
+    else:
+        (folder / file).write_bytes(content)
+    with pytest.raises(BadFile, match=r"cell\.json|frames\.npz|" + folder.name):
+        results.read_cell(folder)
+
+
+def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:
+    folder = results.write_cell(run_folder, make_cell())
+    np.savez(folder / "frames.npz", time_s=np.array([{"a": 1}], dtype=object))
+    with pytest.raises(BadFile, match="pickle"):
+        results.read_cell(folder)
+
+
+def test_no_run_in_a_folder_is_said_at_once(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="harness run"):
+        results.read_cells(tmp_path)
+    with pytest.raises(BadFile, match="harness run"):
+        results.read_summary(tmp_path)
+
+
+def test_a_key_depends_on_inputs_method_and_source_and_on_nothing_else() -> None:
+    key = results.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "ik"}, "s")
+    assert key == results.cell_key({"b": {"c": 2.0}, "a": 1}, {"name": "ik"}, "s")
+    others = [
+        results.cell_key({"a": 2, "b": {"c": 2.0}}, {"name": "ik"}, "s"),
+        results.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "pca"}, "s"),
+        results.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "ik"}, "t"),
+    ]
+    assert len({key, *others}) == 4
+    assert results.digest(np.zeros((2, 3))) != results.digest(np.zeros((3, 2)))
+
+
+def test_a_manifest_survives_its_file_and_names_the_machine(run_folder: Path) -> None:
+    results.open_run(run_folder, manifest())
+    back = manifests.Manifest.read(run_folder / "manifest.json")
+    assert back.differences(manifest()) == []
+    assert back.metric_versions["mpjpe_mm"] >= 1
+    assert back.circumstances["source_hash"] == manifests.source_hash()
+    assert back.circumstances["packages"]["numpy"] == np.__version__
+    assert back.circumstances["methods"] == ["ik"]
+    (run_folder / "manifest.json").write_text("{}")
+    with pytest.raises(BadFile, match="inputs"):
+        manifests.Manifest.read(run_folder / "manifest.json")
