@@ -1,7 +1,7 @@
 """Everything that can be named on the command line or in a scenario, with a line about each."""
 
 from harness.config import load_scenario, shipped_scenarios
-from harness.mocap.sources import BUILT_IN_TITLE
+from harness.mocap import performer
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
 from harness.stream.inputs import COMBINATIONS
@@ -9,12 +9,10 @@ from harness.stream.inputs import COMBINATIONS
 
 def catalogue() -> dict[str, dict[str, str]]:
     """Title -> name -> one line."""
-    from harness.mocap import performer
-
     return {
         "methods": {name: registry.summary(name) for name in registry.methods()},
         "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
-        f"motion of the {BUILT_IN_TITLE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
+        f"motion of the {performer.SOURCE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
         "inputs": dict(COMBINATIONS),
         "noise": {
             "clean": "what the tracker would say if it were perfect",

@@ -18,7 +18,7 @@ import numpy as np
 from harness.body import humanoid, retarget
 from harness.body.mounts import Mount
 from harness.config import Motion, Scenario, changed
-from harness.core.humanoid24 import standard_skeleton
+from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip, Take
 from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
 from harness.core.seeds import generator
@@ -162,7 +162,7 @@ class Setting:
     def body(self) -> humanoid.Body:
         if self.scenario.motion.body == "standard":
             return humanoid.build(standard_skeleton())
-        return retarget.to_own_body(self.clip)[0]
+        return humanoid.build(self.clip.skeleton.subset(BONES)[0])
 
     @cached_property
     def whole(self) -> Take:
@@ -234,6 +234,8 @@ class Setting:
         return results.cell_key(self.inputs_of(method, name, inputs), described, manifests.source_hash())
 
     def _on_body(self, clip: Clip) -> Take:
+        if clip.name == self.clip.name and self.scenario.motion.body == "own":
+            return retarget.to_own_body(clip)[1]
         return retarget.to_common_body(clip, self.body.skeleton)[0]
 
 

@@ -10,7 +10,6 @@ from harness.mocap import performer
 from harness.mocap.library import MotionLibrary
 
 VARIABLE = "HARNESS_MOCAP"
-BUILT_IN_TITLE = "built-in performer"
 
 
 class MotionSource(Protocol):
@@ -46,7 +45,7 @@ def open_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | N
 class BuiltIn:
     """The built-in performer's takes; the seed is the scenario's."""
 
-    title = BUILT_IN_TITLE
+    title = performer.SOURCE
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
@@ -59,13 +58,20 @@ class BuiltIn:
             raise UnknownName("built-in take", name, self.names())
 
     def subject(self, name: str) -> str:
-        return performer.subject_of(name)
+        return _parts(name)[1]
 
     def behaviour(self, name: str) -> str:
-        return performer.behaviour_of(name)
+        return _parts(name)[0]
 
     def load(self, name: str) -> Clip:
-        return performer.generate_named(name, seed=self._seed)
+        behaviour, who, take = _parts(name)
+        return performer.generate(behaviour, who, take, seed=self._seed)
+
+
+def _parts(name: str) -> tuple[str, str, int]:
+    """Behaviour, performer and number of a built-in take such as "table_tennis_p1_03"."""
+    behaviour, who, take = name.rsplit("_", 2)
+    return behaviour, who, int(take)
 
 
 class MotionFiles:
