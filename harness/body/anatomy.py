@@ -25,7 +25,7 @@ _LEAST_M = 1e-3
 _LIMBS: tuple[tuple[str, float, float, float, float], ...] = (
     ("lowerneck", 0.0072, 0.058, 0.15, 0.9),
     ("upperneck", 0.0072, 0.056, 0.0, 1.0),
-    ("clavicle", 0.0300, 0.060, 0.25, 0.92),
+    ("clavicle", 0.0300, 0.054, 0.20, 0.90),
     ("humerus", 0.0271, 0.047, 0.0, 1.0),
     ("radius", 0.0118, 0.040, 0.0, 1.0),
     ("wrist", 0.0044, 0.031, 0.0, 1.0),

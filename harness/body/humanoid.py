@@ -1,13 +1,6 @@
-"""The 24-bone MuJoCo humanoid: `models/humanoid24/humanoid24.xml` scaled to a skeleton, with trackers as sites.
+"""The 24-bone MuJoCo humanoid: `models/humanoid24/humanoid24.xml` scaled to a skeleton, with trackers as sites."""
 
-    python -m harness.body.humanoid > models/humanoid24/humanoid24.xml
-
-writes that file anew from `core.humanoid24` and `body.anatomy`; a test holds it up to date.
-"""
-
-import sys
-import xml.etree.ElementTree as ET
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -21,9 +14,6 @@ from harness.core.arrays import Floats, Ints
 from harness.core.share import share_folder
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-
-_HINGE_DAMPING_NMS, _HINGE_ARMATURE_KGM2 = 1.0, 0.01
-"""What keeps an unpowered fall tame; kinematics do not see them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +70,7 @@ def _built(bone_m: bytes, axes: bytes, trackers: tuple[mounts.Mount, ...]) -> Bo
         np.frombuffer(axes).reshape(-1, 3),
     )
     spec = mujoco.MjSpec.from_file(str(share_folder("models") / "humanoid24" / "humanoid24.xml"))
-    for name, start_m in zip(own.names, _starts_m(own), strict=True):
+    for name, start_m in zip(own.names, joints_m(own), strict=True):
         spec.body(name).pos = start_m
     for name, axis in zip(own.dof_names, own.axes, strict=True):
         spec.joint(name).axis = axis
@@ -106,85 +96,6 @@ def tpose(own: Skeleton) -> Floats:
     return humanoid24.pack(np.array([0.0, 0.0, height_m]), np.array([1.0, 0.0, 0.0, 0.0]), angles)
 
 
-def mjcf() -> str:
-    """The text of humanoid24.xml: the standard skeleton, before scaling."""
-    own, limits_deg = humanoid24.standard_skeleton(), np.rad2deg(humanoid24.limits_rad())
-    top = ET.Element("mujoco", model="humanoid24")
-    ET.SubElement(top, "compiler", angle="degree", autolimits="true")
-    ET.SubElement(top, "option", timestep="0.004", integrator="implicitfast")
-    _look(top)
-    world = ET.SubElement(top, "worldbody")
-    ET.SubElement(world, "light", pos="0 0 4", dir="0 0 -1", type="directional")
-    ET.SubElement(world, "camera", name="front", pos="3.6 1.3 1.3", mode="targetbody", target="upperback", fovy="36")
-    ET.SubElement(
-        world,
-        "geom",
-        {"name": "floor", "type": "plane", "size": "10 10 0.1", "material": "floor"}
-        | {"rgba": "1 1 1 1", "contype": "0", "conaffinity": "1"},
-    )
-    nodes = {"root": ET.SubElement(world, "body", name="root", pos="0 0 1")}
-    ET.SubElement(nodes["root"], "freejoint", name="root")
-    _add_flesh(nodes["root"], "root", own)
-    for bone, start_m in enumerate(_starts_m(own)):
-        name, parent = own.names[bone], own.parents[bone]
-        nodes[name] = ET.SubElement(
-            nodes["root" if parent < 0 else own.names[parent]], "body", name=name, pos=_text(start_m)
-        )
-        where = own.dof_of_bone[bone]
-        for dof in reversed(range(where.start, where.stop)):  # MuJoCo composes outermost first
-            ET.SubElement(
-                nodes[name],
-                "joint",
-                name=own.dof_names[dof],
-                axis=_text(own.axes[dof]),
-                range=_text(limits_deg[dof]),
-            )
-        _add_flesh(nodes[name], name, own)
-    keys = ET.SubElement(top, "keyframe")
-    ET.SubElement(keys, "key", name="tpose", qpos=_text(tpose(own)))
-    ET.indent(top)
-    return ET.tostring(top, encoding="unicode") + "\n"
-
-
-def _add_flesh(node: ET.Element, bone: str, own: Skeleton) -> None:
-    for shape in anatomy.shapes(own):
-        if shape.bone == bone:
-            ET.SubElement(
-                node,
-                "geom",
-                name=shape.name,
-                type=shape.kind,
-                pos=_text(shape.centre_m),
-                quat=_text(shape.bone_from_shape),
-                size=_text(shape.size_m[: 2 if shape.kind == "capsule" else 3]),
-                mass=_text([shape.mass_kg]),
-            )
-
-
-def _look(top: ET.Element) -> None:
-    """Defaults, colours and light. Flesh meets the floor but not itself."""
-    default = ET.SubElement(top, "default")
-    ET.SubElement(
-        default, "joint", type="hinge", damping=_text([_HINGE_DAMPING_NMS]), armature=_text([_HINGE_ARMATURE_KGM2])
-    )
-    ET.SubElement(default, "geom", contype="1", conaffinity="0", rgba="0.78 0.62 0.52 1")
-    ET.SubElement(default, "site", type="box", size="0.018 0.012 0.006", rgba="0.1 0.3 0.9 1")
-    visual = ET.SubElement(top, "visual")
-    ET.SubElement(visual, "headlight", ambient="0.4 0.4 0.4", diffuse="0.5 0.5 0.5", specular="0.1 0.1 0.1")
-    asset = ET.SubElement(top, "asset")
-    colours = {"rgb1": "0.86 0.88 0.9", "rgb2": "0.76 0.79 0.82"}
-    ET.SubElement(asset, "texture", name="floor", type="2d", builtin="checker", width="64", height="64", attrib=colours)
-    ET.SubElement(asset, "material", name="floor", texture="floor", texrepeat="20 20")
-
-
-def _starts_m(own: Skeleton) -> list[Floats]:
-    """Where each bone's body lies in its parent's: at the parent's far end."""
+def joints_m(own: Skeleton) -> list[Floats]:
+    """(24) where each bone's joint lies in its parent's frame: at the parent's far end [m]."""
     return [np.zeros(3) if parent < 0 else own.bone_m[parent] for parent in own.parents]
-
-
-def _text(numbers: Sequence[float] | Floats) -> str:
-    return " ".join(f"{round(float(number), 6) + 0.0:g}" for number in numbers)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(mjcf())
