@@ -119,7 +119,7 @@ def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[S
     """A sole of two capsules from heel to toe, and an instep."""
     ahead, down, across = _foot_axes(skeleton, side)
     bone, share = f"{side}foot", mass_kg * _FOOT_SHARE / 3
-    ball = ahead * _BALL_M + down * _SOLE_DROP_M
+    ball = ahead * _BALL_M + down * (_SOLE_DROP_M - 0.004)
     parts = [_capsule(bone, f"{bone}_instep", 0.0 * down, scale * ball, 0.034 * scale, share)]
     for name, sign in (("inner", -1.0), ("outer", 1.0)):
         sideways = sign * (1.0 if side == "r" else -1.0) * _SOLE_HALF_WIDTH_M * across

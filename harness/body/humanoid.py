@@ -56,7 +56,12 @@ def build(own: Skeleton | None = None, trackers: Iterable[mounts.Mount] = ()) ->
             f"A skeleton of {fitted.bone_count} bones and {len(fitted.axes)} hinges is not the humanoid's.",
             "Take its 24 bones first, in the order of core.humanoid24.BONES: skeleton.subset(BONES).",
         )
-    return _built(fitted.bone_m.tobytes(), fitted.axes.tobytes(), tuple(trackers))
+    worn = tuple(trackers)
+    stations = [mount.station for mount in worn]
+    for station in stations:
+        if stations.count(station) > 1:
+            raise BadInput(f"Station {station!r} is worn twice.", "Give each tracker its own name.")
+    return _built(fitted.bone_m.tobytes(), fitted.axes.tobytes(), worn)
 
 
 @lru_cache(maxsize=32)
