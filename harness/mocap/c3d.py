@@ -1,24 +1,34 @@
 """C3D files: positions of markers, read by ezc3d (extra `c3d`), in world axes and metres.
 
-The header is checked first, because ezc3d trusts it. Unit and axes come from the file's own parameters
-(POINT:UNITS, POINT:X_SCREEN and Y_SCREEN; https://www.c3d.org/HTML/Documents/parameterslist.htm): in CMU's files
-millimetres, x across the screen and z up, which are the world's x and z.
+The header is checked first, and ezc3d runs in a process of its own, because it trusts its input. Unit and axes come
+from the file's own parameters (POINT:UNITS, POINT:X_SCREEN and Y_SCREEN;
+https://www.c3d.org/HTML/Documents/parameterslist.htm): in CMU's files millimetres, x across the screen and z up, which
+are the world's x and z.
 """
 
+import subprocess
+import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, freeze
 from harness.core.motion import Clip
 from harness.core.skeleton import forward
 from harness.errors import BadFile, MissingExtra
+from harness.mocap import c3d_child
 from harness.mocap.c3d_header import check_header
-from harness.mocap.files import check_size
+from harness.mocap.files import LARGEST, check_size
 
 UNITS_M = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
+
+PATIENCE_S = 20.0
+BYTES_A_SECOND = 2e6
+"""ezc3d gets so long, and longer for large files; it needs 0.1 s for CMU's."""
 
 _WHAT = "a C3D marker file"
 _AGAIN = "Fetch or export it again."
@@ -57,40 +67,50 @@ def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
     path = Path(path)
     check_size(path, _WHAT)
     check_header(path)
-    try:
-        import ezc3d
-    except ImportError as error:
-        raise MissingExtra("Reading C3D files", "ezc3d", "c3d") from error
-    try:
-        content = ezc3d.c3d(str(path))
-    except (OSError, RuntimeError, ValueError, IndexError, KeyError) as error:
-        raise BadFile(path, f"a file that ezc3d cannot read ({error})", _WHAT, _AGAIN) from error
-    point = content["parameters"]["POINT"]
-    unit, unit_evidence = _unit(path, _texts(point, "UNITS"), unit_m)
-    screen = tuple((_texts(point, key) or [""])[0] for key in ("X_SCREEN", "Y_SCREEN"))
+    content = _through_ezc3d(path)
+    unit, unit_evidence = _unit(path, _texts(content["UNITS"]), unit_m)
+    screen = tuple((_texts(content[key]) or [""])[0] for key in ("X_SCREEN", "Y_SCREEN"))
     if screen not in _WORLD_FROM_FILE:
         found = f"POINT:X_SCREEN {screen[0]!r} and Y_SCREEN {screen[1]!r}"
         known = " or ".join(f"{across} and {up}" for across, up in _WORLD_FROM_FILE)
         raise BadFile(path, found, f"{known}, which say where up is", "Set them in the program that wrote it.")
-    points = np.asarray(content["data"]["points"], dtype=float)[:3]
-    seen = np.asarray(content["data"]["meta_points"]["residuals"], dtype=float)[0] >= 0.0
-    seen &= np.all(np.isfinite(points), axis=0)
-    labels = [
-        label for key in sorted(point, key=_label_order) if key.startswith("LABELS") for label in _texts(point, key)
-    ]
-    if points.shape[1] != len(labels) or points.shape[2] == 0:
-        found = f"{points.shape[1]} markers, {len(labels)} labels and {points.shape[2]} frames"
-        raise BadFile(path, found, "a label for each marker, and frames", _AGAIN)
-    position: Floats = np.where(seen[..., None], np.moveaxis(points, 0, -1), np.nan)
+    points = content["points"]
+    seen = (content["residuals"] >= 0.0) & np.all(np.abs(points) < LARGEST, axis=0)
+    labels = _texts(content["labels"])
+    rate_hz = float(content["rate_hz"])
+    if points.shape[1] != len(labels) or points.shape[2] == 0 or not 0.0 < rate_hz < 1e5:
+        found = f"{points.shape[1]} markers, {len(labels)} labels, {points.shape[2]} frames, {rate_hz:g} Hz"
+        raise BadFile(path, found, "a label for each marker, frames and a rate", _AGAIN)
+    position: Floats = np.moveaxis(np.where(seen, points, np.nan), 0, -1)
     return MarkerClip(
         name=path.stem,
         subject=path.stem.split("_", 1)[0],
         labels=tuple(label.split(":")[-1] for label in labels),
-        rate_hz=float(content["header"]["points"]["frame_rate"]),
+        rate_hz=rate_hz,
         position_m=np.moveaxis(position, 0, 1) * unit @ _WORLD_FROM_FILE[screen].T,
         unit_m=unit,
         evidence=f"{unit_evidence}; {screen[1]} is up, from POINT:Y_SCREEN",
     )
+
+
+def _through_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
+    """The arrays that `c3d_child` writes; BadFile if ezc3d refuses the file, crashes on it or does not finish."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "content.npz"
+        patience_s = PATIENCE_S + path.stat().st_size / BYTES_A_SECOND
+        command = [sys.executable, "-m", c3d_child.__name__, str(path), str(out)]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=patience_s)
+        except subprocess.TimeoutExpired as error:
+            raise BadFile(path, f"a file that keeps ezc3d busy over {patience_s:.0f} s", _WHAT, _AGAIN) from error
+        if done.returncode == c3d_child.NO_EZC3D:
+            raise MissingExtra("Reading C3D files", "ezc3d", "c3d")
+        if done.returncode != 0:
+            refused = done.returncode == c3d_child.REFUSED
+            why = done.stderr.strip().splitlines()[-1:] if refused else ["it crashes"]
+            raise BadFile(path, f"a file that ezc3d cannot read ({' '.join(why)})", _WHAT, _AGAIN)
+        with np.load(out, allow_pickle=False) as arrays:
+            return dict(arrays)
 
 
 @dataclass(frozen=True)
@@ -133,13 +153,5 @@ def _unit(path: Path, units: list[str], given_m: float | None) -> tuple[float, s
     return UNITS_M[units[0].lower()], f"{units[0]}, from POINT:UNITS"
 
 
-def _texts(group: Any, key: str) -> list[str]:
-    """A text parameter, stripped; [] if there is none."""
-    value = group[key]["value"] if key in group else []
-    return [text.strip() for text in value if isinstance(text, str)]
-
-
-def _label_order(key: str) -> int:
-    """LABELS, LABELS2, LABELS3, ...: 255 labels fit in each."""
-    digits = key.removeprefix("LABELS")
-    return int(digits) if digits.isdigit() else 1
+def _texts(values: NDArray[Any]) -> list[str]:
+    return [str(value).strip() for value in values]
