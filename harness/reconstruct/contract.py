@@ -25,12 +25,22 @@ class Reconstructor(Protocol):
 
 
 class Method(Protocol):
-    """A configured algorithm."""
+    """A configured algorithm; its `repr` tells its options, as that of a dataclass does."""
 
-    name: str
-    """As it stands in tables, such as "ik"."""
-    needs_examples: bool
-    """Whether `fit` learns from other takes; without it the result's protocol is "none"."""
+    @property
+    def name(self) -> str:
+        """As it stands in tables, such as "ik"."""
+        ...
+
+    @property
+    def summary(self) -> str:
+        """What it does, in one line."""
+        ...
+
+    @property
+    def needs_examples(self) -> bool:
+        """Whether `fit` learns from other takes; without it the result's protocol is "none"."""
+        ...
 
     def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Reconstructor:
         """Learn from takes at the tracker's rate, retargeted to `body`; never from the take under test."""

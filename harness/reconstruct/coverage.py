@@ -1,0 +1,29 @@
+"""Status of an estimate, from how many of the configured stations report (ALGORITHMS.md E, "lost tracker")."""
+
+from harness.core.estimate import Status
+from harness.stream.frame import TrackerFrame
+
+LOST_AFTER_S = 0.5
+
+
+class Coverage:
+    """Watches one session's frames; a station reports when its position or its orientation is valid."""
+
+    def __init__(self, lost_after_s: float = LOST_AFTER_S) -> None:
+        self._lost_after_s = lost_after_s
+        self._enough_at_s: float | None = None
+
+    def seen(self, frame: TrackerFrame) -> tuple[Status, bool]:
+        """The status of this frame, and whether any station reports at all.
+
+        SOLVED with at least half of the stations, else HELD, else LOST once that has lasted too long.
+        """
+        reporting = frame.position_valid | frame.orientation_valid
+        count = int(reporting.sum())
+        if 2 * count >= len(reporting) and count:
+            self._enough_at_s = frame.received_s
+            return Status.SOLVED, True
+        if self._enough_at_s is None:
+            self._enough_at_s = frame.received_s
+        long_ago = frame.received_s - self._enough_at_s > self._lost_after_s
+        return Status.LOST if long_ago else Status.HELD, count > 0

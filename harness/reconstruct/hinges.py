@@ -1,0 +1,83 @@
+"""Hinge angles in the representation that the joint limits speak of.
+
+An angle means the same 2 pi later, and three perpendicular hinges also know the twin (a + pi, pi - b, c + pi).
+Motion files wander through all of them; the limits hold for one (`core.humanoid24`). Hinges that may turn all the
+way round have no limits here. Angles are in the order of `qpos[7:]`.
+"""
+
+import numpy as np
+
+from harness.body.humanoid import Body
+from harness.core.arrays import Floats, Ints
+from harness.core.humanoid24 import QPOS_OF_DOF
+
+_ALL_ROUND_RAD = np.deg2rad(350.0)
+_TURN = 2.0 * np.pi
+
+
+class HingeLimits:
+    """The limits of one body's 48 hinges."""
+
+    def __init__(self, body: Body, keep: bool = True) -> None:
+        """With `keep` off no hinge has limits."""
+        low, high = body.limits_rad[QPOS_OF_DOF].T
+        free = (high - low >= _ALL_ROUND_RAD) | (not keep)
+        self.low_rad: Floats = np.where(free, -np.inf, low)
+        """(48,) lowest angle; -inf for a hinge that may turn all the way round."""
+        self.high_rad: Floats = np.where(free, np.inf, high)
+        self._middle_rad: Floats = np.where(free, 0.0, 0.5 * (low + high))
+        self._gimbals: Ints = np.array(
+            [
+                QPOS_OF_DOF[where]
+                for where in body.skeleton.dof_of_bone
+                if np.shape(axes := body.skeleton.axes[where]) == (3, 3) and np.allclose(axes @ axes.T, np.eye(3))
+            ]
+        )
+
+    def clipped(self, angles_rad: Floats) -> Floats:
+        """The nearest angles (..., 48) within the limits."""
+        out: Floats = np.clip(angles_rad, self.low_rad, self.high_rad)
+        return out
+
+    def excess_rad(self, angles_rad: Floats) -> Floats:
+        """(..., 48) how far each angle lies outside."""
+        out: Floats = np.abs(angles_rad - self.clipped(angles_rad))
+        return out
+
+    def past_gimbal(self, angles_rad: Floats) -> bool:
+        """Whether a middle hinge of angles (48,) stands beyond 90 deg, where the twin may be the lawful one."""
+        return bool(np.any(np.abs(angles_rad[self._gimbals[:, 1]]) > 0.5 * np.pi))
+
+    def principal(self, angles_rad: Floats) -> Floats:
+        """The same rotations (..., 48) as deep within the limits as any representation of them gets.
+
+        Twins that are equally lawful are told apart by the middle hinge, which stays within 90 deg.
+        """
+        plain = self._wrapped(angles_rad)
+        twin = np.array(plain)
+        twin[..., self._gimbals] = plain[..., self._gimbals] * [1.0, -1.0, 1.0] + np.pi
+        twin = self._wrapped(twin)
+        beyond = np.abs(plain[..., self._gimbals[:, 1]]) > 0.5 * np.pi
+        outside, outside_twin = (
+            np.sum(self.excess_rad(angles)[..., self._gimbals], axis=-1) for angles in (plain, twin)
+        )
+        better = (outside_twin < outside - 1e-9) | (beyond & (outside_twin <= outside + 1e-9))
+        plain[..., self._gimbals] = np.where(better[..., None], twin[..., self._gimbals], plain[..., self._gimbals])
+        return plain
+
+    def near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
+        """`angles_rad` with every hinge that has no limits turned as near to the other as whole turns bring it."""
+        turns = np.where(np.isinf(self.high_rad), np.round((other_rad - angles_rad) / _TURN), 0.0)
+        out: Floats = angles_rad + _TURN * turns
+        return out
+
+    def mean(self, angles_rad: Floats) -> Floats:
+        """(48,) mean of angles (T, 48) as directions, in principal form and within the limits."""
+        principal = self.principal(angles_rad)
+        mean = np.arctan2(np.mean(np.sin(principal), axis=0), np.mean(np.cos(principal), axis=0))
+        return self.clipped(self._wrapped(mean))
+
+    def _wrapped(self, angles_rad: Floats) -> Floats:
+        """Whole turns added until every angle is within pi of the middle of its limits."""
+        out: Floats = angles_rad - _TURN * np.round((angles_rad - self._middle_rad) / _TURN)
+        return out
