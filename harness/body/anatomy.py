@@ -16,8 +16,8 @@ from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.skeleton import Skeleton
 
-_STANDARD_MASS_KG = 71.7
-"""BMI of de Leva's mean man (24.08 kg/m2) times the square of the standard body's height, 1.725 m."""
+_STANDARD_MASS_KG = 74.2
+"""BMI of de Leva's mean man (24.08 kg/m2) times the square of the standard body's height, 1.755 m."""
 _LEAST_M = 1e-3
 """Half length of the capsule of a bone without length (some BVH files leave bones out)."""
 

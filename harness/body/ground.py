@@ -7,8 +7,8 @@ from harness.body import anatomy
 from harness.core.arrays import Bools, Floats
 from harness.core.skeleton import Pose, Skeleton
 
-SLOW_M_S, STANCE_S = 0.3, 0.1
-"""A foot in stance is slower than this for at least this long; at the top of a jump it is not."""
+SLOW_M_S, STANCE_S = 0.5, 0.105
+"""A foot in stance is slower than this for at least this long; at the top of a jump only for 2 v / g = 0.102 s."""
 FLOOR_WITHIN_M = 0.08
 """The floor of a clip is looked for within this distance of z = 0 (CMU's lie within 6 cm)."""
 SETTLE_S = 0.5
