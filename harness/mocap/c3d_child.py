@@ -1,8 +1,8 @@
 """ezc3d in a process of its own: `python -m harness.mocap.c3d_child FILE OUT` writes what it read as npz.
 
 ezc3d is C++ that trusts its input: of files with a few damaged bytes in the header about one in 200 crashes it, and
-some keep it busy for ever. Neither may take the program along. Exit 3 means that ezc3d is not installed, 4 that it refused
-the file, for the reason on stderr; memory is limited where the system can.
+some keep it busy for ever. Neither may take the program along. Exit 3 means that ezc3d is not installed, 4 that it
+refused the file, for the reason on stderr; memory is limited where the system can.
 """
 
 import sys
@@ -31,12 +31,12 @@ def main(file: str, out: str) -> int:
         arrays: dict[str, Any] = {
             key: np.array(point[key]["value"] if key in point else [], dtype=str) for key in TEXTS
         }
-        arrays |= dict(
-            points=content["data"]["points"][:3],
-            residuals=content["data"]["meta_points"]["residuals"][0],
-            rate_hz=content["header"]["points"]["frame_rate"],
-            labels=np.array([text for key in keys for text in point[key]["value"]], dtype=str),
-        )
+        arrays |= {
+            "points": content["data"]["points"][:3],
+            "residuals": content["data"]["meta_points"]["residuals"][0],
+            "rate_hz": content["header"]["points"]["frame_rate"],
+            "labels": np.array([text for key in keys for text in point[key]["value"]], dtype=str),
+        }
         np.savez(out, **arrays)
     except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
