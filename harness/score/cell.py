@@ -107,6 +107,11 @@ class Cell:
         """By name; None is "not measured"."""
         return self.scores.metrics
 
+    @property
+    def errors(self) -> Mapping[str, Floats]:
+        """(F,) each: the metrics that have a value in every frame."""
+        return self.scores.per_frame
+
     def __len__(self) -> int:
         return len(self.time_s)
 
@@ -162,8 +167,9 @@ def read_cell(folder: Path) -> Cell:
             **{name: content[name] for name in _TEXTS},
             **{name: arrays[name] for name in (*_FLOATS, *_INTS, *_BOOLS)},
         )
-    except KeyError as error:
-        raise BadFile(folder, f"no {error}", "a cell of this version of the harness", advice) from error
+    except (KeyError, TypeError, ValueError) as error:
+        found = f"no {error}" if isinstance(error, KeyError) else str(error)
+        raise BadFile(folder, found, "a cell of this version of the harness", advice) from error
     except ShapeError as error:
         raise BadFile(frames, str(error), "arrays that agree", advice) from error
 

@@ -153,7 +153,11 @@ def evo_ape_mean_m(program: str, truth: Path, estimate: Path) -> float:
     home = truth.parent  # evo writes its settings into the home folder when it first runs
     done = subprocess.run(
         [program, "tum", str(truth), str(estimate)],
-        env={**os.environ, "HOME": str(home), "MPLBACKEND": "agg"}, capture_output=True, text=True, timeout=120, check=True,
-    )  # fmt: skip
+        env={**os.environ, "HOME": str(home), "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=True,
+    )
     rows = dict(line.split() for line in done.stdout.splitlines() if len(line.split()) == 2)
     return float(rows["mean"])

@@ -3,6 +3,9 @@
 import csv
 import json
 import os
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -163,6 +166,50 @@ def test_a_broken_cell_is_a_clear_refusal(
         (folder / file).write_bytes(content)
     with pytest.raises(BadFile, match=r"cell\.json|frames\.npz|" + folder.name):
         results.read_cell(folder)
+
+
+@pytest.mark.parametrize(("field", "value"), [("bone_m", "long"), ("bone_m", [[1, 2]]), ("notes", 3), ("key", None)])
+def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
+    run_folder: Path, make_cell: MakeCell, field: str, value: object
+) -> None:
+    folder = results.write_cell(run_folder, make_cell())
+    content = json.loads((folder / "cell.json").read_text())
+    if value is None:
+        del content[field]
+    else:
+        content[field] = value
+    (folder / "cell.json").write_text(json.dumps(content))
+    with pytest.raises(BadFile, match=folder.name):
+        results.read_cell(folder)
+
+
+WRITE_FOR_EVER = """
+import dataclasses, itertools, pathlib, sys
+from harness.score import results
+run, key = pathlib.Path(sys.argv[1]), sys.argv[2]
+cell = results.read_cell(run / "cells" / key)
+for n in itertools.count():
+    results.write_cell(run, dataclasses.replace(cell, key=f"{sys.argv[3]}-{n}"))
+"""
+
+
+def test_a_kill_at_any_moment_leaves_whole_cells_only(run_folder: Path, make_cell: MakeCell) -> None:
+    results.open_run(run_folder, manifest())
+    key = results.write_cell(run_folder, make_cell()).name
+    for turn, delay_s in enumerate((0.0, 0.013, 0.029)):
+        child = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, str(run_folder), key, str(turn)])
+        try:
+            deadline = time.monotonic() + 30.0
+            while not results.has_cell(run_folder, f"{turn}-0"):
+                assert time.monotonic() < deadline, "the child writes nothing"
+                time.sleep(0.002)
+            time.sleep(delay_s)
+        finally:
+            child.kill()
+            child.wait()
+    results.open_run(run_folder, manifest())
+    cells = list(results.read_cells(run_folder))
+    assert len(cells) == len(os.listdir(run_folder / "cells")) >= 4
 
 
 def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:

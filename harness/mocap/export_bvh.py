@@ -1,0 +1,94 @@
+"""BVH: centimetres, x left, y up, z forward as in the common conversion of CMU's library; every bone is a joint.
+
+The joint called after a bone stands at the bone's near end; End Sites are the far ends of head, hands and feet. BVH has
+no times, so a frame without an estimate repeats the one before it, in truth and estimate alike.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.asf import WORLD_FROM_ASF
+from harness.mocap.export_motion import Motion
+
+CENTIMETRES_PER_METRE = 100.0
+_ROTATION = "Zrotation Yrotation Xrotation"
+
+
+def bvh_files(motion: Motion) -> dict[str, str]:
+    """Ending -> text of the file."""
+    return {".bvh": "\n".join([*_hierarchy(motion.skeleton), *_motion(motion)]) + "\n"}
+
+
+def euler_zyx_deg(rotation: Floats) -> Floats:
+    """(..., 3) angles (z, y, x) with R = Rz Ry Rx of matrices (..., 3, 3); x is zero where y is +-90 deg [deg]."""
+    r = np.asarray(rotation, dtype=float)
+    cos_y = np.hypot(r[..., 0, 0], r[..., 1, 0])
+    locked = cos_y < 1e-7
+    z = np.where(locked, np.arctan2(-r[..., 0, 1], r[..., 1, 1]), np.arctan2(r[..., 1, 0], r[..., 0, 0]))
+    y = np.arctan2(-r[..., 2, 0], cos_y)
+    x = np.where(locked, 0.0, np.arctan2(r[..., 2, 1], r[..., 2, 2]))
+    return np.rad2deg(np.stack([z, y, x], axis=-1))
+
+
+def _hierarchy(skeleton: Skeleton) -> Iterator[str]:
+    offset_cm = skeleton.bone_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
+    children = {
+        p: [b for b, parent in enumerate(skeleton.parents) if parent == p] for p in (-1, *range(len(offset_cm)))
+    }
+
+    def joint(bone: int, at_cm: Floats, tab: str) -> Iterator[str]:
+        yield f"{tab}JOINT {skeleton.names[bone]}"
+        yield f"{tab}{{"
+        yield f"{tab}\tOFFSET {_row(at_cm)}"
+        yield f"{tab}\tCHANNELS 3 {_ROTATION}"
+        for child in children[bone]:
+            yield from joint(child, offset_cm[bone], tab + "\t")
+        if not children[bone]:
+            yield f"{tab}\tEnd Site"
+            yield f"{tab}\t{{"
+            yield f"{tab}\t\tOFFSET {_row(offset_cm[bone])}"
+            yield f"{tab}\t}}"
+        yield f"{tab}}}"
+
+    yield from ("HIERARCHY", "ROOT root", "{", "\tOFFSET 0.000000 0.000000 0.000000")
+    yield f"\tCHANNELS 6 Xposition Yposition Zposition {_ROTATION}"
+    for bone in children[-1]:
+        yield from joint(bone, np.zeros(3), "\t")
+    yield "}"
+
+
+def _motion(motion: Motion) -> Iterator[str]:
+    grid = np.arange(motion.frame_index[0], motion.frame_index[-1] + 1)
+    shown = np.searchsorted(motion.frame_index, grid, side="right") - 1
+    world_from_root = rotations.to_matrix(motion.world_from_root)
+    local = [world_from_root]
+    for bone, parent in enumerate(motion.skeleton.parents):
+        above = world_from_root if parent < 0 else motion.world_from_bone[:, parent]
+        local.append(np.swapaxes(above, -1, -2) @ motion.world_from_bone[:, bone])
+    # joints are listed depth first, which the skeleton's order need not be
+    order = [0, *(1 + bone for bone in _depth_first(motion.skeleton))]
+    turned = np.stack([local[j] for j in order], axis=1)
+    angles_deg = euler_zyx_deg(WORLD_FROM_ASF.T @ turned @ WORLD_FROM_ASF)
+    angles_deg = np.unwrap(angles_deg, period=360.0, axis=0)
+    root_cm = motion.joints_m[:, 0] @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
+    table = np.concatenate([root_cm, angles_deg.reshape(len(root_cm), -1)], axis=1)[shown]
+    yield from ("MOTION", f"Frames: {len(table)}", f"Frame Time: {1.0 / motion.rate_hz:.9f}")
+    yield from map(_row, table)
+
+
+def _depth_first(skeleton: Skeleton) -> list[int]:
+    def below(parent: int) -> Iterator[int]:
+        for bone, above in enumerate(skeleton.parents):
+            if above == parent:
+                yield bone
+                yield from below(bone)
+
+    return list(below(-1))
+
+
+def _row(values: Floats) -> str:
+    return " ".join(f"{value:.6f}" for value in values)

@@ -1,0 +1,215 @@
+"""Other programs read what is written, and read the same motion."""
+
+import csv
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Ints
+from harness.core.humanoid24 import pack, standard_skeleton, unpack
+from harness.core.skeleton import forward
+from harness.errors import BadInput, UnknownName
+from harness.mocap.bvh import read_bvh
+from harness.mocap.export import FORMATS, export
+from harness.mocap.export_bvh import euler_zyx_deg
+from harness.mocap.export_tum import POINTS
+from harness.score.doctor import evo_ape_mean_m, evo_program
+from harness.score.pair import Pair, posed
+from harness.score.positions import root_position_mm
+
+FRAMES, RATE_HZ = 50, 40.0
+SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)
+NAMES = ("root", *SKELETON.names)
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a cell must have to be exported."""
+
+    truth_qpos: Floats
+    estimate_qpos: Floats
+    key: str = "0123456789abcdef"
+    method: str = "ik"
+    clip: str = "walking/01_02@0.20-0.40"
+    inputs: str = "pos+ori"
+    rate_hz: float = RATE_HZ
+    bone_m: Floats = field(default_factory=lambda: SKELETON.bone_m)
+    frame_index: Ints = field(default_factory=lambda: np.arange(FRAMES))
+    status: Ints = field(default_factory=lambda: np.zeros(FRAMES, dtype=np.int64))
+    errors: Mapping[str, Floats] = field(default_factory=lambda: {"mpjpe_mm": np.full(FRAMES, 12.5)})
+
+    @property
+    def time_s(self) -> Floats:
+        return 3.0 + self.frame_index / RATE_HZ
+
+
+@pytest.fixture
+def cell(rng: np.random.Generator) -> Written:
+    """Arbitrary motion, upside down and beyond gimbal lock included."""
+
+    def motion() -> Floats:
+        turns = np.cumsum(0.3 * rng.normal(size=(FRAMES, 3)), axis=0)
+        return pack(rng.normal(size=(FRAMES, 3)), rotations.exp(turns), rng.uniform(-2.0, 2.0, (FRAMES, 48)))
+
+    return Written(motion(), motion())
+
+
+def joints_m(qpos: Floats) -> Floats:
+    root_m, quaternion, angles_rad = unpack(qpos)
+    pose = forward(SKELETON, root_m, quaternion, angles_rad)
+    return np.concatenate([root_m[:, None], pose.end_m], axis=1)
+
+
+def test_pymotion_reads_the_same_joint_centres_from_bvh(cell: Written, tmp_path: Path) -> None:
+    from pymotion.io.bvh import BVH
+    from pymotion.ops.skeleton import fk
+
+    for file, qpos in zip(export([cell], "bvh", tmp_path), (cell.truth_qpos, cell.estimate_qpos), strict=True):
+        bvh = BVH()
+        bvh.load(str(file))
+        turned, position, parents, offsets, ends, end_parents = bvh.get_data()
+        assert bvh.data["frame_time"] == pytest.approx(1 / RATE_HZ)
+        assert list(bvh.data["names"]) == list(NAMES)
+        place_cm, rotation = fk(turned, position[:, 0], offsets, parents)
+        expected_cm = 100.0 * joints_m(qpos)[..., [1, 2, 0]]  # x left, y up, z forward
+        np.testing.assert_allclose(place_cm[:, 0], expected_cm[:, 0], atol=1e-3)
+        for bone, parent in enumerate(SKELETON.parents):
+            np.testing.assert_allclose(place_cm[:, 1 + bone], expected_cm[:, 1 + parent], atol=1e-3)
+        tips_cm = place_cm[:, end_parents] + np.einsum("tjab,jb->tja", rotation[:, end_parents], ends)
+        np.testing.assert_allclose(tips_cm, expected_cm[:, end_parents], atol=1e-3)
+        assert sorted(NAMES[p] for p in end_parents) == ["head", "lfoot", "lhand", "rfoot", "rhand"]
+
+
+def test_our_own_reader_takes_its_bvh_for_a_persons(cell: Written, tmp_path: Path) -> None:
+    truth, _ = export([cell], "bvh", tmp_path)
+    back = read_bvh(truth)
+    assert back.rate_hz == RATE_HZ
+    np.testing.assert_allclose(back.root_m, cell.truth_qpos[:, :3], atol=1e-7)
+    turn = rotations.angle_between_rad(back.parent_from_joint[:, 0], cell.truth_qpos[:, 3:7])
+    assert turn.max() < 1e-6
+
+
+def test_euler_angles_rebuild_every_rotation(rng: np.random.Generator) -> None:
+    quaternions = rotations.exp(rng.normal(size=(500, 3)) * 2.0)
+    locked = rotations.multiply(
+        rotations.about_z(rng.normal(size=50)), rotations.exp(np.tile([0.0, np.pi / 2, 0.0], (50, 1)))
+    )
+    matrices = rotations.to_matrix(np.concatenate([quaternions, locked, locked * [1, -1, -1, 1]]))
+    z, y, x = np.deg2rad(euler_zyx_deg(matrices)).T
+    axes = np.eye(3)
+    back = [rotations.to_matrix(rotations.exp(a[:, None] * axes[i])) for a, i in ((z, 2), (y, 1), (x, 0))]
+    np.testing.assert_allclose(back[0] @ back[1] @ back[2], matrices, atol=2e-7)
+
+
+def test_trc_has_the_joint_centres_y_up_and_mot_the_angles(cell: Written, tmp_path: Path) -> None:
+    files = export([cell], "trc", tmp_path)
+    assert [f.suffix for f in files] == [".trc", ".mot", ".trc", ".mot"]
+    lines = files[2].read_text().split("\n")
+    assert lines[2].split("\t") == ["40", "40", "50", "25", "mm", "40", "1", "50"]
+    assert [name for name in lines[3].split("\t") if name] == ["Frame#", "Time", *NAMES]
+    assert len(lines[4].split("\t")) == len(lines[6].split("\t")) == 2 + 3 * 25
+    assert lines[4].split("\t")[2:5] == ["X1", "Y1", "Z1"]
+    table = np.array([[float(x) for x in line.split("\t")] for line in lines[6:-1]])
+    np.testing.assert_array_equal(table[:, 0], np.arange(1, FRAMES + 1))
+    np.testing.assert_allclose(table[:, 1], cell.time_s, atol=1e-6)
+    place = table[:, 2:].reshape(FRAMES, 25, 3)
+    expected = 1e3 * joints_m(cell.estimate_qpos)
+    np.testing.assert_allclose(place[..., 0], expected[..., 0], atol=1e-3)
+    np.testing.assert_allclose(place[..., 1], expected[..., 2], atol=1e-3)
+    np.testing.assert_allclose(place[..., 2], -expected[..., 1], atol=1e-3)
+
+    head, _, body = files[3].read_text().partition("endheader\n")
+    assert {"nRows=50", "nColumns=49", "inDegrees=yes"} <= set(head.split("\n"))
+    names, *rows = body.strip().split("\n")
+    assert names.split("\t")[:2] == ["time", "lowerback_rx"]
+    angles = np.array([[float(x) for x in row.split("\t")] for row in rows])[:, 1:]
+    np.testing.assert_allclose(np.deg2rad(angles), unpack(cell.estimate_qpos)[2], atol=1e-7)
+
+
+def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path: Path) -> None:
+    errors = {"mpjpe_mm": np.where(np.arange(FRAMES) == 3, np.nan, 12.5)}
+    truth, estimate = export([replace(cell, errors=errors)], "csv", tmp_path)
+    with estimate.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == FRAMES
+    assert float(rows[7]["lhand_z_m"]) == pytest.approx(joints_m(cell.estimate_qpos)[7, NAMES.index("lhand"), 2])
+    dof = SKELETON.dof_names.index("lradius.rx")
+    assert float(rows[7]["lradius.rx_deg"]) == pytest.approx(np.rad2deg(unpack(cell.estimate_qpos)[2][7, dof]))
+    assert (rows[7]["frame"], rows[7]["status"], rows[7]["mpjpe_mm"], rows[3]["mpjpe_mm"]) == ("7", "0", "12.5", "")
+    assert "mpjpe_mm" not in truth.read_text().split("\n")[0]
+
+
+def test_tum_has_a_trajectory_a_point(cell: Written, tmp_path: Path) -> None:
+    files = export([cell], "tum", tmp_path)
+    assert [f.name.split(".", 3)[-1] for f in files if "truth" in f.name] == [f"truth.{p}.tum" for p in POINTS]
+    for point in ("root", "rfoot"):
+        table = np.loadtxt(next(f for f in files if f.name.endswith(f"estimate.{point}.tum")))
+        np.testing.assert_allclose(table[:, 0], cell.time_s)
+        np.testing.assert_allclose(table[:, 1:4], joints_m(cell.estimate_qpos)[:, NAMES.index(point)], atol=1e-8)
+        pose = posed(SKELETON, cell.estimate_qpos)
+        bone = rotations.from_matrix(pose.world_from_bone[:, SKELETON.index("rfoot")])
+        expected = cell.estimate_qpos[:, 3:7] if point == "root" else bone
+        assert rotations.angle_between_rad(table[:, [7, 4, 5, 6]], expected).max() < 1e-7
+
+
+def test_evo_finds_our_root_position_error(cell: Written, tmp_path: Path) -> None:
+    program = evo_program()
+    if program is None:
+        pytest.skip("evo is not installed (extra dev)")
+    files = export([cell], "tum", tmp_path)
+    truth, estimate = (next(f for f in files if f.name.endswith(f"{kind}.root.tum")) for kind in ("truth", "estimate"))
+    pair = Pair(posed(SKELETON, cell.truth_qpos), posed(SKELETON, cell.estimate_qpos), cell.frame_index, RATE_HZ)
+    ours_m = 1e-3 * root_position_mm(pair).mean()
+    assert ours_m > 0.1
+    assert evo_ape_mean_m(program, truth, estimate) == pytest.approx(ours_m, abs=6e-7)  # evo prints six digits
+
+
+def test_gaps_and_broken_estimates(cell: Written, tmp_path: Path) -> None:
+    """BVH has no times, so it holds the frame before; the others skip what is not there."""
+    estimate = cell.estimate_qpos.copy()
+    estimate[10] = np.nan
+    gappy = replace(cell, estimate_qpos=estimate, frame_index=np.r_[np.arange(20), np.arange(23, 23 + 30)])
+    truth, _ = export([gappy], "bvh", tmp_path)
+    text = truth.read_text().split("\n")
+    assert "Frames: 53" in text
+    rows = text[text.index("Frames: 53") + 2 :]
+    assert rows[9] == rows[10] != rows[11]
+    assert rows[19] == rows[20] == rows[22] != rows[23]
+    tum = export([gappy], "tum", tmp_path)[0]
+    assert len(tum.read_text().split("\n")) - 1 == FRAMES - 1
+
+
+@pytest.mark.parametrize("fmt", FORMATS)
+def test_a_file_is_written_over_only_when_told(cell: Written, tmp_path: Path, fmt: str) -> None:
+    folder = tmp_path / "deep" / "out"
+    files = export([cell], fmt, folder)
+    assert sorted(folder.iterdir()) == sorted(files)
+    files[-1].write_text("edited by hand")
+    with pytest.raises(BadInput, match="--force"):
+        export([cell], fmt, folder)
+    assert files[-1].read_text() == "edited by hand"
+    assert export([cell], fmt, folder, force=True) == files
+    assert files[-1].read_text() != "edited by hand"
+
+
+def test_names_of_files_are_safe_and_unlike(cell: Written, tmp_path: Path) -> None:
+    files = export([cell, replace(cell, key="fedcba9876543210")], "csv", tmp_path)
+    assert len(set(files)) == 4
+    assert all(file.parent == tmp_path for file in files)
+    assert files[0].name == "walking_01_02@0.20-0.40-ik-pos+ori.truth.csv"
+
+
+def test_what_cannot_be_exported_is_refused(cell: Written, tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="bvh"):
+        export([cell], "fbx", tmp_path)
+    with pytest.raises(BadInput, match="No cell"):
+        export([], "csv", tmp_path)
+    with pytest.raises(BadInput, match="No cell"):
+        export([replace(cell, estimate_qpos=cell.estimate_qpos * np.nan)], "bvh", tmp_path)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadInput, match="cannot be written"):
+        export([cell], "csv", tmp_path / "file")
