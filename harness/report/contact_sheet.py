@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import Clip
 from harness.core.skeleton import forward
@@ -69,8 +68,10 @@ def contact_sheet(
 
 
 def _facing(clip: Clip) -> Floats:
-    """(T,) the pelvis' heading averaged over a second around each frame [rad]."""
-    yaw = rotations.yaw_rad(clip.world_from_root)
+    """(T,) the heading of the head, averaged over a second around each frame [rad]."""
+    pose = forward(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
+    ahead = pose.world_from_bone[:, clip.skeleton.index("head"), :, 0]
+    yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     half = max(int(0.5 * clip.rate_hz), 1)
     window = np.ones(2 * half + 1)
     spread = [np.convolve(np.pad(f(yaw), half, mode="edge"), window, mode="valid") for f in (np.cos, np.sin)]

@@ -95,3 +95,11 @@ def smaller(a: Floats, b: Floats, softness: float) -> Floats:
 def larger(a: Floats, b: Floats, softness: float) -> Floats:
     """A smooth upper envelope."""
     return -smaller(-a, -b, softness)
+
+
+def smoothed(curve: Floats, frames: float) -> Floats:
+    """The curve (T,) under a bell of the given standard deviation; ends are held."""
+    half = int(3.0 * frames)
+    bell = np.exp(-0.5 * (np.arange(-half, half + 1) / frames) ** 2)
+    out: Floats = np.convolve(np.pad(curve, half, mode="edge"), bell / bell.sum(), mode="valid")
+    return out

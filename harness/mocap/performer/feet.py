@@ -6,12 +6,13 @@ the ball does not move from the moment the foot lies flat until it leaves. Betwe
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.performer.curves import ease, pulse, smaller, through, travel
+from harness.mocap.performer.curves import ease, pulse, through, travel
 from harness.mocap.performer.figure import Foot
 
 ANKLE_M = 0.080
@@ -52,17 +53,19 @@ def foot(
     plants: Sequence[Plant],
     knee_out_rad: float | Floats = 0.0,
     heel_up: Floats | float = 0.0,
+    pivot: Floats | float = 0.0,
 ) -> Foot:
     """The foot's movement (T,) through its plants, in order of time; it rests on the first before and the last after.
 
-    `heel_up` adds to the pitch: a boxer's heel. `knee_out_rad` turns the knee outwards of the foot.
+    `heel_up` adds to the pitch and `pivot` to the heading, both about the ball: a boxer's or golfer's rear foot.
+    `knee_out_rad` turns the knee outwards of the foot.
     """
     ball = np.empty((len(t), 3))
     yaw = np.full(len(t), plants[0].yaw_rad)
     pitch = through(t, *_pitch_keys(plants)) + heel_up
     heel_first = np.zeros(len(t))
     ball[:] = (*plants[0].ball_m, BALL_M)
-    for a, b in zip(plants, plants[1:], strict=False):
+    for a, b in pairwise(plants):
         share = (t - a.off_s) / (b.on_s - a.off_s)
         moving = share > 0.0
         way = np.append(np.subtract(b.ball_m, a.ball_m), 0.0)
@@ -71,7 +74,7 @@ def foot(
         yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease(share[moving])
         heel_first[moving] = ease(share[moving]) if b.land_rad else 0.0
         heel_first[t > 0.5 * (b.on_s + b.off_s)] = 0.0  # it lies flat there
-    return placed(skeleton, side, ball, yaw, pitch, heel_first, knee_out_rad)
+    return placed(skeleton, side, ball, yaw + pivot, pitch, heel_first, knee_out_rad)
 
 
 def placed(
@@ -114,22 +117,3 @@ def _pitch_keys(plants: Sequence[Plant]) -> tuple[list[float], list[float]]:
             at += [plant.off_s]
             value += [0.0]
     return at, value
-
-
-def standing_root_m(
-    root_m: Floats, hips: tuple[Floats, Floats], feet: tuple[Foot, Foot], skeleton: Skeleton, straightest: float = 0.992
-) -> Floats:
-    """The pelvis path (T, 3) lowered, smoothly, wherever a leg would be stretched beyond `straightest` of its length.
-
-    `hips` are the hip joints (T, 3) relative to the root, in the world's axes, left and right.
-    """
-    height = root_m[:, 2]
-    for side, hip, one in zip("lr", hips, feet, strict=True):
-        ankle = one.toe_m - float(skeleton.length_m[skeleton.index(f"{side}foot")]) * one.direction
-        long = straightest * float(
-            skeleton.length_m[skeleton.index(f"{side}femur")] + skeleton.length_m[skeleton.index(f"{side}tibia")]
-        )
-        flat = np.sum((root_m[:, :2] + hip[:, :2] - ankle[:, :2]) ** 2, axis=1)
-        top = ankle[:, 2] + np.sqrt(np.maximum(long**2 - flat, 0.04)) - hip[:, 2]
-        height = smaller(height, top, 0.02)
-    return np.concatenate([root_m[:, :2], height[:, None]], axis=1)

@@ -17,7 +17,7 @@ LEFT = {"l": 1.0, "r": -1.0}
 """Sign of a side along the world's y."""
 
 _SPINE = {"lowerback": (0.40, 0.25, 0.40), "upperback": (0.33, 0.40, 0.32), "thorax": (0.27, 0.35, 0.28)}
-"""Share of bend, twist and lean that each back bone takes; the low back bends most and twists least (White and Panjabi)."""
+"""Share of bend, twist and lean that each back bone takes; the low back bends most, twists least (White and Panjabi)."""
 _NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
 _NECK_BIAS_RAD = {"lowerneck": -0.26, "upperneck": 0.24, "head": 0.10}
 """The neck's S-shape when looking straight ahead, about the medians of real clips."""
@@ -39,7 +39,7 @@ class Foot:
 
 
 class Figure:
-    """A moving body that is filled in from the trunk outwards; `angles_rad` (T, 48) is complete after two legs and arms."""
+    """A moving body that is filled in from the trunk outwards; `angles_rad` (T, 48) is complete after legs and arms."""
 
     def __init__(
         self,
@@ -94,6 +94,13 @@ class Figure:
         """(T, 3) where the upper arm starts."""
         return self._end[f"{side}clavicle"]
 
+    def around_m(self, yaw: Floats, ahead: Floats, left: Floats, up: Floats) -> Floats:
+        """(T, 3) the point so far ahead, left and above the top of the chest, as seen when facing `yaw` (T,) [rad]."""
+        c, s = np.cos(yaw), np.sin(yaw)
+        return self.chest_m + np.stack(
+            [c * ahead - s * left, s * ahead + c * left, np.broadcast_to(up, c.shape)], axis=-1
+        )
+
     def hip_m(self, side: str) -> Floats:
         """(T, 3) where the thigh starts."""
         return self.root_m + self.pelvis @ self.skeleton.bone_m[self.skeleton.index(f"{side}hipjoint")]
@@ -137,7 +144,7 @@ class Figure:
         above = self._world[f"{side}clavicle"]
         self._three(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
         self._set(f"{side}radius", elbow)
-        self._set(f"{side}wrist", turn)
+        self._set(f"{side}wrist", -sign * turn)
         self._set(f"{side}hand", hand[0], -sign * hand[1])
 
     def hang(
@@ -151,6 +158,24 @@ class Figure:
 
     def reach(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: Hand) -> None:
         """An arm whose wrist is at `wrist_m` (T, 3) in the world, drawn in if too far; the elbow points `towards`."""
+        self.arm(side, *self._bent(side, wrist_m, towards), turn, hand)
+
+    def palm_turn(self, side: str, wrist_m: Floats, towards: Floats, palm: Floats) -> Floats:
+        """Pronation (T,) [rad] at which the palm of an arm that reaches so faces the world direction `palm` (T, 3).
+
+        Softly bounded to what a forearm can do.
+        """
+        upper, elbow = self._bent(side, wrist_m, towards)
+        rest = limbs.frame_of(self.skeleton, f"{side}humerus")
+        facing = turned(np.swapaxes(upper @ rest @ about(0, elbow), -1, -2), palm)
+        down = -rest[2]
+        angle = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]) - np.arctan2(down[0], down[2]))
+        angle = -LEFT[side] * (angle - 2.0 * np.pi * np.round(np.median(angle) / (2.0 * np.pi)))
+        out: Floats = -0.4 + 1.3 * np.tanh((angle + 0.4) / 1.3)
+        return out
+
+    def _bent(self, side: str, wrist_m: Floats, towards: Floats) -> tuple[Floats, Floats]:
+        """World rotation (T, 3, 3) of the upper arm and flexion (T,) of the elbow that bring the wrist there."""
         first = self.length_m(f"{side}humerus")
         second = self.length_m(f"{side}radius") + self.length_m(f"{side}wrist")
         shoulder = self.shoulder_m(side)
@@ -160,6 +185,5 @@ class Figure:
         near = larger(smaller(distance, np.array(longest), 0.02), np.array(shortest), 0.02)
         wrist = shoulder + line * (near / distance)
         bent = limbs.middle_joint(shoulder, wrist, towards, first, second)
-        normal = unit(np.cross(towards, line))
         rest = limbs.frame_of(self.skeleton, f"{side}humerus")
-        self.arm(side, *limbs.hinged(unit(bent - shoulder), unit(wrist - bent), normal, rest), turn, hand)
+        return limbs.hinged(unit(bent - shoulder), unit(wrist - bent), unit(np.cross(towards, line)), rest)

@@ -10,7 +10,7 @@ from harness.core.motion import Clip
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.mocap.performer import walking
+from harness.mocap.performer import boxing, golf, jumping, table_tennis, walking
 from harness.mocap.performer.figure import Figure
 from harness.mocap.performer.performers import Habits, habits, performers, skeleton
 
@@ -19,6 +19,10 @@ TAKES_EACH = 4
 
 _MOVES: dict[str, Callable[[Skeleton, Habits, np.random.Generator, Floats, int], Figure]] = {
     "walking": walking.move,
+    "boxing": boxing.move,
+    "jumping": jumping.move,
+    "golf": golf.move,
+    "table_tennis": table_tennis.move,
 }
 BEHAVIOURS = tuple(_MOVES)
 
@@ -32,7 +36,7 @@ def take_names(behaviour: str) -> tuple[str, ...]:
 def generate(
     behaviour: str, performer: str, take: int, *, seed: int, duration_s: float = 20.0, rate_hz: float = 120.0
 ) -> Clip:
-    """One take; the same arguments give the same bytes. UnknownName, BadInput for a take below 1 or too short a time."""
+    """One take; the same arguments give the same bytes. UnknownName; BadInput for a take below 1 or no duration."""
     _known(behaviour)
     if take < 1 or duration_s * rate_hz < 2.0:
         raise BadInput(f"take {take} of {duration_s} s at {rate_hz} Hz.", "Takes count from 1 and need two frames.")

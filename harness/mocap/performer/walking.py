@@ -8,8 +8,9 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.performer.curves import ease, wander
-from harness.mocap.performer.feet import Plant, foot, standing_root_m
+from harness.mocap.performer.curves import ease, smaller, smoothed, wander
+from harness.mocap.performer.feet import Plant, foot
+from harness.mocap.performer.footwork import highest_root_m
 from harness.mocap.performer.figure import LEFT, SIDES, Figure
 from harness.mocap.performer.performers import Habits
 
@@ -111,10 +112,8 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     )
     forward = {"l": -np.cos(turn - 0.1), "r": np.cos(turn - 0.1)}
     shoulders = {s: (0.02 * breath + wander(rng, t, 3.0, 0.01), 0.04 * swing * forward[s]) for s in SIDES}
-    hips = np.zeros((2, len(t), 3))
-    for n, side in enumerate(SIDES):
-        hips[n] = _rotation(pelvis) @ skeleton.bone_m[skeleton.index(f"{side}hipjoint")]
-    root = standing_root_m(root, (hips[0], hips[1]), (feet["l"], feet["r"]), skeleton)
+    top = highest_root_m(skeleton, root[:, :2], pelvis, feet, 0.994)
+    root[:, 2] = smaller(top, smoothed(top, 1.2 / step_s) - 0.012, 0.04)
     figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders)
     for side in SIDES:
         figure.leg(side, feet[side])
@@ -130,12 +129,6 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
             (-0.22 + 0.08 * s + wander(rng, t, 1.5, 0.03), wander(rng, t, 1.5, 0.03)),
         )
     return figure
-
-
-def _rotation(pelvis: Floats) -> Floats:
-    from harness.mocap.performer.limbs import about
-
-    return about(2, pelvis[:, 0]) @ about(1, pelvis[:, 1]) @ about(0, pelvis[:, 2])
 
 
 def _course(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tuple[Floats, Floats]:

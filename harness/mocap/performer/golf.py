@@ -1,0 +1,181 @@
+"""Golf swings: address, backswing, top, downswing, impact, follow-through, hold, and back to the next ball.
+
+The hands ride on a tilted circle about the top of the chest, the wrists cock the club around them; hips lead the
+downswing and the eyes stay on the ball until it is gone. Backswing 0.75 to 1.0 s, downswing 0.23 to 0.3 s, near the 3:1
+tempo of Grober (2009). Written for a right-hander facing the ball, target on the left; `s` mirrors it.
+"""
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.performer.curves import smaller, wander
+from harness.mocap.performer.feet import foot
+from harness.mocap.performer.figure import LEFT, SIDES, Figure
+from harness.mocap.performer.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
+from harness.mocap.performer.gestures import Gesture, play
+from harness.mocap.performer.limbs import unit
+from harness.mocap.performer.performers import Habits
+
+_APART_M = 0.085
+"""Between the two wrists along the grip."""
+
+
+def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
+    """One take: a swing every six to eight seconds, full or three quarters."""
+    trail = habits.hand
+    lead = "l" if trail == "r" else "r"
+    s = LEFT[lead]
+    leg = leg_m(skeleton)
+    full = (1.0, 0.88, 0.95, 0.80)[(take - 1) % 4] * rng.uniform(0.97, 1.03)
+    swings, begins = _swings(rng, t, habits, full)
+    act = play(t, swings)
+
+    half = leg * rng.uniform(0.24, 0.29)
+    stance = {
+        lead: Stance(0.06, s * half, s * rng.uniform(0.20, 0.40)),
+        trail: Stance(0.06, -s * half, -s * rng.uniform(0.05, 0.20)),
+    }
+    start = Shift(0.0, (0.0, 0.0), float(rng.uniform(-np.pi, np.pi)))
+    shifts = _next_ball(rng, start, begins)
+    place, facing = body_path(t, start, shifts)
+    plants = steps(rng, stance, start, shifts, float(t[-1]))
+    feet = {
+        lead: foot(t, skeleton, lead, plants[lead], 0.02, act["lead heel"]),
+        trail: foot(t, skeleton, trail, plants[trail], 0.02, act["trail heel"], s * act["pivot"]),
+    }
+
+    tilt = rng.uniform(0.28, 0.38) + act["tilt"] + wander(rng, t, 2.5, 0.01)
+    bend = habits.bend_rad + rng.uniform(0.28, 0.38) + act["bend"] + wander(rng, t, 2.5, 0.015)
+    turn = s * (act["pelvis"] + wander(rng, t, 2.5, 0.015))
+    twist = s * (act["twist"] + wander(rng, t, 2.5, 0.02))
+    pelvis = np.stack([facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"]], axis=-1)
+    over = turn + 0.5 * twist
+    spine = np.stack([bend * np.cos(over), twist, bend * np.sin(over) - s * act["side bend"]], axis=-1)
+    breath = np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
+    spine[:, 0] += 0.01 * breath
+    gaze = np.stack(
+        [
+            facing + s * (act["look"] + 0.03) + wander(rng, t, 2.5, 0.03),
+            0.80 + act["nod"] + wander(rng, t, 2.5, 0.02),
+            s * act["cant"] + wander(rng, t, 3.0, 0.015),
+        ],
+        axis=-1,
+    )
+    ahead = -0.13 * leg - 0.03 + act["ahead"] + wander(rng, t, 2.5, 0.006)
+    left = s * act["side"] + wander(rng, t, 2.5, 0.006)
+    c, d = np.cos(facing), np.sin(facing)
+    place = place + np.stack([c * ahead - d * left, d * ahead + c * left], axis=-1)
+    top = highest_root_m(skeleton, place, pelvis, feet, 0.985)
+    height = np.median(top) - 0.035 * leg + act["up"] + wander(rng, t, 2.5, 0.004)
+    root = np.concatenate([place, smaller(top, height, 0.03)[:, None]], axis=1)
+    shoulders = {
+        lead: (-0.03 + act["lead lift"] + 0.01 * breath, 0.10 + act["lead reach"]),
+        trail: (-0.03 + act["trail lift"] + 0.01 * breath, 0.10 + act["trail reach"]),
+    }
+    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders)
+
+    arm = sum(figure.length_m(f"{lead}{bone}") for bone in ("humerus", "radius", "wrist")) / 0.58
+    swing = act["swing"] + wander(rng, t, 2.5, 0.015)
+    plane = rng.uniform(0.88, 1.02) + act["plane"]
+    target = np.stack([-s * d, s * c, np.zeros_like(c)], axis=-1)
+    away = np.stack([np.cos(plane) * c, np.cos(plane) * d, -np.sin(plane) * np.ones_like(c)], axis=-1)
+    out = 0.52 + act["radius"] + wander(rng, t, 2.5, 0.006)
+    grip = figure.chest_m + arm * out[:, None] * (np.cos(swing)[:, None] * away + np.sin(swing)[:, None] * target)
+    grip += (arm * (0.02 + act["in"]))[:, None] * np.stack([c, d, np.zeros_like(c)], axis=-1)
+    cocked = swing + act["cock"] + 0.02
+    shaft = np.cos(cocked)[:, None] * away + np.sin(cocked)[:, None] * target
+    along = -np.sin(swing)[:, None] * away + np.cos(swing)[:, None] * target
+    for side, end in ((lead, -0.5), (trail, 0.5)):
+        figure.leg(side, feet[side])
+        inward = LEFT[side]
+        chest_left = figure.chest[:, :, 1]
+        elbow = -0.8 * figure.chest[:, :, 2] + 0.35 * inward * chest_left - 0.35 * figure.chest[:, :, 0]
+        wrist = grip + end * _APART_M * shaft
+        palm = along * (1.0 if side == trail else -1.0) + 0.2 * np.array([0.0, 0.0, -1.0])
+        turned = figure.palm_turn(side, wrist, elbow, unit(palm))
+        figure.reach(
+            side,
+            wrist,
+            elbow,
+            turned,
+            (
+                -0.10 - (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"]) + wander(rng, t, 1.6, 0.02),
+                0.05 + 0.45 * np.tanh(0.6 * act["load"]) + wander(rng, t, 1.6, 0.02),
+            ),
+        )
+    return figure
+
+
+def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) -> tuple[list[Gesture], list[float]]:
+    """The swings, and when each return to the ball begins [s]."""
+    gestures: list[Gesture] = []
+    begins: list[float] = []
+    now = float(t[0]) - rng.uniform(0.0, 3.0)
+    slow = rng.uniform(0.95, 1.12) / habits.pace
+    while now < t[-1]:
+        back, down = rng.uniform(0.80, 0.98) * slow, rng.uniform(0.26, 0.31) * slow
+        waggle = rng.uniform(1.0, 1.8)
+        through_s, hold, home = rng.uniform(0.42, 0.52) * slow, rng.uniform(0.6, 1.3), rng.uniform(1.5, 2.1)
+        a = waggle
+        b = a + back
+        p = b + 0.06
+        i = p + down
+        f = i + through_s
+        h = f + hold
+        e = h + home
+        size = full * rng.normal(1.0, 0.02)
+        gestures += [
+            Gesture(
+                now,
+                {
+                    "swing": [(a, 0.0), (b + 0.03, -2.48 * size), (i, 0.04), (f, 2.55 * size), (h, 2.5 * size), (e, 0.0)],
+                    "cock": [(a + 0.1, 0.0), (b + 0.08, -1.45), (p + 0.45 * down, -1.15), (i, 0.0), (f, 1.30), (h, 1.25), (e, 0.0)],
+                    "load": [(a + 0.1, 0.0), (b + 0.05, 1.0), (p + 0.5 * down, 0.9), (i, 0.0), (f - 0.1, 0.9), (h, 0.85), (e, 0.0)],
+                    "radius": [(a, 0.0), (b, -0.06), (i, 0.015), (i + 0.35 * through_s, 0.0), (f, -0.15), (h, -0.15), (e, 0.0)],
+                    "in": [(a, 0.0), (b, 0.08), (i, 0.0), (f, 0.10), (h, 0.10), (e, 0.0)],
+                    "plane": [(a, 0.0), (b, 0.02), (i, 0.0), (f, 0.05), (h, 0.05), (e, 0.0)],
+                    "pelvis": [(a + 0.08, 0.0), (b - 0.04, -0.70 * size), (i, 0.60), (f, 1.25 * size), (h, 1.20 * size), (e - 0.1, 0.0)],
+                    "twist": [(a, 0.0), (b + 0.04, -0.78 * size), (i, -0.22), (f, 0.38 * size), (h, 0.34 * size), (e, 0.0)],
+                    "tilt": [(b, 0.0), (i, 0.02), (f, -0.26 * size), (h, -0.28), (e, 0.0)],
+                    "bend": [(b, 0.0), (i, -0.05), (f, -0.34 * size), (h, -0.32), (e, 0.0)],
+                    "side bend": [(a, 0.0), (b, 0.04), (i, -0.16), (f, -0.06), (e, 0.0)],
+                    "drop": [(a, 0.0), (b, 0.05), (i, -0.06), (f, -0.02), (e, 0.0)],
+                    "look": [(i + 0.08, 0.0), (f + 0.1, 1.25), (h, 1.30), (h + 0.8 * home, 0.0)],
+                    "nod": [(i + 0.06, 0.0), (f + 0.1, -0.68), (h, -0.70), (h + 0.8 * home, 0.0)],
+                    "cant": [(a, 0.0), (b, 0.10), (i, 0.16), (f, 0.05), (e, 0.0)],
+                    "side": [(a, 0.0), (b, -0.045), (i, 0.09), (f, 0.15), (h, 0.15), (e, 0.0)],
+                    "ahead": [(a, 0.0), (i, 0.02), (f, 0.06), (h, 0.06), (e, 0.0)],
+                    "up": [(a, 0.0), (b, 0.0), (p + 0.5 * down, -0.03), (i, 0.01), (f, 0.03), (h, 0.03), (e, 0.0)],
+                    "lead heel": [(a, 0.0), (b, 0.10), (i, 0.0)],
+                    "trail heel": [(p + 0.4 * down, 0.0), (i, 0.35), (f, 1.05 * size), (h, 1.0 * size), (e - 0.5, 0.0)],
+                    "pivot": [(p + 0.4 * down, 0.0), (i, 0.15), (f, 0.65), (h, 0.62), (e - 0.5, 0.0)],
+                    "lead reach": [(a, 0.0), (b, 0.12), (i, 0.0), (f, -0.08), (e, 0.0)],
+                    "trail reach": [(a, 0.0), (b, -0.08), (i, 0.03), (f, 0.12), (e, 0.0)],
+                    "lead lift": [(a, 0.0), (b, 0.10), (i, 0.03), (f, 0.12), (e, 0.0)],
+                    "trail lift": [(a, 0.0), (b, 0.14), (i, -0.03), (f, 0.08), (e, 0.0)],
+                },
+            ).varied(rng, 1.0, 1.0, 0.02),
+            Gesture(now, {"swing": _waggle(rng, waggle), "cock": _waggle(rng, waggle, 1.6)}),
+        ]  # fmt: skip
+        begins.append(now + h + 0.25)
+        now += e + rng.uniform(0.0, 0.3)
+    return gestures, begins
+
+
+def _waggle(rng: np.random.Generator, lasts_s: float, size: float = 1.0) -> list[tuple[float, float]]:
+    times = np.linspace(0.0, 0.9 * lasts_s, 6)
+    swing = np.array([0.0, -0.10, 0.02, -0.12, 0.01, 0.0]) * rng.uniform(0.6, 1.3, 6) * size
+    return [(float(a), float(b)) for a, b in zip(times, swing, strict=True)]
+
+
+def _next_ball(rng: np.random.Generator, start: Shift, begins: list[float]) -> list[Shift]:
+    """Small steps to the next ball after each swing."""
+    shifts: list[Shift] = []
+    place, yaw = np.array(start.place_m), start.yaw_rad
+    for at_s in begins:
+        place = 0.5 * place + rng.normal(0.0, 0.05, 2)
+        yaw += rng.normal(0.0, 0.08)
+        if at_s > 0.0:
+            shifts.append(Shift(at_s, (float(place[0]), float(place[1])), yaw, 0.42, 0.10, 0.025))
+    return shifts
