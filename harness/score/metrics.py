@@ -94,9 +94,16 @@ DEFINITIONS: dict[str, Definition] = {
         "mm/s", "horizontal speed of ankles and toes that truly touch the ground (< 5 cm, < 15 cm/s)", 1, "mean"
     ),
     "foot_skate_true_mm_s": Definition("mm/s", "the truth's own foot skate", 1, "mean"),
-    "penetration_mm": Definition("mm", "depth of the lowest ankle or toe below ground in contact frames", 1, "mean"),
+    "penetration_mm": Definition(
+        "mm", "depth of the lowest ankle or toe below the ground that the truth stands on, in contact frames", 1, "mean"
+    ),
     "penetration_true_mm": Definition("mm", "the truth's own penetration", 1, "mean"),
-    "float_mm": Definition("mm", "height of the lowest ankle or toe above ground in contact frames", 1, "mean"),
+    "float_mm": Definition(
+        "mm",
+        "height of the lowest ankle or toe above the ground that the truth stands on, in contact frames",
+        1,
+        "mean",
+    ),
     "float_true_mm": Definition("mm", "the truth's own float", 1, "mean"),
     "lag_ms": Definition("ms", "shift that minimises joint_angle_mean_deg, positive when late; reported, not removed"),
     "step_mean_ms": Definition("ms", "mean wall time of one step, the first frame left out"),

@@ -86,6 +86,8 @@ class Pair:
     frame_index: Ints
     """(F,) which of the true frames each row is, strictly increasing; a step of more than one is a gap."""
     rate_hz: float
+    ground_m: float = 0.0
+    """Height at which the truth's feet stand, see `contact.ground_m` [m]."""
 
     @property
     def skeleton(self) -> Skeleton:
@@ -93,7 +95,7 @@ class Pair:
 
     def at(self, rows: Bools) -> "Pair":
         """Some of the frames."""
-        return Pair(self.truth.at(rows), self.estimate.at(rows), self.frame_index[rows], self.rate_hz)
+        return Pair(self.truth.at(rows), self.estimate.at(rows), self.frame_index[rows], self.rate_hz, self.ground_m)
 
     def unbroken(self, steps: int) -> Bools:
         """(F,) True where the frame and the `steps` before it follow each other without a gap."""

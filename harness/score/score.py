@@ -9,7 +9,7 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, ShapeError
-from harness.score import angles, positions, timing
+from harness.score import angles, contact, positions, timing
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS, Pool
 from harness.score.pair import Pair, hinged_bones, joint_names, posed
 
@@ -59,8 +59,9 @@ def score(
     coverage = scored.sum() / expected if expected else 0.0
 
     truth = posed(skeleton, truth_qpos)
+    ground_m = contact.ground_m(truth) if len(truth_qpos) else 0.0
     known = frame_index[finite]
-    pair = Pair(truth.at(known), posed(skeleton, estimate_qpos[finite]), known, rate_hz)
+    pair = Pair(truth.at(known), posed(skeleton, estimate_qpos[finite]), known, rate_hz, ground_m)
     per_frame = {name: np.full(len(frame_index), np.nan) for name in FRAME_METRICS}
     for name, function in FRAME_METRICS.items():
         if len(known):
