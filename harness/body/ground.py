@@ -1,14 +1,16 @@
 """Feet and the floor: how high the soles are, and when they carry the body."""
 
 import numpy as np
-from scipy.ndimage import binary_opening, gaussian_filter1d
+from scipy.ndimage import binary_opening, gaussian_filter1d, minimum_filter1d
 
 from harness.body import anatomy
 from harness.core.arrays import Bools, Floats
 from harness.core.skeleton import Pose, Skeleton
 
-SLOW_M_S, STANCE_S = 0.5, 0.105
-"""A foot in stance is slower than this for at least this long; at the top of a jump only for 2 v / g = 0.102 s."""
+SLOW_M_S, STANCE_S = 0.5, 0.06
+"""A foot in stance is slower than this for at least this long,"""
+LOW_WITHIN_M, LOW_WITHIN_S = 0.03, 0.3
+"""and no higher than this above the lowest that it gets within this time: at the top of a jump it is."""
 FLOOR_WITHIN_M = 0.08
 """The floor of a clip is looked for within this distance of z = 0 (CMU's lie within 6 cm)."""
 SETTLE_S = 0.5
@@ -25,14 +27,16 @@ def sole_heights_m(own: Skeleton, pose: Pose) -> Floats:
 
 
 def stance(own: Skeleton, pose: Pose, rate_hz: float) -> Bools:
-    """(T, 2) whether the left and right foot carries the body: it is the lower one, and slow for a while."""
+    """(T, 2) whether the left and right foot carries the body: the lower one, slow and low for a while."""
     if len(pose.end_m) < 2:
         return np.zeros((len(pose.end_m), 2), dtype=bool)
     heights_m = sole_heights_m(own, pose)
     lower = heights_m <= np.min(heights_m, axis=1, keepdims=True) + 0.01
+    around = minimum_filter1d(heights_m, 2 * round(LOW_WITHIN_S * rate_hz) + 1, axis=0)
+    low = heights_m <= around + LOW_WITHIN_M
     balls_m = pose.end_m[:, [own.index("lfoot"), own.index("rfoot")]]
     slow = np.linalg.norm(np.gradient(balls_m, 1.0 / rate_hz, axis=0), axis=2) < SLOW_M_S
-    out: Bools = binary_opening(lower & slow, np.ones((max(1, round(STANCE_S * rate_hz)), 1), dtype=bool))
+    out: Bools = binary_opening(lower & low & slow, np.ones((max(1, round(STANCE_S * rate_hz)), 1), dtype=bool))
     return out
 
 

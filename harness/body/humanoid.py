@@ -46,22 +46,27 @@ class Body:
 def build(own: Skeleton | None = None, trackers: Iterable[mounts.Mount] = ()) -> Body:
     """The humanoid with this skeleton (the standard one by default) and these trackers.
 
-    Bones, hinge axes, geoms and masses follow the skeleton; equal input gives equal bytes. BadInput unless the
-    skeleton has the 24 bones and 48 hinges of `core.humanoid24`; errors of `mounts.place` for the trackers.
+    Bones, hinge axes, geoms and masses follow the skeleton; equal input gives equal bytes. BadInput as
+    `require` says or for a station worn twice; errors of `mounts.place` for the trackers.
     """
     fitted = humanoid24.standard_skeleton() if own is None else own
-    standard = humanoid24.standard_skeleton()
-    if (fitted.names, fitted.parents, fitted.hinges) != (standard.names, standard.parents, standard.hinges):
-        raise BadInput(
-            f"A skeleton of {fitted.bone_count} bones and {len(fitted.axes)} hinges is not the humanoid's.",
-            "Take its 24 bones first, in the order of core.humanoid24.BONES: skeleton.subset(BONES).",
-        )
+    require(fitted)
     worn = tuple(trackers)
     stations = [mount.station for mount in worn]
     for station in stations:
         if stations.count(station) > 1:
             raise BadInput(f"Station {station!r} is worn twice.", "Give each tracker its own name.")
     return _built(fitted.bone_m.tobytes(), fitted.axes.tobytes(), worn)
+
+
+def require(own: Skeleton) -> None:
+    """BadInput unless the skeleton has the 24 bones and 48 hinges of the humanoid."""
+    standard = humanoid24.standard_skeleton()
+    if (own.names, own.parents, own.hinges) != (standard.names, standard.parents, standard.hinges):
+        raise BadInput(
+            f"A skeleton of {own.bone_count} bones and {len(own.axes)} hinges is not the humanoid's.",
+            "Take its 24 bones first, in the order of core.humanoid24.BONES: skeleton.subset(BONES).",
+        )
 
 
 @lru_cache(maxsize=32)

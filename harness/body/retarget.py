@@ -42,9 +42,8 @@ class RetargetReport:
 
 def to_own_body(clip: Clip) -> tuple[Body, Take]:
     """The clip on the body scaled to its own skeleton: nothing is changed, fingers and toes are left out."""
-    own, dofs = clip.skeleton.subset(humanoid24.BONES)
-    qpos = humanoid24.pack(clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])
-    return humanoid.build(own), _take(clip, qpos)
+    own, angles_rad = _humanoid_part(clip)
+    return humanoid.build(own), _take(clip, humanoid24.pack(clip.root_m, clip.world_from_root, angles_rad))
 
 
 def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
@@ -54,8 +53,8 @@ def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
     then moves by one constant offset in its own frame, that of least squared joint deviation, and by a slowly
     varying height that puts soles in stance where the performer's are, over a floor at z = 0.
     """
-    own, dofs = clip.skeleton.subset(humanoid24.BONES)
-    turns, kept_rad = clip.world_from_root, clip.angles_rad[:, dofs]
+    own, kept_rad = _humanoid_part(clip)
+    turns = clip.world_from_root
     seen = skeleton.forward(own, clip.root_m, turns, kept_rad)
     soles_m, standing = ground.sole_heights_m(own, seen), ground.stance(own, seen, clip.rate_hz)
     floor_m, scale = ground.floor_m(soles_m, standing), _leg_m(target) / _leg_m(own)
@@ -89,6 +88,13 @@ def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
         sink_mm=_beyond(-feet_mm),
     )
     return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), report
+
+
+def _humanoid_part(clip: Clip) -> tuple[Skeleton, Floats]:
+    """The 24 bones of the clip's skeleton and their (T, 48) angles; UnknownName or BadInput if it has not got them."""
+    own, dofs = clip.skeleton.subset(humanoid24.BONES)
+    humanoid.require(own)
+    return own, clip.angles_rad[:, dofs]
 
 
 def _best_offset_m(residual_m: Floats, world_from_root: Floats) -> Floats:

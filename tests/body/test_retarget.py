@@ -1,0 +1,216 @@
+"""Captured motion onto the performer's own body and onto a common one."""
+
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from harness.body import ground, humanoid, kinematics, retarget
+from harness.body.retarget import RetargetReport
+from harness.core import humanoid24, rotations, skeleton
+from harness.core.motion import Clip
+from harness.core.skeleton import Skeleton
+from harness.errors import BadInput, UnknownName
+from harness.mocap.acclaim import read_clip
+from harness.mocap.library import MotionLibrary, skeleton_file
+from tests.body.conftest import clip_on, random_qpos
+
+STANDARD = humanoid24.standard_skeleton()
+
+
+def amcs(mocap: Path) -> list[Path]:
+    return [entry.path for entry in MotionLibrary(mocap).entries() if entry.format == "amc"]
+
+
+def as_recorded(path: Path, mocap: Path) -> Clip:
+    return read_clip(skeleton_file(path, mocap.resolve()), path, rate_hz=120.0)
+
+
+def unwrapped(clip: Clip) -> Clip:
+    return replace(clip, angles_rad=skeleton.unwrapped(clip.skeleton, clip.angles_rad))
+
+
+def own_body_errors(clip: Clip, frames: range) -> tuple[float, float]:
+    """Largest distance [m] and angle [rad] between MuJoCo's bodies and direct ASF kinematics of the 30 bones."""
+    body, take = retarget.to_own_body(unwrapped(clip))
+    direct = skeleton.forward(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], clip.angles_rad[frames])
+    kept = [clip.skeleton.index(name) for name in humanoid24.BONES]
+    turns = rotations.from_matrix(direct.world_from_bone[:, kept])
+    kin, metres, radians = kinematics.Kinematics(body), 0.0, 0.0
+    for row, frame in enumerate(frames):
+        kin.set(take.qpos[frame])
+        joint_m, turn = kin.bone_poses()
+        end_m = joint_m + rotations.rotate(turn, body.skeleton.bone_m)
+        metres = max(metres, *np.linalg.norm(joint_m - direct.start_m[row, kept], axis=1))
+        metres = max(metres, *np.linalg.norm(end_m - direct.end_m[row, kept], axis=1))
+        radians = max(radians, *rotations.angle_between_rad(turn, turns[row]))
+    return metres, radians
+
+
+def test_every_staged_clip_is_exact_on_its_own_body(mocap: Path) -> None:
+    for path in amcs(mocap):
+        clip = as_recorded(path, mocap)
+        metres, radians = own_body_errors(clip, range(0, len(clip), max(1, len(clip) // 8)))
+        assert metres < 1e-3, path.stem
+        assert radians < np.deg2rad(0.1), path.stem
+
+
+@pytest.mark.slow
+def test_every_frame_of_every_staged_clip_is_exact_on_its_own_body(
+    mocap: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    errors = {}
+    for path in amcs(mocap):
+        clip = as_recorded(path, mocap)
+        errors[path.stem] = own_body_errors(clip, range(len(clip)))
+    metres, radians = np.max(list(errors.values()), axis=0)
+    with capsys.disabled():
+        print(
+            f"\n{len(errors)} clips on their own bodies: at most {1e3 * metres:.2e} mm, {np.rad2deg(radians):.2e} deg"
+        )
+    assert metres < 1e-3
+    assert radians < np.deg2rad(0.1)
+
+
+def test_own_body_keeps_the_clip_to_the_bit(lanky: Skeleton, rng: np.random.Generator) -> None:
+    qpos = random_qpos(rng, 5)
+    body, take = retarget.to_own_body(clip_on(lanky, qpos))
+    np.testing.assert_array_equal(take.qpos, qpos)
+    np.testing.assert_array_equal(body.skeleton.bone_m, lanky.bone_m)
+    assert (take.name, take.rate_hz) == ("made_up", 60.0)
+
+
+def test_clips_without_the_humanoids_bones_or_hinges_are_refused(rng: np.random.Generator) -> None:
+    clip = clip_on(STANDARD, random_qpos(rng, 3))
+    small, dofs = STANDARD.subset(STANDARD.names[:-1])
+    with pytest.raises(UnknownName, match="rfoot"):
+        retarget.to_own_body(replace(clip, skeleton=small, angles_rad=clip.angles_rad[:, dofs]))
+    stiff = Skeleton(STANDARD.names, STANDARD.parents, STANDARD.bone_m, (*STANDARD.hinges[:-1], ()), STANDARD.axes[:-2])
+    with pytest.raises(BadInput, match="46 hinges"):
+        retarget.to_own_body(replace(clip, skeleton=stiff, angles_rad=clip.angles_rad[:, :-2]))
+
+
+def walking_in_place(own: Skeleton, rate_hz: float = 60.0) -> Clip:
+    """Four seconds of bending the knees in turn, the other foot planted; the hips follow the planted foot."""
+    time_s = np.arange(0.0, 4.0, 1.0 / rate_hz)
+    qpos = np.tile(humanoid.tpose(own), (len(time_s), 1))
+    root_m, turns, angles = humanoid24.unpack(qpos)
+    angles = np.array(angles)
+    for side, sign in (("l", 1.0), ("r", -1.0)):
+        lift = np.maximum(0.0, sign * np.sin(np.pi * time_s))
+        angles[:, own.dof_names.index(f"{side}femur.rx")] = -0.6 * lift
+        angles[:, own.dof_names.index(f"{side}tibia.rx")] = 1.0 * lift
+    pose = skeleton.forward(own, root_m, turns, angles)
+    root_m = root_m - np.min(ground.sole_heights_m(own, pose), axis=1)[:, None] * np.array([0.0, 0.0, 1.0])
+    return clip_on(own, humanoid24.pack(root_m, turns, angles), rate_hz)
+
+
+def test_a_body_of_the_same_shape_loses_nothing() -> None:
+    clip = walking_in_place(STANDARD.with_bones(1.1 * STANDARD.bone_m))
+    take, report = retarget.to_common_body(clip, STANDARD)
+    assert report.leg_scale == pytest.approx(1 / 1.1)
+    assert max(report.deviation_mm, report.proportions_mm, report.float_mm, report.sink_mm) < 1e-3
+    np.testing.assert_allclose(humanoid24.unpack(take.qpos)[2], clip.angles_rad, atol=1e-9)
+    np.testing.assert_allclose(take.qpos[:, :3], clip.root_m / 1.1, atol=1e-6)
+
+
+def test_a_raised_clip_comes_down_to_the_floor() -> None:
+    clip = walking_in_place(STANDARD)
+    raised = replace(clip, root_m=clip.root_m + np.array([0.0, 0.0, 0.04]))
+    take, report = retarget.to_common_body(raised, STANDARD)
+    assert report.floor_m == pytest.approx(0.04, abs=1e-3)
+    assert report.float_plain_mm == pytest.approx(40.0, abs=1.0)
+    assert max(report.float_mm, report.sink_mm) < 0.1
+    np.testing.assert_allclose(take.qpos, retarget.to_common_body(clip, STANDARD)[0].qpos, atol=1e-4)
+
+
+def test_other_proportions_are_met_as_far_as_they_allow() -> None:
+    bone_m = np.array(STANDARD.bone_m)
+    for bone, stretch in {"hipjoint": 1.2, "femur": 1.1, "tibia": 0.92, "foot": 1.1, "clavicle": 0.9}.items():
+        for side in "lr":
+            bone_m[STANDARD.index(side + bone)] *= stretch
+    bone_m[STANDARD.index("lclavicle")] += [0.03, 0.0, 0.02]
+    take, report = retarget.to_common_body(walking_in_place(STANDARD.with_bones(bone_m)), STANDARD)
+    assert report.stance_share > 0.9
+    assert report.float_plain_mm > 10.0
+    assert report.deviation_mm < report.deviation_plain_mm
+    assert max(report.float_mm, report.sink_mm) < 5.0
+    pose = kinematics.pose(STANDARD, take.qpos)
+    lowest_mm = 1e3 * np.min(ground.sole_heights_m(STANDARD, pose), axis=1)
+    assert np.max(np.abs(lowest_mm)) < 8.0
+
+
+def test_feet_that_never_stand_are_not_measured() -> None:
+    clip = walking_in_place(STANDARD)
+    flying = replace(clip, root_m=clip.root_m + 3.0 * np.arange(len(clip))[:, None] / clip.rate_hz)
+    report = retarget.to_common_body(flying, STANDARD)[1]
+    assert report.stance_share == 0.0
+    assert np.isnan([report.float_mm, report.sink_mm, report.float_plain_mm, report.sink_plain_mm]).all()
+    assert np.isfinite(report.deviation_mm)
+
+
+def onto_standard(paths: list[Path], mocap: Path) -> Iterator[RetargetReport]:
+    for path in paths:
+        yield retarget.to_common_body(unwrapped(as_recorded(path, mocap)), STANDARD)[1]
+
+
+def hold(reports: list[RetargetReport]) -> None:
+    """What the README of the model states."""
+    for report in reports:
+        assert report.deviation_mm < 35.0, report
+        assert report.deviation_mm < report.deviation_plain_mm + 5.0, report
+        assert report.deviation_mm < 1.75 * report.proportions_mm, report
+        if report.stance_share:
+            assert max(report.float_mm, report.sink_mm) < 20.0, report
+    measured = [r for r in reports if r.stance_share]
+    assert len(measured) >= 0.95 * len(reports)
+    assert np.mean([max(r.float_mm, r.sink_mm) for r in measured]) < 8.0
+    assert np.mean([r.deviation_mm for r in reports]) < 0.9 * np.mean([r.deviation_plain_mm for r in reports])
+
+
+def table(reports: list[RetargetReport]) -> str:
+    names = [field.name for field in fields(RetargetReport)]
+    rows = [names] + [[_shown(getattr(r, name)) for name in names] for r in reports]
+    for label, of in (("mean", np.nanmean), ("largest", np.nanmax)):
+        rows.append([label] + [_shown(float(of([getattr(r, name) for r in reports]))) for name in names[1:]])
+    widths = [max(len(row[column]) for row in rows) for column in range(len(names))]
+    return "\n".join("  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)) for row in rows)
+
+
+def _shown(value: str | float) -> str:
+    if isinstance(value, str):
+        return value
+    return "not measured" if np.isnan(value) else f"{value:.3f}" if abs(value) < 2.0 else f"{value:.1f}"
+
+
+def test_one_clip_of_each_subject_on_the_standard_body(mocap: Path) -> None:
+    first = {path.stem.split("_")[0]: path for path in reversed(amcs(mocap))}
+    hold(list(onto_standard(sorted(first.values()), mocap)))
+
+
+@pytest.mark.slow
+def test_every_staged_clip_on_the_standard_body(mocap: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    reports = list(onto_standard(amcs(mocap), mocap))
+    with capsys.disabled():
+        print("\n" + table(reports))
+    hold(reports)
+
+
+def test_the_root_needs_no_unit_quaternion_sign(rng: np.random.Generator) -> None:
+    clip = walking_in_place(STANDARD.with_bones(1.05 * STANDARD.bone_m))
+    flipped = replace(clip, world_from_root=-clip.world_from_root)
+    one, other = (retarget.to_common_body(c, STANDARD)[0].qpos for c in (clip, flipped))
+    np.testing.assert_allclose(one[:, 7:], other[:, 7:], atol=1e-12)
+    np.testing.assert_allclose(one[:, :3], other[:, :3], atol=1e-12)
+
+
+def test_a_retargeted_take_poses_in_mujoco(lanky: Skeleton) -> None:
+    take, _ = retarget.to_common_body(walking_in_place(lanky), STANDARD)
+    model = humanoid.build().model
+    data = mujoco.MjData(model)
+    data.qpos[:] = take.qpos[10]
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.body("root").xpos, take.qpos[10, :3])
