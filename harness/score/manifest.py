@@ -103,7 +103,7 @@ def _commit(root: Path) -> dict[str, Any]:
         done = subprocess.run([git, "-C", str(root), *question], capture_output=True, text=True, timeout=20)
         return done.stdout.strip() if done.returncode == 0 else None
 
-    status = ask("status", "--porcelain", "--untracked-files=no")
+    status = ask("status", "--porcelain", "--", "harness", "models", "scenarios")
     return {"commit": ask("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
 
 

@@ -23,7 +23,7 @@ def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: 
     estimate, at = estimate_rad[inside], frame_index[inside]
     shifts = np.arange(-reach, reach + 1)
     error = np.array([np.abs(wrapped(estimate - truth_rad[at - shift])).mean() for shift in shifts])
-    if np.ptp(error) < 1e-9:
+    if min(np.ptp(error), np.ptp(estimate, axis=0).max()) < 1e-9:
         return float("nan")
     best = int(np.argmin(error))
     if best in (0, len(shifts) - 1):

@@ -10,6 +10,7 @@ from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Status
 from harness.core.humanoid24 import pack, standard_skeleton
 from harness.score import results
+from harness.score.cell import IDENTITY
 from harness.score.score import Scores, score
 
 RATE_HZ = 40.0
@@ -82,9 +83,8 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., results.Cell]:
             "orientation_valid": np.ones((frames, 2)),
             "suspect": np.zeros((frames, 2)),
         } | fields
-        key = results.cell_key(
-            {**content["defined_by"], "clip": content["clip"]}, {"name": content["method"]}, "source"
-        )  # type: ignore[dict-item]
+        described = {name: content[name] for name in IDENTITY}
+        key = results.cell_key(described, {"off_m": off_m, "frames": frames}, "source")
         return results.Cell(key=key, **content)  # type: ignore[arg-type]
 
     return cell

@@ -20,14 +20,14 @@ def take(truth_qpos: Floats) -> Take:
 def test_null_methods_bound_the_scale(truth_qpos: Floats) -> None:
     found = {name: s.metrics for name, s in bounds(standard_skeleton(), RATE_HZ, truth_qpos).items()}
     assert list(found) == list(NULLS)
-    angle = {name: metrics["joint_angle_mean_deg"] for name, metrics in found.items()}
+    angle = {name: metrics["joint_angle_mean_deg"] or 0.0 for name, metrics in found.items()}
     assert angle["oracle"] == 0.0
     assert 0.0 < angle["last_value"] < 0.2 * angle["frozen_pose"]
     assert angle["last_value"] < angle["mean_pose"] < angle["frozen_pose"]
     assert found["last_value"]["lag_ms"] == pytest.approx(1e3 / RATE_HZ)
     assert found["mean_pose"]["root_position_mm"] == 0.0
     assert found["frozen_pose"]["jitter_m_s3"] == 0.0
-    assert found["frozen_pose"]["lag_ms"] is None or found["frozen_pose"]["lag_ms"] != 0.0
+    assert found["frozen_pose"]["lag_ms"] is None  # what does not move cannot be late
 
 
 def test_the_doctor_finds_these_scores_sound(take: Take) -> None:
