@@ -66,8 +66,10 @@ def read_asf(path: Path | str) -> Skeleton:
     return read_asf_file(path).skeleton
 
 
-def read_asf_file(path: Path | str) -> AsfFile:
+def read_asf_file(path: Path | str, *, unit_m: float | None = None) -> AsfFile:
     """Skeleton and unit of an ASF file; bones are depth first in the order of its hierarchy.
+
+    `unit_m` overrules the unit of length in the file [m].
 
     Raises BadFile with the line for anything that cannot be understood: units, unknown or repeated bones, a bone
     with two parents, none, or among its own ancestors.
@@ -91,7 +93,7 @@ def read_asf_file(path: Path | str) -> AsfFile:
             _hierarchy(path, draft, words, line)
         elif not section:
             raise BadFile(path, f"{text.strip()[:40]!r}", "a section such as :version", f"Is it {_WHAT}?", line)
-    return _build(path, draft)
+    return _build(path, draft, unit_m)
 
 
 def _units(path: Path, draft: _Draft, words: list[str], line: int) -> None:
@@ -185,7 +187,7 @@ def _hierarchy(path: Path, draft: _Draft, words: list[str], line: int) -> None:
         draft.parent_of[child] = words[0]
 
 
-def _build(path: Path, draft: _Draft) -> AsfFile:
+def _build(path: Path, draft: _Draft, unit_m: float | None) -> AsfFile:
     for missing, what in (
         (not draft.length_unit, ":units with a length"),
         (not draft.root_order, ":root with an order"),
@@ -200,7 +202,7 @@ def _build(path: Path, draft: _Draft) -> AsfFile:
         found = f"bone {lost[0]} that does not hang on the root (an orphan or a cycle)"
         raise BadFile(path, found, "every bone below the root", "Correct :hierarchy.", draft.bones[lost[0]].line)
     bones = [draft.bones[name] for name in names]
-    metres = INCH_M / draft.length_unit
+    metres = INCH_M / draft.length_unit if unit_m is None else unit_m
     skeleton = Skeleton(
         names=names,
         parents=tuple(names.index(draft.parent_of[n]) if draft.parent_of[n] != "root" else -1 for n in names),
@@ -238,4 +240,4 @@ def _check_longest(path: Path, skeleton: Skeleton) -> None:
     longest = float(skeleton.length_m.max())
     if not 0.1 <= longest <= 1.0:
         found = f"a longest bone of {longest:.3g} m"
-        raise BadFile(path, found, "0.1 to 1 m", "Correct the length in :units (0.45 in CMU's files).")
+        raise BadFile(path, found, "0.1 to 1 m", "Correct length in :units (CMU: 0.45), or give --unit.")

@@ -78,17 +78,27 @@ def read_bvh(path: Path | str, *, unit_m: float | None = None) -> JointClip:
         rate_hz=_rate_hz(text.frame_time_s),
         root_m=position[:, 0] @ WORLD_FROM_ASF.T * unit,
         parent_from_joint=turned,
-        notes=(f"unit {unit:.6g} m: {evidence}",),
+        unit_m=unit,
+        unit_evidence=evidence,
     )
 
 
 def read_clip(path: Path | str, *, unit_m: float | None = None) -> Clip:
     """A BVH file of CMU's conversion as a clip of the 24 bones, without the T-pose that it adds in front."""
     joint_clip = read_bvh(path, unit_m=unit_m)
-    absent = {drive.joint for drive in CMU_MAP.values()} - set(joint_clip.names)
-    if absent:
+    if not is_cmu(joint_clip):
         advice = "For another skeleton write a joint map and use joints.to_clip."
-        raise BadFile(path, f"no joint {', '.join(sorted(absent))}", "the joints of CMU's BVH conversion", advice)
+        raise BadFile(path, "other joints", "those of CMU's BVH conversion, Hips to Head", advice)
+    return to_cmu_clip(joint_clip)
+
+
+def is_cmu(joint_clip: JointClip) -> bool:
+    """Whether the file has the joints of CMU's conversion."""
+    return {joint for drive in CMU_MAP.values() for joint in (drive.joint, drive.tip) if joint} <= set(joint_clip.names)
+
+
+def to_cmu_clip(joint_clip: JointClip) -> Clip:
+    """The motion on the 24 bones, if its joints are those of CMU's conversion."""
     if starts_in_t_pose(joint_clip):
         joint_clip = replace(joint_clip.cut(1), notes=(*joint_clip.notes, "frame 1, an added T-pose, was left out"))
     return to_clip(joint_clip, CMU_MAP)

@@ -52,8 +52,10 @@ class MarkerClip:
     position_m: Floats
     """(T, M, 3) NaN where a marker was not seen [m]."""
     unit_m: float
-    evidence: str
-    """Why the unit and the axes are what they are."""
+    unit_evidence: str
+    """Why the unit is what it is."""
+    up_evidence: str
+    """Which axis of the file is up, and why."""
 
     def __post_init__(self) -> None:
         freeze(self, position_m=("T", len(self.labels), 3))
@@ -89,7 +91,8 @@ def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
         rate_hz=rate_hz,
         position_m=np.moveaxis(position, 0, 1) * unit @ _WORLD_FROM_FILE[screen].T,
         unit_m=unit,
-        evidence=f"{unit_evidence}; {screen[1]} is up, from POINT:Y_SCREEN",
+        unit_evidence=unit_evidence,
+        up_evidence=f"{screen[1].removeprefix('+').lower()} (POINT:Y_SCREEN is {screen[1]})",
     )
 
 

@@ -40,6 +40,10 @@ class JointClip:
     """(T, 3) position of the first joint [m]."""
     parent_from_joint: Floats
     """(T, J, 4) unit quaternions (w, x, y, z)."""
+    unit_m: float = 1.0
+    """Length of 1 in the file [m]."""
+    unit_evidence: str = "metres"
+    """Why the unit is what it is."""
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
