@@ -1,4 +1,4 @@
-"""Errors of joint angles and rotations (ALGORITHMS.md, part D). Each metric: a `Pair` in, one number a frame out.
+"""Errors of joint angles and rotations (docs/methods.md, part D). Each metric: a `Pair` in, one number a frame out.
 
 Different definitions give numbers that differ by a factor of two on the same motion; never compare across them.
 """

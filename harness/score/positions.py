@@ -1,4 +1,4 @@
-"""Errors of joint centres (ALGORITHMS.md, part D). Each metric: a `Pair` in, one number a frame out.
+"""Errors of joint centres (docs/methods.md, part D). Each metric: a `Pair` in, one number a frame out.
 
 Nothing is aligned unless the name says so.
 """
