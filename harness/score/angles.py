@@ -6,7 +6,7 @@ Different definitions give numbers that differ by a factor of two on the same mo
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.score.pair import Pair, bones_named, hinged_bones
 
 SIP_BONES = ("lhumerus", "rhumerus", "lfemur", "rfemur")
@@ -71,8 +71,7 @@ def mpjre_axis_angle_deg(pair: Pair) -> Floats:
 
 def joint_geodesic_global_deg(pair: Pair) -> Floats:
     """(F,) mean geodesic error of the hinged bones' global rotations, roots aligned."""
-    bones = hinged_bones(pair.skeleton)
-    return _root_aligned_deg(pair, bones)
+    return _root_aligned_deg(pair, hinged_bones(pair.skeleton))
 
 
 def sip_error_deg(pair: Pair) -> Floats:
@@ -88,12 +87,11 @@ def root_angle_deg(pair: Pair) -> Floats:
 
 def root_heading_deg(pair: Pair) -> Floats:
     """(F,) wrapped difference of the root's yaw, without sign."""
-    yaw = (rotations.yaw_rad(p.world_from_root) for p in (pair.truth, pair.estimate))
-    truth, estimate = yaw
+    truth, estimate = (rotations.yaw_rad(p.world_from_root) for p in (pair.truth, pair.estimate))
     out: Floats = np.rad2deg(np.abs(wrapped(estimate - truth)))
     return out
 
 
-def _root_aligned_deg(pair: Pair, bones: np.typing.NDArray[np.int64]) -> Floats:
+def _root_aligned_deg(pair: Pair, bones: Ints) -> Floats:
     out: Floats = geodesic_deg(pair.truth.root_from_bone[:, bones], pair.estimate.root_from_bone[:, bones]).mean(axis=1)
     return out

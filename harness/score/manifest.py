@@ -17,7 +17,7 @@ from typing import Any
 
 import harness
 from harness.errors import BadFile
-from harness.score.files import content_key, plain, read_json
+from harness.score.files import plain, read_json
 from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "plotly", "ezc3d", "mink")
@@ -86,11 +86,6 @@ def source_hash() -> str:
         state.update(f"{file.relative_to(package).as_posix()}\0".encode())
         state.update(file.read_bytes() + b"\0")
     return state.hexdigest()
-
-
-def inputs_key(manifest: Manifest) -> str:
-    """Stands for everything that two comparable results share."""
-    return content_key({"inputs": manifest.inputs, "metric_versions": manifest.metric_versions})
 
 
 def _commit(root: Path) -> dict[str, Any]:
