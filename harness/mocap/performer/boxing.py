@@ -11,9 +11,11 @@ from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.mocap.performer.curves import smaller, wander
 from harness.mocap.performer.feet import foot
-from harness.mocap.performer.figure import LEFT, SIDES, Figure
+from harness.mocap.performer.figure import LEFT, Figure
 from harness.mocap.performer.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
 from harness.mocap.performer.gestures import Gesture, Keys, play
+from harness.mocap.performer.limbs import columns, on_floor
+from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
 
 
@@ -28,7 +30,7 @@ _JAB: Mapping[str, Keys] = {
     "lead.pronate": _out_and_back(1.0),
     "lead.elbow": _out_and_back(0.35),
     "lead.reach": _out_and_back(0.16),
-    "twist": _out_and_back(-0.20, 0.15),
+    "twist": _out_and_back(-0.26, 0.15),
     "pelvis": _out_and_back(-0.08, 0.1),
     "ahead": _out_and_back(0.05, 0.1),
     "bend": _out_and_back(0.04),
@@ -41,8 +43,8 @@ _CROSS: Mapping[str, Keys] = {
     "rear.elbow": _out_and_back(0.4),
     "rear.reach": _out_and_back(0.16),
     "lead.ahead": _out_and_back(-0.06),
-    "twist": _out_and_back(0.48, 0.12),
-    "pelvis": _out_and_back(0.55, 0.08),
+    "twist": _out_and_back(0.55, 0.12),
+    "pelvis": _out_and_back(0.66, 0.08),
     "ahead": _out_and_back(0.07, 0.1),
     "bend": _out_and_back(0.10),
     "heel": _out_and_back(0.35),
@@ -103,13 +105,23 @@ _COMBINATIONS: tuple[tuple[Mapping[str, Keys], ...], ...] = (
 )
 
 
+_REST: Mapping[str, Keys] = {
+    "drop": [(0.0, 0.0), (0.5, 1.0), (1.8, 0.95), (2.4, 0.0)],
+    "pelvis": [(0.0, 0.0), (0.5, 0.25), (1.8, 0.22), (2.4, 0.0)],
+    "dip": [(0.0, 0.0), (0.5, -0.04), (1.8, -0.04), (2.4, 0.0)],
+    "bend": [(0.0, 0.0), (0.5, -0.10), (1.8, -0.10), (2.4, 0.0)],
+}
+"""Guard down, on the toes."""
+
+
 def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
     """One take; each favours some of the combinations."""
     rear = habits.hand
     lead = "l" if rear == "r" else "r"
     s = LEFT[lead]
-    size, slow = habits.size * rng.uniform(0.93, 1.05), rng.uniform(0.95, 1.2) / habits.pace
+    size, slow = habits.size * float(rng.uniform(0.93, 1.08)), float(rng.uniform(0.92, 1.12)) / habits.pace
     leg = leg_m(skeleton)
+    bladed, crouch = float(rng.uniform(0.45, 0.80)), float(rng.uniform(0.04, 0.09))
 
     stance = {
         lead: Stance(0.27 * leg, s * 0.15 * leg, -s * 0.30),
@@ -120,80 +132,74 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     plants = steps(rng, stance, start, shifts, float(t[-1]))
     act = play(t, _rounds(rng, t, size, slow, take))
 
-    bounce = 2.0 * np.pi * np.cumsum(np.full(len(t), t[1] - t[0]) * (1.9 + wander(rng, t, 3.0, 0.15)))
+    bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.9 + wander(rng, t, 3.0, 0.15)))
     ahead = act["ahead"] + 0.02 * np.sin(0.5 * bounce) + wander(rng, t, 1.8, 0.012)
-    side = s * (act["side"] + wander(rng, t, 1.6, 0.015))
-    place = place + _turned(facing, ahead, side)
+    place = place + on_floor(facing, ahead, s * (act["side"] + wander(rng, t, 1.6, 0.015)))
+    heel = 0.32 + 0.04 * np.sin(bounce) + act["heel"]
     feet = {
         lead: foot(t, skeleton, lead, plants[lead], 0.05, 0.03 + 0.03 * np.sin(bounce)),
-        rear: foot(t, skeleton, rear, plants[rear], 0.05, 0.32 + 0.04 * np.sin(bounce) + act["heel"], s * act["pivot"]),
+        rear: foot(t, skeleton, rear, plants[rear], 0.05, heel, s * act["pivot"]),
     }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.4, 0.55) + rng.uniform(0.0, 6.0))
-    pelvis = np.stack(
-        [
-            facing - s * (0.62 - act["pelvis"]) + wander(rng, t, 1.6, 0.04),
-            habits.pelvis_rad + 0.10 + 0.3 * act["bend"] + wander(rng, t, 2.0, 0.02),
-            s * 0.35 * act["lean"] + wander(rng, t, 2.0, 0.02),
-        ],
-        axis=-1,
+    pelvis = columns(
+        facing - s * (bladed - act["pelvis"]) + wander(rng, t, 1.6, 0.05),
+        habits.pelvis_rad + 0.10 + 0.3 * act["bend"] + wander(rng, t, 2.0, 0.02),
+        s * 0.35 * act["lean"] + wander(rng, t, 2.0, 0.02),
     )
-    spine = np.stack(
-        [
-            habits.bend_rad + 0.16 + act["bend"] + 0.01 * breath + wander(rng, t, 2.0, 0.025),
-            s * (0.16 + act["twist"]) + wander(rng, t, 1.6, 0.03),
-            s * 0.65 * act["lean"] + wander(rng, t, 2.0, 0.025),
-        ],
-        axis=-1,
+    spine = columns(
+        habits.bend_rad + 0.12 + 1.2 * crouch + act["bend"] + 0.01 * breath + wander(rng, t, 2.0, 0.025),
+        s * (0.16 + act["twist"]) + wander(rng, t, 1.6, 0.03),
+        s * 0.65 * act["lean"] + wander(rng, t, 2.0, 0.025),
     )
-    gaze = np.stack(
-        [
-            facing - s * 0.06 + 0.15 * s * act["twist"] + wander(rng, t, 2.0, 0.05),
-            0.18 + wander(rng, t, 2.0, 0.03),
-            s * 0.4 * act["lean"] + wander(rng, t, 2.0, 0.03),
-        ],
-        axis=-1,
+    gaze = columns(
+        facing - s * (0.06 - 0.15 * act["twist"]) + wander(rng, t, 2.0, 0.05),
+        0.18 + wander(rng, t, 2.0, 0.03),
+        s * 0.4 * act["lean"] + wander(rng, t, 2.0, 0.03),
     )
     top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
-    height = np.median(top) - rng.uniform(0.05, 0.08) * leg + 0.010 * np.sin(bounce) - act["dip"]
-    root = np.concatenate([place, smaller(top, height + wander(rng, t, 2.0, 0.008), 0.03)[:, None]], axis=1)
+    height = np.median(top) - crouch * leg + 0.010 * np.sin(bounce) - act["dip"] + wander(rng, t, 2.0, 0.008)
+    root = columns(*place.T, smaller(top, height, 0.03))
     shoulders = {
-        lead: (0.06 + 0.02 * breath, act["lead.reach"] + wander(rng, t, 1.5, 0.015)),
-        rear: (0.06 + 0.02 * breath, act["rear.reach"] + wander(rng, t, 1.5, 0.015)),
+        side: (0.06 + 0.02 * breath, act[f"{who}.reach"] + wander(rng, t, 1.5, 0.015))
+        for who, side in (("lead", lead), ("rear", rear))
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders)
-    arm = sum(figure.length_m(f"{lead}{bone}") for bone in ("humerus", "radius", "wrist"))
-    guard = {lead: (0.36, 0.16, 0.04), rear: (0.20, 0.14, 0.06)}
-    for who, side_name in (("lead", lead), ("rear", rear)):
-        figure.leg(side_name, feet[side_name])
-        sign = LEFT[side_name]
-        x, y, z = guard[side_name]
-        reach = arm / 0.58
-        wrist = figure.around_m(
-            facing,
-            reach * (x + act[f"{who}.ahead"] + wander(rng, t, 1.3, 0.018)),
-            sign * reach * (y - act[f"{who}.in"] + wander(rng, t, 1.3, 0.014)),
-            reach * (z + act[f"{who}.up"] + wander(rng, t, 1.3, 0.016)),
-        )
-        raised = act[f"{who}.elbow"] + 0.30 + wander(rng, t, 1.6, 0.06)
-        figure.reach(
-            side_name,
-            wrist,
-            _pole(facing, sign, raised),
-            -0.35 + act[f"{who}.pronate"] + wander(rng, t, 1.4, 0.06),
-            (-0.08 + 0.06 * act[f"{who}.pronate"] + wander(rng, t, 1.4, 0.04), 0.05 + wander(rng, t, 1.4, 0.03)),
-        )
+    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    for who, side, guard in (("lead", lead, (0.36, 0.16, 0.04)), ("rear", rear, (0.20, 0.14, 0.06))):
+        figure.leg(side, feet[side])
+        _fist(figure, side, rng, t, facing, np.array(guard), {k: act[f"{who}.{k}"] for k in _CHANNELS}, act["drop"])
     return figure
 
 
-def _turned(yaw: Floats, ahead: Floats, left: Floats) -> Floats:
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.stack([c * ahead - s * left, s * ahead + c * left], axis=-1)
+_CHANNELS = ("ahead", "in", "up", "elbow", "pronate")
 
 
-def _pole(yaw: Floats, sign: float, raised: Floats) -> Floats:
-    """(T, 3) where an elbow points: down when `raised` is 0, out to its side at pi/2 [rad]."""
-    flat = _turned(yaw, -0.25 * np.ones_like(yaw), sign * np.sin(raised))
-    return np.concatenate([flat, -np.cos(raised)[:, None]], axis=1)
+def _fist(
+    figure: Figure,
+    side: str,
+    rng: np.random.Generator,
+    t: Floats,
+    facing: Floats,
+    guard: Floats,
+    act: Mapping[str, Floats],
+    drop: Floats,
+) -> None:
+    """One arm from its guard: ahead, out and up of the chest for an arm of 0.58 m [m]."""
+    sign, reach = LEFT[side], figure.arm_m(side) / 0.58
+    x, y, z = guard + rng.normal(0.0, 0.025, 3)
+    wrist = figure.around_m(
+        facing,
+        reach * (x + act["ahead"] - 0.10 * drop + wander(rng, t, 1.3, 0.018)),
+        sign * reach * (y - act["in"] + 0.08 * drop + wander(rng, t, 1.3, 0.014)),
+        reach * (z + act["up"] - 0.30 * drop + wander(rng, t, 1.3, 0.016)),
+    )
+    raised = act["elbow"] + 0.30 + float(rng.normal(0.0, 0.08)) + wander(rng, t, 1.6, 0.05)
+    figure.reach(
+        side,
+        wrist,
+        columns(*on_floor(facing, -0.25, sign * np.sin(raised)).T, -np.cos(raised)),
+        -0.35 + act["pronate"] + wander(rng, t, 1.4, 0.05),
+        (-0.08 + 0.06 * act["pronate"], np.full(len(t), 0.05)),
+    )
 
 
 def _dance(rng: np.random.Generator, t: Floats, slow: float) -> tuple[Shift, list[Shift]]:
@@ -205,17 +211,11 @@ def _dance(rng: np.random.Generator, t: Floats, slow: float) -> tuple[Shift, lis
     while now < t[-1]:
         yaw += rng.normal(0.0, 0.16)
         home = -0.25 * place
-        move = rng.uniform(0.08, 0.20) * _unit2(rng) + home
-        place = place + move
+        place = place + on_floor(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.08, 0.20), 0.0) + home
         step_s = rng.uniform(0.20, 0.26) * slow
         shifts.append(Shift(now, (float(place[0]), float(place[1])), yaw, step_s, rng.uniform(0.02, 0.08), 0.022))
         now += 2.0 * step_s + 0.1 + rng.uniform(0.05, 0.9)
     return start, shifts
-
-
-def _unit2(rng: np.random.Generator) -> Floats:
-    angle = rng.uniform(0.0, 2.0 * np.pi)
-    return np.array([np.cos(angle), np.sin(angle)])
 
 
 def _rounds(rng: np.random.Generator, t: Floats, size: float, slow: float, take: int) -> list[Gesture]:
@@ -232,5 +232,8 @@ def _rounds(rng: np.random.Generator, t: Floats, size: float, slow: float, take:
                 punch = Gesture(now, {**punch.parts, "dip": [(dt, -v) for dt, v in punch.parts["dip"]]})
             gestures.append(punch)
             now += (0.62 if parts is _ROLL else rng.uniform(0.34, 0.46)) * slow
-        now += rng.uniform(0.3, 1.1) * slow
+        now += rng.uniform(0.15, 0.8) * slow
+        if rng.random() < 0.16:
+            gestures.append(Gesture(now, _REST).varied(rng, 1.0, slow))
+            now += 2.1 * slow
     return gestures

@@ -10,6 +10,7 @@ from harness.core.skeleton import Skeleton
 from harness.mocap.performer import limbs
 from harness.mocap.performer.curves import larger, smaller
 from harness.mocap.performer.limbs import about, turned, unit
+from harness.mocap.performer.manner import Manner
 
 Hand = tuple[Floats, Floats]
 SIDES = ("l", "r")
@@ -19,7 +20,7 @@ LEFT = {"l": 1.0, "r": -1.0}
 _SPINE = {"lowerback": (0.40, 0.25, 0.40), "upperback": (0.33, 0.40, 0.32), "thorax": (0.27, 0.35, 0.28)}
 """Share of bend, twist and lean that each back bone takes; the low back bends most, twists least (White and Panjabi)."""
 _NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
-_NECK_BIAS_RAD = {"lowerneck": -0.26, "upperneck": 0.24, "head": 0.10}
+_NECK_BIAS_RAD = {"lowerneck": -0.28, "upperneck": 0.20, "head": 0.08}
 """The neck's S-shape when looking straight ahead, about the medians of real clips."""
 _CLAVICLE_RAD = 0.16
 _HANGING = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -49,20 +50,22 @@ class Figure:
         spine: Floats,
         gaze: Floats,
         shoulders: Mapping[str, tuple[Floats, Floats]],
+        manner: Manner,
     ) -> None:
         """Pose the trunk of T frames.
 
         `pelvis` (T, 3) yaw, pitch, roll [rad]; `spine` (T, 3) bend, twist and lean of the chest on the pelvis [rad];
-        `gaze` (T, 3) yaw, pitch and roll of the head in the world [rad]; `shoulders` lift and reach (T,) [rad].
+        `gaze` (T, 3) yaw, pitch and roll of the head in the world [rad]; `shoulders` lift and reach (T,) [rad];
+        `manner` what back, neck and hands do on top.
         """
-        self.skeleton, self.root_m = skeleton, root_m
+        self.skeleton, self.root_m, self._manner = skeleton, root_m, manner
         self.angles_rad = np.zeros((len(root_m), len(skeleton.axes)))
         self.pelvis = about(2, pelvis[:, 0]) @ about(1, pelvis[:, 1]) @ about(0, pelvis[:, 2])
         self._world: dict[str, Floats] = {}
         self._end: dict[str, Floats] = {}
         above, at = self.pelvis, root_m
         for bone, share in _SPINE.items():
-            above, at = self._put(bone, above, at, spine * share)
+            above, at = self._put(bone, above, at, spine * share + manner[bone])
         self.chest, self.chest_m = above, at
         self._neck(gaze)
         for side in SIDES:
@@ -88,7 +91,7 @@ class Figure:
         wanted = limbs.euler_xyz(rest.T @ np.swapaxes(self.chest, -1, -2) @ head @ rest)
         for bone, share in _NECK.items():
             where = self.skeleton.dof_of_bone[self.skeleton.index(bone)]
-            self.angles_rad[:, where] = wanted * share + [_NECK_BIAS_RAD[bone] - 0.03, 0.0, 0.0]
+            self.angles_rad[:, where] = wanted * share + self._manner[bone] + [_NECK_BIAS_RAD[bone], 0.0, 0.0]
 
     def shoulder_m(self, side: str) -> Floats:
         """(T, 3) where the upper arm starts."""
@@ -107,6 +110,10 @@ class Figure:
 
     def length_m(self, bone: str) -> float:
         return float(self.skeleton.length_m[self.skeleton.index(bone)])
+
+    def arm_m(self, side: str) -> float:
+        """From shoulder to wrist."""
+        return sum(self.length_m(f"{side}{bone}") for bone in ("humerus", "radius", "wrist"))
 
     def _set(self, bone: str, *angles: Floats) -> None:
         self.angles_rad[:, self.skeleton.dof_of_bone[self.skeleton.index(bone)]] = np.stack(angles, axis=-1)
@@ -144,8 +151,9 @@ class Figure:
         above = self._world[f"{side}clavicle"]
         self._three(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
         self._set(f"{side}radius", elbow)
-        self._set(f"{side}wrist", -sign * turn)
-        self._set(f"{side}hand", hand[0], -sign * hand[1])
+        self._set(f"{side}wrist", -sign * turn + self._manner[f"{side}wrist"][:, 0])
+        loose = self._manner[f"{side}hand"]
+        self._set(f"{side}hand", hand[0] + loose[:, 0], -sign * hand[1] + loose[:, 1])
 
     def hang(
         self, side: str, swing: Floats, spread: Floats, twist: Floats, elbow: Floats, turn: Floats, hand: Hand

@@ -5,16 +5,19 @@ downswing and the eyes stay on the ball until it is gone. Backswing 0.75 to 1.0 
 tempo of Grober (2009). Written for a right-hander facing the ball, target on the left; `s` mirrors it.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.mocap.performer.curves import smaller, wander
 from harness.mocap.performer.feet import foot
-from harness.mocap.performer.figure import LEFT, SIDES, Figure
+from harness.mocap.performer.figure import LEFT, Figure
 from harness.mocap.performer.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
 from harness.mocap.performer.gestures import Gesture, play
-from harness.mocap.performer.limbs import unit
+from harness.mocap.performer.limbs import columns, on_floor, unit
+from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
 
 _APART_M = 0.085
@@ -22,19 +25,19 @@ _APART_M = 0.085
 
 
 def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
-    """One take: a swing every six to eight seconds, full or three quarters."""
+    """One take: a swing every eight seconds or so, full or three quarters."""
     trail = habits.hand
     lead = "l" if trail == "r" else "r"
     s = LEFT[lead]
     leg = leg_m(skeleton)
-    full = (1.0, 0.88, 0.95, 0.80)[(take - 1) % 4] * rng.uniform(0.97, 1.03)
+    full = (1.0, 0.88, 0.95, 0.80)[(take - 1) % 4] * float(rng.uniform(0.97, 1.03))
     swings, begins = _swings(rng, t, habits, full)
     act = play(t, swings)
 
-    half = leg * rng.uniform(0.24, 0.29)
+    half = leg * float(rng.uniform(0.22, 0.30))
     stance = {
-        lead: Stance(0.06, s * half, s * rng.uniform(0.20, 0.40)),
-        trail: Stance(0.06, -s * half, -s * rng.uniform(0.05, 0.20)),
+        lead: Stance(0.06, s * half, s * float(rng.uniform(0.20, 0.40))),
+        trail: Stance(0.06, -s * half, -s * float(rng.uniform(0.05, 0.20))),
     }
     start = Shift(0.0, (0.0, 0.0), float(rng.uniform(-np.pi, np.pi)))
     shifts = _next_ball(rng, start, begins)
@@ -44,67 +47,66 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
         lead: foot(t, skeleton, lead, plants[lead], 0.02, act["lead heel"]),
         trail: foot(t, skeleton, trail, plants[trail], 0.02, act["trail heel"], s * act["pivot"]),
     }
-
-    tilt = rng.uniform(0.28, 0.38) + act["tilt"] + wander(rng, t, 2.5, 0.01)
-    bend = habits.bend_rad + rng.uniform(0.28, 0.38) + act["bend"] + wander(rng, t, 2.5, 0.015)
+    tilt = float(rng.uniform(0.26, 0.40)) + act["tilt"] + wander(rng, t, 2.5, 0.01)
+    bend = habits.bend_rad + float(rng.uniform(0.26, 0.38)) + act["bend"] + wander(rng, t, 2.5, 0.015)
     turn = s * (act["pelvis"] + wander(rng, t, 2.5, 0.015))
     twist = s * (act["twist"] + wander(rng, t, 2.5, 0.02))
-    pelvis = np.stack([facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"]], axis=-1)
+    # bends are towards the ball whichever way hips and chest have turned
+    pelvis = columns(facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"])
     over = turn + 0.5 * twist
-    spine = np.stack([bend * np.cos(over), twist, bend * np.sin(over) - s * act["side bend"]], axis=-1)
-    breath = np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
-    spine[:, 0] += 0.01 * breath
-    gaze = np.stack(
-        [
-            facing + s * (act["look"] + 0.03) + wander(rng, t, 2.5, 0.03),
-            0.80 + act["nod"] + wander(rng, t, 2.5, 0.02),
-            s * act["cant"] + wander(rng, t, 3.0, 0.015),
-        ],
-        axis=-1,
+    breath = 0.01 * np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
+    spine = columns(bend * np.cos(over) + breath, twist, bend * np.sin(over) - s * act["side bend"])
+    gaze = columns(
+        facing + s * (act["look"] + 0.03) + wander(rng, t, 2.5, 0.03),
+        0.80 + act["nod"] + wander(rng, t, 2.5, 0.02),
+        s * act["cant"] + wander(rng, t, 3.0, 0.015),
     )
     ahead = -0.13 * leg - 0.03 + act["ahead"] + wander(rng, t, 2.5, 0.006)
-    left = s * act["side"] + wander(rng, t, 2.5, 0.006)
-    c, d = np.cos(facing), np.sin(facing)
-    place = place + np.stack([c * ahead - d * left, d * ahead + c * left], axis=-1)
+    place = place + on_floor(facing, ahead, s * act["side"] + wander(rng, t, 2.5, 0.006))
     top = highest_root_m(skeleton, place, pelvis, feet, 0.985)
-    height = np.median(top) - 0.035 * leg + act["up"] + wander(rng, t, 2.5, 0.004)
-    root = np.concatenate([place, smaller(top, height, 0.03)[:, None]], axis=1)
+    height = np.median(top) - float(rng.uniform(0.025, 0.05)) * leg + act["up"] + wander(rng, t, 2.5, 0.004)
+    root = columns(*place.T, smaller(top, height, 0.03))
     shoulders = {
-        lead: (-0.03 + act["lead lift"] + 0.01 * breath, 0.10 + act["lead reach"]),
-        trail: (-0.03 + act["trail lift"] + 0.01 * breath, 0.10 + act["trail reach"]),
+        lead: (-0.03 + act["lead lift"] + breath, 0.10 + act["lead reach"]),
+        trail: (-0.03 + act["trail lift"] + breath, 0.10 + act["trail reach"]),
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders)
+    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    for side in (lead, trail):
+        figure.leg(side, feet[side])
+    _grip(figure, rng, t, facing, act, lead, trail)
+    return figure
 
-    arm = sum(figure.length_m(f"{lead}{bone}") for bone in ("humerus", "radius", "wrist")) / 0.58
+
+def _grip(
+    figure: Figure,
+    rng: np.random.Generator,
+    t: Floats,
+    facing: Floats,
+    act: Mapping[str, Floats],
+    lead: str,
+    trail: str,
+) -> None:
+    """Both hands on the club: `swing` is the angle of the arms on their plane, `cock` what the wrists add."""
+    s = LEFT[lead]
+    arm = figure.arm_m(lead) / 0.58
     swing = act["swing"] + wander(rng, t, 2.5, 0.015)
-    plane = rng.uniform(0.88, 1.02) + act["plane"]
-    target = np.stack([-s * d, s * c, np.zeros_like(c)], axis=-1)
-    away = np.stack([np.cos(plane) * c, np.cos(plane) * d, -np.sin(plane) * np.ones_like(c)], axis=-1)
+    plane = float(rng.uniform(0.88, 1.02)) + act["plane"]
+    target = columns(*on_floor(facing, 0.0, s).T, 0.0)
+    away = columns(*on_floor(facing, np.cos(plane), 0.0).T, -np.sin(plane))
     out = 0.52 + act["radius"] + wander(rng, t, 2.5, 0.006)
-    grip = figure.chest_m + arm * out[:, None] * (np.cos(swing)[:, None] * away + np.sin(swing)[:, None] * target)
-    grip += (arm * (0.02 + act["in"]))[:, None] * np.stack([c, d, np.zeros_like(c)], axis=-1)
+    cos, sin = np.cos(swing)[:, None], np.sin(swing)[:, None]
+    grip = figure.chest_m + arm * out[:, None] * (cos * away + sin * target)
+    grip += columns(*on_floor(facing, arm * (0.02 + act["in"]), 0.0).T, arm * act["raise"])
     cocked = swing + act["cock"] + 0.02
     shaft = np.cos(cocked)[:, None] * away + np.sin(cocked)[:, None] * target
-    along = -np.sin(swing)[:, None] * away + np.cos(swing)[:, None] * target
+    strike = cos * target - sin * away
     for side, end in ((lead, -0.5), (trail, 0.5)):
-        figure.leg(side, feet[side])
-        inward = LEFT[side]
-        chest_left = figure.chest[:, :, 1]
-        elbow = -0.8 * figure.chest[:, :, 2] + 0.35 * inward * chest_left - 0.35 * figure.chest[:, :, 0]
         wrist = grip + end * _APART_M * shaft
-        palm = along * (1.0 if side == trail else -1.0) + 0.2 * np.array([0.0, 0.0, -1.0])
-        turned = figure.palm_turn(side, wrist, elbow, unit(palm))
-        figure.reach(
-            side,
-            wrist,
-            elbow,
-            turned,
-            (
-                -0.10 - (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"]) + wander(rng, t, 1.6, 0.02),
-                0.05 + 0.45 * np.tanh(0.6 * act["load"]) + wander(rng, t, 1.6, 0.02),
-            ),
-        )
-    return figure
+        elbow = 0.35 * LEFT[side] * figure.chest[:, :, 1] - 0.8 * figure.chest[:, :, 2] - 0.35 * figure.chest[:, :, 0]
+        palm = (1.0 if side == trail else -1.0) * strike - [0.0, 0.0, 0.2]
+        back = 0.10 + (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"])
+        up = 0.05 + 0.45 * np.tanh(0.6 * act["load"])
+        figure.reach(side, wrist, elbow, figure.palm_turn(side, wrist, elbow, unit(palm)), (-back, up))
 
 
 def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) -> tuple[list[Gesture], list[float]]:
@@ -124,6 +126,7 @@ def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) ->
         f = i + through_s
         h = f + hold
         e = h + home
+        relax = rng.uniform(0.6, 2.2)
         size = full * rng.normal(1.0, 0.02)
         gestures += [
             Gesture(
@@ -136,31 +139,44 @@ def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) ->
                     "in": [(a, 0.0), (b, 0.08), (i, 0.0), (f, 0.10), (h, 0.10), (e, 0.0)],
                     "plane": [(a, 0.0), (b, 0.02), (i, 0.0), (f, 0.05), (h, 0.05), (e, 0.0)],
                     "pelvis": [(a + 0.08, 0.0), (b - 0.04, -0.70 * size), (i, 0.60), (f, 1.25 * size), (h, 1.20 * size), (e - 0.1, 0.0)],
-                    "twist": [(a, 0.0), (b + 0.04, -0.78 * size), (i, -0.22), (f, 0.38 * size), (h, 0.34 * size), (e, 0.0)],
+                    "twist": [(a, 0.0), (b + 0.04, -0.70 * size), (i, -0.22), (f, 0.38 * size), (h, 0.34 * size), (e, 0.0)],
                     "tilt": [(b, 0.0), (i, 0.02), (f, -0.26 * size), (h, -0.28), (e, 0.0)],
                     "bend": [(b, 0.0), (i, -0.05), (f, -0.34 * size), (h, -0.32), (e, 0.0)],
                     "side bend": [(a, 0.0), (b, 0.04), (i, -0.16), (f, -0.06), (e, 0.0)],
                     "drop": [(a, 0.0), (b, 0.05), (i, -0.06), (f, -0.02), (e, 0.0)],
-                    "look": [(i + 0.08, 0.0), (f + 0.1, 1.25), (h, 1.30), (h + 0.8 * home, 0.0)],
+                    "look": [(a, 0.0), (b, -0.32), (p + 0.5 * down, -0.2), (i + 0.08, 0.0), (f + 0.1, 1.25), (h, 1.30), (h + 0.8 * home, 0.0)],
                     "nod": [(i + 0.06, 0.0), (f + 0.1, -0.68), (h, -0.70), (h + 0.8 * home, 0.0)],
                     "cant": [(a, 0.0), (b, 0.10), (i, 0.16), (f, 0.05), (e, 0.0)],
                     "side": [(a, 0.0), (b, -0.045), (i, 0.09), (f, 0.15), (h, 0.15), (e, 0.0)],
                     "ahead": [(a, 0.0), (i, 0.02), (f, 0.06), (h, 0.06), (e, 0.0)],
                     "up": [(a, 0.0), (b, 0.0), (p + 0.5 * down, -0.03), (i, 0.01), (f, 0.03), (h, 0.03), (e, 0.0)],
                     "lead heel": [(a, 0.0), (b, 0.10), (i, 0.0)],
-                    "trail heel": [(p + 0.4 * down, 0.0), (i, 0.35), (f, 1.05 * size), (h, 1.0 * size), (e - 0.5, 0.0)],
-                    "pivot": [(p + 0.4 * down, 0.0), (i, 0.15), (f, 0.65), (h, 0.62), (e - 0.5, 0.0)],
+                    "trail heel": [(p + 0.4 * down, 0.0), (i, 0.35), (f, 0.88 * size), (h, 0.85 * size), (e - 0.5, 0.0)],
+                    "pivot": [(p + 0.4 * down, 0.0), (i, 0.15), (f, 1.0), (h, 0.95), (e - 0.5, 0.0)],
                     "lead reach": [(a, 0.0), (b, 0.12), (i, 0.0), (f, -0.08), (e, 0.0)],
                     "trail reach": [(a, 0.0), (b, -0.08), (i, 0.03), (f, 0.12), (e, 0.0)],
+                    "raise": [(b - 0.4, 0.0), (b, 0.06), (i - 0.1, 0.0), (f, 0.04), (h, 0.04), (e, 0.0)],
                     "lead lift": [(a, 0.0), (b, 0.10), (i, 0.03), (f, 0.12), (e, 0.0)],
                     "trail lift": [(a, 0.0), (b, 0.14), (i, -0.03), (f, 0.08), (e, 0.0)],
                 },
             ).varied(rng, 1.0, 1.0, 0.02),
+            _relax(rng, now + h + 0.5 * home, relax),
             Gesture(now, {"swing": _waggle(rng, waggle), "cock": _waggle(rng, waggle, 1.6)}),
         ]  # fmt: skip
         begins.append(now + h + 0.25)
-        now += e + rng.uniform(0.0, 0.3)
+        now += e + relax + 0.6 * home
     return gestures, begins
+
+
+def _relax(rng: np.random.Generator, at_s: float, lasts_s: float) -> Gesture:
+    """Upright, club down, a look to where the ball went."""
+
+    def hold(value: float) -> list[tuple[float, float]]:
+        return [(0.0, 0.0), (0.9, value), (0.9 + lasts_s, 0.95 * value), (1.9 + lasts_s, 0.0)]
+
+    parts = {"tilt": -0.26, "bend": -0.34, "nod": -0.55, "look": 0.7, "radius": -0.05, "up": 0.03, "ahead": 0.05}
+    parts |= {"twist": 0.15, "swing": 0.15, "plane": 0.10}
+    return Gesture(at_s, {name: hold(value * rng.uniform(0.6, 1.1)) for name, value in parts.items()})
 
 
 def _waggle(rng: np.random.Generator, lasts_s: float, size: float = 1.0) -> list[tuple[float, float]]:

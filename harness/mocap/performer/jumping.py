@@ -13,8 +13,9 @@ from harness.core.skeleton import Skeleton
 from harness.mocap.performer.curves import GRAVITY_M_S2, ease, larger, pulse, quintics, through, wander
 from harness.mocap.performer.feet import placed
 from harness.mocap.performer.figure import LEFT, SIDES, Figure
-from harness.mocap.performer.footwork import highest_root_m, leg_m, pelvis_matrix
+from harness.mocap.performer.footwork import highest_root_m, leg_m
 from harness.mocap.performer.gestures import Gesture, play
+from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
 
 _KINDS = ("up", "forward", "side", "turning", "series")
@@ -139,7 +140,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
         side: (0.02 * breath + 0.06 * np.tanh(act["swing"]), 0.05 * np.tanh(act["swing"]) + wander(rng, t, 2.0, 0.01))
         for side in SIDES
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders)
+    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
     for side in SIDES:
         figure.leg(side, feet[side])
         own = rng.uniform(0.93, 1.07)
@@ -266,7 +267,7 @@ def _gestures(rng: np.random.Generator, jump: Jump, habits: Habits) -> list[Gest
     b, leave, land, deep, end = (x - start for x in (jump.bottom_s, jump.leave_s, jump.land_s, jump.deep_s, jump.up_s))
     end = max(end, deep + 0.35)
     top = 0.5 * (leave + land)
-    high = rng.uniform(1.7, 2.5) * habits.size * (0.55 if jump.rebound else 1.0)
+    high = rng.uniform(1.6, 2.2) * habits.size * (0.55 if jump.rebound else 1.0)
     dip, give = jump.dip, jump.give
     far = float(np.hypot(*jump.way_m))
     return [

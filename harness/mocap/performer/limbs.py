@@ -33,6 +33,17 @@ def about(axis: int, angle_rad: float | Floats) -> Floats:
     return out
 
 
+def on_floor(yaw_rad: float | Floats, ahead: float | Floats, left: float | Floats) -> Floats:
+    """(..., 2) the vector so far ahead and left when facing `yaw_rad`."""
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    return np.stack([c * ahead - s * left, s * ahead + c * left], axis=-1)
+
+
+def columns(*values: float | Floats) -> Floats:
+    """(T, N) curves (T,) and constants side by side."""
+    return np.stack(np.broadcast_arrays(*values), axis=-1)
+
+
 def turned(m: Floats, v: Floats) -> Floats:
     """(..., 3) vectors v in the frame that m (..., 3, 3) comes from, taken through m."""
     out: Floats = np.einsum("...ij,...j->...i", m, v)

@@ -4,6 +4,7 @@ Bone lengths spread as the 20 CMU skeletons behind the standard one do (their st
 common stature; legs and arms stay mirror images.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -56,6 +57,10 @@ class Habits:
     toes_out_rad: float
     pelvis_rad: float
     """Forward tilt of the pelvis."""
+    elbow_rad: float
+    """How far the elbows of hanging arms are bent."""
+    posture_rad: Mapping[str, tuple[float, ...]]
+    """Standing offsets of the hinges of back, neck and hands, by bone."""
 
 
 def performers() -> tuple[str, ...]:
@@ -99,7 +104,27 @@ def habits(performer: str) -> Habits:
         spread_rad=float(rng.uniform(0.10, 0.20)),
         toes_out_rad=float(rng.uniform(0.05, 0.17)),
         pelvis_rad=float(rng.uniform(-0.03, 0.08)),
+        elbow_rad=float(rng.uniform(0.28, 0.60)),
+        posture_rad=_posture(rng),
     )
+
+
+def _posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
+    """Offsets that leave the carriage of chest and head about as it is: what one bone adds, the next takes away."""
+    back, neck = np.deg2rad(rng.normal(0.0, (3.5, 1.0, 1.5))), np.deg2rad(rng.normal(0.0, (5.0, 2.0, 3.5)))
+    low = float(rng.uniform(0.3, 0.7))
+    out = {
+        "lowerback": back,
+        "upperback": -low * back,
+        "thorax": (low - 1.0) * back,
+        "lowerneck": neck,
+        "upperneck": -0.8 * neck,
+        "head": -0.2 * neck,
+    }
+    for side in ("l", "r"):
+        out[f"{side}wrist"] = np.deg2rad(rng.normal(0.0, 6.0, 1))
+        out[f"{side}hand"] = np.deg2rad(rng.normal(0.0, (5.0, 6.0)))
+    return {bone: tuple(float(x) for x in angles) for bone, angles in out.items()}
 
 
 def _rng(performer: str, what: str) -> np.random.Generator:

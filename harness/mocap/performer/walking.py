@@ -4,161 +4,174 @@ Timing and amplitudes after Perry, Gait Analysis (1992): stance 62 % of the cycl
 steps that grow and quicken with speed.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.performer.curves import ease, smaller, smoothed, wander
+from harness.mocap.performer.course import Course, course
+from harness.mocap.performer.curves import GRAVITY_M_S2, smaller, smoothed, wander
 from harness.mocap.performer.feet import Plant, foot
-from harness.mocap.performer.footwork import highest_root_m
 from harness.mocap.performer.figure import LEFT, SIDES, Figure
+from harness.mocap.performer.footwork import highest_root_m
+from harness.mocap.performer.gestures import Gesture, play
+from harness.mocap.performer.limbs import columns, on_floor
+from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
 
 STANCE = 0.62
 """Share of the gait cycle that a foot is on the floor."""
+_PASSING = 0.53
+"""The pelvis passes the ankle so many steps after the heel came down."""
 _PAD_S = 3.0
-_TURNS = ("round the room", "to and fro", "square left", "square right", "figure of eight", "wandering")
+
+
+@dataclass(frozen=True)
+class Gait:
+    """How one take is walked."""
+
+    effort: float
+    """Speed over 1.3 m/s."""
+    swing: float
+    """Size of the arm swing, about 1."""
+    elbow_rad: float
+    stoop_rad: float
+    land_rad: float
+    push_rad: float
+    lift_m: float
+    half_width_m: float
 
 
 def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
     """One take along one of six kinds of path."""
-    step_s = t[1] - t[0]
+    step_s = float(t[1] - t[0])
     pad = int(_PAD_S / step_s)
-    long = (np.arange(len(t) + 2 * pad) - pad) * step_s
-    speed, heading = _course(rng, long, habits, _TURNS[(take - 1 + int(rng.integers(2))) % len(_TURNS)])
-    path = np.stack([np.cos(heading), np.sin(heading)], axis=-1) * speed[:, None]
-    path = np.concatenate([np.zeros((1, 2)), np.cumsum(0.5 * (path[1:] + path[:-1]) * step_s, axis=0)])
-    path -= 0.5 * (path.min(axis=0) + path.max(axis=0))
+    long = (np.arange(len(t) + 2 * pad) - pad) * step_s + t[0]
+    way = course(rng, long, take)
+    gait = _gait(rng, habits, float(way.speed_m_s.mean()))
     # cadence: step length grows as speed to the power 0.55
-    rhythm = (
-        1.88 * habits.pace * rng.uniform(0.97, 1.03) * (speed / 1.3) ** 0.45 * (1.0 + wander(rng, long, 1.5, 0.012))
-    )
-    phase = np.concatenate([[0.0], np.cumsum(0.5 * (rhythm[1:] + rhythm[:-1]) * step_s)]) + rng.uniform(0.0, 2.0)
-
-    def at(phases: Floats, curve: Floats) -> Floats:
-        out: Floats = np.interp(phases, phase, curve)
-        return out
-
-    effort = np.clip(speed.mean() / 1.3, 0.6, 1.4)
-    width = rng.uniform(0.045, 0.075)
-    land, push, lift = rng.uniform(0.28, 0.40) * effort**0.5, rng.uniform(0.90, 1.05), rng.uniform(0.04, 0.07)
-    plants: dict[str, list[Plant]] = {"l": [], "r": []}
-    ahead = float(skeleton.length_m[skeleton.index("lfoot")]) * 0.92
-    for k in range(int(np.ceil(phase[0])), int(phase[-1] - 2 * STANCE)):
-        side = SIDES[k % 2]
-        yaw = float(at(np.array(k + 0.62), heading))
-        where = np.array([at(np.array(k + 0.53), path[:, 0]), at(np.array(k + 0.53), path[:, 1])])
-        out = yaw + LEFT[side] * habits.toes_out_rad + rng.normal(0.0, 0.02)
-        aside = LEFT[side] * (width + rng.normal(0.0, 0.006))
-        where = (
-            where
-            + aside * np.array([-np.sin(yaw), np.cos(yaw)])
-            + rng.normal(0.0, 0.008) * np.array([np.cos(yaw), np.sin(yaw)])
-        )
-        where = where + ahead * np.array([np.cos(out), np.sin(out)])
-        plants[side].append(
-            Plant(
-                float(at(np.array(float(k)), long)),
-                float(at(np.array(k + 2.0 * STANCE), long)),
-                (float(where[0]), float(where[1])),
-                float(out),
-                land * rng.uniform(0.92, 1.08),
-                push * rng.uniform(0.95, 1.05),
-                lift * rng.uniform(0.9, 1.1),
-                0.6,
-            )
-        )
+    rhythm = 1.88 * habits.pace * rng.uniform(0.97, 1.03) * (way.speed_m_s / 1.3) ** 0.45
+    rhythm *= 1.0 + wander(rng, long, 1.5, 0.012)
+    steps = np.concatenate([[0.0], np.cumsum(0.5 * (rhythm[1:] + rhythm[:-1]) * step_s)]) + rng.uniform(0.0, 2.0)
+    plants = _plants(rng, skeleton, habits, gait, long, way, steps)
     feet = {side: foot(t, skeleton, side, plants[side], 0.03) for side in SIDES}
 
     inside = slice(pad, pad + len(t))
-    turn = np.pi * phase[inside]  # a step is pi
-    yaw, pace = heading[inside], speed[inside]
-    lean_in = np.clip(np.gradient(yaw, step_s) * pace / 9.81, -0.3, 0.3)
-    swing = rng.uniform(0.85, 1.15) * habits.size * effort
-    pelvis = np.stack(
-        [
-            yaw - 0.085 * effort * np.cos(turn + 0.15) + wander(rng, t, 2.5, 0.012),
-            habits.pelvis_rad + 0.05 + 0.012 * np.cos(2.0 * turn - 0.8) + wander(rng, t, 3.0, 0.008),
-            0.055 * np.cos(turn - 0.4 * np.pi) - 0.5 * lean_in + wander(rng, t, 3.0, 0.008),
-        ],
-        axis=-1,
+    stride = np.pi * steps[inside]
+    """Phase [rad]: 0 when the left heel comes down, pi when the right one does."""
+    yaw = way.yaw_rad[inside]
+    lean = np.clip(np.gradient(yaw, step_s) * way.speed_m_s[inside] / GRAVITY_M_S2, -0.3, 0.3)
+    pelvis = columns(
+        yaw - 0.085 * gait.effort * np.cos(stride + 0.15) + wander(rng, t, 2.5, 0.012),
+        habits.pelvis_rad
+        + 0.05
+        + 0.3 * gait.stoop_rad
+        + 0.012 * np.cos(2.0 * stride - 0.8)
+        + wander(rng, t, 3.0, 0.008),
+        0.055 * np.cos(stride - 0.4 * np.pi) - 0.5 * lean + wander(rng, t, 3.0, 0.008),
     )
-    sway = rng.uniform(0.016, 0.026) * np.cos(turn - 0.6 * np.pi)
-    aside = np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1) * (sway + wander(rng, t, 2.0, 0.004))[:, None]
-    root = np.concatenate(
-        [path[inside] + aside - 0.03 * np.stack([np.cos(yaw), np.sin(yaw)], -1), np.full((len(t), 1), 2.0)], axis=1
-    )
+    sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + wander(rng, t, 2.0, 0.004)
+    place = way.place_m[inside] + on_floor(yaw, -0.03, sway)
+    top = highest_root_m(skeleton, place, pelvis, feet, 0.994)
+    root = columns(*place.T, smaller(top, smoothed(top, 1.2 / step_s) - 0.012, 0.04))
+
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
-    spine = np.stack(
-        [
-            habits.bend_rad
-            + 0.02 * effort
-            + 0.02 * np.cos(2.0 * turn + 0.6)
-            + 0.008 * breath
-            + wander(rng, t, 4.0, 0.012),
-            0.15 * swing * np.cos(turn) + wander(rng, t, 3.0, 0.015),
-            -0.065 * np.cos(turn - 0.4 * np.pi) + 0.2 * lean_in + wander(rng, t, 3.0, 0.012),
-        ],
-        axis=-1,
+    bob = 0.02 * np.cos(2.0 * stride + 0.6) + 0.008 * breath
+    spine = columns(
+        habits.bend_rad + 0.7 * gait.stoop_rad + 0.02 * gait.effort + bob + wander(rng, t, 4.0, 0.012),
+        0.15 * gait.swing * gait.effort * np.cos(stride) + wander(rng, t, 3.0, 0.015),
+        -0.065 * np.cos(stride - 0.4 * np.pi) + 0.2 * lean + wander(rng, t, 3.0, 0.012),
     )
-    ahead_s = np.interp(t + 0.35, long, heading)
-    gaze = np.stack(
-        [
-            yaw + np.clip(1.1 * (ahead_s - yaw), -0.7, 0.7) + wander(rng, t, 2.5, 0.05),
-            0.06 + rng.uniform(-0.04, 0.08) + wander(rng, t, 2.5, 0.03),
-            -0.15 * lean_in + wander(rng, t, 3.0, 0.012),
-        ],
-        axis=-1,
+    look = play(t, _glances(rng, t))
+    bearing = np.clip(1.1 * (np.interp(t + 0.35, long, way.yaw_rad) - yaw), -0.7, 0.7)
+    gaze = columns(
+        yaw + bearing + look["yaw"] + wander(rng, t, 2.5, 0.05),
+        0.06 + rng.uniform(-0.04, 0.12) + look["pitch"] + wander(rng, t, 2.5, 0.03),
+        -0.15 * lean + wander(rng, t, 3.0, 0.012),
     )
-    forward = {"l": -np.cos(turn - 0.1), "r": np.cos(turn - 0.1)}
-    shoulders = {s: (0.02 * breath + wander(rng, t, 3.0, 0.01), 0.04 * swing * forward[s]) for s in SIDES}
-    top = highest_root_m(skeleton, root[:, :2], pelvis, feet, 0.994)
-    root[:, 2] = smaller(top, smoothed(top, 1.2 / step_s) - 0.012, 0.04)
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders)
+    forward = {"l": -np.cos(stride - 0.1), "r": np.cos(stride - 0.1)}
+    shoulders = {s: (0.02 * breath + wander(rng, t, 3.0, 0.01), 0.04 * gait.swing * forward[s]) for s in SIDES}
+    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
     for side in SIDES:
         figure.leg(side, feet[side])
-        s = forward[side]
-        own = rng.uniform(0.9, 1.1)
-        figure.hang(
-            side,
-            0.30 * swing * own * s - 0.08 + wander(rng, t, 2.5, 0.03),
-            habits.spread_rad + 0.02 * s + wander(rng, t, 2.5, 0.02),
-            0.25 + 0.08 * s + wander(rng, t, 2.5, 0.03),
-            0.42 + 0.20 * swing * s + 0.05 * s**2 + wander(rng, t, 2.0, 0.03),
-            0.05 + 0.08 * s + wander(rng, t, 2.0, 0.04),
-            (-0.22 + 0.08 * s + wander(rng, t, 1.5, 0.03), wander(rng, t, 1.5, 0.03)),
-        )
+        _swing_arm(figure, side, rng, t, habits, gait, forward[side])
     return figure
 
 
-def _course(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tuple[Floats, Floats]:
-    """Speed [m/s] and heading [rad] over time."""
-    usual = rng.uniform(0.95, 1.6)
-    heading = np.full(len(t), rng.uniform(-np.pi, np.pi)) + wander(rng, t, 4.0, 0.05)
-    slow = np.zeros(len(t))
-    start = t[0]
-    way = 1.0 if rng.random() < 0.5 else -1.0
-    while start < t[-1]:
-        angle, lasts_s, straight_s, way = _next_turn(rng, kind, way, usual)
-        share = (t - start - straight_s) / lasts_s
-        heading += angle * ease(share)
-        sharp = min(abs(angle) / lasts_s / 1.6, 1.0)
-        slow = np.maximum(slow, sharp * ease(1.0 - np.abs(2.0 * (share - 0.5)) / 1.8))
-        start += straight_s + lasts_s
-    speed = usual * (1.0 + wander(rng, t, 3.0, 0.02))
-    return speed + (np.minimum(speed, 0.92) - speed) * slow, heading
+def _gait(rng: np.random.Generator, habits: Habits, speed_m_s: float) -> Gait:
+    effort = float(np.clip(speed_m_s / 1.3, 0.6, 1.4))
+    brisk = rng.random() < 0.3
+    return Gait(
+        effort=effort,
+        swing=habits.size * float(rng.uniform(1.2, 1.7) if brisk else rng.uniform(0.55, 1.35)),
+        elbow_rad=habits.elbow_rad + float(rng.uniform(0.45, 0.9) if brisk else rng.normal(0.0, 0.12)),
+        stoop_rad=float(rng.uniform(-0.03, 0.22)),
+        land_rad=float(rng.uniform(0.28, 0.40)) * effort**0.5,
+        push_rad=float(rng.uniform(0.90, 1.05)),
+        lift_m=float(rng.uniform(0.04, 0.07)),
+        half_width_m=float(rng.uniform(0.045, 0.075)),
+    )
 
 
-def _next_turn(rng: np.random.Generator, kind: str, way: float, usual: float) -> tuple[float, float, float, float]:
-    """Angle [rad], time it takes [s], straight time before it [s], and the side of the turn after it."""
-    if kind == "round the room":
-        return way * 2.0 * np.pi, 2.0 * np.pi * rng.uniform(1.5, 2.3) / usual, 0.01, way
-    if kind == "to and fro":
-        return way * np.pi, rng.uniform(2.6, 3.2), rng.uniform(2.5, 4.5), -way
-    if kind == "square left":
-        return 0.5 * np.pi, rng.uniform(1.3, 1.7), rng.uniform(1.8, 3.2), way
-    if kind == "square right":
-        return -0.5 * np.pi, rng.uniform(1.3, 1.7), rng.uniform(1.8, 3.2), way
-    if kind == "figure of eight":
-        return way * 1.6 * np.pi, 1.6 * np.pi * rng.uniform(1.4, 1.9) / usual, rng.uniform(1.0, 1.8), -way
-    return way * rng.uniform(0.4, 1.8), rng.uniform(1.2, 2.2), rng.uniform(0.5, 2.5), float(rng.choice([-1.0, 1.0]))
+def _plants(
+    rng: np.random.Generator, skeleton: Skeleton, habits: Habits, gait: Gait, t: Floats, way: Course, steps: Floats
+) -> Mapping[str, list[Plant]]:
+    """A plant for each whole number of `steps` (T,), the steps made by the time t."""
+
+    def at(step: float, curve: Floats) -> float:
+        return float(np.interp(step, steps, curve))
+
+    plants: dict[str, list[Plant]] = {side: [] for side in SIDES}
+    ahead_m = 0.92 * float(skeleton.length_m[skeleton.index("lfoot")])
+    for k in range(int(np.ceil(steps[0])), int(steps[-1] - 2.0 * STANCE)):
+        side = SIDES[k % 2]
+        yaw = at(k + STANCE, way.yaw_rad)
+        toes = yaw + LEFT[side] * habits.toes_out_rad + float(rng.normal(0.0, 0.02))
+        ankle = np.array([at(k + _PASSING, way.place_m[:, 0]), at(k + _PASSING, way.place_m[:, 1])])
+        ankle += on_floor(yaw, rng.normal(0.0, 0.008), LEFT[side] * gait.half_width_m + rng.normal(0.0, 0.006))
+        ball = ankle + on_floor(toes, ahead_m, 0.0)
+        plants[side].append(
+            Plant(
+                on_s=at(k, t),
+                off_s=at(k + 2.0 * STANCE, t),
+                ball_m=(float(ball[0]), float(ball[1])),
+                yaw_rad=toes,
+                land_rad=gait.land_rad * float(rng.uniform(0.92, 1.08)),
+                push_rad=gait.push_rad * float(rng.uniform(0.95, 1.05)),
+                lift_m=gait.lift_m * float(rng.uniform(0.9, 1.1)),
+                lift_early=0.6,
+            )
+        )
+    return plants
+
+
+def _glances(rng: np.random.Generator, t: Floats) -> list[Gesture]:
+    """Looks to the side or to the floor."""
+    glances: list[Gesture] = []
+    now = float(t[0]) - rng.uniform(0.0, 3.0)
+    while now < t[-1]:
+        hold_s, yaw, pitch = rng.uniform(0.5, 1.6), rng.uniform(-0.8, 0.8), rng.uniform(-0.1, 0.3)
+        keys = (0.0, 0.0), (0.45, 1.0), (0.45 + hold_s, 0.95), (1.0 + hold_s, 0.0)
+        parts = {"yaw": [(s, yaw * v) for s, v in keys], "pitch": [(s, pitch * v) for s, v in keys]}
+        glances.append(Gesture(now, parts))
+        now += 1.0 + hold_s + rng.uniform(0.5, 5.0)
+    return glances
+
+
+def _swing_arm(
+    figure: Figure, side: str, rng: np.random.Generator, t: Floats, habits: Habits, gait: Gait, forward: Floats
+) -> None:
+    """`forward` (T,) is 1 when the arm is most forward, -1 when it is most back."""
+    size = gait.swing * gait.effort * float(rng.uniform(0.9, 1.1))
+    bent = gait.elbow_rad
+    figure.hang(
+        side,
+        0.30 * size * forward - 0.08 + 0.10 * bent + wander(rng, t, 2.5, 0.03),
+        habits.spread_rad + 0.02 * forward + wander(rng, t, 2.5, 0.02),
+        0.20 + 0.15 * bent + 0.08 * forward + wander(rng, t, 2.5, 0.03),
+        bent + 0.20 * size * forward + 0.05 * forward**2 + wander(rng, t, 2.0, 0.03),
+        0.05 + 0.08 * forward + wander(rng, t, 2.0, 0.04),
+        (-0.22 + 0.08 * forward + wander(rng, t, 1.5, 0.02), wander(rng, t, 1.5, 0.02)),
+    )
