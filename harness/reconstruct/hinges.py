@@ -36,7 +36,7 @@ class HingeLimits:
 
     def clipped(self, angles_rad: Floats) -> Floats:
         """The nearest angles (..., 48) within the limits."""
-        out: Floats = np.clip(angles_rad, self.low_rad, self.high_rad)
+        out: Floats = np.minimum(np.maximum(angles_rad, self.low_rad), self.high_rad)
         return out
 
     def excess_rad(self, angles_rad: Floats) -> Floats:

@@ -34,17 +34,17 @@ class Loss:
 
 
 class Residuals:
-    """Residuals of S stations on one body. Holds the last frame read and the last pose placed; one per session.
+    """Residuals of S stations on one body, for one session: `read` a frame, `place` poses, ask for slopes.
 
-    Rows are the S positions, then the S orientations; a row that was not measured counts nothing.
+    Rows are the S positions, then the S orientations; a row that was not measured counts nothing. Everything is
+    written into arrays made once, for calls cost more than numbers here.
     """
 
     def __init__(self, body: Body, calibration: Calibration, loss: Loss) -> None:
         count = len(calibration.stations)
         self.kinematics = Kinematics(body)
         self.bones = [body.skeleton.index(bone) for bone in calibration.bones]
-        self.mount_m = calibration.mount_m
-        self.bone_from_station = calibration.bone_from_station
+        self.mount_m, self.bone_from_station = calibration.mount_m, calibration.bone_from_station
         self.measured: Bools = np.zeros(2 * count, bool)
         """(2S,) which rows the last frame measured."""
         self.target_m: Floats = np.zeros((count, 3))
@@ -53,45 +53,59 @@ class Residuals:
         """(S, 4) measured orientation of the bones that carry the stations; identity where not measured."""
         self.error: Floats = np.zeros((2 * count, 3))
         """(2S, 3) measured minus modelled [m; rad]; means nothing in rows that were not measured."""
-        self.distance: Floats = np.zeros(2 * count)
-        """(2S,) norms of `error` [m; rad]."""
-
-        world_from_tracker = rotations.to_matrix(calibration.world_from_tracker)
-        self._tracker_from_world, self._origin_m = world_from_tracker.T, calibration.tracker_origin_m
-        station_from_bone = rotations.inverse(calibration.bone_from_station)
-        self._to_bone = _left(calibration.world_from_tracker) @ _right(station_from_bone)
-        self._bodies = body.bone_body_ids[self.bones]
-        self._arm_m = np.ascontiguousarray(calibration.mount_m)[:, :, None]
-        data = self.kinematics.data
-        self._body_m, self._turned, self._quaternion = data.xpos, data.xmat.reshape(-1, 3, 3), data.xquat
-        self._turn_from_model = np.zeros((count, 4, 4))
-
-        self._robust = loss.robust
-        self._precision_when_measured = np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count)
         self.scale: Floats = np.repeat([loss.position_scale_m, loss.orientation_scale_rad], count)
         """(2S,) where each row's Lorentzian starts to let go [m; rad]."""
-        self._precision = np.zeros(2 * count)
-        self._twice_scale_squared = 2.0 * self.scale**2
+
+        self._world_from_tracker = rotations.to_matrix(calibration.world_from_tracker)
+        self._origin_m = calibration.tracker_origin_m
+        station_from_bone = rotations.inverse(calibration.bone_from_station)
+        self._to_bone = _left(calibration.world_from_tracker) @ _right(station_from_bone)
+
+        data = self.kinematics.data
+        self._bodies = body.bone_body_ids[self.bones]
+        self._body_m, self._body_turned, self._body_quaternion = (
+            data.xpos,
+            data.xmat.reshape(-1, 3, 3),
+            data.xquat[:, :, None],
+        )
+        self._mount_m = np.array(calibration.mount_m)[:, :, None]
+        self._turned, self._station_m = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        self._turn_from_model = np.zeros((count, 4, 4))
+        self._quaternion, self._turn = np.zeros((count, 4, 1)), np.zeros((count, 4, 1))
+        self._turn_vector, self._turn_cosine = self._turn[:, 1:, 0], self._turn[:, 0, 0]
+        self._position_error, self._turn_error = self.error[:count], self.error[count:]
+
+        self._robust = loss.robust
+        self._own_precision = np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count)
+        self._precision, self._weight, self._root_weight = np.zeros((3, 2 * count))
+        self._squared, self._twice_scale_squared = np.zeros(2 * count), 2.0 * self.scale**2
         self._softness = np.zeros(2 * count)
-        self._weight = np.zeros(2 * count)
-        self._skew = np.zeros((2 * count, 3, 3))
-        self._share = np.repeat([1.0, 0.5], count)
-        self._jacobian = np.zeros((2 * count, 3, self.kinematics.nv))
-        self._linear, self._angular = self._jacobian[:count], self._jacobian[count:]
-        self._station_m = np.zeros((count, 3))
+        nv = self.kinematics.nv
+        self._jacobian, self._weighted = np.zeros((2, 2 * count, 3, nv))
+        self._rows, self._columns = self._weighted.reshape(-1, nv), self._weighted.reshape(-1, nv).T
+        self._points = list(self._station_m), list(self._jacobian[:count]), list(self._jacobian[count:])
+        self._skew, self._share = np.zeros((2 * count, 3, 3)), np.repeat([1.0, 0.5], count)
+
+    @property
+    def distance(self) -> Floats:
+        """(2S,) norms of `error` [m; rad]."""
+        out: Floats = np.sqrt(self._squared)
+        return out
 
     def read(self, frame: TrackerFrame) -> None:
         """Take up the valid readings of a frame."""
-        count = len(self.target_m)
+        count = len(self.bones)
         self.measured = np.concatenate([frame.position_valid, frame.orientation_valid])
-        target_m = frame.position_m @ self._tracker_from_world + self._origin_m
+        target_m = frame.position_m @ self._world_from_tracker.T + self._origin_m
         turned = (self._to_bone @ frame.tracker_from_station[:, :, None])[:, :, 0]
         if not self.measured.all():
             target_m = np.where(self.measured[:count, None], target_m, 0.0)
             turned = np.where(self.measured[count:, None], turned, rotations.IDENTITY)
         self.target_m, self.world_from_target = target_m, turned
-        self._turn_from_model = (turned @ _TIMES_CONJUGATE).reshape(-1, 4, 4)
-        self._precision = self._precision_when_measured * self.measured
+        self._turn_from_model = (turned @ _TIMES_CONJUGATE).reshape(count, 4, 4)
+        self._precision = self._own_precision * self.measured
+        np.copyto(self._weight, self._precision)
+        np.sqrt(self._weight, out=self._root_weight)
         self.widen(1.0)
 
     def widen(self, factor: float) -> None:
@@ -101,63 +115,61 @@ class Residuals:
 
     def place(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""
-        count = len(self._station_m)
+        bodies, station_m = self._bodies, self._station_m
         self.kinematics.set(qpos)
-        arm_m = self._turned[self._bodies] @ self._arm_m
-        np.add(self._body_m[self._bodies], arm_m[:, :, 0], out=self._station_m)
-        error = self.error
-        np.subtract(self.target_m, self._station_m, out=error[:count])
-        turn = (self._turn_from_model @ self._quaternion[self._bodies][:, :, None])[:, :, 0]
-        error[count:] = _rotation_vector(turn)
-        squared = np.einsum("ij,ij->i", error, error)
-        np.sqrt(squared, out=self.distance)
+        self._body_turned.take(bodies, 0, self._turned, "clip")
+        self._body_m.take(bodies, 0, station_m, "clip")
+        self._body_quaternion.take(bodies, 0, self._quaternion, "clip")
+        station_m += np.matmul(self._turned, self._mount_m)[:, :, 0]
+        np.subtract(self.target_m, station_m, out=self._position_error)
+        np.matmul(self._turn_from_model, self._quaternion, out=self._turn)
+        _rotation_vector(self._turn_vector, self._turn_cosine, out=self._turn_error)
+        np.vecdot(self.error, self.error, out=self._squared)
         if not self._robust:
-            self._weight = self._precision
-            return 0.5 * float(self._precision @ squared)
-        ratio = squared / self._twice_scale_squared
-        self._weight = self._precision / (1.0 + ratio)
-        return float(self._softness @ np.log1p(ratio))
+            return 0.5 * float(self._precision @ self._squared)
+        ratio = self._squared / self._twice_scale_squared
+        cost = float(self._softness @ np.log1p(ratio))
+        ratio += 1.0
+        np.divide(self._precision, ratio, out=self._weight)
+        np.sqrt(self._weight, out=self._root_weight)
+        return cost
 
-    def normal_equations(self) -> tuple[Floats, Floats]:
-        """Where `place` left the body: A^T A (54, 54) of the weighted slopes, and the cost's descent (54,).
+    def normal_equations(self, hessian: Floats) -> Floats:
+        """Where `place` left the body: fills `hessian` (54, 54) with Gauss and Newton's, returns the descent (54,).
 
-        The descent is exact; the matrix is Gauss and Newton's, with the Lorentzian's weights held.
+        The descent, minus the cost's gradient, is exact; the matrix holds the Lorentzian's weights as they are.
         """
-        self.kinematics.jacobians(self.bones, self._station_m, self._linear, self._angular)
-        root_weight = np.sqrt(self._weight)
-        rows = (self._jacobian * root_weight[:, None, None]).reshape(-1, self.kinematics.nv)
-        hessian: Floats = rows.T @ rows
-        descent: Floats = (self.error * root_weight[:, None]).reshape(-1) @ rows
-        return hessian, descent
+        self.kinematics.jacobians(self.bones, *self._points)
+        np.multiply(self._jacobian, self._root_weight[:, None, None], out=self._weighted)
+        np.matmul(self._columns, self._rows, out=hessian)
+        descent: Floats = (self.error * self._root_weight[:, None]).reshape(-1) @ self._rows
+        return descent
 
-    def curvature(self) -> Floats:
-        """After `normal_equations`: what Gauss and Newton leave out of the Hessian, lower triangle (54, 54).
+    def add_curvature(self, hessian: Floats) -> None:
+        """After `normal_equations`: adds to the lower triangle what Gauss and Newton leave out.
 
         A hinge i turns the slope J_j of everything beyond it: the derivative of J_j by q_i is a_i x J_j where j lies
         beyond i, half of it between axes of orientations. Trackers pin a pose so stiffly against so weak a prior that
         this term outweighs the prior as soon as residuals reach 1 mm.
         """
+        count, nv = len(self.bones), self.kinematics.nv
         pull = self.error * (self._weight * self._share)[:, None]
         self._skew[:, _SKEW_ROWS, _SKEW_COLUMNS] = (pull[:, :, None] * _SKEW_SIGNS).reshape(-1, 6)
         turned = self._skew @ self._jacobian
-        count = len(self._station_m)
-        beyond = (turned[:count] + turned[count:]).reshape(-1, self.kinematics.nv)
-        out: Floats = beyond.T @ self._angular.reshape(-1, self.kinematics.nv)
-        out[3:6, 3:6] = 0.5 * (out[3:6, 3:6] + out[3:6, 3:6].T)
-        return out
+        beyond = (turned[:count] + turned[count:]).reshape(-1, nv)
+        curvature = beyond.T @ self._jacobian[count:].reshape(-1, nv)
+        curvature[3:6, 3:6] = 0.5 * (curvature[3:6, 3:6] + curvature[3:6, 3:6].T)
+        hessian += curvature
 
 
-_SKEW_ROWS, _SKEW_COLUMNS = np.array([[2, 1, 0, 2, 1, 0], [1, 2, 2, 0, 0, 1]])
-_SKEW_SIGNS: Floats = np.array([1.0, -1.0])
-
-
-def _rotation_vector(turn: Floats) -> Floats:
-    """`rotations.log` (S, 3) for the inner loop."""
-    vector, cosine = turn[:, 1:], turn[:, 0]
-    sine = np.sqrt(np.einsum("ij,ij->i", vector, vector)) + 1e-12
-    angle = np.arctan2(sine, np.abs(cosine))
-    out: Floats = vector * (np.copysign(2.0, cosine) * angle / sine)[:, None]
-    return out
+def _rotation_vector(vector: Floats, cosine: Floats, out: Floats) -> None:
+    """`rotations.log` of quaternions in two parts, (S, 3) and (S,), for the inner loop."""
+    sine = np.sqrt(np.vecdot(vector, vector))
+    sine += 1e-12
+    factor = np.arctan2(sine, np.abs(cosine))
+    factor /= sine
+    factor *= np.copysign(2.0, cosine)
+    np.multiply(vector, factor[:, None], out=out)
 
 
 def _left(q: Floats) -> Floats:
@@ -170,5 +182,7 @@ def _right(q: Floats) -> Floats:
     return np.stack([rotations.multiply(unit, q) for unit in np.eye(4)], axis=-1)
 
 
+_SKEW_ROWS, _SKEW_COLUMNS = np.array([[2, 1, 0, 2, 1, 0], [1, 2, 2, 0, 0, 1]])
+_SKEW_SIGNS: Floats = np.array([1.0, -1.0])
 _TIMES_CONJUGATE: Floats = np.array([_left(unit) * [1.0, -1.0, -1.0, -1.0] for unit in np.eye(4)]).reshape(4, 16)
 """Makes of a quaternion q the matrix of p -> q p*."""

@@ -23,8 +23,8 @@ class Prior:
 
     qpos: Floats
     """(55,) its mean."""
-    precision: Floats
-    """(54,) one over the variance along each direction of the tangent [1/m^2, 1/rad^2]; 0 knows nothing."""
+    precision: Floats | None
+    """(54,) one over the variance along each direction of the tangent [1/m^2, 1/rad^2]; 0 or None knows nothing."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,14 @@ class Solution:
     converged: bool
 
 
-_DAMPING, _FIRST_RAISE, _RAISE = 1e-2, 1.0, 30.0
+_DAMPING, _RAISE, _LOWER = 0.3, 10.0, 3.0
+_MODEST = 30.0
+"""Damping that still lets a step go where it wants: as a prior, 10 deg about the present pose [1/rad^2]."""
+_GOOD, _FAIR = 0.9, 0.5
+"""Shares of a step's promise kept: the plain model will do from the one, damping may fall from the other."""
 _LONGEST_TURN_RAD = 1.0
+_SMALL = 1e-2
+"""A step that promises next to nothing is still taken when it is no larger [m, rad]."""
 
 
 class Solver:
@@ -61,52 +67,68 @@ class Solver:
         nv = residuals.kinematics.nv
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
         self._program = BoxQP(nv)
-        self._diagonal = slice(None, None, nv + 1)
+        self._hessian, self._bent = np.zeros((nv, nv)), np.zeros((nv, nv))
+        self._diagonal = self._hessian.reshape(-1)[:: nv + 1]
         self._least, self._most = np.full(nv, -np.inf), np.full(nv, np.inf)
+        self._least_hinge, self._most_hinge = self._least[6:], self._most[6:]
+        self._away = np.zeros(nv)
 
     def solve(self, start: Floats, prior: Prior) -> Solution:
         """From a configuration (55,), clipped to the limits, downhill to a minimum."""
-        stopping, residuals = self.stopping, self.residuals
+        stopping, residuals, kinematics = self.stopping, self.residuals, self.residuals.kinematics
         qpos = np.array(start, dtype=float)
         qpos[7:] = self.limits.clipped(qpos[7:])
-        cost, away = self._cost(qpos, prior)
-        damping, fresh = _DAMPING, False
-        curved: Floats | None = None
+        cost = residuals.place(qpos) + self._prior_cost(qpos, prior)
+        damping, kept, fresh = _DAMPING, 1.0, False
         for steps in range(1, stopping.most_steps + 1):
             if not fresh:
-                hessian, descent = residuals.normal_equations()
-                hessian.reshape(-1)[self._diagonal] += prior.precision
-                descent += prior.precision * away
-                curved = hessian + residuals.curvature() if steps > 1 else None
+                gradient = self._linearise(prior, damping)
                 fresh = True
-            step = None if curved is None else self._step(qpos, curved, descent, damping)
-            if step is None:
-                step = self._step(qpos, hessian, descent, damping)
-            if step is None:
-                raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
-            promised, longest = 0.5 * float(descent @ step), float(np.max(np.abs(step)))
+            step = self._step(qpos, gradient, curved=kept < _GOOD)
+            promised, longest = -0.5 * float(gradient @ step), float(abs(step).max())
             if longest > _LONGEST_TURN_RAD:
-                step[3:] *= min(1.0, _LONGEST_TURN_RAD / float(np.max(np.abs(step[3:]))))
-            moved = residuals.kinematics.moved(qpos, step)
-            if damping == _DAMPING and (longest < stopping.step or promised < stopping.decrease):
-                return Solution(moved, cost, steps, True)
-            new_cost, new_away = self._cost(moved, prior)
+                step[3:] *= min(1.0, _LONGEST_TURN_RAD / float(abs(step[3:]).max()))
+            moved = kinematics.moved(qpos, step)
+            if damping <= _MODEST and (longest < stopping.step or promised < stopping.decrease):
+                return Solution(moved if longest < _SMALL else qpos, cost, steps, True)
+            new_cost = residuals.place(moved) + self._prior_cost(moved, prior)
+            kept = (cost - new_cost) / promised
             if new_cost < cost:
-                qpos, cost, away = moved, new_cost, new_away
-                damping, fresh = max(_DAMPING, damping / _RAISE**2), False
+                qpos, cost, fresh = moved, new_cost, False
+                damping = max(_DAMPING, damping / _LOWER) if kept > _FAIR else damping
+                if cost < stopping.decrease:
+                    return Solution(qpos, cost, steps, True)
             else:
-                curved, damping = None, max(_FIRST_RAISE, damping * _RAISE)
+                more = max(_RAISE, damping * _RAISE)
+                self._diagonal += more - damping
+                damping = more
         return Solution(qpos, cost, stopping.most_steps, False)
 
-    def _cost(self, qpos: Floats, prior: Prior) -> tuple[float, Floats]:
-        """Data and prior; and the tangent step (54,) from here to the prior's mean."""
-        away = self.residuals.kinematics.difference(qpos, prior.qpos)
-        return self.residuals.place(qpos) + 0.5 * float(prior.precision @ (away * away)), away
+    def _prior_cost(self, qpos: Floats, prior: Prior) -> float:
+        if prior.precision is None:
+            return 0.0
+        self._away = self.residuals.kinematics.difference(qpos, prior.qpos)
+        return 0.5 * float(prior.precision @ (self._away * self._away))
 
-    def _step(self, qpos: Floats, hessian: Floats, descent: Floats, damping: float) -> Floats | None:
-        """(54,) the minimum of the damped model within the limits; None where it has none."""
-        damped = hessian.copy()
-        damped.reshape(-1)[self._diagonal] += damping
-        np.subtract(self.limits.low_rad, qpos[7:], out=self._least[6:])
-        np.subtract(self.limits.high_rad, qpos[7:], out=self._most[6:])
-        return self._program.solve(damped, descent, self._least, self._most)
+    def _linearise(self, prior: Prior, damping: float) -> Floats:
+        gradient = -self.residuals.normal_equations(self._hessian)
+        if prior.precision is not None:
+            gradient -= prior.precision * self._away
+            self._diagonal += prior.precision
+        self._diagonal += damping
+        return gradient
+
+    def _step(self, qpos: Floats, gradient: Floats, curved: bool) -> Floats:
+        """(54,) the minimum of the damped model within the limits."""
+        np.subtract(self.limits.low_rad, qpos[7:], out=self._least_hinge)
+        np.subtract(self.limits.high_rad, qpos[7:], out=self._most_hinge)
+        step: Floats | None = None
+        if curved:
+            np.copyto(self._bent, self._hessian)
+            self.residuals.add_curvature(self._bent)
+            step = self._program.solve(self._bent, gradient, self._least, self._most)
+        if step is None:
+            step = self._program.solve(self._hessian, gradient, self._least, self._most)
+        if step is None:
+            raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
+        return step
