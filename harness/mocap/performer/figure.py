@@ -18,7 +18,7 @@ LEFT = {"l": 1.0, "r": -1.0}
 """Sign of a side along the world's y."""
 
 _SPINE = {"lowerback": (0.40, 0.25, 0.40), "upperback": (0.33, 0.40, 0.32), "thorax": (0.27, 0.35, 0.28)}
-"""Share of bend, twist and lean that each back bone takes; the low back bends most, twists least (White and Panjabi)."""
+"""Share of bend, twist and lean that each back bone takes; the low back bends most and twists least."""
 _NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
 _NECK_BIAS_RAD = {"lowerneck": -0.28, "upperneck": 0.20, "head": 0.08}
 """The neck's S-shape when looking straight ahead, about the medians of real clips."""
@@ -106,7 +106,8 @@ class Figure:
 
     def hip_m(self, side: str) -> Floats:
         """(T, 3) where the thigh starts."""
-        return self.root_m + self.pelvis @ self.skeleton.bone_m[self.skeleton.index(f"{side}hipjoint")]
+        hip: Floats = self.root_m + self.pelvis @ self.skeleton.bone_m[self.skeleton.index(f"{side}hipjoint")]
+        return hip
 
     def length_m(self, bone: str) -> float:
         return float(self.skeleton.length_m[self.skeleton.index(bone)])

@@ -37,6 +37,13 @@ class Gesture:
         )
 
 
+def timed(moments: Mapping[str, float], lag_s: float = 0.0, **values: float) -> Keys:
+    """Keys at named moments [s], at rest (0) at the first and last of them; `lag_s` delays those in between."""
+    names = list(moments)
+    keys = [(moments[name] + lag_s, value) for name, value in values.items()]
+    return sorted([(moments[names[0]], 0.0), *keys, (moments[names[-1]], 0.0)])
+
+
 def play(t: Floats, gestures: Iterable[Gesture]) -> Mapping[str, Floats]:
     """Every channel (T,) as the sum of the gestures on it; a channel that nothing moves is 0."""
     out: defaultdict[str, Floats] = defaultdict(lambda: np.zeros(len(t)))

@@ -15,7 +15,7 @@ from harness.mocap.performer.curves import smaller, wander
 from harness.mocap.performer.feet import foot
 from harness.mocap.performer.figure import LEFT, Figure
 from harness.mocap.performer.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
-from harness.mocap.performer.gestures import Gesture, play
+from harness.mocap.performer.gestures import Gesture, Keys, play, timed
 from harness.mocap.performer.limbs import columns, on_floor, unit
 from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
@@ -114,58 +114,60 @@ def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) ->
     gestures: list[Gesture] = []
     begins: list[float] = []
     now = float(t[0]) - rng.uniform(0.0, 3.0)
-    slow = rng.uniform(0.95, 1.12) / habits.pace
+    slow = float(rng.uniform(0.95, 1.12)) / habits.pace
     while now < t[-1]:
-        back, down = rng.uniform(0.80, 0.98) * slow, rng.uniform(0.26, 0.31) * slow
-        waggle = rng.uniform(1.0, 1.8)
-        through_s, hold, home = rng.uniform(0.42, 0.52) * slow, rng.uniform(0.6, 1.3), rng.uniform(1.5, 2.1)
-        a = waggle
-        b = a + back
-        p = b + 0.06
-        i = p + down
-        f = i + through_s
-        h = f + hold
-        e = h + home
-        relax = rng.uniform(0.6, 2.2)
-        size = full * rng.normal(1.0, 0.02)
+        waggle, relax, home = (float(rng.uniform(*span)) for span in ((1.0, 1.8), (0.6, 2.2), (1.5, 2.1)))
+        at = {"address": waggle}
+        at["top"] = at["address"] + float(rng.uniform(0.80, 0.98)) * slow
+        down = float(rng.uniform(0.26, 0.31)) * slow
+        at["late"] = at["top"] + 0.06 + 0.5 * down
+        at["hit"] = at["top"] + 0.06 + down
+        at["finish"] = at["hit"] + float(rng.uniform(0.42, 0.52)) * slow
+        at["hold"] = at["finish"] + float(rng.uniform(0.6, 1.3))
+        at["end"] = at["hold"] + home
+        size = full * float(rng.normal(1.0, 0.02))
         gestures += [
-            Gesture(
-                now,
-                {
-                    "swing": [(a, 0.0), (b + 0.03, -2.48 * size), (i, 0.04), (f, 2.55 * size), (h, 2.5 * size), (e, 0.0)],
-                    "cock": [(a + 0.1, 0.0), (b + 0.08, -1.45), (p + 0.45 * down, -1.15), (i, 0.0), (f, 1.30), (h, 1.25), (e, 0.0)],
-                    "load": [(a + 0.1, 0.0), (b + 0.05, 1.0), (p + 0.5 * down, 0.9), (i, 0.0), (f - 0.1, 0.9), (h, 0.85), (e, 0.0)],
-                    "radius": [(a, 0.0), (b, -0.06), (i, 0.015), (i + 0.35 * through_s, 0.0), (f, -0.15), (h, -0.15), (e, 0.0)],
-                    "in": [(a, 0.0), (b, 0.08), (i, 0.0), (f, 0.10), (h, 0.10), (e, 0.0)],
-                    "plane": [(a, 0.0), (b, 0.02), (i, 0.0), (f, 0.05), (h, 0.05), (e, 0.0)],
-                    "pelvis": [(a + 0.08, 0.0), (b - 0.04, -0.70 * size), (i, 0.60), (f, 1.25 * size), (h, 1.20 * size), (e - 0.1, 0.0)],
-                    "twist": [(a, 0.0), (b + 0.04, -0.70 * size), (i, -0.22), (f, 0.38 * size), (h, 0.34 * size), (e, 0.0)],
-                    "tilt": [(b, 0.0), (i, 0.02), (f, -0.26 * size), (h, -0.28), (e, 0.0)],
-                    "bend": [(b, 0.0), (i, -0.05), (f, -0.34 * size), (h, -0.32), (e, 0.0)],
-                    "side bend": [(a, 0.0), (b, 0.04), (i, -0.16), (f, -0.06), (e, 0.0)],
-                    "drop": [(a, 0.0), (b, 0.05), (i, -0.06), (f, -0.02), (e, 0.0)],
-                    "look": [(a, 0.0), (b, -0.32), (p + 0.5 * down, -0.2), (i + 0.08, 0.0), (f + 0.1, 1.25), (h, 1.30), (h + 0.8 * home, 0.0)],
-                    "nod": [(i + 0.06, 0.0), (f + 0.1, -0.68), (h, -0.70), (h + 0.8 * home, 0.0)],
-                    "cant": [(a, 0.0), (b, 0.10), (i, 0.16), (f, 0.05), (e, 0.0)],
-                    "side": [(a, 0.0), (b, -0.045), (i, 0.09), (f, 0.15), (h, 0.15), (e, 0.0)],
-                    "ahead": [(a, 0.0), (i, 0.02), (f, 0.06), (h, 0.06), (e, 0.0)],
-                    "up": [(a, 0.0), (b, 0.0), (p + 0.5 * down, -0.03), (i, 0.01), (f, 0.03), (h, 0.03), (e, 0.0)],
-                    "lead heel": [(a, 0.0), (b, 0.10), (i, 0.0)],
-                    "trail heel": [(p + 0.4 * down, 0.0), (i, 0.35), (f, 0.88 * size), (h, 0.85 * size), (e - 0.5, 0.0)],
-                    "pivot": [(p + 0.4 * down, 0.0), (i, 0.15), (f, 1.0), (h, 0.95), (e - 0.5, 0.0)],
-                    "lead reach": [(a, 0.0), (b, 0.12), (i, 0.0), (f, -0.08), (e, 0.0)],
-                    "trail reach": [(a, 0.0), (b, -0.08), (i, 0.03), (f, 0.12), (e, 0.0)],
-                    "raise": [(b - 0.4, 0.0), (b, 0.06), (i - 0.1, 0.0), (f, 0.04), (h, 0.04), (e, 0.0)],
-                    "lead lift": [(a, 0.0), (b, 0.10), (i, 0.03), (f, 0.12), (e, 0.0)],
-                    "trail lift": [(a, 0.0), (b, 0.14), (i, -0.03), (f, 0.08), (e, 0.0)],
-                },
-            ).varied(rng, 1.0, 1.0, 0.02),
-            _relax(rng, now + h + 0.5 * home, relax),
+            Gesture(now, _swing(at, size)).varied(rng, 1.0, 1.0, 0.02),
+            _relax(rng, now + at["hold"] + 0.5 * home, relax),
             Gesture(now, {"swing": _waggle(rng, waggle), "cock": _waggle(rng, waggle, 1.6)}),
-        ]  # fmt: skip
-        begins.append(now + h + 0.25)
-        now += e + relax + 0.6 * home
+        ]
+        begins.append(now + at["hold"] + 0.25)
+        now += at["end"] + relax + 0.6 * home
     return gestures, begins
+
+
+def _swing(at: Mapping[str, float], size: float) -> Mapping[str, Keys]:
+    """One swing between its moments [s]; angles [rad] and lengths [m] as a right-hander's, for `size` 1."""
+    return {
+        "swing": timed(at, 0.02, top=-2.48 * size, hit=0.04, finish=2.55 * size, hold=2.5 * size),
+        "cock": timed(at, 0.03, top=-1.45, late=-1.15, hit=0.0, finish=1.30, hold=1.25),
+        "load": timed(at, 0.0, top=1.0, late=0.9, hit=0.0, finish=0.9, hold=0.85),
+        "radius": timed(at, 0.0, top=-0.06, hit=0.015, finish=-0.15, hold=-0.15),
+        "in": timed(at, 0.0, top=0.08, hit=0.0, finish=0.10, hold=0.10),
+        "plane": timed(at, 0.0, top=0.02, hit=0.0, finish=0.05, hold=0.05),
+        "raise": timed(at, 0.0, top=0.06, hit=0.0, finish=0.04, hold=0.04),
+        # the hips turn back before the chest has come to the top
+        "pelvis": timed(at, -0.04, top=-0.70 * size, hit=0.60, finish=1.25 * size, hold=1.20 * size),
+        "twist": timed(at, 0.04, top=-0.70 * size, hit=-0.22, finish=0.38 * size, hold=0.34 * size),
+        "tilt": timed(at, 0.0, top=0.0, hit=0.02, finish=-0.26 * size, hold=-0.28),
+        "bend": timed(at, 0.0, top=0.0, hit=-0.05, finish=-0.34 * size, hold=-0.32),
+        "side bend": timed(at, 0.0, top=0.04, hit=-0.16, finish=-0.06),
+        "drop": timed(at, 0.0, top=0.05, hit=-0.06, finish=-0.02),
+        # the eyes stay on the ball
+        "look": timed(at, 0.06, top=-0.32, hit=0.0, finish=1.25, hold=1.30),
+        "nod": timed(at, 0.06, top=0.0, hit=0.0, finish=-0.68, hold=-0.70),
+        "cant": timed(at, 0.0, top=0.10, hit=0.16, finish=0.05),
+        "side": timed(at, 0.0, top=-0.045, hit=0.09, finish=0.15, hold=0.15),
+        "ahead": timed(at, 0.0, hit=0.02, finish=0.06, hold=0.06),
+        "up": timed(at, 0.0, top=0.0, late=-0.03, hit=0.01, finish=0.03, hold=0.03),
+        "lead heel": timed(at, 0.0, top=0.10, hit=0.0),
+        "trail heel": timed(at, 0.0, late=0.0, hit=0.35, finish=0.88 * size, hold=0.85 * size),
+        "pivot": timed(at, 0.0, late=0.0, hit=0.15, finish=1.0, hold=0.95),
+        "lead reach": timed(at, 0.0, top=0.12, hit=0.0, finish=-0.08),
+        "trail reach": timed(at, 0.0, top=-0.08, hit=0.03, finish=0.12),
+        "lead lift": timed(at, 0.0, top=0.10, hit=0.03, finish=0.12),
+        "trail lift": timed(at, 0.0, top=0.14, hit=-0.03, finish=0.08),
+    }
 
 
 def _relax(rng: np.random.Generator, at_s: float, lasts_s: float) -> Gesture:

@@ -111,7 +111,7 @@ def habits(performer: str) -> Habits:
 
 def _posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
     """Offsets that leave the carriage of chest and head about as it is: what one bone adds, the next takes away."""
-    back, neck = np.deg2rad(rng.normal(0.0, (3.5, 1.0, 1.5))), np.deg2rad(rng.normal(0.0, (5.0, 2.0, 3.5)))
+    back, neck = np.deg2rad(rng.normal(0.0, (2.5, 0.5, 0.8))), np.deg2rad(rng.normal(0.0, (4.0, 1.0, 1.5)))
     low = float(rng.uniform(0.3, 0.7))
     out = {
         "lowerback": back,
@@ -122,8 +122,8 @@ def _posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
         "head": -0.2 * neck,
     }
     for side in ("l", "r"):
-        out[f"{side}wrist"] = np.deg2rad(rng.normal(0.0, 6.0, 1))
-        out[f"{side}hand"] = np.deg2rad(rng.normal(0.0, (5.0, 6.0)))
+        out[f"{side}wrist"] = np.deg2rad(rng.normal(0.0, 5.0, 1))
+        out[f"{side}hand"] = np.deg2rad(rng.normal(0.0, (4.0, 5.0)))
     return {bone: tuple(float(x) for x in angles) for bone, angles in out.items()}
 
 

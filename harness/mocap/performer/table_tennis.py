@@ -173,7 +173,7 @@ def _arm(
     wrist_m: tuple[Floats, Floats, Floats],
     forearm: tuple[Floats, Floats, Floats],
 ) -> None:
-    """The wrist ahead, out and up of the chest for an arm of 0.58 m [m]; elbow raised, pronated, wrist laid back [rad]."""
+    """The wrist ahead, out and up of the chest for an arm of 0.58 m [m]; elbow raised, pronated, laid back [rad]."""
     sign, reach = LEFT[side], figure.arm_m(side) / 0.58
     ahead, out, up = (x + rng.normal(0.0, 0.02) + wander(rng, t, 1.4, 0.018) for x in wrist_m)
     elbow, pronate, lay = forearm

@@ -15,7 +15,7 @@ from harness.mocap.performer.course import Course, course
 from harness.mocap.performer.curves import GRAVITY_M_S2, smaller, smoothed, wander
 from harness.mocap.performer.feet import Plant, foot
 from harness.mocap.performer.figure import LEFT, SIDES, Figure
-from harness.mocap.performer.footwork import highest_root_m
+from harness.mocap.performer.footwork import highest_root_m, leg_m
 from harness.mocap.performer.gestures import Gesture, play
 from harness.mocap.performer.limbs import columns, on_floor
 from harness.mocap.performer.manner import manner
@@ -38,6 +38,8 @@ class Gait:
     """Size of the arm swing, about 1."""
     elbow_rad: float
     stoop_rad: float
+    crouch: float
+    """How much lower the pelvis rides, as a share of the leg."""
     land_rad: float
     push_rad: float
     lift_m: float
@@ -50,7 +52,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     pad = int(_PAD_S / step_s)
     long = (np.arange(len(t) + 2 * pad) - pad) * step_s + t[0]
     way = course(rng, long, take)
-    gait = _gait(rng, habits, float(way.speed_m_s.mean()))
+    gait = _gait(rng, habits, float(way.speed_m_s.mean()), take)
     # cadence: step length grows as speed to the power 0.55
     rhythm = 1.88 * habits.pace * rng.uniform(0.97, 1.03) * (way.speed_m_s / 1.3) ** 0.45
     rhythm *= 1.0 + wander(rng, long, 1.5, 0.012)
@@ -75,7 +77,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + wander(rng, t, 2.0, 0.004)
     place = way.place_m[inside] + on_floor(yaw, -0.03, sway)
     top = highest_root_m(skeleton, place, pelvis, feet, 0.994)
-    root = columns(*place.T, smaller(top, smoothed(top, 1.2 / step_s) - 0.012, 0.04))
+    root = columns(*place.T, smaller(top, smoothed(top, 1.2 / step_s) - 0.012 - gait.crouch * leg_m(skeleton), 0.04))
 
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
     bob = 0.02 * np.cos(2.0 * stride + 0.6) + 0.008 * breath
@@ -100,17 +102,25 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     return figure
 
 
-def _gait(rng: np.random.Generator, habits: Habits, speed_m_s: float) -> Gait:
+def _gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, take: int) -> Gait:
+    """Takes go through an easy, a brisk, a tired and a marching walk."""
     effort = float(np.clip(speed_m_s / 1.3, 0.6, 1.4))
-    brisk = rng.random() < 0.3
+    style = ("easy", "brisk", "tired", "marching")[(take - 1) % 4]
+    swing, elbow, stoop, crouch, lift = {
+        "easy": ((0.8, 1.3), (-0.1, 0.15), (0.0, 0.10), (0.0, 0.01), (0.04, 0.07)),
+        "brisk": ((1.3, 1.7), (0.5, 0.95), (0.02, 0.12), (0.0, 0.015), (0.04, 0.07)),
+        "tired": ((0.4, 0.8), (-0.15, 0.2), (0.14, 0.30), (0.02, 0.05), (0.03, 0.05)),
+        "marching": ((1.5, 1.9), (-0.1, 0.3), (-0.05, 0.03), (0.0, 0.01), (0.12, 0.18)),
+    }[style]
     return Gait(
         effort=effort,
-        swing=habits.size * float(rng.uniform(1.2, 1.7) if brisk else rng.uniform(0.55, 1.35)),
-        elbow_rad=habits.elbow_rad + float(rng.uniform(0.45, 0.9) if brisk else rng.normal(0.0, 0.12)),
-        stoop_rad=float(rng.uniform(-0.03, 0.22)),
+        swing=habits.size * float(rng.uniform(*swing)),
+        elbow_rad=habits.elbow_rad + float(rng.uniform(*elbow)),
+        stoop_rad=float(rng.uniform(*stoop)),
+        crouch=float(rng.uniform(*crouch)),
         land_rad=float(rng.uniform(0.28, 0.40)) * effort**0.5,
         push_rad=float(rng.uniform(0.90, 1.05)),
-        lift_m=float(rng.uniform(0.04, 0.07)),
+        lift_m=float(rng.uniform(*lift)),
         half_width_m=float(rng.uniform(0.045, 0.075)),
     )
 
@@ -141,7 +151,7 @@ def _plants(
                 land_rad=gait.land_rad * float(rng.uniform(0.92, 1.08)),
                 push_rad=gait.push_rad * float(rng.uniform(0.95, 1.05)),
                 lift_m=gait.lift_m * float(rng.uniform(0.9, 1.1)),
-                lift_early=0.6,
+                lift_early=0.6 if gait.lift_m < 0.1 else 0.8,
             )
         )
     return plants
