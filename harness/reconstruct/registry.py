@@ -14,6 +14,7 @@ from pathlib import Path
 
 from harness.errors import BadInput, UnknownName
 from harness.reconstruct import ik
+from harness.reconstruct.best_match import BestMatch
 from harness.reconstruct.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.contract import Method
 from harness.reconstruct.mean_pose import MeanPose
@@ -29,6 +30,7 @@ def methods() -> dict[str, Callable[[], Method]]:
         "ik:gaussian": lambda: ik.GAUSSIAN,
         "ik:mean": lambda: ik.MEAN,
         "mean_pose": MeanPose,
+        "best_match": BestMatch,
     }
 
 

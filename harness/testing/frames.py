@@ -1,0 +1,85 @@
+"""Frames without a device: what exact trackers would read of a known motion, for tests and contract suites."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from harness.body import mounts
+from harness.body.humanoid import Body, tpose
+from harness.body.kinematics import Kinematics
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.seeds import generator
+from harness.stream.frame import TrackerFrame
+
+SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
+
+
+def worn(body: Body, stations: Sequence[str] = SIX) -> Calibration:
+    """Default mounts of these stations, known exactly, in a room whose tracker frame is not the world's."""
+    placed = [mounts.place(body.skeleton, mounts.DEFAULTS[station]) for station in stations]
+    return Calibration(
+        kind="exact",
+        stations=tuple(stations),
+        bones=tuple(mounts.DEFAULTS[station].bone for station in stations),
+        mount_m=np.array([mount_m for mount_m, _ in placed]),
+        bone_from_station=np.array([turn for _, turn in placed]),
+        world_from_tracker=rotations.exp(np.array([np.pi, 0.0, 0.3])),
+        tracker_origin_m=np.array([1.0, -2.0, 2.5]),
+    )
+
+
+def exact_frames(body: Body, calibration: Calibration, qpos: Floats, rate_hz: float = 40.0) -> list[TrackerFrame]:
+    """Noiseless frames of configurations (T, 55), evenly spaced in time."""
+    kinematics = Kinematics(body)
+    bones = [body.skeleton.index(bone) for bone in calibration.bones]
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    every, frames = np.ones(len(bones), bool), []
+    for index, configuration in enumerate(qpos):
+        kinematics.set(configuration)
+        at_m, turned = kinematics.station_poses(bones, calibration.mount_m, calibration.bone_from_station)
+        frames.append(
+            TrackerFrame(
+                received_s=index / rate_hz,
+                measured_s=np.full(len(bones), index / rate_hz),
+                position_m=rotations.rotate(tracker_from_world, at_m - calibration.tracker_origin_m),
+                tracker_from_station=rotations.multiply(tracker_from_world, turned),
+                position_valid=every,
+                orientation_valid=every,
+                quality=every,
+                suspect=~every,
+            )
+        )
+    return frames
+
+
+def without(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
+    """The frame as if these stations had not reported."""
+    kept = np.ones(len(frame.quality), bool)
+    kept[list(lost)] = False
+    return TrackerFrame(
+        received_s=frame.received_s,
+        measured_s=np.where(kept, frame.measured_s, np.nan),
+        position_m=np.where(kept[:, None], frame.position_m, np.nan),
+        tracker_from_station=np.where(kept[:, None], frame.tracker_from_station, np.nan),
+        position_valid=frame.position_valid & kept,
+        orientation_valid=frame.orientation_valid & kept,
+        quality=np.where(kept, frame.quality, 0.0),
+        suspect=frame.suspect & kept,
+    )
+
+
+def swaying(body: Body, frames: int, seed: int = 1, rate_hz: float = 40.0) -> Floats:
+    """(T, 55) a performer who strolls along a curve while every hinge swings gently: no behaviour, but smooth."""
+    rng = generator(seed, "swaying")
+    t = np.arange(frames)[:, None] / rate_hz
+    low, high = body.model.jnt_range[1:].T
+    out = np.tile(tpose(body.skeleton), (frames, 1))
+    out[:, :2] += 0.5 * np.hstack([np.sin(0.4 * t), 1.0 - np.cos(0.4 * t)])
+    out[:, 3:7] = rotations.about_z(0.4 * t[:, 0])
+    swing = np.minimum(0.3, 0.2 * (high - low)) * np.sin(
+        2.0 * np.pi * (rng.uniform(0.2, 0.6, 48) * t + rng.uniform(0.0, 1.0, 48))
+    )
+    out[:, 7:] = np.clip(out[:, 7:] + swing, low + 0.01, high - 0.01)
+    return out
