@@ -1,0 +1,133 @@
+"""The library: names, copies, rates and skeletons, and nothing outside its folder."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.errors import BadFile, BadInput, UnknownName
+from harness.mocap.library import MotionLibrary
+from tests.mocap.synthetic import amass_arrays, asf_text, bvh_text, clip, write_clip
+
+INDEX = "path,subject,trial,behaviour,frames,fps,note\n91/91_01.amc,91,01,walking,24,60,limps\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Four clips: 91_01 in three formats, 91_02 as BVH, 91_03 as npz, 91_04 as C3D only."""
+    motion = clip()
+    write_clip(tmp_path, motion)
+    (tmp_path / "manifest.csv").write_text(INDEX)
+    (tmp_path / "deep" / "down").mkdir(parents=True)
+    for name in ("91_01", "91_02"):
+        (tmp_path / "deep" / f"{name}.bvh").write_text(bvh_text(motion))
+    for name in ("91_01", "91_03"):
+        np.savez(tmp_path / "deep" / "down" / f"{name}_poses.npz", **amass_arrays(motion))  # type: ignore[arg-type]
+    (tmp_path / "deep" / "91_04.c3d").write_bytes(b"not read before it is asked for")
+    (tmp_path / "readme.txt").write_text("no motion")
+    return tmp_path
+
+
+def test_clips_are_found_by_name_whatever_their_format(folder: Path) -> None:
+    library = MotionLibrary(folder)
+    assert library.names() == ("91_01", "91_02", "91_03")
+    assert {entry.name: entry.format for entry in library.entries()} == {
+        "91_01": "amc",
+        "91_02": "bvh",
+        "91_03": "npz",
+        "91_04": "c3d",
+    }
+    assert sorted(copy.suffix for copy in library.entry("91_01").copies) == [".bvh", ".npz"]
+    told = library.entry("91_01").as_dict()
+    assert (told["behaviour"], told["frames"], told["rate_hz"], told["subject"]) == ("walking", 24, 60.0, "91")
+    assert "walking" in library.entry("91_01").line()
+    assert "? Hz" in library.entry("91_02").line()
+
+
+def test_what_is_loaded_carries_what_the_index_knows(folder: Path) -> None:
+    found = MotionLibrary(folder).load("91_01")
+    assert (found.name, found.subject, found.source, found.behaviour) == ("91_01", "91", "cmu", "walking")
+    assert (found.rate_hz, found.notes, len(found)) == (60.0, ("limps",), 24)
+
+
+@pytest.mark.parametrize("name", ["91_02", "91_03"])
+def test_other_formats_load_on_the_24_bones(folder: Path, name: str) -> None:
+    found = MotionLibrary(folder).load(name)
+    assert (found.name, found.rate_hz, len(found.skeleton.names)) == (name, 120.0, 24)
+    femur = found.skeleton.dof_of_bone[found.skeleton.index("lfemur")]
+    np.testing.assert_allclose(found.angles_rad[:, femur], clip().angles_rad[:, femur], atol=1e-5)
+
+
+def test_an_unknown_clip_is_named_with_its_neighbour(folder: Path) -> None:
+    with pytest.raises(UnknownName, match="Did you mean '91_03'"):
+        MotionLibrary(folder).load("91_3")
+
+
+def test_markers_are_no_motion(folder: Path) -> None:
+    with pytest.raises(BadInput, match="holds markers"):
+        MotionLibrary(folder).load("91_04")
+
+
+def test_without_a_rate_an_amc_is_refused_until_it_is_given(folder: Path) -> None:
+    (folder / "manifest.csv").unlink()
+    with pytest.raises(BadInput, match="--rate"):
+        MotionLibrary(folder).load("91_01")
+    assert MotionLibrary(folder, rate_hz=120.0).load("91_01").rate_hz == 120.0
+
+
+def test_the_skeleton_may_lie_above_or_alone(folder: Path) -> None:
+    library = MotionLibrary(folder, rate_hz=120.0)
+    (folder / "91" / "91.asf").rename(folder / "91.asf")
+    assert len(library.load("91_01")) == 24
+    (folder / "91.asf").rename(folder / "91" / "anyone.asf")
+    assert len(library.load("91_01")) == 24
+    (folder / "91" / "another.asf").write_text(asf_text(clip().skeleton))
+    with pytest.raises(BadFile, match=r"2 skeletons, none called 91\.asf"):
+        library.load("91_01")
+    (folder / "91" / "another.asf").unlink()
+    (folder / "91" / "anyone.asf").unlink()
+    with pytest.raises(BadFile, match="no skeleton beside it"):
+        library.load("91_01")
+
+
+def test_links_out_of_the_folder_are_not_followed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    outside = tmp_path_factory.mktemp("outside")
+    motion = clip(name="92_01")
+    target = write_clip(outside, motion)
+    (folder / "92_01.amc").symlink_to(target)
+    (folder / "92").symlink_to(outside / "92", target_is_directory=True)
+    library = MotionLibrary(folder)
+    assert "92_01" not in library.names()
+    with pytest.raises(UnknownName):
+        library.load("../outside/92_01")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("path,fps\n91/91_01.amc,fast\n", "line 2: fps 'fast'"),
+        ("path,fps\n91/91_01.amc,-5\n", "line 2: fps '-5'"),
+        ("path,frames\n91/91_01.amc,nan\n", "line 2: frames 'nan'"),
+        ("name,fps\n91_01,60\n", "line 2: a row without a path"),
+        ('path,fps\n"91/91_01.amc,60\n', "unexpected end of data"),
+        ("path\n\xff\xfe\n", "codec"),
+    ],
+)
+def test_a_bad_index_is_refused(folder: Path, text: str, found: str) -> None:
+    (folder / "manifest.csv").write_bytes(text.encode("latin-1"))
+    with pytest.raises(BadFile) as error:
+        MotionLibrary(folder)
+    assert found in str(error.value)
+
+
+def test_a_library_is_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="is no folder"):
+        MotionLibrary(tmp_path / "absent")
+
+
+def test_the_staged_library_is_whole(mocap: Path) -> None:
+    library = MotionLibrary(mocap)
+    assert len(library.names()) >= 100
+    boxing = library.entry("13_17")
+    assert (boxing.format, boxing.behaviour, boxing.rate_hz, boxing.frames) == ("amc", "boxing", 120.0, 4840)
+    assert [copy.suffix for copy in library.entry("02_01").copies] == [".bvh", ".c3d"]
