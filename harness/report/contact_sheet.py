@@ -1,5 +1,6 @@
 """Contact sheets: a clip as a row of figures seen from the side, and the same row from the front."""
 
+import io
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,28 +27,37 @@ _TRUNK_WIDTH_M = {
 
 
 def contact_sheet(
-    clip: Clip, path: Path, *, start_s: float, every_s: float, figures: int = 10, rows: int = 1, title: str = ""
+    clip: Clip,
+    path: Path,
+    *,
+    start_s: float,
+    every_s: float,
+    figures: int = 10,
+    rows: int = 1,
+    title: str = "",
+    faces: str = "thorax",
 ) -> None:
     """Write a PNG of `rows` strips of figures, `every_s` apart from `start_s` on; BadInput if the clip is too short.
 
-    Each figure is seen from its right side (upper half of a strip) and from the front (lower half), as it faces on
-    average within a second around; left limbs are blue, right ones red.
+    Each figure is seen from its right side (upper half of a strip) and from the front (lower half), by where the bone
+    `faces` points on average within a second around; left limbs are blue, right ones red.
     """
     frames = np.rint((start_s + every_s * np.arange(figures * rows)) * clip.rate_hz).astype(int)
     if frames[-1] >= len(clip) or start_s < 0.0:
         raise BadInput(f"A sheet up to {frames[-1] / clip.rate_hz:.1f} s of {clip.name}.", "Take fewer figures.")
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from PIL import Image
 
     pose = forward(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], clip.angles_rad[frames])
-    facing = _facing(clip)[frames]
-    tall, wide = 2.15, 1.15
+    facing = _facing(clip, faces)[frames]
+    tall, wide = 2.40, 1.15
     picture = Figure(figsize=(1.15 * figures, 2 * rows * 1.15 * tall / wide * 0.92), dpi=100)
     FigureCanvasAgg(picture)
     for row in range(rows):
         for view in (0, 1):
             axes = picture.add_axes((0.0, 1.0 - (2 * row + view + 1) / (2 * rows), 1.0, 1.0 / (2 * rows)))
-            axes.set_xlim(-0.5 * wide, (figures - 0.5) * wide)
+            axes.set_xlim(-0.55 * wide, (figures - 0.35) * wide)
             axes.set_ylim(-0.15, tall - 0.15)
             axes.set_aspect("equal")
             axes.axis("off")
@@ -64,13 +74,16 @@ def contact_sheet(
                         n * wide, -0.12, f"{frames[k] / clip.rate_hz:.2f} s", ha="center", fontsize=7, color="#555"
                     )
     picture.text(0.005, 0.995, title or clip.name, va="top", fontsize=9, color="#222")
-    picture.savefig(path)
+    drawn = io.BytesIO()
+    picture.savefig(drawn, format="png")
+    with Image.open(drawn) as image:
+        image.convert("RGB").quantize(64).save(path, optimize=True)  # few colours: a third of the size
 
 
-def _facing(clip: Clip) -> Floats:
-    """(T,) the heading of the head, averaged over a second around each frame [rad]."""
+def _facing(clip: Clip, bone: str) -> Floats:
+    """(T,) the heading of a bone, averaged over a second around each frame [rad]."""
     pose = forward(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
-    ahead = pose.world_from_bone[:, clip.skeleton.index("head"), :, 0]
+    ahead = pose.world_from_bone[:, clip.skeleton.index(bone), :, 0]
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     half = max(int(0.5 * clip.rate_hz), 1)
     window = np.ones(2 * half + 1)

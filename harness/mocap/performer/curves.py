@@ -33,10 +33,11 @@ def _ramp_area(x: Floats) -> Floats:
     return out
 
 
-def pulse(share: Floats) -> Floats:
-    """0 to 1 and back to 0 as `share` goes from 0 to 1."""
+def pulse(share: Floats, peak: float = 0.5) -> Floats:
+    """0 to 1 and back to 0 as `share` goes from 0 to 1; highest at `peak`, which is at most a half."""
     x = np.clip(share, 0.0, 1.0)
-    out: Floats = 64.0 * (x * (1.0 - x)) ** 3
+    fall = 3.0 * (1.0 - peak) / peak
+    out: Floats = (x / peak) ** 3 * ((1.0 - x) / (1.0 - peak)) ** fall
     return out
 
 

@@ -37,8 +37,8 @@ class Plant:
     """How far the heel is up when the ball leaves."""
     lift_m: float = 0.05
     """How high the ball is carried to the next plant."""
-    lift_early: float = 1.0
-    """Below 1 the ball is highest before the middle of its way."""
+    lift_peak: float = 0.5
+    """Where on that way it is highest, 0.5 at most."""
 
 
 def flat_pitch_rad(skeleton: Skeleton, side: str) -> float:
@@ -70,7 +70,7 @@ def foot(
         moving = share > 0.0
         way = np.append(np.subtract(b.ball_m, a.ball_m), 0.0)
         ball[moving] = (*a.ball_m, BALL_M) + travel(share[moving])[:, None] * way
-        ball[moving, 2] += a.lift_m * pulse(share[moving] ** a.lift_early)
+        ball[moving, 2] += a.lift_m * pulse(share[moving], a.lift_peak)
         yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease(share[moving])
         heel_first[moving] = ease(share[moving]) if b.land_rad else 0.0
         heel_first[t > 0.5 * (b.on_s + b.off_s)] = 0.0  # it lies flat there

@@ -38,7 +38,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
         tuck += 0.95 * GRAVITY_M_S2 * jump.flight_s**2 / 8.0 * pulse(share)
         leave, land = jump.leave_s, jump.land_s
         heels_up = [0.45 * leave + 0.55 * jump.bottom_s, leave, leave + 0.09, land - 0.08, land, land + 0.09]
-        pitch += through(t, heels_up, [0.0, 0.62, 1.0, 0.42, 0.32, 0.0])
+        pitch += through(t, heels_up, [0.0, 0.60, 0.88, 0.42, 0.32, 0.0])
     middle = 0.5 * (foot_place.min(axis=0) + foot_place.max(axis=0))
     pelvis = columns(
         yaw + wander(rng, t, 2.5, 0.02),
@@ -59,7 +59,8 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
         return feet
 
     top = highest_root_m(skeleton, place, pelvis, feet_at(0.0), 0.99)
-    root = columns(*place.T, _height(t, jumps, float(np.median(top)) - 0.012, leg))
+    stand = float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012
+    root = columns(*place.T, _height(t, jumps, stand, leg))
     # the legs follow the body up, tucked a little
     feet = feet_at(larger(tuck, root[:, 2] - top, 0.02))
     spine = columns(

@@ -39,7 +39,7 @@ class Jump:
 
 
 def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tuple[list[Jump], float]:
-    """The jumps of a take, most of one kind, and the heading it begins with [rad]; far from the middle it turns back."""
+    """The jumps of a take, most of one kind, and the first heading [rad]; far from the middle it turns back."""
     yaw0 = yaw = float(rng.uniform(-np.pi, np.pi))
     jumps: list[Jump] = []
     now, rebound, left_in_series, hand = float(t[0]) + rng.uniform(0.3, 0.9), False, 0, 1.0
@@ -57,12 +57,12 @@ def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tupl
         elif this == "side":
             aside, hand = hand * rng.uniform(0.25, 0.5), -hand
         elif this == "turning":
-            turn = float(rng.choice([-1.0, 1.0])) * rng.uniform(0.7, 1.6)
+            turn = float(rng.choice([-1.0, 1.0])) * rng.uniform(0.7, 1.5)
         elif this == "series":
             along = rng.uniform(0.0, 0.12)
         if np.hypot(*place) > 1.2 and along > 0.3:
             home = np.arctan2(-place[1], -place[0])
-            turn = float(np.clip(wrapped(home - yaw), -1.7, 1.7))
+            turn = float(np.clip(wrapped(home - yaw), -1.5, 1.5))
             along = 0.15
         bottom_s = now if rebound else now + rng.uniform(0.45, 0.65) * slow
         leave_s = bottom_s + rng.uniform(0.27, 0.33) * slow

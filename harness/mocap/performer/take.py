@@ -15,7 +15,7 @@ from harness.mocap.performer.figure import Figure
 from harness.mocap.performer.performers import Habits, habits, performers, skeleton
 
 SOURCE = "built-in performer"
-TAKES_EACH = 4
+TAKES_EACH = 6
 
 _MOVES: dict[str, Callable[[Skeleton, Habits, np.random.Generator, Floats, int], Figure]] = {
     "walking": walking.move,

@@ -109,8 +109,8 @@ def _gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, take: int)
     swing, elbow, stoop, crouch, lift = {
         "easy": ((0.8, 1.3), (-0.1, 0.15), (0.0, 0.10), (0.0, 0.01), (0.04, 0.07)),
         "brisk": ((1.3, 1.7), (0.5, 0.95), (0.02, 0.12), (0.0, 0.015), (0.04, 0.07)),
-        "tired": ((0.4, 0.8), (-0.15, 0.2), (0.14, 0.30), (0.02, 0.05), (0.03, 0.05)),
-        "marching": ((1.5, 1.9), (-0.1, 0.3), (-0.05, 0.03), (0.0, 0.01), (0.12, 0.18)),
+        "tired": ((0.4, 0.8), (-0.15, 0.2), (0.12, 0.28), (0.01, 0.035), (0.035, 0.06)),
+        "marching": ((1.5, 1.9), (-0.1, 0.3), (-0.05, 0.03), (0.0, 0.01), (0.10, 0.15)),
     }[style]
     return Gait(
         effort=effort,
@@ -151,7 +151,7 @@ def _plants(
                 land_rad=gait.land_rad * float(rng.uniform(0.92, 1.08)),
                 push_rad=gait.push_rad * float(rng.uniform(0.95, 1.05)),
                 lift_m=gait.lift_m * float(rng.uniform(0.9, 1.1)),
-                lift_early=0.6 if gait.lift_m < 0.1 else 0.8,
+                lift_peak=0.33 if gait.lift_m < 0.1 else 0.42,
             )
         )
     return plants
