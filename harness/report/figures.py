@@ -1,0 +1,211 @@
+"""The charts of the page: error over time with quality under it, per-joint boxes, error CDF."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import standard_skeleton
+from harness.report.run import Run, Trace, file_name
+from harness.report.style import COLOURS, FAINT, GRID, INK, SETTINGS, Chart, bare, line_style, to_svg
+from harness.score.pair import hinged_bones, joint_names
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WIDTH_IN = 8.6
+_MOST_POINTS = 1500
+"""Along one line; more are no sharper on a screen."""
+ANGLE, POSITION = "joint_angle_mean_deg", "mpjpe_mm"
+UNITS = {ANGLE: "joint angle error [deg]", POSITION: "joint position error [mm]"}
+
+
+def over_time(run: Run, behaviour: str) -> Chart:
+    """Error of every method on the clip of this behaviour with the largest mean error, and station quality."""
+    traces = [trace for trace in run.traces if trace.behaviour == behaviour]
+    clips = tuple(dict.fromkeys(trace.clip for trace in traces))
+    clip = max(clips, key=lambda name: _mean([t.errors[ANGLE][t.scored] for t in traces if t.clip == name]))
+    shown = [trace for trace in traces if trace.clip == clip]
+    which = f"{clip}" + (f", of {len(clips)} clips the one with the largest error" if len(clips) > 1 else "")
+
+    def draw(figure: "Figure") -> None:
+        error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
+        for trace in shown:
+            values = np.where(trace.scored, trace.errors[ANGLE], np.nan)
+            time_s, values = _thinned(*_with_gaps(trace.time_s, values))
+            error.plot(time_s, values, label=trace.series, **line_style(run.series.index(trace.series)))
+        _logarithmic(error, "y")
+        error.set_ylabel(UNITS[ANGLE])
+        start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
+        error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
+        figure.legend(*error.get_legend_handles_labels(), **_legend([trace.series for trace in shown]))
+        _quality(quality, shown[0])
+
+    return _chart(
+        f"error_{file_name(behaviour)}",
+        behaviour.replace("_", " "),
+        f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).",
+        f"Joint angle error of {len(shown)} methods over time on {clip}, and the quality of every station below it.",
+        draw,
+        2.6 + 0.2 * len(shown[0].stations),
+    )
+
+
+def per_joint(run: Run, series: str) -> Chart:
+    """Boxes of the errors of each joint for one method, the medians of the others as points."""
+    skeleton = standard_skeleton()
+    bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
+    joints = list(joint_names(skeleton))
+    own, others = _pool(run, series), [name for name in run.series if name != series]
+
+    def draw(figure: "Figure") -> None:
+        left, right = figure.subplots(1, 2)
+        for axes, names, part, title in (
+            (left, bones, 0, "rotation relative to the parent [deg]"),
+            (right, joints, 1, "position of the far end [mm]"),
+        ):
+            places = np.arange(len(names))
+            axes.bxp(_boxes(own[part], names), positions=places, orientation="horizontal", **_box_style(run, series))
+            for name in others:
+                middle = np.median(_pool(run, name)[part], axis=0)
+                colour = line_style(run.series.index(name))["color"]
+                axes.plot(middle, places, "o", markersize=3.5, color=colour, label=name)
+            axes.set_yticks(places, names)
+            axes.invert_yaxis()
+            axes.set_xscale("function", functions=(np.sqrt, np.square))
+            axes.set_xlim(left=0.0)
+            axes.set_title(title)
+            axes.grid(False, axis="y")
+        if others:
+            figure.legend(*left.get_legend_handles_labels(), **_legend(others))
+
+    return _chart(
+        "per_joint",
+        f"Each joint, {series}",
+        f"{series}: box from quartile to quartile, line at the median, whiskers at the 5th and 95th percentile of all "
+        f"scored frames. Points: medians of the other methods. The axes are square-root scaled.",
+        f"Box plots of the rotation error of 22 bones and the position error of 25 joint centres for {series}.",
+        draw,
+        6.4,
+    )
+
+
+def distribution(run: Run) -> Chart:
+    """How many of the frames stay below an error, for every method."""
+    shares = np.concatenate([np.linspace(0.0, 0.98, 150), np.linspace(0.981, 1.0, 60)])
+
+    def draw(figure: "Figure") -> None:
+        for axes, metric in zip(figure.subplots(1, 2, sharey=True), UNITS, strict=True):
+            for place, name in enumerate(run.series):
+                values = np.concatenate(
+                    [t.errors[metric][t.scored] for t in run.traces if t.series == name] or [np.empty(0)]
+                )
+                values = values[np.isfinite(values)]
+                if len(values):
+                    axes.plot(np.quantile(values, shares), 100.0 * shares, label=name, **line_style(place))
+            _logarithmic(axes, "x")
+            axes.set_xlabel(UNITS[metric])
+            axes.set_ylim(0.0, 100.0)
+        first = figure.axes[0]
+        first.set_ylabel("frames below [%]")
+        figure.legend(*first.get_legend_handles_labels(), **_legend(run.series))
+
+    return _chart(
+        "error_cdf",
+        "How often an error stays below",
+        "All scored frames of all clips; the axis of the error is logarithmic. Further left is better.",
+        f"Cumulative distribution of joint angle and joint position error of {len(run.series)} methods.",
+        draw,
+        3.3,
+    )
+
+
+def _chart(name: str, title: str, caption: str, alt: str, draw: Callable[["Figure"], None], height_in: float) -> Chart:
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(SETTINGS):
+        figure = Figure(figsize=(_WIDTH_IN, height_in), layout="constrained")
+        draw(figure)
+        return Chart(name, title, caption, alt, to_svg(figure, name))
+
+
+def _quality(axes: "Axes", trace: Trace) -> None:
+    """A band for each station."""
+    from matplotlib.colors import LinearSegmentedColormap
+
+    colours = LinearSegmentedColormap.from_list("quality", ["#b2182b", "#f4a582", "#c6dcec", "#7fb2d6"])
+    step_s = float(np.min(np.diff(trace.time_s), initial=1.0))
+    columns = np.rint((trace.time_s - trace.time_s[0]) / step_s).astype(int)
+    band = np.full((len(trace.stations), columns[-1] + 1), np.nan)
+    band[:, columns] = trace.quality.T
+    extent = (trace.time_s[0] - step_s / 2, trace.time_s[-1] + step_s / 2, len(trace.stations) - 0.5, -0.5)
+    axes.imshow(band, aspect="auto", extent=extent, cmap=colours, vmin=0.0, vmax=1.0, interpolation="nearest")
+    for edge in np.arange(0.5, len(trace.stations) - 1):
+        axes.axhline(edge, color="white", linewidth=1.5)
+    bare(axes)
+    axes.set_yticks(range(len(trace.stations)), trace.stations)
+    axes.set_xlabel("time [s]")
+
+
+def _pool(run: Run, series: str) -> tuple[Floats, Floats]:
+    """Rotation (N, 22) and position (N, 25) errors of every scored frame of a method."""
+    traces = [trace for trace in run.traces if trace.series == series]
+    return np.concatenate([t.rotation_deg for t in traces]), np.concatenate([t.position_mm for t in traces])
+
+
+def _boxes(values: Floats, names: Sequence[str]) -> list[dict[str, Any]]:
+    low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
+    return [
+        {"label": name, "whislo": low[n], "q1": q1[n], "med": middle[n], "q3": q3[n], "whishi": high[n], "fliers": []}
+        for n, name in enumerate(names)
+    ]
+
+
+def _box_style(run: Run, series: str) -> dict[str, Any]:
+    colour = COLOURS[run.series.index(series) % len(COLOURS)]
+    return {
+        "showfliers": False,
+        "widths": 0.62,
+        "patch_artist": True,
+        "boxprops": {"facecolor": colour, "edgecolor": "none", "alpha": 0.55},
+        "medianprops": {"color": INK, "linewidth": 1.6},
+        "whiskerprops": {"color": FAINT, "linewidth": 1.0},
+        "capprops": {"linewidth": 0.0},
+    }
+
+
+def _legend(names: Sequence[str]) -> dict[str, Any]:
+    """Above the chart, in one row if the names are short enough."""
+    return {"loc": "outside upper left", "ncols": len(names) if sum(len(name) + 6 for name in names) < 95 else 3}
+
+
+def _logarithmic(axes: "Axes", which: Literal["x", "y"]) -> None:
+    """A logarithmic axis with plain numbers, unless nothing on it is above zero (a perfect method)."""
+    column = 0 if which == "x" else 1
+    values = np.concatenate([np.asarray(line.get_data()[column], dtype=float) for line in axes.lines] or [np.zeros(1)])
+    if np.nanmax(values, initial=0.0) > 0.0:
+        axes.set(**{f"{which}scale": "log"})
+        axis = axes.xaxis if which == "x" else axes.yaxis
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+
+
+def _with_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """A NaN wherever frames are missing, so that no line is drawn across."""
+    step_s = np.diff(time_s)
+    holes = np.flatnonzero(step_s > 1.5 * np.min(step_s, initial=np.inf)) + 1
+    return np.insert(time_s, holes, time_s[holes - 1]), np.insert(values, holes, np.nan)
+
+
+def _thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Every n-th point of a long line."""
+    every = max(1, len(time_s) // _MOST_POINTS)
+    return time_s[::every], values[::every]
+
+
+def _mean(parts: Sequence[Floats]) -> float:
+    values = np.concatenate(parts)
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else -1.0

@@ -1,0 +1,191 @@
+"""The page: one offline HTML file that asks nothing of anyone."""
+
+import base64
+import json
+import shlex
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from harness.report import tables
+from harness.report.markup import Markup, folded, joined, scrolling, table, tag
+from harness.report.run import Run
+from harness.report.style import Chart
+from harness.report.verdict import Verdict
+from harness.report.worst import Window
+from harness.score.files import plain
+from harness.score.metrics import DEFINITIONS
+
+_POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+    "base-uri 'none'; form-action 'none'"
+)
+_REPOSITORY_NOTE = "Run it where the scenario file and, for recorded motion, the library lie."
+
+
+@dataclass(frozen=True)
+class Strip:
+    """The worst two seconds of the leading method by one metric, as a picture."""
+
+    window: Window
+    title: str
+    instants_s: Sequence[float]
+    picture: Path
+    """May be absent: then the page says so."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """All that the page shows."""
+
+    run: Run
+    verdict: Verdict
+    over_time: Sequence[Chart]
+    per_joint: Chart | None
+    distribution: Chart | None
+    windows: Mapping[tuple[str, str], Window]
+    """(series, metric) -> its worst two seconds."""
+    strips: Sequence[Strip]
+    scrubber: Markup
+    movies: Sequence[Path]
+    missing: Sequence[str]
+    """What is not on the page, and why."""
+
+
+def page(content: Content) -> str:
+    """The whole file."""
+    run = content.run
+    style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", f"{run.name}: harness report"),
+        tag("style", Markup(style)),
+    )
+    sections = [(title, name, body) for title, name, body in _sections(content) if body]
+    links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in sections))
+    facts = [joined(tag("dt", title), tag("dd", text)) for title, text in content.verdict.facts.items()]
+    if content.missing:
+        gaps = [tag("span", text, tag("br")) for text in content.missing]
+        facts.append(joined(tag("dt", "Missing here"), tag("dd", *gaps, class_="missing")))
+    body = tag(
+        "body",
+        tag(
+            "header",
+            tag("p", f"harness report · {run.name}", class_="kicker"),
+            tag("h1", content.verdict.sentence),
+            tag("dl", *facts, class_="facts"),
+            tag("nav", links, aria_label="sections"),
+        ),
+        tag("main", *(tag("section", tag("h2", title), text, id_=name) for title, name, text in sections)),
+    )
+    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def _sections(content: Content) -> list[tuple[str, str, Markup]]:
+    run = content.run
+    measured = bool(run.cells)
+    nothing = Markup()
+    return [
+        ("Results", "results", tables.results(run) if measured else nothing),
+        ("Coverage", "coverage", tables.coverage(run)),
+        ("Error over time", "time", joined(*(_chart(chart, 3) for chart in content.over_time))),
+        ("Each joint", "joints", _chart(content.per_joint) if content.per_joint else nothing),
+        ("How often", "cdf", _chart(content.distribution) if content.distribution else nothing),
+        ("Stream health", "health", tables.health(run) if measured else nothing),
+        ("Worst two seconds", "worst", _worst(content) if content.windows else nothing),
+        ("Look around", "look", _look(content)),
+        (
+            "Every metric",
+            "metrics",
+            _every_metric(run) if measured else nothing,
+        ),
+        ("Manifest", "manifest", _manifest(run)),
+        ("Reproduce", "reproduce", _reproduce(run)),
+    ]
+
+
+def _chart(chart: Chart, level: int = 0) -> Markup:
+    image = tag("img", src=_data(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
+    title = tag(f"h{level}", chart.title) if level else None
+    caption = chart.caption if level else joined(tag("b", f"{chart.title}. "), chart.caption)
+    return joined(title, tag("figure", scrolling(image, chart.title), tag("figcaption", caption), class_="chart"))
+
+
+def _worst(content: Content) -> Markup:
+    metrics = list(dict.fromkeys(metric for _, metric in content.windows))
+    clips = {trace.key: trace.clip for trace in content.run.traces}
+    rows = []
+    for series in content.run.series:
+        cells: list[Any] = []
+        for metric in metrics:
+            window = content.windows.get((series, metric))
+            if window is None:
+                cells.append(tables.NOT_MEASURED)
+                continue
+            place = f"{clips[window.key]}, {window.start_s:.1f}–{window.end_s:.1f} s"
+            cells.append(joined(_mean(window), tag("span", place, class_="spread under")))
+        rows.append([series, *cells])
+    head = ["method", *(joined(m, tag("span", f" [{DEFINITIONS[m].unit}]", class_="spread")) for m in metrics)]
+    caption = "The two seconds with the largest mean of each metric, and where they are."
+    summary = table(caption, head, rows, label="worst two seconds")
+    key = tag(
+        "p",
+        "Rendered for the leading method. ",
+        tag("span", class_="chip truth"),
+        "truth, pale and full; ",
+        tag("span", class_="chip estimate"),
+        "estimate, slimmer: where it is right it lies inside.",
+    )
+    strips = [_strip(strip) for strip in content.strips if strip.picture.is_file()]
+    links = [tag("li", tag("a", path.name, href=path.name)) for path in content.movies]
+    movies = joined(tag("h3", "Movies"), tag("ul", *links)) if links else None
+    return joined(summary, key if strips else None, *strips, movies)
+
+
+def _strip(strip: Strip) -> Markup:
+    alt = f"Truth and estimate at {len(strip.instants_s)} instants of {strip.title}"
+    times = tag("div", *(tag("span", f"{t:.2f} s") for t in strip.instants_s), class_="times")
+    image = tag("img", src=_data(strip.picture.read_bytes(), "image/png"), alt=alt)
+    caption = joined(tag("b", f"{strip.window.metric}, mean {_mean(strip.window)}. "), strip.title)
+    return tag("figure", scrolling(joined(image, times), strip.title), tag("figcaption", caption), class_="strip")
+
+
+def _look(content: Content) -> Markup:
+    if not content.scrubber:
+        return Markup()
+    text = (
+        "The worst two seconds of every method, by every metric above. Drag to turn; the camera follows the true root."
+    )
+    return joined(tag("p", text), content.scrubber)
+
+
+def _every_metric(run: Run) -> Markup:
+    return folded("All metrics, all methods", tables.everything(run))
+
+
+def _manifest(run: Run) -> Markup:
+    text = json.dumps(plain(run.manifest.as_dict()), indent=2, ensure_ascii=False)
+    notes = list(dict.fromkeys(f"{trace.clip}: {note}" for trace in run.traces for note in trace.notes))
+    listed = folded("Notes on the motion", tag("ul", *(tag("li", note) for note in notes))) if notes else None
+    return joined(folded("Inputs, metric versions, circumstances", tag("pre", text)), listed)
+
+
+def _reproduce(run: Run) -> Markup:
+    command = run.manifest.circumstances.get("command")
+    again = shlex.join(["harness", "report", run.out.name])
+    if not command:
+        return tag("p", "The run was started from a program: no command was recorded.")
+    return joined(tag("pre", tag("code", str(command))), tag("p", f"{_REPOSITORY_NOTE} This page alone: {again}"))
+
+
+def _mean(window: Window) -> str:
+    unit = DEFINITIONS[window.metric].unit
+    return f"{tables.number(window.mean, unit)} {unit}"
+
+
+def _data(content: bytes, kind: str) -> str:
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,0 +1,141 @@
+"""What the page needs of a run: its summary, and of every cell the numbers that are drawn, without the poses."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+from harness.core.humanoid24 import standard_skeleton
+from harness.score.angles import local_errors_deg
+from harness.score.cell import Cell, cell_folder
+from harness.score.manifest import Manifest
+from harness.score.pair import Pair, posed
+from harness.score.positions import joint_errors_mm
+from harness.score.results import read_cell, read_cells, read_summary
+
+Row = Mapping[str, Any]
+WORST_METRICS = (
+    "joint_angle_mean_deg",
+    "mpjre_deg",
+    "mpjpe_mm",
+    "mpjpe_root_mm",
+    "jitter_m_s3",
+    "foot_skate_mm_s",
+)
+"""Whose worst two seconds are shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One cell over time, F frames of S stations."""
+
+    key: str
+    series: str
+    """Name of the group that it belongs to, see `Run.series`."""
+    behaviour: str
+    clip: str
+    stations: tuple[str, ...]
+    health: Mapping[str, Any]
+    notes: tuple[str, ...]
+    time_s: Floats
+    scored: Bools
+    errors: Mapping[str, Floats]
+    """(F,) of each of WORST_METRICS; NaN where undefined."""
+    rotation_deg: Floats
+    """(N, 22) geodesic error of each hinged bone in the scored frames, float32."""
+    position_mm: Floats
+    """(N, 25) error of each joint centre in the scored frames, float32."""
+    quality: Floats
+    """(F, S)."""
+    position_valid: Bools
+    orientation_valid: Bools
+    suspect: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A finished run, ready to be shown."""
+
+    out: Path
+    manifest: Manifest
+    summary: Row
+    traces: tuple[Trace, ...]
+
+    @property
+    def name(self) -> str:
+        return str(self.manifest.inputs.get("name", self.out.name))
+
+    @property
+    def cells(self) -> Sequence[Row]:
+        """A row for each finished cell."""
+        rows: Sequence[Row] = self.summary["cells"]
+        return rows
+
+    @cached_property
+    def series(self) -> tuple[str, ...]:
+        """Names of the groups that are compared: methods, told apart by inputs and protocol where these vary."""
+        return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
+
+    @cached_property
+    def behaviours(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(str(row["behaviour"]) for row in self.cells))
+
+    def series_of(self, row: Row) -> str:
+        """Name of the group of a row of the summary."""
+        rows = self.summary["methods"]
+        parts = []
+        if len({r["inputs"] for r in rows}) > 1:
+            parts.append(str(row["inputs"]))
+        if len({r["protocol"] for r in rows if r["method"] == row["method"]}) > 1:
+            parts.append(f"protocol {row['protocol']}")
+        return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+
+    def cell(self, key: str) -> Cell:
+        return read_cell(cell_folder(self.out, key))
+
+
+def read_run(out: Path) -> Run:
+    """Read it, one cell at a time; BadFile when the folder holds no run or a damaged one."""
+    manifest = Manifest.read(out / "manifest.json")
+    run = Run(out, manifest, read_summary(out), ())
+    return Run(out, manifest, run.summary, tuple(_trace(run, cell) for cell in read_cells(out)))
+
+
+def _trace(run: Run, cell: Cell) -> Trace:
+    pair = pair_of(cell)
+    identity = {"method": cell.method, "inputs": cell.inputs, "protocol": cell.protocol}
+    return Trace(
+        key=cell.key,
+        series=run.series_of(identity),
+        behaviour=cell.behaviour,
+        clip=cell.clip,
+        stations=cell.stations,
+        health=cell.health,
+        notes=cell.notes,
+        time_s=cell.time_s,
+        scored=cell.scores.scored,
+        errors={name: cell.errors[name] for name in WORST_METRICS},
+        rotation_deg=local_errors_deg(pair).astype(np.float32),
+        position_mm=joint_errors_mm(pair).astype(np.float32),
+        quality=cell.quality,
+        position_valid=cell.position_valid,
+        orientation_valid=cell.orientation_valid,
+        suspect=cell.suspect,
+    )
+
+
+def pair_of(cell: Cell) -> Pair:
+    """Truth and estimate of the scored frames."""
+    skeleton = standard_skeleton().with_bones(cell.bone_m)
+    rows = cell.scores.scored
+    truth, estimate = (posed(skeleton, qpos[rows]) for qpos in (cell.truth_qpos, cell.estimate_qpos))
+    return Pair(truth, estimate, cell.frame_index[rows], cell.rate_hz)
+
+
+def file_name(text: str) -> str:
+    """Letters, digits and underscores only."""
+    return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in text)

@@ -1,0 +1,72 @@
+"""The process that renders: `python -m harness.report.studio JOB.npz ...`, started by `harness.report.apart`.
+
+Each job is a file of arrays (see `apart.Job`); every picture is there whole or not at all.
+"""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import standard_skeleton
+from harness.report.scene import Scene
+from harness.score.pair import Posed, posed
+
+STRIP_SIZE, MOVIE_SIZE = (264, 384), (640, 640)
+"""Width and height in pixels; a movie's must be even."""
+
+
+def main(jobs: Sequence[str]) -> None:
+    for job in jobs:
+        with np.load(job, allow_pickle=False) as content:
+            skeleton = standard_skeleton().with_bones(content["bone_m"])
+            truth, estimate = posed(skeleton, content["truth_qpos"]), posed(skeleton, content["estimate_qpos"])
+            output, fps = Path(str(content["output"])), float(content["fps"])
+        beside = output.with_name(f".unfinished-{output.name}")
+        if fps:
+            movie(truth, estimate, fps, beside)
+        else:
+            strip(truth, estimate, beside)
+        os.replace(beside, output)
+
+
+def strip(truth: Posed, estimate: Posed, path: Path) -> None:
+    """Every frame side by side, in one PNG."""
+    from matplotlib.image import imsave
+
+    pictures = list(_pictures(truth, estimate, STRIP_SIZE))
+    imsave(path, np.ascontiguousarray(np.hstack(pictures)), format="png")
+
+
+def movie(truth: Posed, estimate: Posed, fps: float, path: Path) -> None:
+    """Every frame one after another, as H.264 that browsers play."""
+    import imageio_ffmpeg
+
+    options = {"fps": fps, "codec": "libx264", "quality": None, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
+    encoding = ["-crf", "22", "-preset", "veryfast", "-movflags", "+faststart", "-f", "mp4"]
+    writer = imageio_ffmpeg.write_frames(str(path), MOVIE_SIZE, **options, output_params=encoding)
+    writer.send(None)
+    try:
+        for picture in _pictures(truth, estimate, MOVIE_SIZE):
+            writer.send(np.ascontiguousarray(picture))
+    finally:
+        writer.close()
+
+
+def _pictures(truth: Posed, estimate: Posed, size: tuple[int, int]) -> Iterator[Floats]:
+    """(height, width, 3) bytes of every frame."""
+    ahead = np.mean(rotations.to_matrix(truth.world_from_root)[:, :, 0], axis=0)
+    scene = Scene(truth.skeleton, size, float(np.arctan2(ahead[1], ahead[0])))
+    try:
+        for frame in range(len(truth.root_m)):
+            yield scene.picture(truth, estimate, frame)
+    finally:
+        scene.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,132 @@
+"""A run folder made up from the built-in performer and from errors of known kind, through the real results API."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from harness.core.arrays import Bools, Floats
+from harness.core.humanoid24 import BONES, pack, unpack
+from harness.core.seeds import generator
+from harness.mocap.performer import SOURCE, generate
+from harness.score import manifest, results
+from harness.score.score import score
+
+RATE_HZ = 40.0
+STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
+METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0}
+"""Method -> size of its errors [deg]."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What to make up."""
+
+    behaviours: tuple[str, ...] = ("walking", "boxing")
+    methods: Mapping[str, float] | None = None
+    takes: int = 1
+    duration_s: float = 5.0
+    inputs: Sequence[str] = ("pos+ori",)
+    clip_name: str = ""
+    """Replaces the name of every clip."""
+    failing: tuple[str, ...] = ()
+    """Methods whose cells are planned and fail."""
+    covered: float = 1.0
+    """Share of the frames that find an estimate."""
+
+
+def fabricate(out: Path, plan: Plan | None = None) -> Path:
+    """Write the run; the same plan gives the same bytes."""
+    plan = plan or Plan()
+    methods = METHODS if plan.methods is None else plan.methods
+    scenario = {"name": "fabricated", "methods": list(methods), **asdict(replace(plan, methods=None))}
+    command = "harness run fabricated.toml --out results/fabricated"
+    results.open_run(out, manifest.of_run(scenario, motion_source=SOURCE, command=command))
+    keys, failures, planned = [], {}, 0
+    for behaviour in plan.behaviours:
+        for take in range(1, plan.takes + 1):
+            for inputs in plan.inputs:
+                for method, error_deg in methods.items():
+                    planned += 1
+                    if method in plan.failing:
+                        text = "Traceback (most recent call last):\n  somewhere\nValueError: <b>no</b> pose & no plan"
+                        failures[f"{method} on {behaviour}_{take}"] = text
+                        continue
+                    cell = make_cell(behaviour, take, method, error_deg, inputs, plan)
+                    results.write_cell(out, cell)
+                    keys.append(cell.key)
+    results.write_summary(out, keys=keys, planned=planned, failures=failures)
+    return out
+
+
+def make_cell(behaviour: str, take: int, method: str, error_deg: float, inputs: str, plan: Plan) -> results.Cell:
+    """One method on one take of the performer."""
+    made = generate(behaviour, "p1", take, seed=1, duration_s=plan.duration_s, rate_hz=RATE_HZ)
+    skeleton, dofs = made.skeleton.subset(BONES)
+    truth = pack(made.root_m, made.world_from_root, made.angles_rad[:, dofs])
+    clip = plan.clip_name or made.name
+    valid, quality = _readings(clip, len(truth))
+    rng = generator(1, clip, method, inputs)
+    seen = np.flatnonzero(rng.random(len(truth)) < plan.covered)
+    estimate = _wrong(truth, error_deg, valid, rng)[seen]
+    status, step_ms = np.where(valid.all(axis=1), 0, 1)[seen], rng.gamma(4.0, 0.15, len(seen))
+    defined_by = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ}
+    return results.Cell(
+        key=results.cell_key(defined_by, {"name": method}, "made up"),
+        method=method,
+        behaviour=behaviour,
+        clip=clip,
+        motion_source=SOURCE,
+        stations=STATIONS,
+        mount="tibia",
+        rate_hz=RATE_HZ,
+        inputs=inputs,
+        protocol="none" if method == "ik" else "sequence",
+        calibration="exact",
+        noise="default",
+        seed=1,
+        defined_by=defined_by,
+        scores=score(skeleton, RATE_HZ, truth, estimate, seen, status, step_ms),
+        health={"records": 6 * len(truth), "frames_dropped": 3, "out_of_order": 0, "clock_ppm": 12.5},
+        bone_m=skeleton.bone_m,
+        source_hash="0123456789abcdef",
+        reproduce="harness run fabricated.toml --out results/fabricated",
+        notes=("made up for a test",),
+        time_s=seen / RATE_HZ,
+        truth_qpos=truth[seen],
+        estimate_qpos=estimate,
+        frame_index=seen,
+        status=status,
+        step_ms=step_ms,
+        quality=quality[seen],
+        position_valid=valid[seen],
+        orientation_valid=valid[seen],
+        suspect=np.zeros_like(valid)[seen],
+    )
+
+
+def _readings(clip: str, frames: int) -> tuple[Bools, Floats]:
+    """Validity and quality (F, S): each station is lost once for up to a second."""
+    valid, quality = np.ones((frames, 6), dtype=bool), np.ones((frames, 6))
+    for s, station in enumerate(STATIONS):
+        rng = generator(1, clip, station)
+        start, length = rng.integers(0, frames), rng.integers(5, 40)
+        lost = slice(start, start + length)
+        valid[lost, s] = False
+        quality[lost, s] = np.linspace(0.6, 0.0, len(quality[lost, s]))
+    return valid, quality
+
+
+def _wrong(truth: Floats, error_deg: float, valid: Bools, rng: np.random.Generator) -> Floats:
+    """The truth with smooth errors in every hinge and the root, four times as large where readings are missing."""
+    root_m, quaternion, angles_rad = unpack(truth)
+    worse = gaussian_filter1d(1.0 + 3.0 * (~valid).sum(axis=1), 4.0)[:, None]
+
+    def smooth(width: int) -> Floats:
+        noise: Floats = gaussian_filter1d(rng.normal(size=(len(truth), width)), 6.0, axis=0)
+        return noise / noise.std()
+
+    angles_rad = angles_rad + np.deg2rad(error_deg) * worse * smooth(angles_rad.shape[1])
+    return pack(root_m + 0.003 * error_deg * worse * smooth(3), quaternion, angles_rad)
