@@ -9,7 +9,9 @@ So the motion is played on the mean skeleton of the 24 bones, the root stands at
 vector of up to 0.25 m away), and the model's rest pose is taken to have its legs straight down and its arms along x.
 """
 
+import lzma
 import math
+import struct
 import zipfile
 import zlib
 from pathlib import Path
@@ -51,6 +53,11 @@ JOINTS: tuple[tuple[str, int], ...] = (
 """Name and parent of the joints that SMPL, SMPL-H and SMPL-X share, in the order of `poses`."""
 
 _WHAT = "an AMASS npz"
+_BROKEN = (
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
+    *(OSError, EOFError, ValueError, OverflowError, NotImplementedError, RuntimeError),
+)
+"""What zipfile raises, as far as it is known, for damaged archives."""
 _WIDTHS = (72, 156, 165)
 _RATES = ("mocap_framerate", "mocap_frame_rate")
 
@@ -100,7 +107,7 @@ def read_npz(path: Path | str) -> JointClip:
             poses = _array(path, archive, "poses")
             trans = _array(path, archive, "trans")
             rate_hz = _rate_hz(path, archive)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+    except _BROKEN as error:
         raise BadFile(path, f"a broken archive ({error})", _WHAT, "Fetch it again.") from error
     frames = trans.shape[0] if trans.ndim else 0
     if (

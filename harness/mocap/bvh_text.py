@@ -6,6 +6,8 @@ from pathlib import Path
 from harness.errors import BadFile
 from harness.mocap.files import check_last_line, number, numbers, read_lines
 
+LIMIT_BYTES = 64 * 2**20
+"""Largest BVH file that is read; about 80,000 frames of CMU's skeleton. Its words take ten times that in memory."""
 MOST_JOINTS = 1000
 
 _WHAT = "a BVH motion"
@@ -56,7 +58,9 @@ class BvhText:
 
 def parse_bvh(path: Path) -> BvhText:
     """Read and check a BVH file; BadFile with the line for anything amiss."""
-    lines = [(line, text.split()) for line, text in enumerate(read_lines(path, _WHAT), start=1) if text.strip()]
+    lines = [
+        (line, text.split()) for line, text in enumerate(read_lines(path, _WHAT, LIMIT_BYTES), start=1) if text.strip()
+    ]
     motion = next((k for k, (_, words) in enumerate(lines) if words == ["MOTION"]), None)
     if motion is None:
         raise BadFile(path, "no line MOTION", _WHAT, "Is the file whole, and BVH?")

@@ -1,5 +1,6 @@
 """C3D: markers come back in world axes, sit on the bones of the same take, and damage never gets through."""
 
+import contextlib
 import subprocess
 import sys
 from pathlib import Path
@@ -87,6 +88,18 @@ def test_damage_is_refused(tmp_path: Path, position_mm: Floats, change: object, 
     with pytest.raises(BadFile) as error:
         read_c3d(tmp_path / "x.c3d")
     assert found in str(error.value)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int) -> None:
+    """Bytes changed anywhere in the header and the parameters: nothing but BadFile may come of it."""
+    content = bytearray(_write(tmp_path / "x.c3d", np.ones((3, 3, 3))))
+    rng = np.random.default_rng(seed)
+    for at in rng.integers(0, 1536, size=seed % 4 + 1):
+        content[at] = rng.integers(256)
+    (tmp_path / "x.c3d").write_bytes(bytes(content))
+    with contextlib.suppress(BadFile):
+        assert len(read_c3d(tmp_path / "x.c3d").labels) == 3
 
 
 def test_a_crash_of_ezc3d_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
