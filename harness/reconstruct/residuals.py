@@ -53,6 +53,8 @@ class Residuals:
         """(S, 4) measured orientation of the bones that carry the stations; identity where not measured."""
         self.error: Floats = np.zeros((2 * count, 3))
         """(2S, 3) measured minus modelled [m; rad]; means nothing in rows that were not measured."""
+        self.station_m: Floats = np.zeros((count, 3))
+        """(S, 3) modelled station positions in the world [m]."""
         self.scale: Floats = np.repeat([loss.position_scale_m, loss.orientation_scale_rad], count)
         """(2S,) where each row's Lorentzian starts to let go [m; rad]."""
 
@@ -69,7 +71,7 @@ class Residuals:
             data.xquat[:, :, None],
         )
         self._mount_m = np.array(calibration.mount_m)[:, :, None]
-        self._turned, self._station_m = np.zeros((count, 3, 3)), np.zeros((count, 3))
+        self._turned = np.zeros((count, 3, 3))
         self._turn_from_model = np.zeros((count, 4, 4))
         self._quaternion, self._turn = np.zeros((count, 4, 1)), np.zeros((count, 4, 1))
         self._turn_vector, self._turn_cosine = self._turn[:, 1:, 0], self._turn[:, 0, 0]
@@ -83,7 +85,7 @@ class Residuals:
         nv = self.kinematics.nv
         self._jacobian, self._weighted = np.zeros((2, 2 * count, 3, nv))
         self._rows, self._columns = self._weighted.reshape(-1, nv), self._weighted.reshape(-1, nv).T
-        self._points = list(self._station_m), list(self._jacobian[:count]), list(self._jacobian[count:])
+        self._points = list(self.station_m), list(self._jacobian[:count]), list(self._jacobian[count:])
         self._skew, self._share = np.zeros((2 * count, 3, 3)), np.repeat([1.0, 0.5], count)
 
     @property
@@ -103,6 +105,14 @@ class Residuals:
             turned = np.where(self.measured[count:, None], turned, rotations.IDENTITY)
         self.target_m, self.world_from_target = target_m, turned
         self._turn_from_model = (turned @ _TIMES_CONJUGATE).reshape(count, 4, 4)
+        self._weigh()
+
+    def leave_out(self, rows: Bools) -> None:
+        """Treat these rows (2S,) of the frame as not measured."""
+        self.measured = self.measured & ~rows
+        self._weigh()
+
+    def _weigh(self) -> None:
         self._precision = self._own_precision * self.measured
         np.copyto(self._weight, self._precision)
         np.sqrt(self._weight, out=self._root_weight)
@@ -115,7 +125,7 @@ class Residuals:
 
     def place(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""
-        bodies, station_m = self._bodies, self._station_m
+        bodies, station_m = self._bodies, self.station_m
         self.kinematics.set(qpos)
         self._body_turned.take(bodies, 0, self._turned, "clip")
         self._body_m.take(bodies, 0, station_m, "clip")

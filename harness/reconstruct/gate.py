@@ -1,0 +1,51 @@
+"""Leaves out a position that jumps away from where the body's own motion carries its station (ALGORITHMS.md F7).
+
+A robust loss alone cannot reject an echo: under a wide prior the limb simply follows it. Readings are held against
+the estimated body, not against their own past: over one period at 40 Hz even a punch (100 m/s^2) strays 6 cm from its
+last velocity. When many jump at once the person moved, and after `patience_s` the reading is believed.
+"""
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats
+
+_LONGEST_PERIOD_S = 0.1
+"""After a longer gap nothing can be said about where stations should be."""
+
+
+class Gate:
+    """Watches the positions of S stations through one session."""
+
+    def __init__(self, stations: int, jump_m: float, patience_s: float) -> None:
+        self._jump_m, self._patience_s = jump_m, patience_s
+        self._station_m: Floats = np.zeros((stations, 3))
+        self._velocity_m_s: Floats = np.zeros((stations, 3))
+        self._believed_at_s: Floats = np.full(stations, -np.inf)
+        self._known_at_s = -np.inf
+        self.all_moved = False
+        """Whether at least half of the last frame's positions jumped: the performer is somewhere else."""
+
+    def jumped(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
+        """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""
+        period_s = now_s - self._known_at_s
+        none, self.all_moved = np.zeros(len(measured), bool), False
+        if not 0.0 < period_s <= _LONGEST_PERIOD_S:
+            self._believed_at_s[:] = now_s
+            return none
+        away_m = target_m - self._station_m - period_s * self._velocity_m_s
+        far = measured & (np.vecdot(away_m, away_m) > self._jump_m**2)
+        self._believed_at_s[~far] = now_s
+        if far.any() and 2 * np.count_nonzero(far) >= np.count_nonzero(measured):
+            self.all_moved = True
+            return none
+        out: Bools = far & (now_s - self._believed_at_s <= self._patience_s)
+        return out
+
+    def settled(self, now_s: float, station_m: Floats) -> None:
+        """Where the answer to this frame puts the stations (S, 3) [m]."""
+        period_s = now_s - self._known_at_s
+        if 0.0 < period_s <= _LONGEST_PERIOD_S:
+            self._velocity_m_s = (station_m - self._station_m) / period_s
+        else:
+            self._velocity_m_s = np.zeros_like(station_m)
+        self._station_m, self._known_at_s = station_m.copy(), now_s
