@@ -1,6 +1,6 @@
 """The error model of a tracker as one record, and its three named levels (docs/is900.md 13.5)."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 from harness.core.seeds import generator
 from harness.errors import UnknownName
@@ -36,14 +36,14 @@ class Noise:
     lost_stations: tuple[LostStation, ...] = ()
     clock: Clock = Clock(ppm=0.0)
 
-    def applied(self, seen: Readings, seed: int) -> Readings:
-        """The readings with every component's error; each draws from generators of its own name and station."""
+    def applied(self, seen: Readings, seed: int, take: str) -> Readings:
+        """The readings with every component's error; each draws from generators of its own name, take and station."""
         for field in fields(self):
             value = getattr(self, field.name)
             for component in value if isinstance(value, tuple) else (value,):
                 if component is not None and not isinstance(component, Clock):
                     name = field.name
-                    seen = component.applied(seen, lambda s, name=name: generator(seed, "noise", name, s))
+                    seen = component.applied(seen, lambda s, name=name: generator(seed, "noise", take, name, s))
         return seen
 
 
@@ -51,9 +51,9 @@ def level(name: str) -> Noise:
     """`clean`: nothing; `noise`: white, slow, session and clock; `default`: all of 13.5. UnknownName."""
     if name == "clean":
         return Noise()
-    quiet = {"session": Session(), "slow": Slow(), "white": White(), "clock": Clock()}
+    noise = Noise(session=Session(), slow=Slow(), white=White(), clock=Clock())
     if name == "noise":
-        return Noise(**quiet)
+        return noise
     if name == "default":
-        return Noise(**quiet, speed_error=SpeedError(), excursion=Excursion(), echo=Echo(), dropout=Dropout())
+        return replace(noise, speed_error=SpeedError(), excursion=Excursion(), echo=Echo(), dropout=Dropout())
     raise UnknownName("noise level", name, LEVELS)

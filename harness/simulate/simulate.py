@@ -82,7 +82,7 @@ def simulate(
     tick_s = np.arange(count) / tracker.rate_hz
     calibration = exact(body, mounts)
     truth = _true_readings(trajectory, calibration, tick_s, tracker)
-    readings = noise.applied(truth, seed)
+    readings = noise.applied(truth, seed, take.name)
     wire, arrived_s, dropped = _transmitted(readings, tracker, noise.clock)
     frames = _received(wire, arrived_s, stations, tracker)
     truth_s = tick_s + 0.5 * last_s
