@@ -19,6 +19,7 @@ Action = Callable[[argparse.Namespace], Outcome]
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; the exit code says how it ended (see `errors.Outcome`)."""
     args = build_parser().parse_args(argv)
+    sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie where they work
     try:
         outcome: Outcome = args.action(args)
         sys.stdout.flush()
@@ -77,13 +78,15 @@ def positive(text: str) -> int:
 def add_demo(verbs: Verbs) -> None:
     text = "run the main job on built-in motion and write its report"
     verb = add_verb(verbs, "demo", text, run_scenario, "seed", "out", "jobs")
-    verb.set_defaults(scenario="demo", mocap=None, movie=False, report=True)
+    verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True)
 
 
 def add_run(verbs: Verbs) -> None:
     text = "run a scenario: every test clip, every method; resumes what was interrupted"
     verb = add_verb(verbs, "run", text, run_scenario, "seed", "out", "jobs", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
+    text = "replaces the scenario's methods, such as ik,best_match+ik,my_module:MyMethod"
+    verb.add_argument("--methods", metavar="A,B", help=text)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
     verb.add_argument("--no-report", dest="report", action="store_false", help="leave out report.html and plots")
 
@@ -97,6 +100,8 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     scenario = load_scenario(args.scenario)
     if args.seed is not None:
         scenario = replace(scenario, seed=args.seed)
+    if args.methods is not None:
+        scenario = replace(scenario, methods=tuple(args.methods.split(",")))
     out = args.out or Path("results") / scenario.name
     with progress_bar("cells") as progress:
         outcome = experiment.run(

@@ -26,7 +26,9 @@ def table(summary: Mapping[str, Any]) -> str:
         matched = f"{row['frames_matched']}/{row['frames_expected']}"
         figures = [_figure(row["metrics"][name], decimals) for _, name, decimals in COLUMNS]
         lines.append([row["behaviour"], row["method"], *varying, str(row["sequences"]), matched, *figures])
-    return "\n".join([_setting(cells), "", *_aligned(lines, text_columns=2 + len(_varying(cells))), "", finished, *failed])
+    return "\n".join(
+        [_setting(cells), "", *_aligned(lines, text_columns=2 + len(_varying(cells))), "", finished, *failed]
+    )
 
 
 def _setting(cells: Sequence[Mapping[str, Any]]) -> str:
