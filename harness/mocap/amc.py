@@ -72,7 +72,7 @@ def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str,
     lines = _content(file)
     block = _header(path, lines, 1 + len(counts))
     order = tuple(text.split(None, 1)[0] for _, text in block[1:])
-    if set(order) != set(counts) or len(order) != len(counts) or not block[0][1].isdigit():
+    if sorted(order) != sorted(counts):
         _explain(path, counts, tuple(counts), block, None)
     words_in_frame = 1 + len(order) + sum(counts.values())
     starts = np.cumsum([1, *(1 + counts[name] for name in order[:-1])]).tolist()
@@ -107,7 +107,7 @@ def _header(path: Path, lines: Iterator[_Line], lines_in_frame: int) -> list[_Li
     keywords = set()
     for line, text in lines:
         if not text.startswith(":"):
-            if ":DEGREES" not in keywords or not text.isdigit():
+            if ":DEGREES" not in keywords or not _is_number(text):
                 raise BadFile(path, f"{text[:40]!r}", ":DEGREES and then frame 1", f"Is it {_WHAT}?", line)
             return [(line, text), *islice(lines, lines_in_frame - 1)]
         keywords.add(text.upper())
@@ -120,7 +120,12 @@ def _floats(words: tuple[str, ...]) -> list[float] | None:
         row = list(map(float, words))
     except ValueError:
         return None
-    return row if sum(map(abs, row)) < LARGEST else None
+    return row if all(abs(value) < LARGEST for value in row) else None
+
+
+def _is_number(text: str) -> bool:
+    """Whether a line can be a frame's number."""
+    return text.isascii() and text.isdecimal() and len(text) < 10
 
 
 def _explain(
@@ -129,7 +134,7 @@ def _explain(
     """What is wrong with a frame that does not read as all the others."""
     line, text = block[0]
     if expected is not None and text != str(expected):
-        again = text.isdigit() and int(text) < expected
+        again = _is_number(text) and int(text) < expected
         found = f"frame {text} again" if again else f"{text[:40]!r}"
         advice = "Frames are repeated." if again else "Frames or rows are missing or too many; fetch the file again."
         raise BadFile(path, found, f"frame {expected}", advice, line)
@@ -137,7 +142,7 @@ def _explain(
     for (line, text), name in zip(block[1:], order, strict=False):
         found, *values = text.split()
         missing = ", ".join(n for n in counts if n not in seen)
-        if found.isdigit():
+        if _is_number(found):
             raise BadFile(path, f"frame {found} before {missing}", "every bone of the skeleton", _CUT, line)
         if found not in counts:
             advice = "Does the ASF belong to this AMC?"

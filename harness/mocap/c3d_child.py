@@ -47,7 +47,7 @@ def main(file: str, out: str) -> int:
 def _label_order(key: str) -> int:
     """LABELS, LABELS2, LABELS3, ...: 255 labels fit in each."""
     digits = key.removeprefix("LABELS")
-    return int(digits) if digits.isdigit() else 1
+    return int(digits) if digits.isdecimal() else 1
 
 
 if __name__ == "__main__":

@@ -137,6 +137,10 @@ FRAME_2 = AMC.index("\n2\n") + 1
 BAD_AMC = [
     ("#!OML", "OML", "line 1: 'OML:ASF"),
     (":DEGREES", ":RADIANS", "line 4: '1'; expected :DEGREES and then frame 1"),
+    ("\n1\n", "\n²\n", "line 4: '²'; expected :DEGREES and then frame 1"),
+    ("\n1\n", "\n" + "1" * 5000 + "\n", "expected :DEGREES and then frame 1"),
+    ("\n2\n", "\n" + "2" * 5000 + "\n", "expected frame 2"),
+    ("\nlradius ", "\nlradius 1000001\nlwrist ", "'1000001' for lradius"),
     ("\n2\n", "\n1\n", "line 28: frame 1 again; expected frame 2"),
     ("\n2\n", "\n3\n", "line 28: '3'; expected frame 2"),
     ("\nlfemur", "\nltail", "line 11: unknown bone 'ltail'"),
@@ -152,7 +156,7 @@ BAD_AMC = [
 @pytest.mark.parametrize(("old", "new", "found"), BAD_AMC)
 def test_a_bad_motion_is_refused_with_the_line(tmp_path: Path, old: str, new: str, found: str) -> None:
     assert old in AMC
-    assert found in _refused(_read, tmp_path / "x.amc", AMC.replace(old, new, 1).encode())
+    assert found in _refused(_read, tmp_path / "x.amc", AMC.replace(old, new, 1).encode("latin-1"))
 
 
 def test_rows_of_a_later_frame_are_held_to_the_first(tmp_path: Path) -> None:
