@@ -11,7 +11,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.performer.curves import smaller, wander
+from harness.mocap.performer.curves import larger, smaller, wander
 from harness.mocap.performer.feet import foot
 from harness.mocap.performer.figure import LEFT, Figure
 from harness.mocap.performer.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
@@ -100,8 +100,14 @@ def _grip(
     cocked = swing + act["cock"] + 0.02
     shaft = np.cos(cocked)[:, None] * away + np.sin(cocked)[:, None] * target
     strike = cos * target - sin * away
-    for side, end in ((lead, -0.5), (trail, 0.5)):
-        wrist = grip + end * _APART_M * shaft
+    ends = {lead: -0.5 * _APART_M * shaft, trail: 0.5 * _APART_M * shaft}
+    for side in (trail, lead, trail, lead):  # draw the grip in until both hands are on it
+        line = grip + ends[side] - figure.shoulder_m(side)
+        distance = np.sqrt(np.sum(line**2, axis=1))
+        over = larger(distance - 0.965 * figure.arm_m(side), np.array(0.0), 0.01) / distance
+        grip = grip - over[:, None] * line
+    for side in (lead, trail):
+        wrist = grip + ends[side]
         elbow = 0.35 * LEFT[side] * figure.chest[:, :, 1] - 0.8 * figure.chest[:, :, 2] - 0.35 * figure.chest[:, :, 0]
         palm = (1.0 if side == trail else -1.0) * strike - [0.0, 0.0, 0.2]
         back = 0.10 + (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"])

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.performer.curves import GRAVITY_M_S2, ease, larger, pulse, quintics, through, wander
+from harness.mocap.performer.curves import GRAVITY_M_S2, ease, larger, pulse, quintics, smaller, through, wander
 from harness.mocap.performer.feet import BALL_M, placed
 from harness.mocap.performer.figure import LEFT, SIDES, Figure, Foot
 from harness.mocap.performer.footwork import highest_root_m, leg_m
@@ -31,8 +31,9 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     tuck, pitch = np.zeros(len(t)), np.zeros(len(t))
     for jump in jumps:
         share = (t - jump.leave_s) / jump.flight_s
-        foot_place += ease(share)[:, None] * jump.way_m
-        foot_yaw += jump.turn_rad * ease(share)
+        aloft = ease((share - 0.1) / 0.8)
+        foot_place += aloft[:, None] * jump.way_m
+        foot_yaw += jump.turn_rad * aloft
         yaw += jump.turn_rad * ease((t - jump.leave_s + 0.12) / (jump.flight_s + 0.2))
         place += _glide(t, jump)[:, None] * jump.way_m
         tuck += 0.95 * GRAVITY_M_S2 * jump.flight_s**2 / 8.0 * pulse(share)
@@ -59,10 +60,11 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
         return feet
 
     top = highest_root_m(skeleton, place, pelvis, feet_at(0.0), 0.99)
-    stand = float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012
-    root = columns(*place.T, _height(t, jumps, stand, leg))
+    stand = float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012 if np.any(pitch < 0.01) else float(np.min(top))
+    air = _airborne(t, jumps)
+    root = columns(*place.T, smaller(_height(t, jumps, stand, leg), top + 0.5 * air, 0.02))
     # the legs follow the body up, tucked a little
-    feet = feet_at(larger(tuck, root[:, 2] - top, 0.02))
+    feet = feet_at(air * larger(tuck, root[:, 2] - top, 0.015))
     spine = columns(
         habits.bend_rad + 0.03 + act["bend"] + 0.012 * breath + wander(rng, t, 2.5, 0.018),
         wander(rng, t, 2.5, 0.025),
@@ -127,6 +129,14 @@ def _height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floats:
             bend.append(0.0)
         rebound = jump.rebound
     return quintics(t, *(np.array(x) for x in (at, value, slope, bend)))
+
+
+def _airborne(t: Floats, jumps: list[Jump]) -> Floats:
+    """(T,) 1 in flight, 0 on the floor, easing in the 80 ms around."""
+    out = np.zeros(len(t))
+    for jump in jumps:
+        out += ease((t - jump.leave_s + 0.08) / 0.08) * ease((jump.land_s + 0.08 - t) / 0.08)
+    return out
 
 
 def _gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:

@@ -46,7 +46,7 @@ def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tupl
     place = np.zeros(2)
     slow = rng.uniform(0.95, 1.1) / habits.pace
     usual = rng.uniform(0.36, 0.50) * habits.size**0.5
-    while now < t[-1] - 0.5:
+    while not jumps or now < t[-1] - 0.5:
         this = kind if rng.random() < 0.7 or left_in_series else str(rng.choice(KINDS))
         if this == "series" and not left_in_series:
             left_in_series = int(rng.integers(3, 7))
