@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.core.humanoid24 import BONES, limits_rad
+from harness.core.humanoid24 import BONES, limits_rad, standard_skeleton
 from harness.core.skeleton import Skeleton
 
 JUMP_M_S = 12.0
@@ -85,10 +85,15 @@ def fastest(names: tuple[str, ...], position_m: Floats, rate_hz: float) -> tuple
     return float(speed[frame, joint]), names[int(joint)], int(frame) + 2
 
 
+def has_the_hinges(skeleton: Skeleton) -> bool:
+    """Whether the skeleton has the 24 bones with just their hinges, so that the model's limits apply."""
+    return set(BONES) <= set(skeleton.names) and skeleton.subset(BONES)[0].dof_names == standard_skeleton().dof_names
+
+
 def outside_limits(skeleton: Skeleton, angles_rad: Floats) -> tuple[float, float, str]:
     """Share of frames with a hinge outside the model's limits, the most by which one is [rad], and its name.
 
-    The limits are those of core.humanoid24, for angles in principal form; of other bones nothing is said.
+    The limits are those of core.humanoid24, for angles in principal form, of a skeleton that `has_the_hinges`.
     """
     body, dofs = skeleton.subset(BONES)
     angles = principal(body, angles_rad[:, dofs])

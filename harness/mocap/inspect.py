@@ -45,6 +45,8 @@ def inspect_file(
         raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC of it.")
     if kind not in FORMATS:
         raise BadFile(path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in FORMATS), "Rename it?")
+    if unit is not None and not 0.0 < unit < np.inf:
+        raise BadInput(f"A unit of {unit} m cannot be.", "Give the length of 1 in the file in metres (--unit).")
     if kind == "amc":
         return _inspect_amc(path, rate_hz, unit, library)
     if rate_hz is not None:
@@ -93,15 +95,13 @@ def inspect_clip(clip: Clip) -> Inspection:
         doubts.append(f"legs of {leg:.3g} m: is the unit right?")
     if not ROOT_IN_LEGS[0] <= above <= ROOT_IN_LEGS[1]:
         doubts.append(f"the root is {above:.3g} leg lengths above z = 0: are root and bones in one unit?")
+    evidence = f"legs of {leg:.2f} m"
+    facts = replace(facts, height_m=_standing_m(skeleton), unit_evidence=evidence, doubts=tuple(doubts))
+    if not checks.has_the_hinges(skeleton):
+        return facts
     share, most, hinge = checks.outside_limits(skeleton, clip.angles_rad)
-    return replace(
-        facts,
-        height_m=_standing_m(skeleton),
-        unit_evidence=f"legs of {leg:.2f} m",
-        limits_share=share,
-        limits_worst=f"{hinge} by {np.rad2deg(most):.1f} deg" if share else "",
-        doubts=tuple(doubts),
-    )
+    worst = f"{hinge} by {np.rad2deg(most):.1f} deg" if share else ""
+    return replace(facts, limits_share=share, limits_worst=worst)
 
 
 def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, library: Path | str | None) -> Inspection:

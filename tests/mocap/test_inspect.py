@@ -144,6 +144,23 @@ def test_a_bvh_of_another_skeleton_is_inspected_without_hinges(tmp_path: Path) -
     assert "not checked" in "\n".join(found.lines())
 
 
+def test_other_hinges_are_not_held_to_the_limits(tmp_path: Path) -> None:
+    amc = write_clip(tmp_path, clip())
+    asf = amc.with_name("91.asf")
+    asf.write_text(asf.read_text().replace("dof rx ry rz", "dof rx ry", 1))  # of lowerback
+    rows = [line.rsplit(" ", 1)[0] if line.startswith("lowerback") else line for line in amc.read_text().split("\n")]
+    amc.write_text("\n".join(rows))
+    found = inspect_file(amc, rate_hz=120.0)
+    assert (found.limits_share, found.findings) == (None, ())
+    assert found.unit_evidence.endswith("m")
+
+
+@pytest.mark.parametrize("unit", [0.0, -1.0, float("nan"), float("inf")])
+def test_a_unit_that_is_none_is_refused(tmp_path: Path, unit: float) -> None:
+    with pytest.raises(BadInput, match="A unit of"):
+        inspect_file(write_clip(tmp_path, clip(3)), rate_hz=120.0, unit=unit)
+
+
 @pytest.mark.parametrize(("name", "error"), [("x.asf", BadInput), ("x.fbx", BadFile), ("absent.amc", BadFile)])
 def test_other_files_are_refused(tmp_path: Path, name: str, error: type[Exception]) -> None:
     if not name.startswith("absent"):
