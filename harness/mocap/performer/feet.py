@@ -73,14 +73,14 @@ def foot(
         moving = share > 0.0
         now = share[moving]
         way = np.append(np.subtract(b.ball_m, a.ball_m), 0.0)
-        # a flat foot is lifted before it moves on and set down after; a heel clears the floor until just before it lands
+        # a flat foot is lifted before it moves on and set down after; a heel clears the floor until it lands
         first, last = (0.03, 0.92) if b.land_rad else (0.12, 0.88)
         ball[moving] = (*a.ball_m, BALL_M) + travel((now - first) / (last - first))[:, None] * way
         ball[moving, 2] += a.lift_m * pulse(now, a.lift_peak)
         if b.land_rad:
             ball[moving, 2] += _CLEARANCE_M * ease(now / 0.35) * ease((1.0 - now) / 0.35)
         yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease(now)
-        heel_first[moving] = ease(now) if b.land_rad else 0.0
+        heel_first[moving] = ease(now / 0.7) if b.land_rad else 0.0
         heel_first[t > 0.5 * (b.on_s + b.off_s)] = 0.0  # it lies flat there
     return placed(skeleton, side, ball, yaw + pivot, pitch, heel_first, knee_out_rad)
 
