@@ -8,7 +8,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.run import Run, Trace, file_name
-from harness.report.style import COLOURS, FAINT, GRID, INK, SETTINGS, Chart, bare, line_style, to_svg
+from harness.report.style import COLOURS, FAINT, GRID, INK, PAPER, SETTINGS, Chart, bare, line_style, to_svg
 from harness.score.pair import hinged_bones, joint_names
 
 if TYPE_CHECKING:
@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN = 8.6
+_ROUND = (0, 1, 2, 5, 10, 20, 40, 70, 100, 150, 200, 300, 400, 500, 700, 1000)
+"""Ticks of a square-root axis."""
 _MOST_POINTS = 1500
 """Along one line; more are no sharper on a screen."""
 ANGLE, POSITION = "joint_angle_mean_deg", "mpjpe_mm"
@@ -76,6 +78,7 @@ def per_joint(run: Run, series: str) -> Chart:
             axes.invert_yaxis()
             axes.set_xscale("function", functions=(np.sqrt, np.square))
             axes.set_xlim(left=0.0)
+            axes.set_xticks([tick for tick in _ROUND if tick <= axes.get_xlim()[1]])
             axes.set_title(title)
             axes.grid(False, axis="y")
         if others:
@@ -144,7 +147,7 @@ def _quality(axes: "Axes", trace: Trace) -> None:
     extent = (trace.time_s[0] - step_s / 2, trace.time_s[-1] + step_s / 2, len(trace.stations) - 0.5, -0.5)
     axes.imshow(band, aspect="auto", extent=extent, cmap=colours, vmin=0.0, vmax=1.0, interpolation="nearest")
     for edge in np.arange(0.5, len(trace.stations) - 1):
-        axes.axhline(edge, color="white", linewidth=1.5)
+        axes.axhline(edge, color=PAPER, linewidth=1.5)
     bare(axes)
     axes.set_yticks(range(len(trace.stations)), trace.stations)
     axes.set_xlabel("time [s]")
@@ -184,11 +187,16 @@ def _legend(names: Sequence[str]) -> dict[str, Any]:
 
 def _logarithmic(axes: "Axes", which: Literal["x", "y"]) -> None:
     """A logarithmic axis with plain numbers, unless nothing on it is above zero (a perfect method)."""
+    from matplotlib.ticker import LogLocator, NullLocator
+
     column = 0 if which == "x" else 1
     values = np.concatenate([np.asarray(line.get_data()[column], dtype=float) for line in axes.lines] or [np.zeros(1)])
     if np.nanmax(values, initial=0.0) > 0.0:
         axes.set(**{f"{which}scale": "log"})
         axis = axes.xaxis if which == "x" else axes.yaxis
+        few = np.nanmin(values[values > 0.0]) * 300.0 < np.nanmax(values)
+        axis.set_major_locator(LogLocator(subs=(1.0,) if few else (1.0, 2.0, 5.0)))
+        axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(lambda value, _: f"{value:g}")
 
 

@@ -37,8 +37,8 @@ def table(caption: Any, head: list[Any], rows: list[list[Any]], *, label: str) -
     """A table whose first column names the rows; it scrolls in itself when it is wider than the page."""
     top = tag("tr", *(tag("th", cell, scope="col") for cell in head))
     body = [tag("tr", tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:])) for row in rows]
-    content = tag("table", tag("caption", caption), tag("thead", top), tag("tbody", *body))
-    return scrolling(content, label)
+    content = tag("table", tag("thead", top), tag("tbody", *body), aria_label=label)
+    return joined(tag("p", caption, class_="caption"), scrolling(content, label))
 
 
 def scrolling(content: Any, label: str) -> Markup:

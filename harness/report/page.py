@@ -21,14 +21,15 @@ _POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'"
 )
-_REPOSITORY_NOTE = "Run it where the scenario file and, for recorded motion, the library lie."
+_WHERE = "Run it where the scenario file and, for recorded motion, the library lie."
 
 
 @dataclass(frozen=True)
 class Strip:
     """The worst two seconds of the leading method by one metric, as a picture."""
 
-    window: Window
+    windows: Sequence[Window]
+    """Which coincide; the first is shown."""
     title: str
     instants_s: Sequence[float]
     picture: Path
@@ -94,10 +95,10 @@ def _sections(content: Content) -> list[tuple[str, str, Markup]]:
         ("Coverage", "coverage", tables.coverage(run)),
         ("Error over time", "time", joined(*(_chart(chart, 3) for chart in content.over_time))),
         ("Each joint", "joints", _chart(content.per_joint) if content.per_joint else nothing),
-        ("How often", "cdf", _chart(content.distribution) if content.distribution else nothing),
+        ("Error distribution", "cdf", _chart(content.distribution) if content.distribution else nothing),
         ("Stream health", "health", tables.health(run) if measured else nothing),
         ("Worst two seconds", "worst", _worst(content) if content.windows else nothing),
-        ("Look around", "look", _look(content)),
+        ("In 3-D", "look", _look(content)),
         (
             "Every metric",
             "metrics",
@@ -126,20 +127,13 @@ def _worst(content: Content) -> Markup:
             if window is None:
                 cells.append(tables.NOT_MEASURED)
                 continue
-            place = f"{clips[window.key]}, {window.start_s:.1f}–{window.end_s:.1f} s"
+            place = joined(clips[window.key], tag("br"), _span(window))
             cells.append(joined(_mean(window), tag("span", place, class_="spread under")))
         rows.append([series, *cells])
-    head = ["method", *(joined(m, tag("span", f" [{DEFINITIONS[m].unit}]", class_="spread")) for m in metrics)]
+    head = ["method", *metrics]
     caption = "The two seconds with the largest mean of each metric, and where they are."
     summary = table(caption, head, rows, label="worst two seconds")
-    key = tag(
-        "p",
-        "Rendered for the leading method. ",
-        tag("span", class_="chip truth"),
-        "truth, pale and full; ",
-        tag("span", class_="chip estimate"),
-        "estimate, slimmer: where it is right it lies inside.",
-    )
+    key = tag("p", "The leading method, where it was worst. ", _key())
     strips = [_strip(strip) for strip in content.strips if strip.picture.is_file()]
     links = [tag("li", tag("a", path.name, href=path.name)) for path in content.movies]
     movies = joined(tag("h3", "Movies"), tag("ul", *links)) if links else None
@@ -150,17 +144,21 @@ def _strip(strip: Strip) -> Markup:
     alt = f"Truth and estimate at {len(strip.instants_s)} instants of {strip.title}"
     times = tag("div", *(tag("span", f"{t:.2f} s") for t in strip.instants_s), class_="times")
     image = tag("img", src=_data(strip.picture.read_bytes(), "image/png"), alt=alt)
-    caption = joined(tag("b", f"{strip.window.metric}, mean {_mean(strip.window)}. "), strip.title)
+    means = [f"{window.metric} {_mean(window)} ({_span(window)})" for window in strip.windows]
+    caption = joined(tag("b", f"{strip.title}. "), f"Means: {', '.join(means)}.")
     return tag("figure", scrolling(joined(image, times), strip.title), tag("figcaption", caption), class_="strip")
+
+
+def _key() -> Markup:
+    truth, estimate = (tag("span", class_=f"chip {name}") for name in ("truth", "estimate"))
+    return joined(truth, "truth, pale and full; ", estimate, "estimate, slimmer: where it is right it lies inside.")
 
 
 def _look(content: Content) -> Markup:
     if not content.scrubber:
         return Markup()
-    text = (
-        "The worst two seconds of every method, by every metric above. Drag to turn; the camera follows the true root."
-    )
-    return joined(tag("p", text), content.scrubber)
+    text = "The worst two seconds of every method. Drag to turn; the camera follows the true root."
+    return joined(tag("p", text, " ", _key()), content.scrubber)
 
 
 def _every_metric(run: Run) -> Markup:
@@ -176,15 +174,19 @@ def _manifest(run: Run) -> Markup:
 
 def _reproduce(run: Run) -> Markup:
     command = run.manifest.circumstances.get("command")
-    again = shlex.join(["harness", "report", run.out.name])
+    again = shlex.join(["harness", "report", str(run.out)])
     if not command:
         return tag("p", "The run was started from a program: no command was recorded.")
-    return joined(tag("pre", tag("code", str(command))), tag("p", f"{_REPOSITORY_NOTE} This page alone: {again}"))
+    return joined(tag("pre", tag("code", str(command))), tag("p", f"{_WHERE} This page alone: ", tag("code", again)))
 
 
 def _mean(window: Window) -> str:
     unit = DEFINITIONS[window.metric].unit
     return f"{tables.number(window.mean, unit)} {unit}"
+
+
+def _span(window: Window) -> str:
+    return f"{window.start_s:.1f}–{window.end_s:.1f} s"
 
 
 def _data(content: bytes, kind: str) -> str:

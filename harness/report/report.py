@@ -1,7 +1,6 @@
 """The report of a finished run: plots, pictures, movies on request, and the page that holds them."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -16,12 +15,12 @@ from harness.report.page import Content, Strip, page
 from harness.report.run import WORST_METRICS, Run, file_name, read_run
 from harness.report.scrubber import Shot, scrubber
 from harness.report.verdict import HEADLINE, verdict
-from harness.report.worst import Window, worst_of, worst_window
+from harness.report.worst import Window, together, worst_of, worst_window
 from harness.score.cell import Cell
 from harness.score.files import write_text
 from harness.score.pair import posed
 
-_INSTANTS = 6
+_INSTANTS = 5
 """Pictures in a strip."""
 _MOVIE_FPS = (20.0, 30.0)
 
@@ -40,18 +39,15 @@ def write_report(out: Path, *, movie: bool = False, rendered: bool = True) -> Pa
     found = verdict(run)
     windows = _windows(run)
     reader = cache(run.cell)
-    strips = [
-        _strip(run, window, plots)
-        for metric in WORST_METRICS
-        if (window := windows.get((found.best or "", metric))) is not None
-    ]
-    rendering = Rendering([_strip_job(reader(s.window.key), run, s) for s in strips] if rendered else [])
+    leading = [window for (series, _), window in windows.items() if series == found.best]
+    strips = [_strip(run, group, plots) for group in together(leading)]
+    rendering = Rendering([_strip_job(reader(s.windows[0].key), run, s) for s in strips] if rendered else [])
     try:
         measured = [name for name in run.behaviours if any(t.scored.any() for t in run.traces if t.behaviour == name)]
         over_time = [figures.over_time(run, behaviour) for behaviour in measured]
         per_joint = figures.per_joint(run, found.best) if found.best else None
         distribution = figures.distribution(run) if measured else None
-        view, no_view = _scrubber(run, windows, reader)
+        view, no_view = _scrubber(run, windows, found.best, reader)
         reason = rendering.finish() if rendered else "rendering was turned off"
     finally:
         rendering.close()
@@ -87,13 +83,13 @@ def _windows(run: Run) -> dict[tuple[str, str], Window]:
 
 
 def _title(run: Run, window: Window) -> str:
-    trace = next(trace for trace in run.traces if trace.key == window.key)
+    trace = run.trace(window.key)
     return f"{trace.series} on {trace.clip}, {window.start_s:.2f} to {window.end_s:.2f} s"
 
 
 def _rows(run: Run, window: Window) -> Ints:
     """The frames of a window that have a finite estimate."""
-    trace = next(trace for trace in run.traces if trace.key == window.key)
+    trace = run.trace(window.key)
     out: Ints = window.first + np.flatnonzero(trace.scored[window.first : window.stop])
     return out
 
@@ -104,30 +100,34 @@ def _instants(run: Run, window: Window) -> Ints:
     return out
 
 
-def _strip(run: Run, window: Window, plots: Path) -> Strip:
-    trace = next(trace for trace in run.traces if trace.key == window.key)
-    instants_s = [float(t) for t in trace.time_s[_instants(run, window)]]
-    return Strip(window, _title(run, window), instants_s, plots / f"worst_{window.metric}.png")
+def _strip(run: Run, windows: Sequence[Window], plots: Path) -> Strip:
+    instants_s = [float(t) for t in run.trace(windows[0].key).time_s[_instants(run, windows[0])]]
+    return Strip(windows, _title(run, windows[0]), instants_s, plots / f"worst_{windows[0].metric}.png")
 
 
 def _strip_job(cell: Cell, run: Run, strip: Strip) -> Job:
-    rows = _instants(run, strip.window)
+    rows = _instants(run, strip.windows[0])
     return Job(strip.picture, cell.bone_m, cell.truth_qpos[rows], cell.estimate_qpos[rows])
 
 
-def _scrubber(run: Run, windows: Mapping[tuple[str, str], Window], reader: Callable[[str], Cell]) -> tuple[Markup, str]:
-    """The interactive view of every window, windows of one method that coincide told once."""
-    shots: dict[tuple[str, int], Shot] = {}
-    for (_, metric), window in windows.items():
-        place = (window.key, window.first)
-        if place in shots:
-            shots[place] = replace(shots[place], title=f"{metric}, {shots[place].title}")
-            continue
-        cell, rows = reader(window.key), _rows(run, window)
-        skeleton = standard_skeleton().with_bones(cell.bone_m)
-        truth, estimate = (posed(skeleton, qpos[rows]) for qpos in (cell.truth_qpos, cell.estimate_qpos))
-        shots[place] = Shot(f"{metric}: {_title(run, window)}", [float(t) for t in cell.time_s[rows]], truth, estimate)
-    return scrubber(standard_skeleton(), list(shots.values())) if shots else (Markup(), "")
+def _scrubber(
+    run: Run, windows: Mapping[tuple[str, str], Window], best: str | None, reader: Callable[[str], Cell]
+) -> tuple[Markup, str]:
+    """The interactive view of every method's worst seconds, the leading one's first; or nothing and why."""
+    shots = []
+    for name in sorted(run.series, key=lambda name: name != best):
+        groups = together(window for (series, _), window in windows.items() if series == name)
+        shots += [_shot(run, name, group, reader(group[0].key)) for group in groups]
+    return scrubber(standard_skeleton(), shots) if shots else (Markup(), "")
+
+
+def _shot(run: Run, series: str, windows: Sequence[Window], cell: Cell) -> Shot:
+    rows = _rows(run, windows[0])
+    skeleton = standard_skeleton().with_bones(cell.bone_m)
+    truth, estimate = (posed(skeleton, qpos[rows]) for qpos in (cell.truth_qpos, cell.estimate_qpos))
+    metrics = ", ".join(window.metric for window in windows)
+    title = f"{series} on {cell.clip}, {windows[0].start_s:.1f}–{windows[0].end_s:.1f} s: {metrics}"
+    return Shot(title, cell.time_s[rows].tolist(), truth, estimate)
 
 
 def _movies(run: Run, reader: Callable[[str], Cell]) -> tuple[list[Path], str]:

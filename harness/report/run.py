@@ -84,6 +84,9 @@ class Run:
     def behaviours(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(str(row["behaviour"]) for row in self.cells))
 
+    def trace(self, key: str) -> Trace:
+        return next(trace for trace in self.traces if trace.key == key)
+
     def series_of(self, row: Row) -> str:
         """Name of the group of a row of the summary."""
         rows = self.summary["methods"]

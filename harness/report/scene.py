@@ -49,7 +49,7 @@ class Scene:
         self._grid.position = tuple(np.round(at / _GRID_M) * _GRID_M)
         middle = np.array([*at[:2], max(0.93, float(truth.root_m[frame, 2]) - 0.05)])
         self._plotter.camera.focal_point = tuple(middle)
-        self._plotter.camera.position = tuple(middle + 4.9 * self._from)
+        self._plotter.camera.position = tuple(middle + 4.6 * self._from)
         self._plotter.camera.up = (0.0, 0.0, 1.0)
         self._plotter.camera.view_angle = 27.0
         self._plotter.reset_camera_clipping_range()

@@ -6,7 +6,14 @@
   const stage = find("stage"), choice = find("shot"), slider = find("frame"), where = find("where");
   const play = find("play"), reset = find("reset");
   const TRUTH = "#5b87ad", ESTIMATE = "#e8850c", FLOOR = "#8d98a5", GRID_M = 0.5, REACH_M = 1.5;
-  const CAMERA = { eye: { x: 1.35, y: -1.35, z: 0.45 }, center: { x: 0, y: 0, z: -0.08 }, up: { x: 0, y: 0, z: 1 } };
+  const CAMERA = { eye: { x: 0.86, y: -0.86, z: 0.24 }, center: { x: 0, y: 0, z: -0.1 }, up: { x: 0, y: 0, z: 1 } };
+  // An icosahedron (its corners are cyclic permutations of (0, +-1, +-golden ratio)).
+  const G = (1 + Math.sqrt(5)) / 2, LONG = Math.hypot(1, G);
+  const BALL = [[-1, G, 0], [1, G, 0], [-1, -G, 0], [1, -G, 0], [0, -1, G], [0, 1, G], [0, -1, -G], [0, 1, -G],
+    [G, 0, -1], [G, 0, 1], [-G, 0, -1], [-G, 0, 1]].map((p) => p.map((c) => c / LONG));
+  const BALL_FACES = [[0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2],
+    [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
+    [8, 6, 7], [9, 8, 1]];
   let bones, head, shots, frame = 0, timer = 0;
 
   async function unpacked(id) {
@@ -26,20 +33,41 @@
     });
   }
 
-  // A figure as one line with a gap after each bone, seen from above the true root: the camera goes along.
-  function lines(joints, at) {
+  const minus = (p, q) => [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
+  const cross = (p, q) => [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+  const unit = (p) => { const n = Math.hypot(...p) || 1; return p.map((c) => c / n); };
+
+  // A bone as an octahedron: its joint, four corners a fifth of the way along, its far end.
+  function octahedron(from, to, girth) {
+    const along = minus(to, from), length = Math.hypot(...along);
+    const side = unit(cross(along, Math.abs(along[2]) < 0.9 * length ? [0, 0, 1] : [1, 0, 0]));
+    const other = unit(cross(along, side));
+    const radius = girth * Math.min(0.06, Math.max(0.028, 0.18 * length));
+    const corner = (a, b) => from.map((c, i) => c + 0.2 * along[i] + radius * (a * side[i] + b * other[i]));
+    return [from, corner(1, 0), corner(0, 1), corner(-1, 0), corner(0, -1), to];
+  }
+
+  // All bones and the head as one mesh, seen from the true root: the camera goes along.
+  function body(joints, at, girth) {
     const out = { x: [], y: [], z: [] };
     const put = (p) => { out.x.push(p[0] - at[0]); out.y.push(p[1] - at[1]); out.z.push(p[2]); };
-    for (const [from, to] of bones) {
-      put(joints[from]);
-      put(joints[to]);
-      out.x.push(null); out.y.push(null); out.z.push(null);
-    }
+    for (const [from, to] of bones) octahedron(joints[from], joints[to], girth).forEach(put);
+    const [neck, top] = bones[head].map((n) => joints[n]);
+    const middle = neck.map((c, i) => c + 0.75 * (top[i] - c));
+    for (const corner of BALL) put(middle.map((c, i) => c + (0.045 + 0.05 * girth) * corner[i]));
     return out;
   }
 
-  function point(joints, at) {
-    return { x: [joints[head][0] - at[0]], y: [joints[head][1] - at[1]], z: [joints[head][2]] };
+  // Which corners make the triangles of `body`.
+  function triangles() {
+    const out = { i: [], j: [], k: [] };
+    const put = (first, faces) => faces.forEach(([i, j, k]) => {
+      out.i.push(first + i); out.j.push(first + j); out.k.push(first + k);
+    });
+    const bone = [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1], [5, 2, 1], [5, 3, 2], [5, 4, 3], [5, 1, 4]];
+    bones.forEach((_, n) => put(6 * n, bone));
+    put(6 * bones.length, BALL_FACES);
+    return out;
   }
 
   function floor(at) {
@@ -57,7 +85,7 @@
   function parts() {
     const shot = shots[Number(choice.value)], truth = shot.truth[frame], estimate = shot.estimate[frame];
     const at = truth[0];
-    return [floor(at), lines(truth, at), point(truth, at), lines(estimate, at), point(estimate, at)];
+    return [floor(at), body(truth, at, 1), body(estimate, at, 0.55)];
   }
 
   function say() {
@@ -71,7 +99,7 @@
     const now = parts();
     const update = { x: now.map((p) => p.x), y: now.map((p) => p.y), z: now.map((p) => p.z) };
     say();
-    return Plotly.restyle(stage, update, [0, 1, 2, 3, 4]);
+    return Plotly.restyle(stage, update, [0, 1, 2]);
   }
 
   function stop() {
@@ -109,17 +137,15 @@
       xaxis: { ...axis, range: [-1.3, 1.3] }, yaxis: { ...axis, range: [-1.3, 1.3] }, zaxis: { ...axis, range: [-0.05, 2.3] },
       aspectmode: "manual", aspectratio: { x: 1.2, y: 1.2, z: 1.085 }, camera: CAMERA, dragmode: "turntable",
     };
-    const line = (colour, width, name) => ({ type: "scatter3d", mode: "lines", hoverinfo: "skip", name,
-      showlegend: Boolean(name), line: { color: colour, width } });
-    const ball = (colour) => ({ type: "scatter3d", mode: "markers", hoverinfo: "skip", showlegend: false,
-      marker: { color: colour, size: 12, line: { width: 0 } } });
-    const looks = [line(FLOOR, 1, ""), line(TRUTH, 11, "truth"), ball(TRUTH), line(ESTIMATE, 7, "estimate"), ball(ESTIMATE)];
+    const mesh = (color, opacity) => ({ type: "mesh3d", hoverinfo: "skip", flatshading: true, color, opacity, ...triangles(),
+      lighting: { ambient: 0.7, diffuse: 0.6, specular: 0.1, roughness: 0.9 }, lightposition: { x: 1e4, y: -1e4, z: 2e4 } });
+    const looks = [
+      { type: "scatter3d", mode: "lines", hoverinfo: "skip", line: { color: FLOOR, width: 1 } },
+      mesh(TRUTH, 0.4), mesh(ESTIMATE, 1),
+    ];
     const now = parts();
-    const ink = getComputedStyle(document.body).color;
     await Plotly.newPlot(stage, looks.map((look, i) => ({ ...look, ...now[i] })), {
-      scene, uirevision: "kept", margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)",
-      legend: { x: 0.01, y: 0.99, bgcolor: "rgba(0,0,0,0)", itemclick: false, itemdoubleclick: false },
-      font: { family: "system-ui, sans-serif", size: 14, color: ink },
+      scene, uirevision: "kept", showlegend: false, margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)",
     }, { displayModeBar: false, responsive: true, scrollZoom: false });
     say();
     choice.addEventListener("change", () => { stop(); frame = 0; draw(); });

@@ -37,7 +37,7 @@ def scrubber(skeleton: Skeleton, shots: Sequence[Shot]) -> tuple[Markup, str]:
     from plotly.offline import get_plotlyjs
 
     bones = [[parent + 1, bone + 1] for bone, parent in enumerate(skeleton.parents)]
-    data = {"bones": bones, "head": skeleton.index("head") + 1, "shots": [_packed(shot) for shot in shots]}
+    data = {"bones": bones, "head": skeleton.index("head"), "shots": [_packed(shot) for shot in shots]}
     script = Path(__file__).with_name("scrubber.js").read_text(encoding="utf-8")
     choices = [tag("option", shot.title, value=n) for n, shot in enumerate(shots)]
     page = joined(

@@ -16,7 +16,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.report.scene import Scene
 from harness.score.pair import Posed, posed
 
-STRIP_SIZE, MOVIE_SIZE = (264, 384), (640, 640)
+STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
 """Width and height in pixels; a movie's must be even."""
 
 

@@ -56,10 +56,10 @@ def _lead(measured: Mapping[str, Mapping[Take, float]], best: str, second: str, 
     ours, others = (np.array([measured[name][k] for k in shared]) for name in (best, second))
     less, ahead = float(np.mean(others - ours)), int(np.sum(ours < others))
     if less < 0.005:
-        return f", no less than the next, {second}"
+        return f", as much as {second}, the next"
     share = f" ({100.0 * less / others.mean():.0f} %)"
-    how_often = "" if len(shared) == 1 else f" and better on {ahead} of {len(shared)}"
-    return f", {less:.2f}°{share} less than the next, {second}{how_often}"
+    how_often = "" if len(shared) == 1 else f", and better on {ahead} of {len(shared)}"
+    return f", {less:.2f}°{share} less than {second}, the next{how_often}"
 
 
 def _by_sequence(run: Run, series: str) -> dict[Take, float]:

@@ -55,6 +55,21 @@ def worst_of(windows: Iterable[Window]) -> Window | None:
     return max(windows, key=lambda window: window.mean, default=None)
 
 
+def together(windows: Iterable[Window]) -> list[tuple[Window, ...]]:
+    """Windows of one cell that overlap by more than half, so that the same moment is shown once; the first leads."""
+    groups: list[list[Window]] = []
+    for window in windows:
+        for group in groups:
+            lead = group[0]
+            shared_s = min(lead.end_s, window.end_s) - max(lead.start_s, window.start_s)
+            if lead.key == window.key and shared_s > 0.5 * WINDOW_S:
+                group.append(window)
+                break
+        else:
+            groups.append([window])
+    return [tuple(group) for group in groups]
+
+
 def _over_windows(values: Floats, stop: Ints) -> Floats:
     """Sums (F,) from each frame to the end of its window."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
