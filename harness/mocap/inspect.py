@@ -6,6 +6,7 @@ Where the evidence is ambiguous nothing is guessed: the error says what was miss
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,7 +19,10 @@ from harness.mocap import checks
 from harness.mocap.files import check_size
 from harness.mocap.inspection import Inspection
 from harness.mocap.joints import LEG
-from harness.mocap.library import INDEX, read_index, skeleton_file
+from harness.mocap.library import INDEX, MotionLibrary, read_index, skeleton_file
+
+if TYPE_CHECKING:
+    from harness.mocap.c3d import MarkerClip
 
 FORMATS = ("amc", "bvh", "npz", "c3d")
 LEG_M = (0.55, 1.15)
@@ -35,7 +39,8 @@ FOOT_REACH = 0.12
 def inspect_file(
     path: Path | str, *, rate_hz: float | None = None, unit: float | None = None, library: Path | str | None = None
 ) -> Inspection:
-    """What the file is. `unit` is the length of 1 in it [m]; `library` holds an index that may name its rate.
+    """What the file is. `unit` is the length of 1 in it [m]; `library` holds an index that may name its rate,
+    and may hold the motion that the markers of a C3D file were recorded in.
 
     BadFile for what cannot be read or understood; BadInput where an option must settle what the file does not say.
     """
@@ -54,7 +59,7 @@ def inspect_file(
     if kind == "bvh":
         return _inspect_bvh(path, unit)
     if kind == "c3d":
-        return _inspect_c3d(path, unit)
+        return _inspect_c3d(path, unit, library)
     if unit is not None:
         raise BadInput(f"{path.name} is in metres, as all AMASS files are.", "Leave out --unit.")
     from harness.mocap.amass import read_clip
@@ -143,7 +148,7 @@ def _inspect_bvh(path: Path, unit_m: float | None) -> Inspection:
     )
 
 
-def _inspect_c3d(path: Path, unit_m: float | None) -> Inspection:
+def _inspect_c3d(path: Path, unit_m: float | None, library: Path | str | None) -> Inspection:
     from harness.mocap.c3d import read_c3d
 
     markers = read_c3d(path, unit_m=unit_m)
@@ -160,7 +165,19 @@ def _inspect_c3d(path: Path, unit_m: float | None) -> Inspection:
         up=markers.up_evidence,
         missing_share=float(1.0 - seen.mean()),
         missing_markers=tuple(label for m, label in enumerate(markers.labels) if not seen[:, m].all()),
+        notes=() if library is None else _spreads(markers, MotionLibrary(library)),
     )
+
+
+def _spreads(markers: "MarkerClip", library: MotionLibrary) -> tuple[str, ...]:
+    """How firmly each marker sits on its bone, if the library has the motion of the same take."""
+    if markers.name not in library.names():
+        return ()
+    from harness.mocap.c3d import marker_spreads
+
+    spreads = marker_spreads(markers, library.load(markers.name))
+    told = ", ".join(f"{s.label} {s.bone} {1000.0 * s.spread_m:.0f}" for s in spreads)
+    return (f"standard deviation of each marker about the bone that it follows in {markers.name} [mm]: {told}",)
 
 
 @dataclass(frozen=True, eq=False)

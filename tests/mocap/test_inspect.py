@@ -200,3 +200,7 @@ def test_markers_are_inspected(mocap: Path) -> None:
     assert (found.format, found.rate_hz, found.up) == ("c3d", 120.0, "z (POINT:Y_SCREEN is +Z)")
     assert found.missing_markers == ("RSHN",)
     assert 0.0 < found.missing_share < 1e-3
+    assert found.notes == ()
+    (note,) = inspect_file(mocap / "c3d" / "02_05.c3d", library=mocap).notes
+    assert "LANK ltibia 2" in note
+    assert note.count(",") == 40
