@@ -1,0 +1,130 @@
+"""What the cells of one clip share: the body, the true motion on it, its simulation, and what may be learnt from."""
+
+from dataclasses import asdict
+from functools import cached_property
+
+import numpy as np
+
+from harness.body import humanoid, retarget
+from harness.body.mounts import Mount
+from harness.config import Scenario, changed
+from harness.core.humanoid24 import BONES, standard_skeleton
+from harness.core.motion import Clip, Take
+from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
+from harness.mocap.sources import MotionSource
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Method
+from harness.score import manifest, results
+from harness.simulate import noise as noises
+from harness.simulate.noise import Noise
+from harness.simulate.simulate import Simulation, TrackerConfig, simulate
+from harness.simulate.trajectory import Trajectory
+
+
+def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
+    """Where the stations are worn."""
+    return tuple(
+        Mount(name, s.bone, s.along, float(np.deg2rad(s.around_deg)), s.stand_off_m)
+        for name, s in scenario.stations.items()
+    )
+
+
+def tracker_of(scenario: Scenario) -> TrackerConfig:
+    return changed(TrackerConfig(), asdict(scenario.tracker), "tracker")
+
+
+def noise_of(scenario: Scenario) -> Noise:
+    """The level, with the scenario's changes to single components; UnknownName, TypeError."""
+    return changed(noises.level(scenario.noise), scenario.components, "components")
+
+
+class Setting:
+    """One test clip of a scenario; each part is made when it is first asked for."""
+
+    def __init__(self, scenario: Scenario, source: MotionSource, part: Part, behaviour: str) -> None:
+        self.scenario, self.source, self.part, self.behaviour = scenario, source, part, behaviour
+        self.clip = source.load(part.clip)
+
+    @cached_property
+    def body(self) -> humanoid.Body:
+        if self.scenario.motion.body == "standard":
+            return humanoid.build(standard_skeleton())
+        return humanoid.build(self.clip.skeleton.subset(BONES)[0])
+
+    @cached_property
+    def whole(self) -> Take:
+        """The test clip on the body."""
+        return self._on_body(self.clip)
+
+    @cached_property
+    def take(self) -> Take:
+        """The part of it that is judged."""
+        frames = self.part.frames(len(self.whole))
+        longest_s = self.scenario.motion.longest_s
+        stop = min(frames.stop, frames.start + round(longest_s * self.whole.rate_hz) + 1) if longest_s else frames.stop
+        return _cut(self.whole, range(frames.start, stop), str(self.part))
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        scenario = self.scenario
+        tracker, noise = tracker_of(scenario), noise_of(scenario)
+        return simulate(self.body, self.take, mounts_of(scenario), tracker, noise, seed=scenario.seed)
+
+    @cached_property
+    def example_clips(self) -> list[Clip]:
+        motion, test = self.scenario.motion, self.part
+        subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
+        names = examples_of(test, motion.examples, motion.protocol, subjects)
+        if motion.database == "behaviour":
+            names = [name for name in names if self.source.behaviour(name) == self.behaviour]
+        return [self.source.load(name) for name in names]
+
+    @cached_property
+    def examples(self) -> list[Take]:
+        """What the protocol lets a method learn from, on this body and at the tracker's rate."""
+        learnt, takes = [], []
+        for clip in self.example_clips:
+            whole = self._on_body(clip)
+            for frames in allowed_frames(self.part, clip.name, len(clip), clip.rate_hz):
+                learnt.append((clip.name, frames))
+                takes.append(_at_rate(self.body, _cut(whole, frames, clip.name), self.scenario.tracker.rate_hz))
+        refuse_leak(self.part, learnt, len(self.clip), self.clip.rate_hz)
+        return takes
+
+    def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
+        """Everything that defines a cell; two results with other inputs are not comparable."""
+        content = asdict(self.scenario)
+        for many in ("methods", "inputs", "name"):
+            del content[many]
+        del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
+        return {
+            **content,
+            "clip": str(self.part),
+            "motion_digest": results.digest(self.clip.root_m, self.clip.world_from_root, self.clip.angles_rad),
+            "body_digest": results.digest(self.clip.skeleton.bone_m),
+            "examples": {
+                c.name: results.digest(c.root_m, c.world_from_root, c.angles_rad)
+                for c in (self.example_clips if method.needs_examples else [])
+            },
+            "inputs": inputs,
+        }
+
+    def key(self, method: Method, name: str, inputs: str) -> str:
+        described = {"name": name, "options": repr(method), "source": registry.source_hash(method)}
+        return results.cell_key(self.inputs_of(method, inputs), described, manifest.source_hash())
+
+    def _on_body(self, clip: Clip) -> Take:
+        if clip.name == self.clip.name and self.scenario.motion.body == "own":
+            return retarget.to_own_body(clip)[1]
+        return retarget.to_common_body(clip, self.body.skeleton)[0]
+
+
+def _cut(take: Take, frames: range, name: str) -> Take:
+    return Take(name, take.subject, take.source, take.behaviour, take.rate_hz, take.qpos[frames.start : frames.stop])
+
+
+def _at_rate(body: humanoid.Body, take: Take, rate_hz: float) -> Take:
+    """The take at the tracker's rate, on the same smooth trajectory that the simulation samples."""
+    trajectory = Trajectory(body, take)
+    time_s = np.arange(0.0, trajectory.duration_s, 1.0 / rate_hz)
+    return Take(take.name, take.subject, take.source, take.behaviour, rate_hz, trajectory.qpos(time_s))

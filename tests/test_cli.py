@@ -1,0 +1,68 @@
+"""The command line as a user meets it: words, exit codes, one error line, nothing written over."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+
+
+def run(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    """The real program in its own process, without a library of real motion."""
+    environment = {k: v for k, v in os.environ.items() if k != "HARNESS_MOCAP"}
+    return subprocess.run(
+        [sys.executable, "-m", "harness.cli", *words], cwd=cwd, env=environment, capture_output=True, text=True
+    )
+
+
+def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["--help"])
+    assert ended.value.code == 0
+    text = capsys.readouterr().out
+    for verb in ("demo", "run", "list", "inspect", "mocap", "export", "report", "bench", "doctor"):
+        assert f"    {verb} " in text
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = "import sys, harness.cli as c; c.build_parser(); print(sorted({m.split('.')[0] for m in sys.modules}))"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    for heavy in ("numpy", "scipy", "mujoco", "matplotlib", "pyvista", "plotly"):
+        assert f"'{heavy}'" not in loaded
+
+
+def test_a_verb_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    ended = run("frobnicate", cwd=tmp_path)
+    assert ended.returncode == 2
+    assert "invalid choice" in ended.stderr
+
+
+def test_real_motion_is_never_replaced_by_built_in(tmp_path: Path) -> None:
+    ended = run("run", "boxing", cwd=tmp_path)
+    assert ended.returncode == 2
+    assert "--mocap" in ended.stderr
+    assert ended.stdout.strip() == "refused"
+    assert not list(tmp_path.iterdir())
+
+
+def test_errors_are_json_when_json_is_asked_for(tmp_path: Path) -> None:
+    ended = run("run", "boxin", "--json", cwd=tmp_path)
+    assert ended.returncode == 2
+    said = json.loads(ended.stdout)
+    assert said["outcome"] == "refused"
+    assert "boxing" in said["error"]
+
+
+def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "harness.cli", "list"]
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        assert program.stdout is not None
+        assert program.stderr is not None
+        program.stdout.close()
+        said = program.stderr.read()
+    assert said == ""
+    assert program.returncode == 0

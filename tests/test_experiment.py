@@ -1,0 +1,202 @@
+"""The whole loop on built-in motion: it measures, resumes, survives a failing method, and is the same every time."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness import experiment
+from harness.body.humanoid import Body
+from harness.config import Motion, Scenario, Station, load_scenario
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate
+from harness.core.motion import Take
+from harness.errors import BadInput, HarnessError, Outcome, UnknownName
+from harness.reconstruct.contract import Reconstructor, Session
+from harness.score.results import read_cells, read_summary
+from harness.stream.frame import TrackerFrame
+
+SMALL = Scenario(
+    name="small",
+    motion=Motion(
+        "builtin", ("walking_p1_01", "boxing_p2_01"), ("walking", "boxing"), ("walking_p1_02",), longest_s=2.5
+    ),
+    stations=load_scenario("demo").stations,
+    methods=("ik", "mean_pose"),
+)
+
+
+def rows(out: Path) -> list[dict[str, object]]:
+    cells: list[dict[str, object]] = read_summary(out)["cells"]
+    return cells
+
+
+def test_a_run_measures_every_cell(tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    out = tmp_path / "run"
+    outcome = experiment.run(SMALL, out, progress=lambda cell, done, planned: seen.append((done, planned)))
+    assert outcome is Outcome.PASS
+    assert seen == [(k, 4) for k in (1, 2, 3, 4)]
+    found = {(row["method"], row["clip"]): row for row in rows(out)}
+    assert set(found) == {(m, c) for m in SMALL.methods for c in SMALL.motion.test}
+    for (method, _), row in found.items():
+        assert row["motion_source"] == "built-in performer"
+        assert row["protocol"] == ("none" if method == "ik" else "sequence")
+        assert row["frames_matched"] == row["frames_expected"]
+        assert 0.5 < row["joint_angle_mean_deg"] < 30.0  # type: ignore[operator]
+    header = (out / "summary.csv").read_text().splitlines()[0].split(",")
+    assert (
+        header[:23]
+        == (
+            "method behaviour clip motion_source stations mount rate_hz inputs protocol calibration noise seed "
+            "frames_matched frames_expected joint_angle_mean_deg joint_angle_rms_deg mpjre_deg mpjpe_mm mpjpe_root_mm "
+            "jitter_m_s3 step_p50_ms step_p99_ms fps"
+        ).split()
+    )
+
+
+def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    experiment.run(SMALL, out)
+    made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
+    gone = sorted(made)[0]
+    for file in (out / "cells" / gone).iterdir():
+        file.unlink()
+    (out / "cells" / gone).rmdir()
+    experiment.run(SMALL, out)
+    again = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
+    assert set(again) == set(made)
+    assert {name for name in made if again[name] != made[name]} == {gone}
+
+
+def test_another_run_is_never_written_over(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    experiment.run(replace(SMALL, methods=("mean_pose",)), out)
+    with pytest.raises(BadInput, match="another run"):
+        experiment.run(replace(SMALL, seed=2), out)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("years of work")
+    with pytest.raises(BadInput, match=r"thesis\.tex"):
+        experiment.run(SMALL, tmp_path / "mine")
+
+
+def test_one_worker_or_two_give_the_same_results(tmp_path: Path) -> None:
+    experiment.run(SMALL, tmp_path / "one", jobs=1)
+    experiment.run(SMALL, tmp_path / "two", jobs=2)
+    one, two = ({cell.key: cell for cell in read_cells(tmp_path / name)} for name in ("one", "two"))
+    assert set(one) == set(two)
+    for key, cell in one.items():
+        np.testing.assert_array_equal(cell.estimate_qpos, two[key].estimate_qpos)
+        np.testing.assert_array_equal(cell.truth_qpos, two[key].truth_qpos)
+    assert [row["key"] for row in rows(tmp_path / "one")] == [row["key"] for row in rows(tmp_path / "two")]
+
+
+@dataclass(frozen=True)
+class Broken:
+    """A method that dies after some frames; named as `tests.test_experiment:Broken`."""
+
+    name: str = "broken"
+    summary: str = "dies on purpose"
+    needs_examples: bool = False
+
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Reconstructor:
+        return self
+
+    def begin(self, calibration: Calibration) -> Session:
+        return self
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        raise ZeroDivisionError("on purpose")
+
+
+def test_a_failing_method_fails_alone(tmp_path: Path) -> None:
+    scenario = replace(SMALL, methods=("tests.test_experiment:Broken", "mean_pose"))
+    assert experiment.run(scenario, tmp_path / "run") is Outcome.INCOMPLETE
+    summary = read_summary(tmp_path / "run")
+    assert (summary["cells_finished"], summary["cells_planned"]) == (2, 4)
+    assert len(summary["failures"]) == 2
+    assert all("on purpose" in text for text in summary["failures"].values())
+
+
+def test_truth_in_the_examples_is_refused(tmp_path: Path) -> None:
+    leaking = replace(SMALL, motion=replace(SMALL.motion, protocol="block"))
+    with pytest.raises(HarnessError, match="own examples|needs examples"):
+        experiment.run(replace(leaking, methods=("mean_pose",)), tmp_path / "run")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"methods": ("ikk",)}, "Did you mean 'ik'"),
+        ({"inputs": ("position",)}, "input combination"),
+        ({"motion": replace(SMALL.motion, test=("walking_p1_99", "boxing_p2_01"))}, "built-in take"),
+        ({"motion": replace(SMALL.motion, examples=("walking_p9_01",))}, "built-in take"),
+        ({"stations": {"head": Station("haed")}}, "bone"),
+        ({"components": {"eco": {"share": 0.1}}}, "echo"),
+        ({"components": {"echo": {"shar": 0.1}}}, "share"),
+    ],
+)
+def test_names_that_do_not_exist_are_refused_before_anything_is_written(
+    tmp_path: Path, change: dict[str, object], message: str
+) -> None:
+    with pytest.raises(UnknownName) as caught:
+        experiment.run(replace(SMALL, **change), tmp_path / "run")  # type: ignore[arg-type]
+    assert message in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_noise_components_change_what_is_seen(tmp_path: Path) -> None:
+    echoes = replace(SMALL, methods=("mean_pose",), components={"echo": {"share": 0.3}})
+    experiment.run(echoes, tmp_path / "run")
+    cell = next(iter(read_cells(tmp_path / "run")))
+    assert cell.health["readings_echo"] > 0.15 * cell.health["readings"]
+    assert cell.noise == "default*"
+
+
+def test_a_killed_run_leaves_whole_cells_and_resumes(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "harness.cli", "run", "demo", "--no-report", "--out", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as program:
+        deadline = time.monotonic() + 60.0
+        while len(list(out.glob("cells/*/cell.json"))) < 3 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        program.send_signal(signal.SIGKILL)
+    finished = {path.parent.name for path in out.glob("cells/*/cell.json")}
+    assert len(finished) >= 3
+    scenario = load_scenario("demo")
+    assert experiment.run(scenario, out) is Outcome.PASS
+    assert finished <= {str(row["key"]) for row in rows(out)}
+    assert len(rows(out)) == len(scenario.methods) * len(scenario.motion.test)
+
+
+def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "harness.cli", "run", "demo", "--no-report", "--out", str(out)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+        deadline = time.monotonic() + 60.0
+        while len(list(out.glob("cells/*/cell.json"))) < 2 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        program.send_signal(signal.SIGINT)
+        said, complained = program.communicate(timeout=30)
+    assert program.returncode == 130
+    assert said.strip().splitlines()[-1] == "interrupted"
+    assert "Traceback" not in complained
+    summary = json.loads((out / "summary.json").read_text())
+    assert 0 < summary["cells_finished"] < summary["cells_planned"]
+
+
+def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
+    scenario = load_scenario("golf")
+    assert experiment.run(scenario, tmp_path / "run", folder=mocap) is Outcome.PASS
+    found = {str(row["method"]): row for row in rows(tmp_path / "run")}
+    assert found["ik"]["motion_source"] == "cmu"
+    assert found["best_match"]["protocol"] == "block"
+    assert os.path.exists(tmp_path / "run" / "summary.csv")
