@@ -21,7 +21,7 @@ class Gate:
         self._station_m: Floats = np.zeros((stations, 3))
         self._velocity_m_s: Floats = np.zeros((stations, 3))
         self._believed_at_s: Floats = np.full(stations, -np.inf)
-        self._known_at_s = -np.inf
+        self._known_at_s, self._moving = -np.inf, False
         self.all_moved = False
         """Whether at least half of the last frame's positions jumped: the performer is somewhere else."""
 
@@ -29,7 +29,7 @@ class Gate:
         """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""
         period_s = now_s - self._known_at_s
         none, self.all_moved = np.zeros(len(measured), bool), False
-        if not 0.0 < period_s <= _LONGEST_PERIOD_S:
+        if not (self._moving and 0.0 < period_s <= _LONGEST_PERIOD_S):
             self._believed_at_s[:] = now_s
             return none
         away_m = target_m - self._station_m - period_s * self._velocity_m_s
@@ -44,8 +44,7 @@ class Gate:
     def settled(self, now_s: float, station_m: Floats) -> None:
         """Where the answer to this frame puts the stations (S, 3) [m]."""
         period_s = now_s - self._known_at_s
-        if 0.0 < period_s <= _LONGEST_PERIOD_S:
+        self._moving = 0.0 < period_s <= _LONGEST_PERIOD_S
+        if self._moving:
             self._velocity_m_s = (station_m - self._station_m) / period_s
-        else:
-            self._velocity_m_s = np.zeros_like(station_m)
         self._station_m, self._known_at_s = station_m.copy(), now_s

@@ -1,0 +1,16 @@
+"""The bench of inverse kinematics: what it prints is real, whatever the speed of the machine."""
+
+import pytest
+
+pytest.importorskip("mink", reason="the bench compares with mink, an extra")
+
+from harness.bench.ik import bench_ik
+
+
+def test_converges_at_least_as_low_as_mink_and_three_times_as_fast() -> None:
+    rows = {row.name: row for row in bench_ik(frames=120)}
+    assert rows["ik, six trackers, converged"].value > 0.0
+    assert rows["ik / mink"].value >= 3.0
+    for name in ("cost", "position", "orientation"):
+        row = rows[f"tracker residual, {name}"]
+        assert 0.0 < row.value <= float(row.reference.split()[1])

@@ -1,0 +1,75 @@
+"""Walks of the built-in performer and what exact trackers read of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from harness.body.humanoid import Body
+from harness.body.kinematics import joint_centres_m
+from harness.body.retarget import to_own_body
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate
+from harness.core.motion import Take
+from harness.mocap import performer
+from harness.reconstruct.contract import Method
+from harness.reconstruct.residuals import Loss, Residuals
+from harness.stream.frame import TrackerFrame
+from harness.testing.frames import exact_frames, worn
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A take on its own body, six trackers, and their frames."""
+
+    body: Body
+    calibration: Calibration
+    take: Take
+    frames: list[TrackerFrame]
+
+    def run(self, method: Method, frames: list[TrackerFrame] | None = None) -> list[Estimate]:
+        examples = [self.take] if method.needs_examples else []
+        session = method.fit(self.body, examples, np.random.default_rng(1)).begin(self.calibration)
+        return [session.step(frame) for frame in (self.frames if frames is None else frames)]
+
+    def off_m(self, estimates: list[Estimate], truth: Floats) -> Floats:
+        """(T,) mean distance over the joint centres [m]."""
+        found = joint_centres_m(self.body.skeleton, np.array([e.qpos for e in estimates]))
+        return np.linalg.norm(found - joint_centres_m(self.body.skeleton, truth), axis=2).mean(axis=1)
+
+    def residuals(self, estimates: list[Estimate], frames: list[TrackerFrame]) -> tuple[Floats, Floats]:
+        """(T, S) position [m] and orientation [rad] residuals, 0 where not measured."""
+        judge, rows = Residuals(self.body, self.calibration, Loss()), []
+        for frame, estimate in zip(frames, estimates, strict=True):
+            judge.read(frame)
+            judge.place(estimate.qpos)
+            rows.append(np.where(judge.measured, judge.distance, 0.0))
+        position, orientation = np.split(np.array(rows), 2, axis=1)
+        return position, orientation
+
+
+def scene(behaviour: str, take: int = 1, seconds: float = 3.0) -> Scene:
+    clip = performer.generate(behaviour, performer.performers()[0], take, seed=1, duration_s=seconds, rate_hz=40.0)
+    body, on_body = to_own_body(clip)
+    calibration = worn(body)
+    return Scene(body, calibration, on_body, exact_frames(body, calibration, on_body.qpos))
+
+
+def moved(qpos: Floats, yaw_rad: float, by_m: tuple[float, float, float]) -> Floats:
+    """The same motion elsewhere: turned about the vertical through the origin, then shifted."""
+    turn, out = rotations.about_z(yaw_rad), np.array(qpos)
+    out[:, :3] = rotations.rotate(turn, qpos[:, :3]) + np.array(by_m)
+    out[:, 3:7] = rotations.multiply(turn, qpos[:, 3:7])
+    return out
+
+
+@pytest.fixture(scope="session")
+def walk() -> Scene:
+    return scene("walking")
+
+
+@pytest.fixture(scope="session")
+def boxing() -> Scene:
+    return scene("boxing")

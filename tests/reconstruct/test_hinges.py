@@ -1,0 +1,79 @@
+"""Representations of hinge angles: the same rotation, within the limits."""
+
+import numpy as np
+import pytest
+
+from harness.body.humanoid import build
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import pack, unpack
+from harness.core.skeleton import forward
+from harness.reconstruct.hinges import HingeLimits
+
+LIMITS = HingeLimits(build())
+SKELETON = build().skeleton
+
+
+def orientations(angles_rad: Floats) -> Floats:
+    """(T, 24, 3, 3) of angles in the order of qpos."""
+    qpos = np.concatenate(
+        [np.zeros((len(angles_rad), 3)), np.tile([1.0, 0, 0, 0], (len(angles_rad), 1)), angles_rad], 1
+    )
+    return forward(SKELETON, *unpack(qpos)).world_from_bone
+
+
+def lawful(rng: np.random.Generator, count: int) -> Floats:
+    low, high = np.maximum(LIMITS.low_rad, -np.pi), np.minimum(LIMITS.high_rad, np.pi)
+    return rng.uniform(low, high, (count, 48))
+
+
+def twins(angles_rad: Floats) -> Floats:
+    """The other representation of every three perpendicular hinges, written out in the skeleton's own order."""
+    root_m, turn, angles = unpack(np.concatenate([np.zeros((len(angles_rad), 7)), angles_rad], axis=1))
+    for where in SKELETON.dof_of_bone:
+        if where.stop - where.start == 3:
+            angles[:, where] = angles[:, where] * [1.0, -1.0, 1.0] + np.pi
+    return pack(root_m, turn, angles)[:, 7:]
+
+
+@pytest.mark.parametrize("turns", [0, 1, -2])
+@pytest.mark.parametrize("twin", [False, True])
+def test_principal_is_the_same_pose_within_limits(rng: np.random.Generator, turns: int, twin: bool) -> None:
+    angles = lawful(rng, 50)
+    disguised = (twins(angles) if twin else angles) + 2.0 * np.pi * turns
+    found = LIMITS.principal(disguised)
+    np.testing.assert_allclose(orientations(found), orientations(angles), atol=1e-9)
+    assert np.max(LIMITS.excess_rad(found)) < 1e-9
+
+
+def test_hinges_that_turn_all_round_have_no_limits() -> None:
+    names = [build().model.joint(1 + d).name for d in range(48)]
+    free = {name for name, low in zip(names, LIMITS.low_rad, strict=True) if np.isinf(low)}
+    assert {"rhumerus.rx", "rhumerus.rz", "rwrist.ry"} <= free
+    assert not any(name.endswith(("tibia.rx", "radius.rx")) for name in free)
+    assert np.all(np.isinf(HingeLimits(build(), keep=False).high_rad))
+
+
+def test_past_the_pole_is_noticed_and_mended() -> None:
+    angles = np.zeros(48)
+    names = [build().model.joint(1 + d).name for d in range(48)]
+    assert not LIMITS.past_gimbal(angles)
+    angles[names.index("rhumerus.ry")] = np.deg2rad(-120.0)
+    assert LIMITS.past_gimbal(angles)
+    assert not LIMITS.past_gimbal(LIMITS.principal(angles))
+
+
+def test_the_mean_is_that_of_directions(rng: np.random.Generator) -> None:
+    angles = np.zeros((2, 48))
+    wrist = [build().model.joint(1 + d).name for d in range(48)].index("rwrist.ry")
+    angles[:, wrist] = np.deg2rad([175.0, -175.0])
+    assert abs(np.cos(LIMITS.mean(angles)[wrist]) + 1.0) < 1e-9
+    cloud = np.clip(rng.normal(0.0, 0.1, (500, 48)), LIMITS.low_rad, LIMITS.high_rad)
+    assert np.max(np.abs(LIMITS.mean(cloud) - cloud.mean(axis=0))) < 0.01
+
+
+def test_near_adds_whole_turns_to_free_hinges_only() -> None:
+    other = np.full(48, 7.0)
+    moved = LIMITS.near(np.full(48, 0.5), other)
+    free = np.isinf(LIMITS.high_rad)
+    np.testing.assert_allclose(moved[free], 0.5 + 2.0 * np.pi)
+    np.testing.assert_allclose(moved[~free], 0.5)

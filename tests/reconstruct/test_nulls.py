@@ -1,0 +1,70 @@
+"""The mean posture and the best match: what they are for is to be beaten, but rightly."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.core import rotations
+from harness.core.humanoid24 import unpack
+from harness.core.motion import Take
+from harness.errors import BadInput
+from harness.reconstruct.best_match import BestMatch
+from harness.reconstruct.mean_pose import MeanPose, mean_posture
+from harness.testing.frames import exact_frames, without
+
+from .conftest import Scene, moved
+
+
+@pytest.mark.parametrize("method", [MeanPose(), BestMatch()])
+def test_examples_are_needed(walk: Scene, method: MeanPose | BestMatch) -> None:
+    with pytest.raises(BadInput, match="examples"):
+        method.fit(walk.body, [], np.random.default_rng(0))
+
+
+def test_the_mean_pose_never_changes_but_follows(walk: Scene) -> None:
+    qpos = np.array([e.qpos for e in walk.run(MeanPose())])
+    mean = mean_posture(walk.body, [walk.take])
+    np.testing.assert_allclose(qpos[:, 7:], np.tile(mean[7:], (len(qpos), 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        np.diff(qpos[[0, -1], :2], axis=0), np.diff(walk.take.qpos[[0, -1], :2], axis=0), atol=0.1
+    )
+    assert np.max(rotations.angle_between_rad(qpos[:, 3:7], walk.take.qpos[:, 3:7])) < np.deg2rad(30.0)
+
+
+def test_the_mean_is_that_of_the_angles(walk: Scene) -> None:
+    _, _, mean = unpack(mean_posture(walk.body, [walk.take]))
+    _, _, angles = unpack(walk.take.qpos)
+    assert np.max(np.abs(mean - angles.mean(axis=0))) < np.deg2rad(3.0)
+
+
+@pytest.mark.parametrize("yaw_deg", [0.0, 120.0])
+def test_finds_the_very_example_wherever_it_is_performed(walk: Scene, yaw_deg: float) -> None:
+    qpos = moved(walk.take.qpos, np.deg2rad(yaw_deg), (3.0, -2.0, 0.0))
+    estimates = walk.run(BestMatch(), exact_frames(walk.body, walk.calibration, qpos))
+    assert np.max(walk.off_m(estimates, qpos)[2:]) < 1e-3
+
+
+def test_finds_it_with_half_of_the_stations_lost(walk: Scene) -> None:
+    frames = [without(f, [0, 2, 5]) for f in walk.frames]
+    assert np.max(walk.off_m(walk.run(BestMatch(), frames), walk.take.qpos)[2:]) < 1e-3
+
+
+@pytest.mark.parametrize("kind", ["position", "orientation"])
+def test_finds_it_from_one_kind_of_reading(walk: Scene, kind: str) -> None:
+    blind = np.zeros(6, bool)
+    if kind == "position":
+        frames = [
+            replace(f, orientation_valid=blind, tracker_from_station=np.full((6, 4), np.nan)) for f in walk.frames
+        ]
+    else:
+        frames = [replace(f, position_valid=blind, position_m=np.full((6, 3), np.nan)) for f in walk.frames]
+    found = np.array([e.qpos for e in walk.run(BestMatch(), frames)])
+    assert np.max(np.abs(found[2:, 7:] - walk.take.qpos[2:, 7:])) < 1e-6
+
+
+def test_takes_the_nearer_of_two_examples(walk: Scene, boxing: Scene) -> None:
+    other = Take("b", "b", "b", "boxing", 40.0, boxing.take.qpos)
+    session = BestMatch().fit(walk.body, [other, walk.take], np.random.default_rng(0)).begin(walk.calibration)
+    found = np.array([session.step(f).qpos[7:] for f in walk.frames])
+    assert np.max(np.abs(found[2:] - walk.take.qpos[2:, 7:])) < 1e-6

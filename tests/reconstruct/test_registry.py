@@ -1,0 +1,75 @@
+"""Methods by name."""
+
+from collections.abc import Iterator
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from harness.errors import BadInput, UnknownName
+from harness.reconstruct import registry
+from harness.reconstruct.clean_up import CleanUp
+from harness.reconstruct.ik import GAUSSIAN, Ik
+from harness.reconstruct.mean_pose import MeanPose
+
+
+@pytest.mark.parametrize("name", sorted(registry.methods()))
+def test_every_name_makes_its_method(name: str) -> None:
+    method = registry.resolve(name)
+    assert method.name == name
+    assert registry.summary(name) == method.summary
+    assert 10 < len(method.summary) < 110
+    assert "\n" not in method.summary
+    assert repr(method) == repr(registry.resolve(name))
+
+
+def test_clean_up_is_added_by_suffix() -> None:
+    method = registry.resolve("mean_pose+ik")
+    assert isinstance(method, CleanUp)
+    assert (method.name, method.needs_examples) == ("mean_pose+ik", True)
+
+
+def test_presets_differ_in_their_repr() -> None:
+    assert repr(Ik()) != repr(GAUSSIAN)
+    assert registry.resolve("ik:gaussian") == GAUSSIAN
+
+
+def test_anyones_own_class_by_module() -> None:
+    assert registry.resolve("harness.reconstruct.mean_pose:MeanPose") == MeanPose()
+
+
+@pytest.mark.parametrize("name", ["", "ik:gausian", "ik:", "mean", "no_such_module:Class", "ik2+ik", ":Class", "+ik"])
+def test_unknown_names_are_refused_with_the_choices(name: str) -> None:
+    with pytest.raises(UnknownName) as caught:
+        registry.resolve(name)
+    assert "mean_pose" in str(caught.value)
+
+
+def test_a_near_miss_gets_a_suggestion() -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'ik:gaussian'"):
+        registry.resolve("ik:gausian")
+
+
+def test_a_module_without_that_class_and_a_class_that_is_no_method() -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'MeanPose'"):
+        registry.resolve("harness.reconstruct.mean_pose:MeanPoze")
+    with pytest.raises(BadInput, match="no summary"):
+        registry.resolve("fractions:Fraction")
+
+
+def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    def installed(group: str) -> Iterator[EntryPoint]:
+        assert group == "harness.methods"
+        for name in ("theirs", "ik"):
+            yield EntryPoint(name, "harness.reconstruct.mean_pose:MeanPose", group)
+
+    monkeypatch.setattr(registry, "entry_points", installed)
+    assert registry.resolve("theirs") == MeanPose()
+    assert registry.resolve("ik") == Ik()
+
+
+def test_the_source_hash_tells_methods_and_what_they_wrap_apart() -> None:
+    hashes = {
+        registry.source_hash(registry.resolve(n)) for n in ("ik", "mean_pose", "best_match", "mean_pose+ik", "ik+ik")
+    }
+    assert len(hashes) == 5
+    assert registry.source_hash(Ik()) == registry.source_hash(GAUSSIAN)

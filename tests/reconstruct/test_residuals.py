@@ -1,0 +1,100 @@
+"""The cost and its slopes against differences, and the Lorentzian against its formula."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.reconstruct.residuals import Loss, Residuals
+from harness.testing.frames import without
+
+from .conftest import Scene
+
+
+def noisy(walk: Scene, rng: np.random.Generator, loss: Loss, off_m: float) -> tuple[Residuals, np.ndarray]:
+    """Residuals that have read a frame, and a pose some way off it."""
+    residuals = Residuals(walk.body, walk.calibration, loss)
+    frame = walk.frames[30]
+    residuals.read(replace(frame, position_m=frame.position_m + rng.normal(0.0, off_m, frame.position_m.shape)))
+    qpos = np.array(walk.take.qpos[30])
+    qpos[7:] += rng.normal(0.0, 0.05, 48)
+    return residuals, qpos
+
+
+@pytest.mark.parametrize("robust", [False, True])
+@pytest.mark.parametrize("off_m", [0.003, 0.2])
+def test_descent_is_the_slope_of_the_cost(walk: Scene, rng: np.random.Generator, robust: bool, off_m: float) -> None:
+    residuals, qpos = noisy(walk, rng, Loss(robust=robust), off_m)
+    residuals.place(qpos)
+    descent = residuals.normal_equations(np.zeros((54, 54)))
+    h, slopes = 1e-6, np.zeros(54)
+    for k, step in enumerate(h * np.eye(54)):
+        ahead, behind = (residuals.place(residuals.kinematics.moved(qpos, s)) for s in (step, -step))
+        slopes[k] = (ahead - behind) / (2.0 * h)
+    np.testing.assert_allclose(-descent, slopes, atol=1e-6 * np.max(np.abs(descent)))
+
+
+def test_slopes_of_every_residual_against_differences(walk: Scene) -> None:
+    """Where measured and modelled agree, the errors' slopes are exactly minus the Jacobian."""
+    loss = Loss(position_sigma_m=1.0, orientation_sigma_rad=1.0, robust=False)
+    residuals, here = Residuals(walk.body, walk.calibration, loss), walk.take.qpos[30]
+    residuals.read(walk.frames[30])
+    residuals.place(here)
+    hessian = np.zeros((54, 54))
+    residuals.normal_equations(hessian)
+
+    def errors(step: np.ndarray) -> np.ndarray:
+        residuals.place(residuals.kinematics.moved(here, step))
+        return residuals.error.reshape(-1).copy()
+
+    h = 1e-6
+    slopes = np.array([(errors(step) - errors(-step)) / (2.0 * h) for step in h * np.eye(54)]).T
+    np.testing.assert_allclose(hessian, slopes.T @ slopes, atol=1e-6)
+
+
+def test_curvature_completes_the_hessian(walk: Scene, rng: np.random.Generator) -> None:
+    residuals, qpos = noisy(walk, rng, Loss(robust=False), 0.02)
+    hessian = np.zeros((54, 54))
+    residuals.place(qpos)
+    residuals.normal_equations(hessian)
+    gauss_newton = hessian.copy()
+    residuals.add_curvature(hessian)
+    full = np.tril(hessian) + np.tril(hessian, -1).T
+    h, columns, scratch = 1e-5, [], np.zeros((54, 54))
+    for step in h * np.eye(54):
+        slopes = []
+        for s in (step, -step):
+            residuals.place(residuals.kinematics.moved(qpos, s))
+            slopes.append(-residuals.normal_equations(scratch))
+        columns.append((slopes[0] - slopes[1]) / (2.0 * h))
+    true = np.array(columns)[6:, 6:]
+    true = 0.5 * (true + true.T)
+    missing = np.max(np.abs(true - gauss_newton[6:, 6:]))
+    assert np.max(np.abs(true - full[6:, 6:])) < 0.05 * missing
+
+
+def test_one_lorentzian_for_each_tracker_and_kind(walk: Scene) -> None:
+    loss = Loss()
+    residuals = Residuals(walk.body, walk.calibration, loss)
+    frame = walk.frames[0]
+    shift = np.zeros((6, 3))
+    shift[2] = [0.03, 0.04, 0.12]  # 13 cm
+    residuals.read(replace(frame, position_m=frame.position_m + shift))
+    expected = (loss.position_scale_m / loss.position_sigma_m) ** 2 * np.log1p(0.13**2 / (2 * loss.position_scale_m**2))
+    assert residuals.place(walk.take.qpos[0]) == pytest.approx(expected, rel=1e-6)
+    residuals.widen(1000.0)
+    assert residuals.place(walk.take.qpos[0]) == pytest.approx(0.5 * (0.13 / 0.003) ** 2, rel=1e-3)
+
+
+def test_rows_that_were_not_measured_count_nothing(walk: Scene) -> None:
+    residuals = Residuals(walk.body, walk.calibration, Loss())
+    residuals.read(without(walk.frames[0], [1, 3]))
+    assert not residuals.measured[[1, 3, 7, 9]].any()
+    assert residuals.place(walk.take.qpos[0]) == pytest.approx(0.0, abs=1e-9)
+    residuals.read(walk.frames[0])
+    elsewhere = np.array(walk.take.qpos[0])
+    elsewhere[0] += 1.0
+    whole = residuals.place(elsewhere)
+    residuals.leave_out(np.arange(12) < 6)
+    assert residuals.place(elsewhere) == pytest.approx(0.0, abs=1e-9)
+    assert whole > 100.0

@@ -1,0 +1,75 @@
+"""Minima within the limits."""
+
+import numpy as np
+import pytest
+
+from harness.reconstruct.hinges import HingeLimits
+from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.solver import Prior, Solver, Stopping
+from harness.testing.frames import without
+
+from .conftest import Scene
+
+
+def precision(sigma_rad: float) -> np.ndarray:
+    out = np.zeros(54)
+    out[6:] = sigma_rad**-2
+    return out
+
+
+@pytest.mark.parametrize("robust", [False, True])
+def test_ends_where_no_lawful_step_lowers_the_cost(walk: Scene, rng: np.random.Generator, robust: bool) -> None:
+    residuals, limits = Residuals(walk.body, walk.calibration, Loss(robust=robust)), HingeLimits(walk.body)
+    solver = Solver(residuals, limits, Stopping(step=1e-7, decrease=0.0, most_steps=200))
+    prior = Prior(walk.take.qpos[30], precision(0.5))
+    start = np.array(walk.take.qpos[30])
+    start[7:] += rng.normal(0.0, 0.2, 48)
+    residuals.read(walk.frames[40])
+    solution = solver.solve(start, prior)
+    assert solution.converged
+
+    def cost(step: np.ndarray) -> float:
+        moved = residuals.kinematics.moved(solution.qpos, step)
+        moved[7:] = limits.clipped(moved[7:])
+        away = residuals.kinematics.difference(moved, prior.qpos)
+        return residuals.place(moved) + 0.5 * float(precision(0.5) @ (away * away))
+
+    least = cost(np.zeros(54))
+    for _ in range(200):
+        assert cost(1e-3 * rng.normal(size=54)) >= least - 1e-9
+
+
+def test_limits_hold_even_where_the_prior_lies_beyond(walk: Scene) -> None:
+    limits = HingeLimits(walk.body)
+    knee = 7 + [walk.body.model.joint(1 + d).name for d in range(48)].index("ltibia.rx")
+    residuals = Residuals(walk.body, walk.calibration, Loss())
+    residuals.read(without(walk.frames[0], range(6)))
+    impossible = np.array(walk.take.qpos[0])
+    impossible[knee] = limits.low_rad[knee - 7] - 0.5
+    prior = Prior(impossible, precision(0.5))
+    kept, loose = (
+        Solver(residuals, known, Stopping(step=1e-7, decrease=0.0)).solve(walk.take.qpos[0], prior).qpos
+        for known in (limits, HingeLimits(walk.body, keep=False))
+    )
+    assert kept[knee] == pytest.approx(limits.low_rad[knee - 7], abs=1e-9)
+    assert loose[knee] == pytest.approx(impossible[knee], abs=1e-3)
+
+
+def test_without_prior_six_trackers_are_met_exactly(walk: Scene) -> None:
+    residuals, limits = Residuals(walk.body, walk.calibration, Loss(robust=False)), HingeLimits(walk.body)
+    solver = Solver(residuals, limits, Stopping())
+    residuals.read(walk.frames[44])
+    solution = solver.solve(walk.take.qpos[40], Prior(walk.take.qpos[40], None))
+    assert solution.converged
+    assert residuals.place(solution.qpos) < 1e-4
+
+
+def test_a_solve_leaves_no_trace(walk: Scene) -> None:
+    residuals, limits = Residuals(walk.body, walk.calibration, Loss()), HingeLimits(walk.body)
+    solver, prior = Solver(residuals, limits, Stopping()), Prior(walk.take.qpos[10], precision(0.5))
+    residuals.read(walk.frames[12])
+    once = solver.solve(walk.take.qpos[10], prior).qpos
+    residuals.read(walk.frames[90])
+    solver.solve(walk.take.qpos[20], prior)
+    residuals.read(walk.frames[12])
+    np.testing.assert_array_equal(solver.solve(walk.take.qpos[10], prior).qpos, once)
