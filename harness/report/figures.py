@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN = 8.6
-_ROUND = (0, 1, 2, 5, 10, 20, 40, 70, 100, 150, 200, 300, 400, 500, 700, 1000)
-"""Ticks of a square-root axis."""
 _MOST_POINTS = 1500
 """Along one line; more are no sharper on a screen."""
 ANGLE, POSITION = "joint_angle_mean_deg", "mpjpe_mm"
@@ -78,7 +76,7 @@ def per_joint(run: Run, series: str) -> Chart:
             axes.invert_yaxis()
             axes.set_xscale("function", functions=(np.sqrt, np.square))
             axes.set_xlim(left=0.0)
-            axes.set_xticks([tick for tick in _ROUND if tick <= axes.get_xlim()[1]])
+            axes.set_xticks(_root_ticks(axes.get_xlim()[1]))
             axes.set_title(title)
             axes.grid(False, axis="y")
         if others:
@@ -198,6 +196,16 @@ def _logarithmic(axes: "Axes", which: Literal["x", "y"]) -> None:
         axis.set_major_locator(LogLocator(subs=(1.0,) if few else (1.0, 2.0, 5.0)))
         axis.set_minor_locator(NullLocator())
         axis.set_major_formatter(lambda value, _: f"{value:g}")
+
+
+def _root_ticks(end: float) -> list[float]:
+    """Round numbers for a square-root axis from 0 to `end`, none too near its neighbour."""
+    ticks = [0.0]
+    for power in range(-3, 5):
+        for tick in (digit * 10.0**power for digit in (1, 2, 5)):
+            if tick <= end and np.sqrt(tick) - np.sqrt(ticks[-1]) > 0.09 * np.sqrt(end):
+                ticks.append(tick)
+    return ticks
 
 
 def _with_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:

@@ -1,0 +1,99 @@
+"""The page in a browser: headless Chromium opens it, nothing leaves it, and the 3-D view follows the slider."""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.report.report import write_report
+from tests.report.fabricate import Plan, fabricate
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]
+HOSTILE = "<script>alert(1)</script>"
+
+
+@pytest.fixture(scope="module")
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A run with a hostile clip name; rendered where that is possible."""
+    plan = Plan(methods={"ik": 2.0, "mean_pose": 12.0}, clip_name=HOSTILE, behaviours=("walking",), failing=())
+    return write_report(fabricate(tmp_path_factory.mktemp("browser") / "run", plan))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = os.environ.get("HARNESS_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("no Chromium: install it or name it in HARNESS_CHROMIUM")
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def seen() -> dict[str, list[str]]:
+    """What went wrong while a page was open."""
+    return {"requests": [], "errors": []}
+
+
+@pytest.fixture(params=[1280, 390])
+def page(request: pytest.FixtureRequest, browser: Any, page_file: Path, seen: dict[str, list[str]]) -> Iterator[Any]:
+    """The page at desktop and at phone width."""
+    opened = browser.new_page(viewport={"width": request.param, "height": 844})
+    outside = ("data:", "blob:", page_file.as_uri())
+    opened.on("request", lambda r: None if r.url.startswith(outside) else seen["requests"].append(r.url))
+    opened.on("console", lambda m: seen["errors"].append(m.text) if m.type == "error" else None)
+    opened.on("pageerror", lambda error: seen["errors"].append(str(error)))
+    opened.on("dialog", lambda dialog: (seen["errors"].append(dialog.message), dialog.dismiss()))
+    opened.goto(page_file.as_uri())
+    yield opened
+    opened.close()
+
+
+def test_the_page_is_whole_and_quiet(page: Any, seen: dict[str, list[str]]) -> None:
+    width = page.viewport_size["width"]
+    assert page.evaluate("document.documentElement.scrollWidth") <= width, "the page scrolls sideways"
+    page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true; })")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width, "it does once everything is unfolded"
+    page.evaluate("Promise.all([...document.images].map((image) => image.decode()))")
+    sizes = page.evaluate("[...document.images].map((image) => [image.naturalWidth, image.naturalHeight, image.alt])")
+    assert len(sizes) >= 3
+    assert all(w > 0 and h > 0 and alt for w, h, alt in sizes)
+    assert HOSTILE in page.inner_text("main")
+    assert seen == {"requests": [], "errors": []}
+
+
+def test_the_slider_moves_the_figures(page: Any, seen: dict[str, list[str]]) -> None:
+    assert not page.evaluate("'Plotly' in window"), "the library is unpacked before it is needed"
+    page.locator("#stage").scroll_into_view_if_needed()
+    page.wait_for_selector("#stage[data-ready]", timeout=60_000)
+    figures = "() => JSON.stringify(document.getElementById('stage').data.map((trace) => [...trace.x]))"
+    assert "frame 1 of 80" in page.inner_text("#where")
+    before = page.evaluate(figures)
+    page.locator("#frame").fill("50")
+    assert "frame 51 of 80" in page.inner_text("#where")
+    page.wait_for_function(f"(before) => ({figures})() !== before", arg=before)
+    _, truth, estimate = zip(json.loads(before), json.loads(page.evaluate(figures)), strict=True)
+    assert truth[0] != truth[1], "the truth stands still"
+    assert estimate[0] != estimate[1], "the estimate stands still"
+    assert truth[1] != estimate[1]
+    page.locator("#frame").press("ArrowRight")
+    assert "frame 52 of 80" in page.inner_text("#where")
+    page.locator("#shot").select_option(index=1)
+    assert "frame 1 of 80" in page.inner_text("#where")
+    page.locator("#play").click()
+    page.wait_for_function("() => Number(document.getElementById('frame').value) > 5", timeout=30_000)
+    page.locator("#play").click()
+    assert page.inner_text("#play") == "Play"
+    assert seen == {"requests": [], "errors": []}
