@@ -156,8 +156,10 @@ def add_inspect(verbs: Verbs) -> None:
 
 def inspect_file(args: argparse.Namespace) -> Outcome:
     from harness.mocap.inspect import inspect_file as inspect
+    from harness.mocap.sources import VARIABLE
 
-    found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=args.mocap)
+    library = args.mocap or (Path(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None)
+    found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
     if args.json:
         print(json.dumps({**found.as_dict(), "outcome": Outcome.PASS.word}))
     else:

@@ -10,7 +10,7 @@ import harness
 PACKAGE = Path(harness.__file__).parent
 EVERYTHING = {p.name for p in PACKAGE.iterdir() if p.is_dir() and (p / "__init__.py").exists()}
 
-# `core` and `errors` are open to all and not listed. The truth wall: methods see no simulation, no motion file, no score.
+# `core` and `errors` are open to all and not listed. The truth wall: methods see no simulation, motion file or score.
 MAY_IMPORT: dict[str, set[str]] = {
     "core": set(),
     "mocap": set(),

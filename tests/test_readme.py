@@ -1,0 +1,43 @@
+"""What the README says to type works as it stands."""
+
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+import harness
+from harness.cli import build_parser, main
+from harness.score.results import read_summary
+
+ROOT = Path(harness.__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len(code) == 1
+    assert len(code[0].splitlines()) < 45
+    (tmp_path / "upright.py").write_text(code[0])
+    command = next(c for c in re.findall(r"`harness (run demo --methods [^`]*)`", README))
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert main([*shlex.split(command), "--no-report"]) == 0
+    methods = {row["method"]: row for row in read_summary(tmp_path / "results" / "mine")["methods"]}
+    assert set(methods) == {"ik", "upright:Upright", "upright:Upright+ik"}
+    errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
+    assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
+
+
+def test_every_command_of_the_readme_parses() -> None:
+    commands = re.findall(r"^    harness (.*?)(?:  +#.*)?$", README, re.MULTILINE)
+    assert len(commands) >= 4
+    for command in commands:
+        build_parser().parse_args(shlex.split(command))
+
+
+def test_every_link_of_the_readme_leads_somewhere() -> None:
+    links = re.findall(r"\]\(([^)]+)\)", README)
+    assert links
+    for link in links:
+        assert (ROOT / link).exists(), link
