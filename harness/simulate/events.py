@@ -76,7 +76,7 @@ class Echo:
 
 @dataclass(frozen=True)
 class Dropout:
-    """Line of sight blocked: the tracker coasts on inertia while quality falls, then is lost for a moment (rate ours)."""
+    """Line of sight blocked: it coasts on inertia while quality falls, then is lost for a moment (rate ours)."""
 
     share: float = 0.01
     """Of a station's readings that are lost."""

@@ -1,56 +1,90 @@
-"""The serial line between tracker and host: when each record arrives, and what it cannot carry.
+"""The tracker as a device on a line: when it samples each station, and when the records arrive."""
 
-8N1 takes ten bits a byte (docs/is900.md section 10). What a real tracker does when the line cannot keep up is not
-documented; here whole records are dropped, oldest first, and counted (section 14).
-"""
-
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.errors import BadInput
+from harness.stream.items import STANDARD_LIST, size
 
 BITS_PER_BYTE = 10
+"""8N1: a start bit, eight bits, a stop bit (PROTOCOL section 2)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """What became of N records."""
+@dataclass(frozen=True)
+class TrackerConfig:
+    """An IS-900 at work."""
 
-    arrived_s: Floats
-    """(N,) host time at which the last byte was in [s]; NaN where dropped."""
+    rate_hz: float = 40.0
+    """Records per second of each station (Liu et al. 2011)."""
+    latency_s: float = 0.004
+    """From the sample to the first bit on the line, when the line is free (PROTOCOL 13.1, unverified)."""
+    baud: int = 115200
+    """Bits per second of the line (PROTOCOL section 2)."""
+    slot_s: float | None = None
+    """Stations are sampled in turn, this much apart [s]; by default as fast as the line takes their records."""
+    items: tuple[int, ...] = STANDARD_LIST
+    """Output list of every station."""
+    queue_records: int = 12
+    """Records that wait for the line before the oldest is dropped (PROTOCOL section 14; the size is a choice)."""
+    origin_m: tuple[float, float, float] = (0.0, 0.0, 2.5)
+    """Origin of the tracker's frame in the world [m]: a constellation under the ceiling."""
+
+    def __post_init__(self) -> None:
+        if not (self.rate_hz > 0.0 and self.baud > 0 and self.latency_s >= 0.0 and self.queue_records >= 1):
+            raise BadInput(f"Not a tracker: {self}.", "Rate and baud are positive, latency is not negative.")
+        if 21 not in self.items:
+            raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")
 
     @property
-    def sent(self) -> Bools:
-        """(N,)"""
-        out: Bools = ~np.isnan(self.arrived_s)
-        return out
+    def record_s(self) -> float:
+        """Time that one record takes on the line [s]."""
+        return size(self.items) * BITS_PER_BYTE / self.baud
+
+    def station_slot_s(self, stations: int) -> float:
+        """Time between the samples of one station and the next [s]."""
+        if self.slot_s is None:
+            return min(self.record_s, 1.0 / (self.rate_hz * stations))
+        if not 0.0 <= self.slot_s * stations <= (1.0 + 1e-9) / self.rate_hz:
+            raise BadInput(
+                f"{stations} stations {1e3 * self.slot_s:g} ms apart do not fit into a period of "
+                f"{1e3 / self.rate_hz:g} ms.",
+                "Choose a shorter slot_s or a lower rate_hz.",
+            )
+        return self.slot_s
 
 
-def carry(ready_s: Floats, record_bytes: int, baud: float, longest_queue: int) -> Carried:
-    """Send records (N,) that are ready at these times, in order; at most `longest_queue` wait at any moment."""
-    takes_s = record_bytes * BITS_PER_BYTE / baud
-    k = np.arange(len(ready_s))
-    ended_s = np.maximum.accumulate(ready_s - k * takes_s) + (k + 1) * takes_s
-    waited = ended_s - ready_s
-    if not len(ready_s) or waited.max() <= longest_queue * takes_s:
-        return Carried(ended_s)
-    return Carried(_with_a_full_queue(ready_s, takes_s, longest_queue))
+def transmit(ready_s: Floats, tracker: TrackerConfig) -> tuple[Bools, Floats]:
+    """Which of N records that are ready at these times, in this order, get through, and when each has arrived [s].
+
+    One record at a time is on the line. A record that finds the queue full displaces the oldest one that waits.
+    """
+    busy_s = tracker.record_s
+    at = busy_s * np.arange(len(ready_s))
+    start_s = at + np.maximum.accumulate(ready_s - at) if len(ready_s) else ready_s
+    if np.all(start_s - ready_s <= (tracker.queue_records - 1) * busy_s):
+        return np.ones(len(ready_s), bool), start_s + busy_s
+    return _overloaded(ready_s, tracker)
 
 
-def _with_a_full_queue(ready_s: Floats, takes_s: float, longest_queue: int) -> Floats:
-    arrived_s = np.full(len(ready_s), np.nan)
-    queue: list[int] = []
-    free_s = -np.inf
-    for k, now_s in enumerate(ready_s):
-        while queue and max(free_s, ready_s[queue[0]]) < now_s:
-            first = queue.pop(0)
-            free_s = max(free_s, ready_s[first]) + takes_s
-            arrived_s[first] = free_s
-        queue.append(k)
-        if len(queue) > longest_queue:
-            queue.pop(0)
-    for k in queue:
-        free_s = max(free_s, ready_s[k]) + takes_s
-        arrived_s[k] = free_s
-    return arrived_s
+def _overloaded(ready_s: Floats, tracker: TrackerConfig) -> tuple[Bools, Floats]:
+    sent, arrived_s = np.zeros(len(ready_s), bool), np.full(len(ready_s), np.nan)
+    waiting: deque[int] = deque()
+    free_s = 0.0
+
+    def send_until(now_s: float) -> None:
+        nonlocal free_s
+        while waiting and max(free_s, float(ready_s[waiting[0]])) < now_s:
+            record = waiting.popleft()
+            free_s = max(free_s, float(ready_s[record])) + tracker.record_s
+            sent[record], arrived_s[record] = True, free_s
+
+    for record, now_s in enumerate(ready_s.tolist()):
+        send_until(now_s)
+        if len(waiting) == tracker.queue_records:
+            waiting.popleft()
+        waiting.append(record)
+    send_until(np.inf)
+    return sent, arrived_s

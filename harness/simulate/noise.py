@@ -1,59 +1,74 @@
-"""The error model of a tracker as one record, and its three named levels (docs/is900.md 13.5)."""
+"""How an IS-900 errs: components put together, and the named levels of PROTOCOL.md 13.5."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
-from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.simulate.events import Dropout, Echo, Excursion, LostStation, Slip
-from harness.simulate.readings import Readings
-from harness.simulate.smooth import Session, Slow, SpeedError, White
+from harness.simulate.components.clock import Clock
+from harness.simulate.components.dropout import Dropout
+from harness.simulate.components.echo import Echo
+from harness.simulate.components.excursion import Excursion
+from harness.simulate.components.lost_station import LostStation
+from harness.simulate.components.mount import MountOffset, MountSlip
+from harness.simulate.components.session import Session
+from harness.simulate.components.slow import Slow
+from harness.simulate.components.speed import Speed
+from harness.simulate.components.white import White
+from harness.simulate.sensed import Sensed
 
 LEVELS = ("clean", "noise", "default")
 
 
 @dataclass(frozen=True)
-class Clock:
-    """The device's clock against the host's."""
-
-    offset_s: float = 0.0
-    """Device time at host time 0 [s]."""
-    ppm: float = 20.0
-    """How much faster the device's clock runs, in millionths; docs/is900.md 13.5, ours."""
-
-
-@dataclass(frozen=True)
 class Noise:
-    """Components that are None do nothing. They act in the order of the fields."""
+    """What goes wrong; None or () for what does not. Each component draws for itself, whatever else there is."""
 
-    slip: Slip | None = None
+    mount: MountOffset | None = None
+    slip: tuple[MountSlip, ...] = ()
+    speed: Speed | None = None
     session: Session | None = None
     slow: Slow | None = None
-    speed_error: SpeedError | None = None
+    white: White | None = None
     excursion: Excursion | None = None
     echo: Echo | None = None
-    white: White | None = None
     dropout: Dropout | None = None
-    lost_stations: tuple[LostStation, ...] = ()
-    clock: Clock = Clock(ppm=0.0)
+    lost: tuple[LostStation, ...] = ()
+    clock: Clock | None = None
 
-    def applied(self, seen: Readings, seed: int, take: str) -> Readings:
-        """The readings with every component's error; each draws from generators of its own name, take and station."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            for component in value if isinstance(value, tuple) else (value,):
-                if component is not None and not isinstance(component, Clock):
-                    name = field.name
-                    seen = component.applied(seen, lambda s, name=name: generator(seed, "noise", take, name, s))
-        return seen
+    def spoil(self, sensed: Sensed) -> None:
+        """Let every component do its work, in the order of the fields: from the body outwards to the device."""
+        for component in (
+            self.mount,
+            *self.slip,
+            self.speed,
+            self.session,
+            self.slow,
+            self.white,
+            self.excursion,
+            self.echo,
+            self.dropout,
+            *self.lost,
+            self.clock,
+        ):
+            if component is not None:
+                component.spoil(sensed)
 
 
 def level(name: str) -> Noise:
-    """`clean`: nothing; `noise`: white, slow, session and clock; `default`: all of 13.5. UnknownName."""
-    if name == "clean":
-        return Noise()
-    noise = Noise(session=Session(), slow=Slow(), white=White(), clock=Clock())
-    if name == "noise":
-        return noise
-    if name == "default":
-        return replace(noise, speed_error=SpeedError(), excursion=Excursion(), echo=Echo(), dropout=Dropout())
+    """`clean` (nothing), `noise` (white, slow, session, clock) or `default` (all of 13.5). UnknownName."""
+    match name:
+        case "clean":
+            return Noise()
+        case "noise":
+            return Noise(white=White(), slow=Slow(), session=Session(), clock=Clock())
+        case "default":
+            return Noise(
+                white=White(),
+                slow=Slow(),
+                session=Session(),
+                excursion=Excursion(),
+                echo=Echo(),
+                dropout=Dropout(),
+                speed=Speed(),
+                clock=Clock(),
+            )
     raise UnknownName("noise level", name, LEVELS)

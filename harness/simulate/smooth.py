@@ -58,7 +58,7 @@ class Session:
 
 @dataclass(frozen=True)
 class SpeedError:
-    """Ranges are taken at another moment than the record's: so many seconds of motion (Gilson et al. 2006; size ours)."""
+    """Ranges are taken at another moment than the record's (Gilson et al. 2006; size ours)."""
 
     lead_s: float = 0.002
 

@@ -1,154 +1,127 @@
-"""Records of single stations, put together into frames.
+"""Records into frames: one row per station, in station order."""
 
-Stations are read one after another, so a frame closes when the station number does not increase, when the last
-station has come, or when 1.5 periods have passed since its first record. A station without a record is an invalid
-row. The wire has no checksum: rows whose time runs backwards or whose numbers cannot be are marked suspect.
-"""
-
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from harness.core.arrays import Floats, Ints
-from harness.errors import BadInput
-from harness.stream.clock import DeviceClock
+from harness.core.arrays import Bools, Floats, Ints
 from harness.stream.frame import TrackerFrame
-from harness.stream.records import STATIONS
+from harness.stream.readings import Readings, join
 
-FARTHEST_M = 30.0
-"""No IS-900 hall is larger; a position beyond it is damage."""
-NORM_SLACK = 0.02
-"""How far the norm of a quaternion may be from 1."""
+PATIENCE = 1.5
+"""A frame that lacks stations is closed after so many periods."""
+_NEVER = -np.inf
 
 
-class FrameAssembler:
-    """For stations that are numbered from 1 in the given order; `unit_m` is the device's unit of length [m]."""
+class Assembler:
+    """Closes a frame when the station number does not increase, at once when every station is there, or after
+    1.5 periods.
 
-    def __init__(self, stations: Sequence[str], period_s: float, unit_m: float = 0.01) -> None:
-        if not 0 < len(stations) <= len(STATIONS):
-            raise BadInput(f"{len(stations)} stations.", f"An IS-900 has 1 to {len(STATIONS)}.")
-        self.stations = tuple(stations)
-        self._patience_s, self._unit_m = 1.5 * period_s, unit_m
-        self._clock = DeviceClock()
-        self._open: list[TrackerFrame] = []
-        self._records: NDArray[np.void] | None = None
-        self._station: Ints = np.empty(0, dtype=np.int64)
-        self._received_s: Floats = np.empty(0)
-        self._device_s: Floats = np.empty(0)
-        self._latest_s = np.full(len(stations), -np.inf)
-        self.unknown = 0
-        """Records of stations that were not configured; left out of every frame."""
+    A reading a period or more after the first of its frame, by the device's clock, belongs to the next one (by the
+    host's clock 1.5 periods, where stamps are missing). A station number that does not increase in the middle of a
+    period, or a stamp that steps back, shows a damaged record: the readings on both sides are suspect, since either
+    may be the wrong one. So is one that is `doubtful` by itself.
+    """
 
-    def push(self, records: NDArray[np.void], received_s: Floats) -> list[TrackerFrame]:
-        """The frames that N further records complete; `received_s` (N,) host time of each [s]."""
-        number = _numbers(records["station"])
-        known = number < len(self.stations)
-        self.unknown += int(np.count_nonzero(~known))
-        records, number, received_s = records[known], number[known], received_s[known]
-        device_s = self._clock.unwrapped_s(records["time"])
-        if self._records is not None:
-            records = np.concatenate([self._records, records])
-            number = np.concatenate([self._station, number])
-            received_s = np.concatenate([self._received_s, received_s])
-            device_s = np.concatenate([self._device_s, device_s])
-        starts = self._starts(number, received_s)
-        whole = len(number) > 0 and number[-1] == len(self.stations) - 1
-        last = len(number) if whole or not len(starts) else int(starts[-1])
-        frames = self._frames(records[:last], number[:last], received_s[:last], device_s[:last], starts)
-        self._records, self._station = records[last:], number[last:]
-        self._received_s, self._device_s = received_s[last:], device_s[last:]
-        return frames
+    def __init__(self, stations: int, period_s: float) -> None:
+        self._stations = stations
+        self._period_s = period_s
+        self._shortest_s = (1.0 - 0.5 / stations) * period_s
+        """Between the first readings of two frames; within a frame they are a station's slot less than that apart."""
+        self._open: Readings | None = None
+        """The beginning of a frame."""
+        self._began_s, self._before_s = _NEVER, _NEVER
+        """First and last stamp of the frame that was closed last."""
+        self._received_s = _NEVER
+        """When that was complete."""
 
-    def flush(self) -> list[TrackerFrame]:
-        """The frame that is still open, at the end of a stream."""
-        if self._records is None or not len(self._records):
+    def add(self, more: Readings) -> list[TrackerFrame]:
+        """The frames that these readings complete."""
+        if len(more) == 0:
             return []
-        starts = np.zeros(1, dtype=np.int64)
-        frames = self._frames(self._records, self._station, self._received_s, self._device_s, starts)
-        self._records = None
-        return frames
+        given = more if self._open is None else join([self._open, more])
+        frame, doubtful = self._cut(given)
+        given = replace(given, doubtful=doubtful)
+        open_from = int(np.searchsorted(frame, frame[-1]))
+        if len(given) - open_from == self._stations:
+            open_from = len(given)
+        self._open = given[open_from:] if open_from < len(given) else None
+        return self._frames(given[:open_from], frame[:open_from])
 
-    def _starts(self, number: Ints, received_s: Floats) -> Ints:
-        """Where frames begin among records."""
-        starts: list[int] = []
-        fresh = np.concatenate([[True], number[1:] <= number[:-1]]) if len(number) else np.empty(0, bool)
-        candidates = np.flatnonzero(fresh)
-        late = np.flatnonzero(received_s - _first_of(received_s, fresh) > self._patience_s) if len(number) else []
-        if not len(late):
-            return candidates
-        first = -np.inf
-        for k in range(len(number)):
-            if fresh[k] or received_s[k] - first > self._patience_s:
-                starts.append(k)
-                first = received_s[k]
-        return np.array(starts, dtype=np.int64)
+    def expire(self, now_s: float) -> list[TrackerFrame]:
+        """The unfinished frame, if its first reading came more than 1.5 periods before `now_s` (host clock)."""
+        waited = self._open is not None and now_s - float(self._open.received_s[0]) > PATIENCE * self._period_s
+        return self.finish() if waited else []
 
-    def _frames(
-        self, records: NDArray[np.void], number: Ints, received_s: Floats, device_s: Floats, starts: Ints
-    ) -> list[TrackerFrame]:
-        if not len(records):
+    def finish(self) -> list[TrackerFrame]:
+        """The unfinished frame."""
+        given, self._open = self._open, None
+        return [] if given is None else self._frames(given, np.zeros(len(given), dtype=np.int64))
+
+    def _cut(self, given: Readings) -> tuple[Ints, Bools]:
+        """The frame of each reading (N,), from 0, and which ones (N,) are doubtful after a look at their neighbours."""
+        frame, doubtful = np.zeros(len(given), dtype=np.int64), given.doubtful.copy()
+        began_s, before_s = (self._began_s, self._before_s) if self._open is None else (_NEVER, _NEVER)
+        station_before, filled, number, arrived_s = self._stations, self._stations, -1, _NEVER
+        rows = zip(given.station.tolist(), given.measured_s.tolist(), given.received_s.tolist(), strict=True)
+        for i, (station, stamp_s, received_s) in enumerate(rows):
+            elapsed_s = stamp_s - began_s
+            untimed = elapsed_s != elapsed_s  # NaN: a stamp is missing
+            increases = station > station_before
+            if (not increases and elapsed_s < self._shortest_s) or stamp_s < before_s:
+                doubtful[i] = True
+                if filled < self._stations:
+                    doubtful[i - 1] = True
+            late = received_s - arrived_s > PATIENCE * self._period_s if untimed else elapsed_s >= self._period_s
+            if late or not increases:
+                number, filled, began_s, arrived_s = number + 1, 0, stamp_s, received_s
+            elif began_s != began_s:
+                began_s = stamp_s
+            if stamp_s == stamp_s:
+                before_s = stamp_s
+            station_before, filled = station, filled + 1
+            frame[i] = number
+        return frame, doubtful
+
+    def _frames(self, given: Readings, frame: Ints) -> list[TrackerFrame]:
+        """Whole frames of readings (N,), of which `frame` (N,) tells the frame of each, from 0 without gaps."""
+        if len(given) == 0:
             return []
-        starts = starts[starts < len(records)]
-        frame = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(records))))
-        shape = (len(starts), len(self.stations))
-        position, quaternion = np.full((*shape, 3), np.nan), np.full((*shape, 4), np.nan)
-        time, quality = np.full(shape, np.nan), np.zeros(shape)
-        position[frame, number] = self._unit_m * records["position"].astype(float)
-        quaternion[frame, number] = records["quaternion"]
-        time[frame, number] = device_s
-        quality[frame, number] = records["quality"] / 255.0
-        came = ~np.isnan(time)
-        suspect = came & self._runs_back(time)
-        norm = np.linalg.norm(quaternion, axis=2)
-        with np.errstate(invalid="ignore"):
-            placed = (np.abs(position) < FARTHEST_M).all(axis=2)
-            turned = np.abs(norm - 1.0) < NORM_SLACK
-        suspect |= came & ~(placed & turned)
-        valid = came & (quality > 0.0)
-        position_valid, orientation_valid = valid & placed, valid & turned
-        position[~position_valid] = np.nan
-        quaternion[~orientation_valid] = np.nan
-        with np.errstate(invalid="ignore"):
-            quaternion /= norm[..., None]
-        ended_s = received_s[np.append(starts[1:], len(records)) - 1]
-        return [
-            TrackerFrame(*row)
-            for row in zip(
-                ended_s.tolist(),
-                time,
-                position,
-                quaternion,
-                position_valid,
-                orientation_valid,
-                quality,
-                suspect,
-                strict=True,
-            )
-        ]
+        count, at = int(frame[-1]) + 1, (frame, given.station)
 
-    def _runs_back(self, time_s: Floats) -> NDArray[np.bool_]:
-        """(F, S) where a station's stamp is not later than every one that it gave before."""
-        with np.errstate(invalid="ignore"):
-            filled = np.where(np.isnan(time_s), -np.inf, time_s)
-            before = np.maximum.accumulate(np.vstack([self._latest_s, filled]), axis=0)
-            self._latest_s = before[-1]
-            back: NDArray[np.bool_] = time_s <= before[:-1]
-        return back
+        def spread(column: Floats, *width: int, missing: float = np.nan) -> Floats:
+            out = np.full((count, self._stations, *width), missing)
+            out[at] = column
+            return out
 
+        usable = given.quality > 0.0
+        placed = usable & np.isfinite(given.position_m).all(axis=1)
+        with np.errstate(invalid="ignore", over="ignore"):
+            length = np.sqrt(np.sum(given.tracker_from_station**2, axis=1))
+            turned = usable & (length > 0.5) & (length < 2.0)
+            turn = given.tracker_from_station / length[:, None]
+        measured_s = spread(given.measured_s)
+        columns = (
+            self._receptions_s(given, frame).tolist(),
+            measured_s,
+            spread(np.where(placed[:, None], given.position_m, np.nan), 3),
+            spread(np.where(turned[:, None], turn, np.nan), 4),
+            spread(placed, missing=0.0) > 0.0,
+            spread(turned, missing=0.0) > 0.0,
+            spread(given.quality, missing=0.0),
+            spread(given.doubtful, missing=0.0) > 0.0,
+        )
+        stamps_s = measured_s[-1][~np.isnan(measured_s[-1])]
+        if len(stamps_s):
+            self._began_s, self._before_s = float(stamps_s[0]), float(stamps_s[-1])
+        return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
 
-def _numbers(characters: NDArray[np.bytes_]) -> Ints:
-    """(N,) 0 for station '1', ..., 11 for 'C'."""
-    table = np.full(256, len(STATIONS), dtype=np.int64)
-    table[np.frombuffer(STATIONS, np.uint8)] = np.arange(len(STATIONS))
-    return (
-        table[characters.view(np.uint8)]
-        if characters.flags.c_contiguous
-        else table[np.ascontiguousarray(characters).view(np.uint8)]
-    )
-
-
-def _first_of(values: Floats, fresh: NDArray[np.bool_]) -> Floats:
-    """(N,) the value at the latest fresh place."""
-    places = np.maximum.accumulate(np.where(fresh, np.arange(len(values)), 0))
-    return values[places]
+    def _receptions_s(self, given: Readings, frame: Ints) -> Floats:
+        """When the last reading of each frame came (F,); frames of one chunk of bytes follow by the least step there is."""
+        last = np.append(np.flatnonzero(np.diff(frame)), len(frame) - 1)
+        out = np.maximum.accumulate(given.received_s[last])
+        for i, received_s in enumerate(out.tolist()):
+            if received_s <= self._received_s:
+                out[i] = np.nextafter(self._received_s, np.inf)
+            self._received_s = float(out[i])
+        return out

@@ -1,27 +1,66 @@
-"""The device's clock as its records tell it: a float32 of milliseconds since it was set to zero (docs/is900.md 8)."""
+"""The device's clock made continuous: it may be set to zero at any time, and single stamps may be damaged.
+
+Stamps are 32-bit floats of milliseconds (PROTOCOL section 8), so their resolution falls with the time since `MZ`:
+0.001 ms after 10 s, 0.25 ms after an hour, 8 ms after a day. Nothing can restore that; re-zeroing can prevent it.
+"""
 
 import numpy as np
 
 from harness.core.arrays import Floats
 
-JUMP_S = 0.5
-"""A stamp so much earlier than the one before means that the clock was set to zero."""
+TOLERANCE_S = 0.25
+"""Delays of the host's reading differ by less than this [s]; no sound record is farther out of order."""
 
 
-class DeviceClock:
-    """Seconds that never start again: time goes on from where it was when the clock was zeroed."""
+class Unwrapper:
+    """Turns stamps into seconds that go on where the clock was set back.
+
+    A stamp is believed when, since the last one believed, it did not step back and advanced no more than the host's
+    clock did, both within `TOLERANCE_S`. Others are damaged (NaN), unless the next stamp agrees with them: then the
+    device set its clock anew, and time goes on from there by the host's clock.
+    """
 
     def __init__(self) -> None:
-        self._before_s = 0.0
-        self._base_s = 0.0
+        self._epoch_s = 0.0
+        """Added to stamps."""
+        self._last: tuple[float, float] | None = None
+        """Unwrapped stamp and host time of the last record believed [s]."""
+        self._odd: tuple[float, float] | None = None
+        """Raw stamp and host time of the last one, where it was not believed [s]."""
+        self.resets = 0
+        """How often the clock was set anew."""
 
-    def unwrapped_s(self, stamps_ms: Floats) -> Floats:
-        """(N,) seconds of successive stamps (N,) [ms]; small steps back are left for the assembler to doubt."""
-        stamps_s = np.asarray(stamps_ms, dtype=float) / 1e3
-        before = np.concatenate([[self._before_s], stamps_s[:-1]])
-        jumps = np.where(stamps_s < before - JUMP_S, before, 0.0)
-        out: Floats = stamps_s + self._base_s + np.cumsum(jumps)
-        if len(stamps_s):
-            self._before_s = float(stamps_s[-1])
-            self._base_s += float(np.sum(jumps))
+    def unwrap(self, stamp_s: Floats, received_s: Floats) -> Floats:
+        """Continuous device time (N,) of stamps (N,) received at these host times (N,) [s]; NaN for damaged ones."""
+        out: Floats = stamp_s + self._epoch_s
+        if len(out) == 0:
+            return out
+        if self._odd is None:
+            before = self._last or (float(out[0]), float(received_s[0]))
+            device, host = np.diff(out, prepend=before[0]), np.diff(received_s, prepend=before[1])
+            if bool(np.all((device > -TOLERANCE_S) & (device < host + TOLERANCE_S))):
+                self._last = float(out[-1]), float(received_s[-1])
+                return out
+        for i, (stamp, received) in enumerate(zip(stamp_s.tolist(), received_s.tolist(), strict=True)):
+            out[i] = self._one(stamp, received)
         return out
+
+    def _one(self, stamp_s: float, received_s: float) -> float:
+        if not np.isfinite(stamp_s):
+            return float("nan")
+        now_s = stamp_s + self._epoch_s
+        if self._last is None or _follows(self._last, (now_s, received_s)):
+            self._last, self._odd = (now_s, received_s), None
+            return now_s
+        if self._odd is not None and _follows(self._odd, (stamp_s, received_s)):
+            self._epoch_s = self._last[0] + (received_s - self._last[1]) - stamp_s
+            self.resets += 1
+            self._last, self._odd = (stamp_s + self._epoch_s, received_s), None
+            return self._last[0]
+        self._odd = stamp_s, received_s
+        return float("nan")
+
+
+def _follows(before: tuple[float, float], now: tuple[float, float]) -> bool:
+    """Whether device and host time (each) may belong to the same running clock."""
+    return -TOLERANCE_S < now[0] - before[0] < now[1] - before[1] + TOLERANCE_S

@@ -1,118 +1,201 @@
-"""Bytes in, events out: finds records and reply lines in what an IS-900 sends, whatever the pieces it comes in.
+"""Bytes in, events out: finds data records and replies in the stream of an IS-900, without input or output.
 
-A record is taken where its header, its length and its terminator agree; a reply line starts with '2' or '3' and ends
-with CR LF (docs/is900.md section 6). Anything else is skipped a byte at a time and counted, so one bad byte costs
-the records that it touches. What cannot be seen: a changed bit inside a float or a station character that leaves a
-well-formed record; the wire has no checksum, and `assemble` doubts what it can.
+There is no checksum and no escape: a record is known by its header and its length, and by the CR LF (or space) that
+its output list may end in. While in step, a record counts once its last byte is there. Out of step, the header of
+whatever follows must be there too; so it must for lists that end in nothing fixed. Every decision depends on the
+bytes alone, never on how they were cut into chunks. Between records, lines that start with 2, 3 or 5 are replies.
 """
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from harness.stream.records import LIST, STATIONS, looks_right, record_type
+from harness.core.arrays import Bools
+from harness.stream.items import HEAD, record_type, terminator
+from harness.stream.records import Table
 
 LONGEST_REPLY = 256
-"""Bytes; the longest known reply has 70."""
+"""No reply in the sources is half as long [bytes]."""
+_REPLY_HEAD = re.compile(rb"[235][ 1-9A-Ca-c]")
+_UNPRINTABLE = re.compile(rb"[^ -~]")
+_CANDIDATE = re.compile(rb"[0235]")
+_STATUS: Bools = np.zeros(256, bool)
+_STATUS[[ord(" "), *range(ord("A"), ord("Z") + 1), *range(ord("a"), ord("z") + 1)]] = True
 
 
 @dataclass(frozen=True, eq=False)
 class Records:
-    """A run of whole records, as they followed each other."""
+    """A run of records of one output list, without a byte between them."""
 
-    records: NDArray[np.void]
-    """(N,) of `records.record_type`."""
-    end: NDArray[np.int64]
-    """(N,) bytes of the whole stream up to the end of each."""
+    offset: int
+    """Bytes of the stream before the run."""
+    items: tuple[int, ...]
+    table: Table
 
 
 @dataclass(frozen=True)
 class Reply:
-    """A line that is no data: status, output list, error; without its CR LF."""
+    """A line that is no data."""
 
-    text: bytes
+    offset: int
+    line: bytes
+    """Without its CR LF."""
 
 
 @dataclass(frozen=True)
-class Skipped:
+class Garbage:
     """Bytes that belong to nothing."""
 
-    count: int
+    offset: int
+    size: int
 
 
-Event = Records | Reply | Skipped
+Event = Records | Reply | Garbage
 
 
-class Decoder:
-    """One stream. Needs a list that ends in CR LF (item 1); keeps less than one record or reply between calls."""
-
-    def __init__(self, items: Sequence[int] = LIST) -> None:
-        self._type = record_type(items)
-        self._rest = b""
-        self._read = 0
-
-    def feed(self, data: bytes) -> list[Event]:
-        """Everything that `data` completes, in order. Any split of a stream gives the same records and replies."""
-        buffer = self._rest + data
-        events = list(self._events(buffer))
-        self._rest = buffer[self._at :]
-        self._read += self._at
-        return _merged(events)
-
-    def _events(self, buffer: bytes) -> Iterator[Event]:
-        size, self._at = self._type.itemsize, 0
-        while self._at < len(buffer):
-            at = self._at
-            records = self._run(buffer, at)
-            if len(records):
-                ends = self._read + at + size * np.arange(1, len(records) + 1)
-                self._at += size * len(records)
-                yield Records(records, ends)
-            elif buffer[at] in b"23":
-                end = buffer.find(b"\r\n", at, at + LONGEST_REPLY)
-                text = buffer[at : end if end >= 0 else at + LONGEST_REPLY].removesuffix(b"\r")
-                if _printable(text) and end >= 0:
-                    self._at = end + 2
-                    yield Reply(text)
-                elif _printable(text) and len(text) < LONGEST_REPLY - 1:
-                    return
-                else:
-                    self._at += 1
-                    yield Skipped(1)
-            elif self._may_begin(buffer[at : at + 3]) and len(buffer) - at < size:
-                return
-            else:
-                self._at += 1
-                yield Skipped(1)
-
-    def _run(self, buffer: bytes, at: int) -> NDArray[np.void]:
-        count = (len(buffer) - at) // self._type.itemsize
-        if not count or buffer[at] != 0x30:
-            return np.empty(0, self._type)
-        one = np.frombuffer(buffer, self._type, 1, at)
-        if not looks_right(one)[0]:
-            return one[:0]
-        records = np.frombuffer(buffer, self._type, count, at)
-        right = looks_right(records)
-        return records if right.all() else records[: int(np.argmin(right))]
-
-    @staticmethod
-    def _may_begin(start: bytes) -> bool:
-        return start[0] == 0x30 and (len(start) < 2 or start[1] in STATIONS) and (len(start) < 3 or start[2] == 0x20)
-
-
-def _printable(text: bytes) -> bool:
-    return all(0x20 <= byte < 0x7F for byte in text)
-
-
-def _merged(events: list[Event]) -> list[Event]:
-    """Neighbouring skips as one."""
+def joined(events: Iterable[Event]) -> list[Event]:
+    """The same events with neighbours made one wherever they touch: what any split of the bytes gives alike."""
     out: list[Event] = []
     for event in events:
-        if isinstance(event, Skipped) and out and isinstance(out[-1], Skipped):
-            out[-1] = Skipped(out[-1].count + event.count)
+        last = out[-1] if out else None
+        if isinstance(event, Garbage) and isinstance(last, Garbage) and last.offset + last.size == event.offset:
+            out[-1] = Garbage(last.offset, last.size + event.size)
+        elif (
+            isinstance(event, Records)
+            and isinstance(last, Records)
+            and last.items == event.items
+            and last.offset + last.table.nbytes == event.offset
+        ):
+            out[-1] = Records(last.offset, last.items, np.concatenate([last.table, event.table]))
         else:
             out.append(event)
     return out
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    items: tuple[int, ...]
+    stations: Bools
+    """(256,) characters of the stations that send this list."""
+
+    @property
+    def size(self) -> int:
+        return int(record_type(self.items).itemsize)
+
+    @property
+    def end(self) -> bytes:
+        return terminator(self.items)
+
+
+class Decoder:
+    """Keeps at most one undecided record or reply between calls, whatever comes in."""
+
+    def __init__(self, lists: Mapping[int, tuple[int, ...]]) -> None:
+        """`lists` is the output list of each station, by its character's code."""
+        self._layouts: dict[int, _Layout] = {}
+        for items in set(lists.values()):
+            stations = np.zeros(256, bool)
+            stations[[station for station, own in lists.items() if own == items]] = True
+            layout = _Layout(items, stations)
+            self._layouts |= {station: layout for station, own in lists.items() if own == items}
+        self._buffer = b""
+        self._offset = 0
+        """Bytes of the stream before the buffer."""
+        self._in_step = False
+
+    @property
+    def pending(self) -> int:
+        """Bytes that wait for more."""
+        return len(self._buffer)
+
+    def feed(self, data: bytes) -> list[Event]:
+        """What became certain with these bytes."""
+        return self._decode(self._buffer + data, ended=False)
+
+    def finish(self) -> list[Event]:
+        """What is left when nothing more will come: the end stands for the header of the next record."""
+        return self._decode(self._buffer, ended=True)
+
+    def _decode(self, buffer: bytes, ended: bool) -> list[Event]:
+        events: list[Event] = []
+        at = 0
+        while at < len(buffer):
+            taken = self._run(buffer, at, events)
+            if taken == 0:
+                taken = self._single(buffer, at, events, ended)
+            if taken == 0:
+                break
+            at += taken
+        self._buffer = buffer[at:]
+        self._offset += at
+        return joined(events)
+
+    def _run(self, buffer: bytes, at: int, events: list[Event]) -> int:
+        """Take as many whole records of one list as follow each other in step; the bytes they have."""
+        layout = self._layouts.get(buffer[at + 1]) if self._in_step and at + 1 < len(buffer) else None
+        if layout is None or not layout.end:
+            return 0
+        count = (len(buffer) - at) // layout.size
+        table = np.frombuffer(buffer, record_type(layout.items), count, at)
+        sound = (table["head"] == HEAD) & layout.stations[table["station"]] & _STATUS[table["status"]]
+        raw = np.frombuffer(buffer, np.uint8, count * layout.size, at).reshape(count, layout.size)
+        sound &= np.all(raw[:, layout.size - len(layout.end) :] == np.frombuffer(layout.end, np.uint8), axis=1)
+        whole = count if sound.all() else int(np.argmin(sound))
+        if whole:
+            events.append(Records(self._offset + at, layout.items, table[:whole]))
+        return whole * layout.size
+
+    def _single(self, buffer: bytes, at: int, events: list[Event], ended: bool) -> int:
+        """Take one record, reply or piece of garbage; the bytes it has, 0 when more are needed to tell."""
+        size = self._size_of(buffer, at, ended)
+        if size is None:
+            return 0
+        if size == 0:
+            self._in_step = False
+            found = _CANDIDATE.search(buffer, at + 1)
+            size = (found.start() if found else len(buffer)) - at
+            events.append(Garbage(self._offset + at, size))
+            return size
+        self._in_step = True
+        if buffer[at] == HEAD:
+            items = self._layouts[buffer[at + 1]].items
+            events.append(Records(self._offset + at, items, np.frombuffer(buffer, record_type(items), 1, at)))
+        else:
+            events.append(Reply(self._offset + at, buffer[at : at + size - 2]))
+        return size
+
+    def _size_of(self, buffer: bytes, at: int, ended: bool) -> int | None:
+        """Bytes of the record or reply at this place; 0 for neither, None when it cannot be told yet."""
+        if buffer[at] == HEAD:
+            return self._size_of_record(buffer, at, ended)
+        head = buffer[at : at + 2]
+        if len(head) == 2 and not _REPLY_HEAD.match(head):
+            return 0
+        if len(head) == 1 and not _CANDIDATE.match(head):
+            return 0
+        broken = _UNPRINTABLE.search(buffer, at, at + LONGEST_REPLY)
+        if broken is None:
+            return 0 if ended or len(buffer) - at >= LONGEST_REPLY else None
+        stop = broken.start()
+        end = buffer[stop : stop + 2]
+        if end == b"\r\n" and stop - at >= 3:
+            return stop + 2 - at
+        return None if end == b"\r" and not ended else 0
+
+    def _size_of_record(self, buffer: bytes, at: int, ended: bool) -> int | None:
+        header = buffer[at + 1 : at + 3]
+        layout = self._layouts.get(header[0]) if header else None
+        if (header and layout is None) or (len(header) == 2 and not _STATUS[header[1]]):
+            return 0
+        if layout is None or len(buffer) - at < layout.size:
+            return 0 if ended else None
+        after = at + layout.size
+        if not buffer.endswith(layout.end, at, after):
+            return 0
+        if self._in_step and layout.end:
+            return layout.size
+        if after == len(buffer):
+            return layout.size if ended else None
+        return layout.size if _CANDIDATE.match(buffer, after) else 0

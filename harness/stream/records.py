@@ -1,64 +1,112 @@
-"""IS-900 data records, binary: what a station's output list makes of a reading, and back (docs/is900.md section 5).
+"""Binary data records, to be sent: SI units into the items of an output list (PROTOCOL section 5)."""
 
-No I/O. A record is '0', the station's character, a space, then the list's items; its end is known from the list
-alone. Lists are data: a numpy structured type per list turns thousands of records into bytes at once.
-"""
-
-from collections.abc import Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from harness.core import rotations
+from harness.core.arrays import Floats
 from harness.errors import BadInput
+from harness.stream.items import BLANK, HEAD, ITEMS, record_type
 
-STATIONS = b"123456789ABC"
-"""Station characters in the order in which the device reads them."""
-LIST = (40, 2, 11, 21, 1)
-"""Output list of this harness: quality, position, quaternion, timestamp, CR LF."""
+Table = NDArray[Any]
+"""Records (N,) of one output list, with a field for each item (`items.record_type`)."""
 
-_ITEMS: dict[int, tuple[str, str | tuple[str, tuple[int]]]] = {
-    0: ("space", "S1"),
-    1: ("end", "S2"),
-    2: ("position", ("<f4", (3,))),
-    4: ("angles_deg", ("<f4", (3,))),
-    11: ("quaternion", ("<f4", (4,))),
-    21: ("time", "<f4"),
-    22: ("buttons", "u1"),
-    23: ("joystick", ("u1", (2,))),
-    40: ("quality", "u1"),
+FULL_SCALE_M, FULL_SCALE_DEG = 3.0, 180.0
+"""Of the 16-bit format (section 5.2)."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the device was told to write numbers."""
+
+    metres_per_unit: float = 0.01
+    """0.01 after `u` (centimetres), 0.0254 after `U` or power-on (inches)."""
+    seconds_per_tick: float = 1e-3
+    """1e-3 after `MT` or power-on, 1e-6 after `Mt`."""
+
+
+@dataclass(frozen=True, eq=False)
+class Said:
+    """What N records are to say."""
+
+    measured_s: Floats
+    """(N,) the device's clock [s]."""
+    position_m: Floats
+    """(N, 3)"""
+    tracker_from_station: Floats
+    """(N, 4) unit quaternions."""
+    quality: Floats
+    """(N,) 0 lost to 1 best."""
+
+
+def encode(items: tuple[int, ...], stations: NDArray[np.uint8], said: Said, settings: Settings) -> Table:
+    """Records (N,) ready for the wire, for these station characters (N,); `tobytes()` gives the bytes.
+
+    Buttons are up and joysticks centred. BadInput for an item that no source says how to fill.
+    """
+    table = np.zeros(len(stations), record_type(items))
+    table["head"], table["station"], table["status"] = HEAD, stations, BLANK
+    for code in items:
+        item = ITEMS[code]
+        if item.fixed:
+            table[item.name] = np.frombuffer(item.fixed, np.uint8) if item.count > 1 else item.fixed[0]
+        elif item.name in _COLUMNS:
+            table[item.name] = _COLUMNS[item.name](said, settings)
+        else:
+            raise BadInput(f"Item {code} ({item.name}) cannot be written.", "Leave it out of the output list.")
+    return table
+
+
+def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
+    """The two-byte form (N, 2k) of values (N, k) within -1 to 1 of full scale (section 5.2)."""
+    fourteen = np.clip(np.floor(np.asarray(values) * 8192.0), -8192, 8191).astype(np.int64) & 0x3FFF
+    pairs = np.stack([fourteen & 0x7F, fourteen >> 7], axis=-1).astype(np.uint8).reshape(len(fourteen), -1)
+    pairs[:, 0] |= 0x80
+    return pairs
+
+
+def unpack_14_bit(pairs: NDArray[np.uint8]) -> Floats:
+    """Values (N, k), -1 to 1 of full scale, of the two-byte form (N, 2k)."""
+    low, high = pairs[:, ::2].astype(np.uint16) & 0x7F, pairs[:, 1::2].astype(np.uint16) & 0x7F
+    out: Floats = ((low << 2) | (high << 9)).view(np.int16) / 32768.0
+    return out
+
+
+def yaw_pitch_roll_deg(turn: Floats) -> Floats:
+    """Angles (N, 3) [deg] about Z, the new Y and the new X that give these quaternions (N, 4) (section 5.3)."""
+    r = rotations.to_matrix(turn)
+    pitch = np.arcsin(np.clip(-r[:, 2, 0], -1.0, 1.0))
+    out: Floats = np.rad2deg(
+        np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), pitch, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
+    )
+    return out
+
+
+def from_yaw_pitch_roll_deg(angles: Floats) -> Floats:
+    """Quaternions (N, 4) of yaw about Z, then pitch about the new Y, then roll about the new X (N, 3) [deg]."""
+    half = np.deg2rad(angles)[:, :, None]
+    x, y, z = np.eye(3)
+    yaw, pitch, roll = (rotations.exp(half[:, i] * axis) for i, axis in enumerate((z, y, x)))
+    return rotations.multiply(rotations.multiply(yaw, pitch), roll)
+
+
+_COLUMNS: dict[str, Callable[[Said, Settings], Any]] = {
+    "position": lambda said, settings: said.position_m / settings.metres_per_unit,
+    "yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
+    "quaternion": lambda said, settings: said.tracker_from_station,
+    "stylus": lambda said, settings: 0,
+    "position_16": lambda said, settings: pack_14_bit(said.position_m / FULL_SCALE_M),
+    "yaw_pitch_roll_16": lambda said, settings: pack_14_bit(
+        yaw_pitch_roll_deg(said.tracker_from_station) / FULL_SCALE_DEG
+    ),
+    "quaternion_16": lambda said, settings: pack_14_bit(said.tracker_from_station),
+    "time": lambda said, settings: said.measured_s / settings.seconds_per_tick,
+    "buttons": lambda said, settings: 0,
+    "joystick": lambda said, settings: 127,
+    "quality": lambda said, settings: np.round(255.0 * np.clip(said.quality, 0.0, 1.0)),
 }
-_CONSTANT = {"space": b" ", "end": b"\r\n"}
-
-
-def record_type(items: Sequence[int] = LIST) -> np.dtype:
-    """The layout of one record; fields head, station, status and one for each item. BadInput for unknown items."""
-    unknown = [item for item in items if item not in _ITEMS]
-    if unknown or len(set(items)) < len(items):
-        raise BadInput(f"output list {list(items)}.", f"Each of {', '.join(map(str, _ITEMS))} may be in it once.")
-    return np.dtype([("head", "S1"), ("station", "S1"), ("status", "S1"), *[_field(item) for item in items]])
-
-
-def blank_records(count: int, items: Sequence[int] = LIST) -> NDArray[np.void]:
-    """`count` records with everything constant filled in; `.tobytes()` is what goes on the wire."""
-    records = np.zeros(count, record_type(items))
-    records["head"], records["status"] = b"0", b" "
-    for name, constant in _CONSTANT.items():
-        if name in (records.dtype.names or ()):
-            records[name] = constant
-    return records
-
-
-def looks_right(records: NDArray[np.void]) -> NDArray[np.bool_]:
-    """(N,) whether head, station, status and terminators are those of a record."""
-    known = np.frombuffer(STATIONS, "S1")
-    right: NDArray[np.bool_] = (records["head"] == b"0") & (records["status"] == b" ")
-    right &= np.isin(records["station"], known)
-    for name, constant in _CONSTANT.items():
-        if name in (records.dtype.names or ()):
-            right &= records[name] == constant
-    return right
-
-
-def _field(item: int) -> tuple[str, str] | tuple[str, str, tuple[int]]:
-    name, kind = _ITEMS[item]
-    return (name, kind) if isinstance(kind, str) else (name, *kind)
+"""How each item is filled, in wire units."""

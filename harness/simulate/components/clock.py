@@ -1,0 +1,21 @@
+"""The device's own time."""
+
+from dataclasses import dataclass
+
+from harness.simulate.sensed import Sensed
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock that was set to zero some time before the take and does not run at the host's pace (PROTOCOL 13.5).
+
+    Rounding to 32-bit milliseconds is the wire's doing and happens at every level.
+    """
+
+    offset_s: float = 5.0
+    """What it shows when the take begins [s]."""
+    drift_ppm: float = 20.0
+    """How much faster it runs [1e-6]."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        sensed.device_s = self.offset_s + (1.0 + 1e-6 * self.drift_ppm) * sensed.time_s

@@ -1,0 +1,58 @@
+"""Short losses: the line of sight is blocked, the station coasts on inertia, then it is lost."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.simulate.sensed import Sensed
+
+GRAVITY_M_S2 = 9.81
+
+
+@dataclass(frozen=True)
+class Dropout:
+    """Gaps of quality 0, each after a stretch of falling quality and growing error.
+
+    While it coasts, a tilt error leaks gravity into the horizontal: 0.5 g sin(tilt) t^2 (PROTOCOL 13.4). In the gap,
+    records keep coming with what the filter believed last (section 7). Share and lengths are inferred (13.5).
+    """
+
+    share: float = 0.01
+    """Share of station readings with quality 0, 0 to below 1."""
+    gap_s: tuple[float, float] = (0.1, 0.5)
+    """Shortest and longest gap [s]."""
+    coast_s: float = 0.5
+    """Time without ranges before each gap [s]."""
+    tilt_rad: float = float(np.deg2rad(0.25))
+    """Tilt error while coasting [rad]: the RMS of pitch and roll."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        lost = np.zeros(sensed.time_s.shape, bool)
+        coasting = np.zeros(sensed.time_s.shape, bool)
+        for row, station in enumerate(sensed.stations):
+            time_s = sensed.time_s[:, row]
+            for begin_s, end_s, leak in self.gaps(sensed.draw("dropout", station), float(time_s.max())):
+                coast = (time_s >= begin_s - self.coast_s) & (time_s < begin_s)
+                coasted_s = time_s[coast] - (begin_s - self.coast_s)
+                sensed.position_m[coast, row] += (
+                    0.5 * GRAVITY_M_S2 * np.sin(self.tilt_rad) * coasted_s[:, None] ** 2 * leak
+                )
+                left = 1.0 - coasted_s / self.coast_s
+                sensed.quality[coast, row] = np.minimum(sensed.quality[coast, row], np.maximum(left, 1.0 / 255.0))
+                coasting[:, row] |= coast
+                lost[:, row] |= (time_s >= begin_s) & (time_s < end_s)
+        sensed.lose(lost)
+        sensed.hits["coast"] = coasting & ~lost
+
+    def gaps(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, float, Floats]]:
+        """Begin and end [s] of each gap up to `until_s`, and the horizontal unit vector (3,) of the error before it."""
+        found: list[tuple[float, float, Floats]] = []
+        if self.share <= 0.0:
+            return found
+        between_s = 0.5 * sum(self.gap_s) * (1.0 - self.share) / self.share
+        end_s = -5.0 * between_s
+        while (begin_s := end_s + rng.exponential(between_s)) < until_s + self.coast_s:
+            end_s, angle = begin_s + rng.uniform(*self.gap_s), rng.uniform(0.0, 2.0 * np.pi)
+            found.append((begin_s, end_s, np.array([np.cos(angle), np.sin(angle), 0.0])))
+        return [gap for gap in found if gap[1] > 0.0]

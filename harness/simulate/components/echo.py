@@ -1,0 +1,44 @@
+"""Outliers: sound that came by a longer way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.simulate.components.excursion import direction
+from harness.simulate.sensed import Sensed
+
+_WARM_UP = 64
+"""Readings before the take, so that it may begin inside a burst."""
+
+
+@dataclass(frozen=True)
+class Echo:
+    """Bursts of readings that are pushed away from one direction, each burst by its own distance.
+
+    A reflection lengthens a range, never shortens it (National Academy Press; rate and size are inferred,
+    PROTOCOL 13.3 and 13.5). The "outlier rate" of a study is `share`.
+    """
+
+    share: float = 0.03
+    """Share of station readings that are hit, 0 to below 1."""
+    burst_records: tuple[int, int] = (1, 8)
+    """Fewest and most readings in a burst, all as likely."""
+    size_m: tuple[float, float] = (0.05, 0.30)
+    """Smallest and largest push [m]."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        hit = np.zeros(sensed.time_s.shape, bool)
+        if self.share > 0.0:
+            for row, station in enumerate(sensed.stations):
+                self._one(sensed, hit, row, sensed.draw("echo", station))
+        sensed.hits["echo"] = hit
+
+    def _one(self, sensed: Sensed, hit: np.ndarray, row: int, rng: np.random.Generator) -> None:
+        fewest, most = self.burst_records
+        clean = 0.5 * (fewest + most) * (1.0 - self.share) / self.share
+        at = -_WARM_UP
+        while at < len(hit):
+            at += int(rng.geometric(1.0 / (1.0 + clean))) - 1
+            burst = slice(max(at, 0), max(at := at + int(rng.integers(fewest, most + 1)), 0))
+            sensed.position_m[burst, row] += rng.uniform(*self.size_m) * direction(rng)
+            hit[burst, row] = True

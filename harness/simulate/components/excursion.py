@@ -1,0 +1,59 @@
+"""Errors that come, stay for seconds and go again."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.simulate.sensed import Sensed
+
+
+@dataclass(frozen=True)
+class Excursion:
+    """ "Now and then off by up to 3 cm for several seconds, then back" (Gilson et al. 2006; the rate is inferred).
+
+    Onsets are a Poisson process for each station, going on since before the take; size, stay and direction are
+    uniform and drawn anew each time. Where two meet they add up.
+    """
+
+    onsets_per_min: float = 1.0
+    """Mean number of onsets per minute and station."""
+    size_m: tuple[float, float] = (0.005, 0.03)
+    """Smallest and largest [m]."""
+    stay_s: tuple[float, float] = (1.0, 5.0)
+    """Shortest and longest time from onset to the beginning of the return [s]."""
+    ramp_s: float = 0.2
+    """Time to get there, and to get back [s]."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        hit = np.zeros(sensed.time_s.shape, bool)
+        for row, station in enumerate(sensed.stations):
+            time_s = sensed.time_s[:, row]
+            for begin_s, stay_s, offset_m in self.events(sensed.draw("excursion", station), float(time_s.max())):
+                share = self.course(time_s - begin_s, stay_s)
+                sensed.position_m[:, row] += share[:, None] * offset_m
+                hit[:, row] |= share > 0.0
+        sensed.hits["excursion"] = hit
+
+    def events(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, float, Floats]]:
+        """Onset [s], stay [s] and offset (3,) [m] of each excursion that touches the time from 0 to `until_s`."""
+        found: list[tuple[float, float, Floats]] = []
+        if self.onsets_per_min <= 0.0:
+            return found
+        begin_s = -(self.stay_s[1] + self.ramp_s)
+        while (begin_s := begin_s + rng.exponential(60.0 / self.onsets_per_min)) < until_s:
+            stay_s, size_m = rng.uniform(*self.stay_s), rng.uniform(*self.size_m)
+            found.append((begin_s, stay_s, size_m * direction(rng)))
+        return found
+
+    def course(self, since_s: Floats, stay_s: float) -> Floats:
+        """Share (N,) of the offset that is reached at these times after the onset [s]."""
+        ramp_s = max(self.ramp_s, 1e-9)
+        return np.clip(np.minimum(since_s, stay_s + ramp_s - since_s) / ramp_s, 0.0, 1.0)
+
+
+def direction(rng: np.random.Generator) -> Floats:
+    """A unit vector (3,), any direction as likely as any other."""
+    v = rng.normal(size=3)
+    out: Floats = v / np.sqrt(v @ v)
+    return out

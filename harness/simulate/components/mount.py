@@ -1,0 +1,56 @@
+"""Trackers that are not where the calibration says: put on badly, or slipping on their straps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core import rotations
+from harness.errors import UnknownName
+from harness.simulate.sensed import Sensed
+
+
+@dataclass(frozen=True)
+class MountOffset:
+    """Each tracker is fixed a little beside its nominal place, for the whole session. Normal, not in any level."""
+
+    position_m: float = 0.0
+    """Standard deviation along each axis of the station [m]."""
+    orientation_rad: float = 0.0
+    """Standard deviation about each axis of the station [rad]."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        for row, station in enumerate(sensed.stations):
+            draw = sensed.draw("mount", station).normal(size=6)
+            sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], self.position_m * draw[:3])
+            turn = rotations.exp(self.orientation_rad * draw[3:])
+            sensed.turn[:, row] = rotations.multiply(sensed.turn[:, row], turn)
+
+
+@dataclass(frozen=True)
+class MountSlip:
+    """A strap that slips: the tracker goes round its bone and along it, at once or slowly, and stays there."""
+
+    station: str
+    from_s: float = 0.0
+    """Beginning of the slip [s]."""
+    over_s: float = 0.0
+    """How long it takes [s]; 0 is a step."""
+    around_rad: float = 0.0
+    """Angle about the bone that it ends with, by the right-hand rule about the bone's direction [rad]."""
+    along_m: float = 0.0
+    """Distance along the bone, towards its far end, that it ends with [m]."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        if self.station not in sensed.stations:
+            raise UnknownName("station", self.station, sensed.stations)
+        row = sensed.stations.index(self.station)
+        since_s = sensed.time_s[:, row] - self.from_s
+        share = np.where(since_s < 0.0, 0.0, np.minimum(since_s / max(self.over_s, 1e-9), 1.0))
+        share = np.where((since_s >= 0.0) & (self.over_s == 0.0), 1.0, share)
+        # In the station's axes the bone runs along x, `radius_m` below the origin.
+        angle = self.around_rad * share
+        below = sensed.radius_m[row] * np.stack([np.zeros_like(angle), -np.sin(angle), np.cos(angle) - 1.0], axis=1)
+        below[:, 0] = self.along_m * share
+        sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], below)
+        around = rotations.exp(angle[:, None] * np.array([1.0, 0.0, 0.0]))
+        sensed.turn[:, row] = rotations.multiply(sensed.turn[:, row], around)

@@ -1,0 +1,19 @@
+"""Error that grows with speed."""
+
+from dataclasses import dataclass
+
+from harness.simulate.sensed import Sensed
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Ranges are measured at another moment than the record's: an error along the velocity.
+
+    Gilson et al. 2006 found errors that grow with speed; the size is inferred (PROTOCOL 13.3 and 13.5).
+    """
+
+    ahead_s: float = 0.002
+    """Motion that is added [s]; negative lags behind."""
+
+    def spoil(self, sensed: Sensed) -> None:
+        sensed.move(self.ahead_s * sensed.velocity_m_s)

@@ -1,0 +1,54 @@
+"""What the tracker believes, before it is written to the wire: the truth, spoilt by one component after another."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats
+from harness.core.seeds import generator
+
+
+@dataclass(eq=False)
+class Sensed:
+    """N samples of S stations in the tracker's frame; components change the arrays in place."""
+
+    seed: int
+    stations: tuple[str, ...]
+    time_s: Floats
+    """(N, S) true time of each sample [s]."""
+    rate_hz: float
+    velocity_m_s: Floats
+    """(N, S, 3) true velocity."""
+    radius_m: Floats
+    """(S,) from the axis of the bone to the station; the station's z points away from that axis, its x along it."""
+    position_m: Floats
+    """(N, S, 3)"""
+    turn: Floats
+    """(N, S, 4) `tracker_from_station`."""
+    quality: Floats
+    """(N, S) 0 lost to 1 best."""
+    device_s: Floats
+    """(N, S) what the device's clock says [s]."""
+    hits: dict[str, Bools] = field(default_factory=dict)
+    """(N, S) readings that a component of this name was at work on, for the record."""
+
+    def draw(self, component: str, station: str) -> np.random.Generator:
+        """The generator of one component at one station, independent of all others."""
+        return generator(self.seed, "noise", component, station)
+
+    def move(self, offset_m: Floats) -> None:
+        """Shift positions by (..., 3) in the tracker's axes."""
+        self.position_m = self.position_m + offset_m
+
+    def rotate(self, rotation_vector_rad: Floats) -> None:
+        """Turn orientations by (..., 3) about the tracker's axes."""
+        self.turn = rotations.multiply(rotations.exp(rotation_vector_rad), self.turn)
+
+    def lose(self, lost: Bools) -> None:
+        """Quality 0 for these readings (N, S); each repeats what its station said last."""
+        self.quality[lost] = 0.0
+        known = np.where(lost, 0, np.arange(len(lost))[:, None])
+        last, row = np.maximum.accumulate(known, axis=0), np.arange(len(self.stations))
+        self.position_m, self.turn = self.position_m[last, row], self.turn[last, row]
+        self.hits["lost"] = self.hits.get("lost", np.zeros_like(lost)) | lost
