@@ -10,7 +10,7 @@ SHEETS = (
     ("walking", "p5", 1, 3.0, 0.1, "thorax"),
     ("boxing", "p2", 1, 4.0, 0.12, "head"),
     ("jumping", "p5", 2, 1.0, 0.1, "thorax"),
-    ("golf", "p5", 1, 0.8, 0.22, "head"),
+    ("golf", "p5", 1, 0.5, 0.22, "head"),
     ("table_tennis", "p2", 2, 7.5, 0.15, "head"),
 )
 

@@ -79,7 +79,7 @@ def foot(
         ball[moving, 2] += a.lift_m * pulse(now, a.lift_peak)
         if b.land_rad:
             ball[moving, 2] += _CLEARANCE_M * ease(now / 0.35) * ease((1.0 - now) / 0.35)
-        yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease(now)
+        yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease((now - first) / (0.85 - first))
         heel_first[moving] = ease(now / 0.7) if b.land_rad else 0.0
         heel_first[t > 0.5 * (b.on_s + b.off_s)] = 0.0  # it lies flat there
     return placed(skeleton, side, ball, yaw + pivot, pitch, heel_first, knee_out_rad)

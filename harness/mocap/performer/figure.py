@@ -124,7 +124,7 @@ class Figure:
         thigh, shank = self.length_m(f"{side}femur"), self.length_m(f"{side}tibia")
         hip = self.hip_m(side)
         ankle = foot.toe_m - self.length_m(f"{side}foot") * foot.direction
-        bend = foot.knee + 0.5 * self.pelvis[:, :, 0]  # a knee points between hip and foot
+        bend = foot.knee + 0.35 * self.pelvis[:, :, 0]  # a knee points between hip and foot
         knee = limbs.middle_joint(hip, ankle, bend, thigh, shank)
         left = unit(np.cross(hip - ankle, bend))
         rest = limbs.frame_of(self.skeleton, f"{side}femur")

@@ -20,7 +20,7 @@ from harness.mocap.performer.limbs import columns, on_floor, unit
 from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
 
-_APART_M = 0.085
+_APART_M = 0.075
 """Between the two wrists along the grip."""
 
 
@@ -50,12 +50,12 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     tilt = float(rng.uniform(0.26, 0.40)) + act["tilt"] + wander(rng, t, 2.5, 0.01)
     bend = habits.bend_rad + float(rng.uniform(0.26, 0.38)) + act["bend"] + wander(rng, t, 2.5, 0.015)
     turn = s * (act["pelvis"] + wander(rng, t, 2.5, 0.015))
-    twist = s * (act["twist"] + wander(rng, t, 2.5, 0.02))
+    twist = s * (0.10 + act["twist"] + wander(rng, t, 2.5, 0.02))
     # bends are towards the ball whichever way hips and chest have turned
     pelvis = columns(facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"])
     over = turn + 0.5 * twist
     breath = 0.01 * np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
-    spine = columns(bend * np.cos(over) + breath, twist, bend * np.sin(over) - s * act["side bend"])
+    spine = columns(bend * np.cos(over) + breath, twist, bend * np.sin(over) + s * (0.10 - act["side bend"]))
     gaze = columns(
         facing + s * (act["look"] + 0.03) + wander(rng, t, 2.5, 0.03),
         0.80 + act["nod"] + wander(rng, t, 2.5, 0.02),
@@ -67,8 +67,8 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     height = np.median(top) - float(rng.uniform(0.025, 0.05)) * leg + act["up"] + wander(rng, t, 2.5, 0.004)
     root = columns(*place.T, smaller(top, height, 0.03))
     shoulders = {
-        lead: (-0.03 + act["lead lift"] + breath, 0.10 + act["lead reach"]),
-        trail: (-0.03 + act["trail lift"] + breath, 0.10 + act["trail reach"]),
+        lead: (act["lead lift"] + breath, 0.05 + act["lead reach"]),
+        trail: (-0.05 + act["trail lift"] + breath, 0.13 + act["trail reach"]),
     }
     figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
     for side in (lead, trail):
@@ -108,7 +108,9 @@ def _grip(
         grip = grip - over[:, None] * line
     for side in (lead, trail):
         wrist = grip + ends[side]
-        elbow = 0.35 * LEFT[side] * figure.chest[:, :, 1] - 0.8 * figure.chest[:, :, 2] - 0.35 * figure.chest[:, :, 0]
+        chest = figure.chest
+        forward = (act["lead elbow"] if side == lead else act["trail elbow"]) - 0.35
+        elbow = forward[:, None] * chest[:, :, 0] + 0.35 * LEFT[side] * chest[:, :, 1] - 0.8 * chest[:, :, 2]
         palm = (1.0 if side == trail else -1.0) * strike - [0.0, 0.0, 0.2]
         back = 0.10 + (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"])
         up = 0.05 + 0.45 * np.tanh(0.6 * act["load"])
@@ -145,7 +147,7 @@ def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) ->
 def _swing(at: Mapping[str, float], size: float) -> Mapping[str, Keys]:
     """One swing between its moments [s]; angles [rad] and lengths [m] as a right-hander's, for `size` 1."""
     return {
-        "swing": timed(at, 0.02, top=-2.48 * size, hit=0.04, finish=2.55 * size, hold=2.5 * size),
+        "swing": timed(at, 0.02, top=-2.22 * size, hit=0.04, finish=2.30 * size, hold=2.25 * size),
         "cock": timed(at, 0.03, top=-1.45, late=-1.15, hit=0.0, finish=1.30, hold=1.25),
         "load": timed(at, 0.0, top=1.0, late=0.9, hit=0.0, finish=0.9, hold=0.85),
         "radius": timed(at, 0.0, top=-0.06, hit=0.015, finish=-0.15, hold=-0.15),
@@ -153,11 +155,11 @@ def _swing(at: Mapping[str, float], size: float) -> Mapping[str, Keys]:
         "plane": timed(at, 0.0, top=0.02, hit=0.0, finish=0.05, hold=0.05),
         "raise": timed(at, 0.0, top=0.06, hit=0.0, finish=0.04, hold=0.04),
         # the hips turn back before the chest has come to the top
-        "pelvis": timed(at, -0.04, top=-0.70 * size, hit=0.60, finish=1.25 * size, hold=1.20 * size),
-        "twist": timed(at, 0.04, top=-0.70 * size, hit=-0.22, finish=0.38 * size, hold=0.34 * size),
+        "pelvis": timed(at, -0.04, top=-0.74 * size, hit=0.60, finish=1.15 * size, hold=1.10 * size),
+        "twist": timed(at, 0.04, top=-0.78 * size, hit=-0.22, finish=0.38 * size, hold=0.34 * size),
         "tilt": timed(at, 0.0, top=0.0, hit=0.02, finish=-0.26 * size, hold=-0.28),
         "bend": timed(at, 0.0, top=0.0, hit=-0.05, finish=-0.34 * size, hold=-0.32),
-        "side bend": timed(at, 0.0, top=0.04, hit=-0.16, finish=-0.06),
+        "side bend": timed(at, 0.0, top=0.10, hit=-0.08, finish=0.04),
         "drop": timed(at, 0.0, top=0.05, hit=-0.06, finish=-0.02),
         # the eyes stay on the ball
         "look": timed(at, 0.06, top=-0.32, hit=0.0, finish=1.25, hold=1.30),
@@ -166,8 +168,11 @@ def _swing(at: Mapping[str, float], size: float) -> Mapping[str, Keys]:
         "side": timed(at, 0.0, top=-0.045, hit=0.09, finish=0.15, hold=0.15),
         "ahead": timed(at, 0.0, hit=0.02, finish=0.06, hold=0.06),
         "up": timed(at, 0.0, top=0.0, late=-0.03, hit=0.01, finish=0.03, hold=0.03),
+        # the elbow of the arm that crosses the chest points ahead
+        "lead elbow": timed(at, 0.0, top=0.8, hit=0.0),
+        "trail elbow": timed(at, 0.0, top=0.0, hit=0.0, finish=1.3, hold=1.3),
         "lead heel": timed(at, 0.0, top=0.10, hit=0.0),
-        "trail heel": timed(at, 0.0, late=0.0, hit=0.35, finish=0.88 * size, hold=0.85 * size),
+        "trail heel": timed(at, 0.0, late=0.0, hit=0.35, finish=0.74 * size, hold=0.72 * size),
         "pivot": timed(at, 0.0, late=0.0, hit=0.15, finish=1.0, hold=0.95),
         "lead reach": timed(at, 0.0, top=0.12, hit=0.0, finish=-0.08),
         "trail reach": timed(at, 0.0, top=-0.08, hit=0.03, finish=0.12),

@@ -152,7 +152,7 @@ def _gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
         "deep": jump.deep_s - start_s,
         "end": max(jump.up_s, jump.deep_s + 0.45) - start_s,
     }
-    high = float(rng.uniform(1.6, 2.2)) * habits.size * (0.55 if jump.rebound else 1.0)
+    high = min(float(rng.uniform(1.6, 2.2)) * habits.size, 2.15) * (0.55 if jump.rebound else 1.0)
     dip, give, far = jump.dip, jump.give, float(np.hypot(*jump.way_m))
     parts = {
         "pelvis": timed(at, bottom=1.5 * dip, leave=0.05, top=-0.03, land=0.04, deep=1.4 * give),

@@ -21,8 +21,8 @@ from harness.mocap.performer.limbs import columns, on_floor
 from harness.mocap.performer.manner import manner
 from harness.mocap.performer.performers import Habits
 
-STANCE = 0.62
-"""Share of the gait cycle that a foot is on the floor."""
+STANCE = 0.59
+"""Share of the gait cycle after which the ball of the foot starts to leave; it is away for good at 0.62."""
 _PASSING = 0.53
 """The pelvis passes the ankle so many steps after the heel came down."""
 _PAD_S = 3.0
