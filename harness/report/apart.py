@@ -15,9 +15,8 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.errors import MissingExtra
 
-_PATIENCE_S = 60.0
-"""For the first picture of a job and, with `_EACH_S`, for every further one."""
-_EACH_S = 2.0
+_START_S, _EACH_S = 60.0, 2.0
+"""Patience: until the first picture, and for every one [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +32,8 @@ class Job:
     """(K, 55)."""
     fps: float = 0.0
     """Of a movie; 0 makes a strip."""
+    title: str = ""
+    """Written into a movie."""
 
 
 class Rendering:
@@ -53,7 +54,7 @@ class Rendering:
         if self._process is not None:
             frames = sum(len(job.truth_qpos) for job in self._jobs)
             try:
-                _, said = self._process.communicate(timeout=_PATIENCE_S * len(self._jobs) + _EACH_S * frames)
+                _, said = self._process.communicate(timeout=_START_S + _EACH_S * frames)
                 self._reason = "" if self._process.returncode == 0 else _why(self._process.returncode, said)
             except subprocess.TimeoutExpired:
                 self._process.kill()
@@ -75,14 +76,14 @@ class Rendering:
         files = []
         for n, job in enumerate(self._jobs):
             files.append(str(Path(self._folder.name) / f"{n}.npz"))
-            output = np.array(str(job.output.resolve()))
             np.savez(
                 files[-1],
                 bone_m=job.bone_m,
                 truth_qpos=job.truth_qpos,
                 estimate_qpos=job.estimate_qpos,
                 fps=np.array(job.fps),
-                output=output,
+                title=np.array(job.title),
+                output=np.array(str(job.output.resolve())),
             )
         command = [sys.executable, "-m", "harness.report.studio", *files]
         environment = dict(os.environ)

@@ -41,7 +41,7 @@ def over_time(run: Run, behaviour: str) -> Chart:
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
         figure.legend(*error.get_legend_handles_labels(), **_legend([trace.series for trace in shown]))
-        _quality(quality, shown[0])
+        _quality(quality, max(shown, key=lambda trace: len(trace.time_s)))
 
     return _chart(
         f"error_{file_name(behaviour)}",
@@ -58,7 +58,8 @@ def per_joint(run: Run, series: str) -> Chart:
     skeleton = standard_skeleton()
     bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
     joints = list(joint_names(skeleton))
-    own, others = _pool(run, series), [name for name in run.series if name != series]
+    own = _pool(run, series)
+    others = [name for name in run.series if name != series and len(_pool(run, name)[0])]
 
     def draw(figure: "Figure") -> None:
         left, right = figure.subplots(1, 2)

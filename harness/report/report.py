@@ -154,7 +154,7 @@ def _movie_job(cell: Cell, series: str, out: Path) -> Job:
     shown_s = np.arange(time_s[0], time_s[-1] + 1e-9, 1.0 / fps)
     rows = known[np.searchsorted(time_s, shown_s + 1e-6, side="right") - 1]
     path = out / f"movie_{file_name(series)}_{file_name(cell.clip)}_{cell.key[:8]}.mp4"
-    return Job(path, cell.bone_m, cell.truth_qpos[rows], cell.estimate_qpos[rows], fps)
+    return Job(path, cell.bone_m, cell.truth_qpos[rows], cell.estimate_qpos[rows], fps, f"{series} on {cell.clip}")
 
 
 def movie_fps(rate_hz: float) -> float:

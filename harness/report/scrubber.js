@@ -6,7 +6,6 @@
   const stage = find("stage"), choice = find("shot"), slider = find("frame"), where = find("where");
   const play = find("play"), reset = find("reset");
   const TRUTH = "#5b87ad", ESTIMATE = "#e8850c", FLOOR = "#8d98a5", GRID_M = 0.5, REACH_M = 1.5;
-  const CAMERA = { eye: { x: 0.86, y: -0.86, z: 0.24 }, center: { x: 0, y: 0, z: -0.1 }, up: { x: 0, y: 0, z: 1 } };
   // An icosahedron (its corners are cyclic permutations of (0, +-1, +-golden ratio)).
   const G = (1 + Math.sqrt(5)) / 2, LONG = Math.hypot(1, G);
   const BALL = [[-1, G, 0], [1, G, 0], [-1, -G, 0], [1, -G, 0], [0, -1, G], [0, 1, G], [0, -1, -G], [0, 1, -G],
@@ -15,6 +14,14 @@
     [10, 7, 6], [7, 1, 8], [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10],
     [8, 6, 7], [9, 8, 1]];
   let bones, head, shots, frame = 0, timer = 0;
+
+  // From ahead and from the side of where the body faces.
+  function camera() {
+    const from = shots[Number(choice.value)].heading_rad - 0.7;
+    return { eye: { x: 1.2 * Math.cos(from), y: 1.2 * Math.sin(from), z: 0.24 }, center: { x: 0, y: 0, z: -0.1 },
+      up: { x: 0, y: 0, z: 1 } };
+  }
+  const lookAgain = () => Plotly.relayout(stage, { "scene.camera": camera() });
 
   async function unpacked(id) {
     const bytes = Uint8Array.from(atob(find(id).textContent), (letter) => letter.charCodeAt(0));
@@ -135,10 +142,10 @@
     const axis = { visible: false, showspikes: false, autorange: false };
     const scene = {
       xaxis: { ...axis, range: [-1.3, 1.3] }, yaxis: { ...axis, range: [-1.3, 1.3] }, zaxis: { ...axis, range: [-0.05, 2.3] },
-      aspectmode: "manual", aspectratio: { x: 1.2, y: 1.2, z: 1.085 }, camera: CAMERA, dragmode: "turntable",
+      aspectmode: "manual", aspectratio: { x: 1.2, y: 1.2, z: 1.085 }, camera: camera(), dragmode: "turntable",
     };
     const mesh = (color, opacity) => ({ type: "mesh3d", hoverinfo: "skip", flatshading: true, color, opacity, ...triangles(),
-      lighting: { ambient: 0.7, diffuse: 0.6, specular: 0.1, roughness: 0.9 }, lightposition: { x: 1e4, y: -1e4, z: 2e4 } });
+      lighting: { ambient: 0.85, diffuse: 0.5, specular: 0.1, roughness: 0.9 }, lightposition: { x: 1e4, y: -1e4, z: 2e4 } });
     const looks = [
       { type: "scatter3d", mode: "lines", hoverinfo: "skip", line: { color: FLOOR, width: 1 } },
       mesh(TRUTH, 0.4), mesh(ESTIMATE, 1),
@@ -148,10 +155,10 @@
       scene, uirevision: "kept", showlegend: false, margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)",
     }, { displayModeBar: false, responsive: true, scrollZoom: false });
     say();
-    choice.addEventListener("change", () => { stop(); frame = 0; draw(); });
+    choice.addEventListener("change", () => { stop(); frame = 0; draw().then(lookAgain); });
     slider.addEventListener("input", () => { stop(); frame = Number(slider.value); draw(); });
     play.addEventListener("click", () => (timer ? stop() : start()));
-    reset.addEventListener("click", () => Plotly.relayout(stage, { "scene.camera": CAMERA }));
+    reset.addEventListener("click", lookAgain);
     stage.dataset.ready = "yes";
   }
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.core import rotations
 from harness.core.skeleton import Skeleton
 from harness.errors import MissingExtra
 from harness.report.markup import Markup, joined, tag
@@ -62,7 +63,18 @@ def _packed(shot: Shot) -> dict[str, Any]:
     """Whole millimetres: the first frame, then differences from frame to frame, which compress well."""
     every = -(-len(shot.time_s) // _MOST_FRAMES)
     time_ms = [round(1e3 * t) for t in shot.time_s[::every]]
-    return {"time_ms": time_ms, "truth": _steps(shot.truth, every), "estimate": _steps(shot.estimate, every)}
+    return {
+        "time_ms": time_ms,
+        "heading_rad": heading_rad(shot.truth),
+        "truth": _steps(shot.truth, every),
+        "estimate": _steps(shot.estimate, every),
+    }
+
+
+def heading_rad(motion: Posed) -> float:
+    """Where the root's forward axis points on average, about the world's z [rad]."""
+    ahead = np.mean(rotations.to_matrix(motion.world_from_root)[:, :, 0], axis=0)
+    return float(np.arctan2(ahead[1], ahead[0]))
 
 
 def _steps(motion: Posed, every: int) -> list[list[int]]:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
-from harness.report.scene import Scene
+from harness.report.scene import ESTIMATE, TRUTH, Scene
+from harness.report.scrubber import heading_rad
 from harness.score.pair import Posed, posed
 
 STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
@@ -25,10 +25,10 @@ def main(jobs: Sequence[str]) -> None:
         with np.load(job, allow_pickle=False) as content:
             skeleton = standard_skeleton().with_bones(content["bone_m"])
             truth, estimate = posed(skeleton, content["truth_qpos"]), posed(skeleton, content["estimate_qpos"])
-            output, fps = Path(str(content["output"])), float(content["fps"])
+            output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
         beside = output.with_name(f".unfinished-{output.name}")
         if fps:
-            movie(truth, estimate, fps, beside)
+            movie(truth, estimate, fps, title, beside)
         else:
             strip(truth, estimate, beside)
         os.replace(beside, output)
@@ -42,8 +42,8 @@ def strip(truth: Posed, estimate: Posed, path: Path) -> None:
     imsave(path, np.ascontiguousarray(np.hstack(pictures)), format="png")
 
 
-def movie(truth: Posed, estimate: Posed, fps: float, path: Path) -> None:
-    """Every frame one after another, as H.264 that browsers play."""
+def movie(truth: Posed, estimate: Posed, fps: float, title: str, path: Path) -> None:
+    """Every frame one after another with a caption, as H.264 that browsers play."""
     import imageio_ffmpeg
 
     options = {"fps": fps, "codec": "libx264", "quality": None, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
@@ -51,16 +51,29 @@ def movie(truth: Posed, estimate: Posed, fps: float, path: Path) -> None:
     writer = imageio_ffmpeg.write_frames(str(path), MOVIE_SIZE, **options, output_params=encoding)
     writer.send(None)
     try:
-        for picture in _pictures(truth, estimate, MOVIE_SIZE):
-            writer.send(np.ascontiguousarray(picture))
+        for frame, picture in enumerate(_pictures(truth, estimate, MOVIE_SIZE)):
+            writer.send(_captioned(picture, title, frame / fps))
     finally:
         writer.close()
 
 
+def _captioned(picture: Floats, title: str, time_s: float) -> bytes:
+    """The picture with what it shows and the time since its start, and which body is which."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.fromarray(picture)
+    pen, font = ImageDraw.Draw(image), ImageFont.load_default(17)
+    pen.text((20, 16), title, "#23282f", font)
+    pen.text((20, 40), f"{time_s:.2f} s", "#5d6773", font)
+    for place, (name, colour) in enumerate((("truth", TRUTH), ("estimate", ESTIMATE))):
+        pen.ellipse((20 + 90 * place, 606, 32 + 90 * place, 618), colour)
+        pen.text((38 + 90 * place, 602), name, "#23282f", font)
+    return image.tobytes()
+
+
 def _pictures(truth: Posed, estimate: Posed, size: tuple[int, int]) -> Iterator[Floats]:
     """(height, width, 3) bytes of every frame."""
-    ahead = np.mean(rotations.to_matrix(truth.world_from_root)[:, :, 0], axis=0)
-    scene = Scene(truth.skeleton, size, float(np.arctan2(ahead[1], ahead[0])))
+    scene = Scene(truth.skeleton, size, heading_rad(truth))
     try:
         for frame in range(len(truth.root_m)):
             yield scene.picture(truth, estimate, frame)

@@ -40,13 +40,13 @@ def results(run: Run) -> Markup:
 
 def by_behaviour(run: Run, metric: str) -> Markup:
     """One metric: a row for each method, a column for each behaviour, then all sequences."""
-    found: dict[tuple[str, str], Row] = {}
+    found: dict[tuple[str, str | None], Row] = {}
     for row in run.summary["behaviours"]:
         found[run.series_of(row), str(row["behaviour"])] = row["metrics"][metric]
     for row in run.summary["methods"]:
-        found[run.series_of(row), ""] = row["metrics"][metric]
+        found[run.series_of(row), None] = row["metrics"][metric]
     unit = DEFINITIONS[metric].unit
-    columns = [*run.behaviours, ""]
+    columns = [*run.behaviours, None]
     counts, best = {}, {}
     for column in columns:
         here = {name: found[name, column] for name in run.series if (name, column) in found}
@@ -55,12 +55,13 @@ def by_behaviour(run: Run, metric: str) -> Markup:
         ranked = len(means) > 1 and metric not in _NO_RANK
         best[column] = min(means, key=lambda name: means[name]) if ranked else None
 
-    def cell(name: str, column: str) -> Markup:
+    def cell(name: str, column: str | None) -> Markup:
         text = statistics(found.get((name, column)), unit, n=counts[column])
         return tag("strong", text) if name == best[column] else text
 
     numbers = [tag("span", f" n {counts[column]}", class_="spread") for column in columns]
-    titles = [joined(column.replace("_", " ") or "all", n) for column, n in zip(columns, numbers, strict=True)]
+    names = [*(name.replace("_", " ") for name in run.behaviours), "all"]
+    titles = [joined(name, n) for name, n in zip(names, numbers, strict=True)]
     rows = [[name, *(cell(name, column) for column in columns)] for name in run.series]
     caption = joined(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")
     return table(caption, ["method", *titles], rows, label=metric)
@@ -92,10 +93,11 @@ def coverage(run: Run) -> Markup:
 def health(run: Run) -> Markup:
     """What the stream lost, by station and by clip; every method on a clip was shown the same stream."""
     streams: dict[str, Trace] = {}
-    for trace in run.traces:
-        held = streams.setdefault(trace.clip, trace)
-        if len(trace.time_s) > len(held.time_s):
-            streams[trace.clip] = trace
+    for trace in sorted(run.traces, key=lambda trace: -len(trace.time_s)):
+        if len(trace.time_s):
+            streams.setdefault(trace.clip, trace)
+    if not streams:
+        return NOT_MEASURED
     rows = []
     for station in dict.fromkeys(name for trace in streams.values() for name in trace.stations):
         parts = [(trace, trace.stations.index(station)) for trace in streams.values() if station in trace.stations]

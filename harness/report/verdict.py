@@ -29,6 +29,7 @@ def verdict(run: Run) -> Verdict:
     facts = {
         "Motion": _motion(run),
         "Tracker": _tracker(run),
+        "Learning": _learning(run),
         "Coverage": _coverage(run),
         "Not measured": _unmeasured(run),
     }
@@ -88,11 +89,22 @@ def _tracker(run: Run) -> str:
     if not run.cells:
         return ""
     row = run.cells[0]
+    inputs = ", ".join(sorted({str(row["inputs"]) for row in run.cells}))
     stations = [str(name).replace("_", " ") for name in row["stations"]]
     return (
         f"simulated; {len(stations)} stations ({', '.join(stations)}; mount {row['mount']}) at {row['rate_hz']:g} Hz, "
-        f"noise {row['noise']}, calibration {row['calibration']}, seed {row['seed']}"
+        f"inputs {inputs}, noise {row['noise']}, calibration {row['calibration']}, seed {row['seed']}"
     )
+
+
+def _learning(run: Run) -> str:
+    """What methods that learn were allowed to see."""
+    learners: dict[str, list[str]] = {}
+    for row in run.summary["methods"]:
+        learners.setdefault(str(row["protocol"]), []).append(run.series_of(row))
+    without = learners.pop("none", [])
+    parts = [f"{', '.join(names)} from other motion (protocol {protocol})" for protocol, names in learners.items()]
+    return "; ".join([*parts, *([f"{', '.join(without)} from none"] if without else [])])
 
 
 def _finished(run: Run) -> str:

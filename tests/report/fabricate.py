@@ -35,6 +35,8 @@ class Plan:
     """Methods whose cells are planned and fail."""
     covered: float = 1.0
     """Share of the frames that find an estimate."""
+    silent: tuple[str, ...] = ()
+    """Methods that never answer."""
 
 
 def fabricate(out: Path, plan: Plan | None = None) -> Path:
@@ -69,7 +71,7 @@ def make_cell(behaviour: str, take: int, method: str, error_deg: float, inputs: 
     clip = plan.clip_name or made.name
     valid, quality = _readings(clip, len(truth))
     rng = generator(1, clip, method, inputs)
-    seen = np.flatnonzero(rng.random(len(truth)) < plan.covered)
+    seen = np.flatnonzero(rng.random(len(truth)) < (0.0 if method in plan.silent else plan.covered))
     estimate = _wrong(truth, error_deg, valid, rng)[seen]
     status, step_ms = np.where(valid.all(axis=1), 0, 1)[seen], rng.gamma(4.0, 0.15, len(seen))
     defined_by = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ}

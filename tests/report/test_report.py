@@ -3,8 +3,6 @@
 import json
 import re
 import time
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -199,14 +197,14 @@ def test_movies_take_every_nth_frame_where_they_can(rate_hz: float, fps: float) 
     assert movie_fps(rate_hz) == fps
 
 
-def test_a_cell_that_answers_rarely_does_not_stretch_time(tmp_path: Path, edge_plan: Callable[..., Plan]) -> None:
-    out = fabricate(tmp_path / "run", edge_plan(covered=0.8))
-    run = read_run(out)
-    for trace in run.traces:
-        assert trace.time_s[-1] == pytest.approx(4.0, abs=0.3)
-    assert "Nothing" not in text_of(write_report(out, rendered=False))
-
-
-@pytest.fixture
-def edge_plan() -> Callable[..., Plan]:
-    return lambda **changes: replace(Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=4.0), **changes)
+@pytest.mark.parametrize("silent", [("ik",), ("ik", "mean_pose")])
+def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tuple[str, ...]) -> None:
+    plan = Plan(behaviours=("walking",), methods={"ik": 2.0, "mean_pose": 9.0}, duration_s=3.0, silent=silent)
+    said = text_of(write_report(fabricate(tmp_path / "run", plan), rendered=False))
+    if len(silent) == 2:
+        assert "Nothing was measured: 2 of 2 cells finished." in said
+        assert "0 of 162 frames matched (0.0 %)" in said
+    else:
+        assert re.search(r"mean_pose: \d+\.\d\d° .*; no other method was measured", said)
+        assert "81 of 162 frames matched (50.0 %)" in said
+    assert "nan" not in said.lower().split()
