@@ -1,31 +1,48 @@
 """What `harness bench` runs."""
 
 from collections.abc import Callable, Sequence
+from importlib.util import find_spec
 
-from harness.bench.ik import bench_ik
 from harness.bench.load import bench_load
 from harness.bench.rows import Row
 from harness.bench.startup import bench_startup
 from harness.bench.stream import bench_stream
-from harness.errors import UnknownName
+from harness.errors import MissingExtra, UnknownName
+
+
+def _ik(seed: int) -> list[Row]:
+    if find_spec("mink") is None:
+        raise MissingExtra("The reference of inverse kinematics", "mink", "bench")
+    from harness.bench.ik import bench_ik
+
+    return bench_ik(seed)
+
 
 BENCHMARKS: dict[str, Callable[[int], list[Row]]] = {
     "startup": lambda seed: bench_startup(),
-    "load": lambda seed: bench_load(seed),
-    "stream": lambda seed: bench_stream(seed),
-    "ik": lambda seed: bench_ik(seed),
+    "load": bench_load,
+    "stream": bench_stream,
+    "ik": _ik,
 }
 
 
-def bench(what: Sequence[str], *, seed: int, progress: Callable[[str, int, int], None]) -> list[Row]:
-    """The rows of the named benchmarks, or of all; UnknownName."""
+def bench(
+    what: Sequence[str], *, seed: int, progress: Callable[[str, int, int], None]
+) -> tuple[list[Row], list[str]]:
+    """The rows of the named benchmarks, or of all, and why some of all could not be run; UnknownName, MissingExtra."""
     for name in what:
         if name not in BENCHMARKS:
             raise UnknownName("benchmark", name, BENCHMARKS)
     chosen = [name for name in BENCHMARKS if name in what or not what]
     rows: list[Row] = []
+    left_out: list[str] = []
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
-        rows += BENCHMARKS[name](seed)
+        try:
+            rows += BENCHMARKS[name](seed)
+        except MissingExtra as missing:
+            if what:
+                raise
+            left_out.append(f"{name} was not run. {missing}")
     progress("", len(chosen), len(chosen))
-    return rows
+    return rows, left_out
