@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.body import kinematics
 from harness.body.humanoid import Body
@@ -22,6 +23,9 @@ from harness.errors import BadInput
 from harness.reconstruct.coverage import Coverage
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
+
+Complexes = NDArray[np.complex128]
+"""Horizontal vectors, x + iy."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,7 @@ class FittedBestMatch:
 
 
 class BestMatchSession:
-    """What the stations would have read in every example, N frames in all, and the search among them."""
+    """The search among N frames of examples, whose stations are placed where this calibration wears them."""
 
     def __init__(self, fitted: FittedBestMatch, calibration: Calibration) -> None:
         self._options = fitted.options
@@ -68,10 +72,10 @@ class BestMatchSession:
         self._qpos = np.concatenate([take.qpos for take in fitted.takes])
         read = [_station_poses(fitted.body, take, calibration) for take in fitted.takes]
         velocity = [_since_last(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]
-        self._position_m = np.concatenate([m for m, _ in read])
-        self._velocity_m_s = np.concatenate(velocity)
-        self._turned = np.concatenate([q for _, q in read])
-        self._turned_by_half = rotations.multiply(rotations.about_z(np.pi), self._turned)
+        self._position = _Vectors(np.concatenate([m for m, _ in read]))
+        self._velocity = _Vectors(np.concatenate(velocity))
+        self._turned = np.ascontiguousarray(np.concatenate([q for _, q in read]).transpose(1, 2, 0))
+        """(S, 4, N) orientations of the bones that carry the stations."""
         self._before: tuple[Floats, Floats, Bools] | None = None
         self._answer = self._qpos[0]
 
@@ -79,11 +83,11 @@ class BestMatchSession:
         status, any_seen = self._coverage.seen(frame)
         if any_seen:
             self._residuals.read(frame)
-            velocity, moving = self._velocity(frame)
-            self._answer = self._nearest(velocity, moving)
+            velocity_m_s, moving = self._velocities(frame)
+            self._answer = self._nearest(velocity_m_s, moving)
         return Estimate(self._answer, status)
 
-    def _velocity(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
+    def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
         """(S, 3) since the last frame [m/s], and where it is known."""
         now = self._residuals.target_m, frame.measured_s, frame.position_valid
         before, self._before = self._before, now
@@ -91,47 +95,77 @@ class BestMatchSession:
             return np.zeros_like(now[0]), np.zeros_like(now[2])
         gap_s = now[1] - before[1]
         known = now[2] & before[2] & (gap_s > 0.0) & (gap_s <= self._options.longest_gap_s)
-        return (now[0] - before[0]) / np.where(known, gap_s, 1.0)[:, None], known
+        return np.where(known[:, None], now[0] - before[0], 0.0) / np.where(known, gap_s, 1.0)[:, None], known
 
     def _nearest(self, velocity_m_s: Floats, moving: Bools) -> Floats:
         """The best example, turned and shifted (55,).
 
-        Turning an example by an angle y changes every squared distance by a term in cos y and sin y alone (for
-        orientations after 2 - 2 |p q| is replaced by 2 - 2 (p q)^2), so the best y of all N comes in closed form.
+        Turning an example by y takes Re(e^-iy pull) off its squared distance, so the best y is the angle of `pull`.
         """
         options, count = self._options, len(self._residuals.bones)
         here, facing = self._residuals.measured[:count], self._residuals.measured[count:]
-        target_m, target = self._residuals.target_m[here], self._residuals.world_from_target[facing]
-        at_m, speed, seen_speed = self._position_m[:, here], self._velocity_m_s[:, moving], velocity_m_s[moving]
-        middle_m, target_middle_m = _middle(at_m), _middle(target_m[None])[0]
-        flat, target_flat = _complex(at_m - middle_m[:, None]), _complex(target_m - target_middle_m)
-        flat_speed, seen_flat_speed = _complex(speed), _complex(seen_speed)
-        straight = np.sum(self._turned[:, facing] * target, axis=2)
-        half_round = np.sum(self._turned_by_half[:, facing] * target, axis=2)
+        target_m = self._residuals.target_m
+        middle_m = np.array([*target_m[here, :2].mean(axis=0), 0.0]) if here.any() else np.zeros(3)
+        far, pull = self._position.against(target_m - middle_m, here, centred=True)
+        distance, pull = options.position_weight * far, options.position_weight * pull
+        far, velocity_pull = self._velocity.against(velocity_m_s, moving, centred=False)
+        distance += options.velocity_weight * far
+        pull += options.velocity_weight * velocity_pull
+        far, orientation_pull = self._orientation(facing)
+        distance += options.orientation_weight * far
+        pull += options.orientation_weight * orientation_pull
+        best = int(np.argmin(distance - np.abs(pull)))
+        return self._stood(best, float(np.angle(pull[best])), middle_m, here)
 
-        pull = options.position_weight * 2.0 * (np.conj(flat) @ target_flat)
-        pull = pull + options.velocity_weight * 2.0 * (np.conj(flat_speed) @ seen_flat_speed)
-        pull = pull + options.orientation_weight * np.sum((straight + 1j * half_round) ** 2, axis=1)
-        yaw = np.angle(pull)
-        turn = np.exp(1j * yaw)[:, None]
-        likeness = np.cos(0.5 * yaw)[:, None] * straight + np.sin(0.5 * yaw)[:, None] * half_round
-        distance = (
-            options.position_weight * _squares(turn * flat - target_flat, (at_m - target_m)[..., 2])
-            + options.velocity_weight * _squares(turn * flat_speed - seen_flat_speed, (speed - seen_speed)[..., 2])
-            + options.orientation_weight * np.sum(2.0 - 2.0 * np.abs(likeness), axis=1)
+    def _orientation(self, facing: Bools) -> tuple[Floats, Complexes]:
+        """Squared distance (N,) of orientations but for the turn, and its pull.
+
+        sin^2 of half the angle between them: min |q -+ p|^2 of eq. 2 to first order, and of period pi in the turn.
+        """
+        target = np.where(facing[:, None], self._residuals.world_from_target, 0.0)
+        half_round = rotations.multiply(rotations.about_z(-np.pi), target)
+        plain, turned = np.matmul(np.stack([target, half_round], axis=1), self._turned).swapaxes(0, 1)
+        plain_plain, turned_turned, plain_turned = (
+            np.einsum("sn,sn->n", one, other) for one, other in ((plain, plain), (turned, turned), (plain, turned))
         )
-        best = int(np.argmin(distance))
-        return self._stood(best, float(yaw[best]), middle_m[best], target_middle_m, bool(here.any()))
+        far: Floats = np.count_nonzero(facing) - 0.5 * (plain_plain + turned_turned)
+        pull: Complexes = 0.5 * (plain_plain - turned_turned) + 1j * plain_turned
+        return far, pull
 
-    def _stood(self, best: int, yaw_rad: float, middle_m: Floats, target_middle_m: Floats, anywhere: bool) -> Floats:
+    def _stood(self, best: int, yaw_rad: float, target_middle_m: Floats, here: Bools) -> Floats:
         out: Floats = self._qpos[best].copy()
         turn = rotations.about_z(yaw_rad)
         out[3:7] = rotations.multiply(turn, out[3:7])
-        if anywhere:
+        if here.any():
+            middle = np.mean(self._position.flat[best, here])
+            middle_m = np.array([middle.real, middle.imag, 0.0])
             out[:3] = rotations.rotate(turn, out[:3] - middle_m) + target_middle_m
         else:  # orientations alone do not say where: stay
             out[:2] = self._answer[:2]
         return out
+
+
+class _Vectors:
+    """N frames of one vector for each of S stations, compared with a reading up to a turn about the vertical."""
+
+    def __init__(self, vectors: Floats) -> None:
+        self.flat: Complexes = vectors[..., 0] + 1j * vectors[..., 1]
+        self._up = np.ascontiguousarray(vectors[..., 2])
+        self._squares: Floats = np.sum(vectors**2, axis=2)
+
+    def against(self, reading: Floats, known: Bools, centred: bool) -> tuple[Floats, Complexes]:
+        """Squared distance (N,) summed over the known ones but for the turn, and its pull.
+
+        `centred` readings have their horizontal mean taken out, and so have the examples, where that is known.
+        """
+        used, count = known.astype(float), np.count_nonzero(known)
+        seen = np.where(known[:, None], reading, 0.0)
+        far = self._squares @ used + float(np.sum(seen**2)) - 2.0 * (self._up @ seen[:, 2])
+        if centred and count:
+            middle = self.flat @ (used / count)
+            far -= count * (middle.real**2 + middle.imag**2)
+        pull: Complexes = (self.flat @ (2.0 * seen[:, 0] - 2.0j * seen[:, 1])).conj()
+        return far, pull
 
 
 def _station_poses(body: Body, take: Take, worn: Calibration) -> tuple[Floats, Floats]:
@@ -145,21 +179,3 @@ def _since_last(points_m: Floats) -> Floats:
     """(T, ...) steps up to each frame; the first is taken to be like the second."""
     steps = np.diff(points_m, axis=0)
     return np.concatenate([steps[:1], steps])
-
-
-def _middle(points_m: Floats) -> Floats:
-    """(N, 3) horizontal mean of points (N, P, 3); heights are left alone, the floor is common to all."""
-    out = np.zeros((len(points_m), 3))
-    if points_m.shape[1]:
-        out[:, :2] = points_m[..., :2].mean(axis=1)
-    return out
-
-
-def _complex(vectors: Floats) -> np.ndarray[tuple[int, ...], np.dtype[np.complex128]]:
-    out: np.ndarray[tuple[int, ...], np.dtype[np.complex128]] = vectors[..., 0] + 1j * vectors[..., 1]
-    return out
-
-
-def _squares(flat: np.ndarray[tuple[int, ...], np.dtype[np.complex128]], up: Floats) -> Floats:
-    out: Floats = np.sum(np.abs(flat) ** 2 + up**2, axis=1)
-    return out
