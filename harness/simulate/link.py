@@ -62,8 +62,8 @@ def transmit(ready_s: Floats, tracker: TrackerConfig) -> tuple[Bools, Floats]:
     One record at a time is on the line. A record that finds the queue full displaces the oldest one that waits.
     """
     busy_s = tracker.record_s
-    at = busy_s * np.arange(len(ready_s))
-    start_s = at + np.maximum.accumulate(ready_s - at) if len(ready_s) else ready_s
+    at: Floats = busy_s * np.arange(len(ready_s), dtype=float)
+    start_s: Floats = at + np.maximum.accumulate(ready_s - at)
     if np.all(start_s - ready_s <= (tracker.queue_records - 1) * busy_s):
         return np.ones(len(ready_s), bool), start_s + busy_s
     return _overloaded(ready_s, tracker)

@@ -121,11 +121,10 @@ def _sensed(
     seed: int,
 ) -> Sensed:
     """The truth in the tracker's frame."""
-    motion = trajectory.station_motion(mounts, time_s)
+    motion = trajectory.station_motion(calibration, time_s)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    along_m = [
-        mount.along * trajectory.body.skeleton.bone_m[trajectory.body.skeleton.index(mount.bone)] for mount in mounts
-    ]
+    skeleton = trajectory.body.skeleton
+    along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
     return Sensed(
         seed=seed,
         stations=calibration.stations,
@@ -158,8 +157,8 @@ def _matched(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
     stamps_s = np.array([frame.measured_s for frame in frames]).reshape(-1, device_s.shape[1])
     if len(pace_s) == 0:
         return np.zeros(len(frames), dtype=np.int64)
-    out: Ints = np.round(np.nanmedian((stamps_s - began_s) / pace_s, axis=1)).astype(np.int64)
-    return out
+    frames_since: Floats = np.nanmean((stamps_s - began_s) / pace_s, axis=1)
+    return np.round(frames_since).astype(np.int64)
 
 
 def _health(sensed: Sensed, sent: Bools, wire: Capture, frames: Sequence[TrackerFrame]) -> dict[str, float]:

@@ -1,17 +1,15 @@
 """One smooth motion for pose, velocity and acceleration alike, and where the trackers on it are at any moment."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from harness.body import mounts
 from harness.body.humanoid import Body
-from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
-from harness.core.humanoid24 import unpack
+from harness.core.calibration import Calibration
+from harness.core.humanoid24 import QPOS_OF_DOF, unpack
 from harness.core.motion import Take
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
@@ -58,70 +56,84 @@ class Trajectory:
 
     def qpos(self, time_s: Floats) -> Floats:
         """Configurations (N, 55) at N moments [s]."""
-        out = self._at(time_s, 0)
-        out[:, 3:7] /= _norm(out[:, 3:7])
-        return out
+        return self._derivatives(time_s, 0)[0]
 
     def qvel(self, time_s: Floats) -> Floats:
         """(N, 54) as MuJoCo has it: root velocity in the world, root turn in the root's own axes, hinges."""
-        p, v = self._at(time_s, 0)[:, 3:7], self._at(time_s, 1)
-        n = _norm(p)
-        turn = 2.0 * rotations.multiply(rotations.inverse(p / n), v[:, 3:7] / n)[:, 1:]
-        return np.concatenate([v[:, :3], turn, v[:, 7:]], axis=1)
+        return self._derivatives(time_s, 1)[1]
 
     def qacc(self, time_s: Floats) -> Floats:
         """(N, 54), the time derivative of `qvel`."""
-        p, v, a = self._at(time_s, 0)[:, 3:7], self._at(time_s, 1)[:, 3:7], self._at(time_s, 2)
-        n = _norm(p)
-        # With q = p/n the part of q'' along p is of no effect: conj(q) p is a pure scalar; so is conj(q') q'.
-        bend = a[:, 3:7] / n - 2.0 * v * np.sum(p * v, axis=1, keepdims=True) / n**3
-        turn = 2.0 * rotations.multiply(rotations.inverse(p / n), bend)[:, 1:]
-        return np.concatenate([a[:, :3], turn, a[:, 7:]], axis=1)
+        return self._derivatives(time_s, 2)[2]
 
-    def station_motion(self, worn: Sequence[Mount], time_s: Floats) -> StationMotion:
-        """True motion of S stations, station s at the N moments `time_s[:, s]` (N, S)."""
-        skeleton = self.body.skeleton
-        rows = [_of_station(skeleton, mount, self, time_s[:, s]) for s, mount in enumerate(worn)]
-        position, turned, velocity, acceleration, turn = (
-            np.stack(column, axis=1) for column in zip(*rows, strict=True)
-        )
-        return StationMotion(time_s, position, rotations.continuous(turned), velocity, acceleration, turn)
+    def station_motion(self, worn: Calibration, time_s: Floats) -> StationMotion:
+        """True motion of S stations that are worn like this, station s at the N moments `time_s[:, s]` (N, S)."""
+        rows = [self._of_station(worn, s, time_s[:, s]) for s in range(len(worn.stations))]
+        at_m, turned, speed, thrust, omega = (np.stack(column, axis=1) for column in zip(*rows, strict=True))
+        return StationMotion(time_s, at_m, rotations.continuous(turned), speed, thrust, omega)
 
-    def _at(self, time_s: Floats, order: int) -> Floats:
+    def _derivatives(self, time_s: Floats, order: int) -> list[Floats]:
+        """`qpos`, `qvel` and `qacc`, as far as the order of the derivative asked for."""
         t = np.asarray(time_s, dtype=float)
         if t.size and not (t.min() >= -1e-9 and t.max() <= self.duration_s + 1e-9):
             raise BadInput(
                 f"A moment between {t.min():.3f} and {t.max():.3f} s lies outside the take.",
                 f"It runs from 0 to {self.duration_s:.3f} s.",
             )
-        out: Floats = self._spline(t, order)
+        splined: list[Floats] = [self._spline(t, k) for k in range(order + 1)]
+        # Let p be the splined quaternion, n its length, q = p/n. What q' and q'' have along q is of no effect on the
+        # turn 2 conj(q) q' and its derivative 2 conj(q) q'': conj(q) q and conj(q') q' are pure scalars.
+        p = splined[0][:, 3:7]
+        n = np.sqrt(np.sum(p**2, axis=1, keepdims=True))
+        q = p / n
+        out = [np.concatenate([splined[0][:, :3], q, splined[0][:, 7:]], axis=1)]
+        for k, at in enumerate(splined[1:]):
+            slope = at[:, 3:7] / n
+            if k == 1:
+                slope = slope - 2.0 * splined[1][:, 3:7] / n * np.sum(q * splined[1][:, 3:7], axis=1, keepdims=True) / n
+            turn = 2.0 * rotations.multiply(rotations.inverse(q), slope)[:, 1:]
+            out.append(np.concatenate([at[:, :3], turn, at[:, 7:]], axis=1))
         return out
 
+    def _of_station(self, worn: Calibration, row: int, time_s: Floats) -> tuple[Floats, ...]:
+        """Position, orientation, velocity, acceleration and angular velocity, passed on from bone to bone."""
+        skeleton = self.body.skeleton
+        q, v, a = self._derivatives(time_s, 2)
+        at, turned, angle = unpack(q)
+        rate, surge = v[:, 6:][:, QPOS_OF_DOF], a[:, 6:][:, QPOS_OF_DOF]
+        point = _Point(at, v[:, :3], a[:, :3])
+        omega, alpha = rotations.rotate(turned, v[:, 3:6]), rotations.rotate(turned, a[:, 3:6])
+        chain = _chain(skeleton, worn.bones[row])
+        for bone in chain:
+            hinges = skeleton.dof_of_bone[bone]
+            for d in range(hinges.stop - 1, hinges.start - 1, -1):
+                axis = rotations.rotate(turned, skeleton.axes[d])
+                alpha = alpha + surge[:, d, None] * axis + rate[:, d, None] * _cross(omega, axis)
+                omega = omega + rate[:, d, None] * axis
+                turned = rotations.multiply(turned, rotations.exp(angle[:, d, None] * skeleton.axes[d]))
+            if bone != chain[-1]:
+                point = point.carried(rotations.rotate(turned, skeleton.bone_m[bone]), omega, alpha)
+        point = point.carried(rotations.rotate(turned, worn.mount_m[row]), omega, alpha)
+        station = rotations.multiply(turned, worn.bone_from_station[row])
+        return point.at_m, station, point.velocity, point.acceleration, omega
 
-def _of_station(
-    skeleton: Skeleton, mount: Mount, trajectory: Trajectory, time_s: Floats
-) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Position, orientation, velocity, acceleration and angular velocity of one station, passed on from bone to bone."""
-    q, v, a = trajectory.qpos(time_s), trajectory.qvel(time_s), trajectory.qacc(time_s)
-    root_m, root, angle = unpack(q)
-    _, _, rate = unpack(np.insert(v, 3, 0.0, axis=1))
-    _, _, surge = unpack(np.insert(a, 3, 0.0, axis=1))
-    turned = rotations.to_matrix(root)
-    at, speed, thrust = root_m, v[:, :3], a[:, :3]
-    omega, alpha = _apply(turned, v[:, 3:6]), _apply(turned, a[:, 3:6])
-    chain = _chain(skeleton, mount.bone)
-    for bone in chain:
-        hinges = skeleton.dof_of_bone[bone]
-        for d in range(hinges.stop - 1, hinges.start - 1, -1):
-            axis = turned @ skeleton.axes[d]
-            alpha = alpha + surge[:, d, None] * axis + rate[:, d, None] * np.cross(omega, axis)
-            omega = omega + rate[:, d, None] * axis
-            turned = turned @ _about(skeleton.axes[d], angle[:, d])
-        if bone != chain[-1]:
-            at, speed, thrust = _carried(turned @ skeleton.bone_m[bone], at, speed, thrust, omega, alpha)
-    mount_m, bone_from_station = mounts.place(skeleton, mount)
-    at, speed, thrust = _carried(turned @ mount_m, at, speed, thrust, omega, alpha)
-    return at, rotations.from_matrix(turned @ rotations.to_matrix(bone_from_station)), speed, thrust, omega
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Of a point on a rigid bone: place, velocity and acceleration, (N, 3) each."""
+
+    at_m: Floats
+    velocity: Floats
+    acceleration: Floats
+
+    def carried(self, reach_m: Floats, omega: Floats, alpha: Floats) -> "_Point":
+        """The same of the point `reach_m` (N, 3) away on the same bone, which turns by `omega` and `alpha`."""
+        swing = _cross(omega, reach_m)
+        return _Point(
+            self.at_m + reach_m,
+            self.velocity + swing,
+            self.acceleration + _cross(alpha, reach_m) + _cross(omega, swing),
+        )
 
 
 def _chain(skeleton: Skeleton, bone: str) -> list[int]:
@@ -132,26 +144,10 @@ def _chain(skeleton: Skeleton, bone: str) -> list[int]:
     return chain
 
 
-def _carried(
-    reach_m: Floats, at: Floats, speed: Floats, thrust: Floats, omega: Floats, alpha: Floats
-) -> tuple[Floats, Floats, Floats]:
-    """Position, velocity and acceleration of a point `reach_m` (N, 3) away on the same rigid bone."""
-    swing = np.cross(omega, reach_m)
-    return at + reach_m, speed + swing, thrust + np.cross(alpha, reach_m) + np.cross(omega, swing)
-
-
-def _about(axis: Floats, angle_rad: Floats) -> Floats:
-    """Rotation matrices (N, 3, 3) about one unit axis, by Rodrigues' formula."""
-    x, y, z = axis
-    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle_rad)[:, None, None] * k + (1.0 - np.cos(angle_rad))[:, None, None] * (k @ k)
-
-
-def _apply(matrices: Floats, vectors: Floats) -> Floats:
-    out: Floats = np.einsum("nij,nj->ni", matrices, vectors)
+def _cross(a: Floats, b: Floats) -> Floats:
+    """Cross products (N, 3); numpy's own is slow on short rows."""
+    out: Floats = a[:, _NEXT] * b[:, _AFTER] - a[:, _AFTER] * b[:, _NEXT]
     return out
 
 
-def _norm(rows: Floats) -> Floats:
-    out: Floats = np.sqrt(np.sum(rows**2, axis=1, keepdims=True))
-    return out
+_NEXT, _AFTER = np.array([1, 2, 0]), np.array([2, 0, 1])

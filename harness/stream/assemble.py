@@ -89,7 +89,7 @@ class Assembler:
             return []
         count, at = int(frame[-1]) + 1, (frame, given.station)
 
-        def spread(column: Floats, *width: int, missing: float = np.nan) -> Floats:
+        def spread(column: Floats | Bools, *width: int, missing: float = np.nan) -> Floats:
             out = np.full((count, self._stations, *width), missing)
             out[at] = column
             return out
@@ -117,7 +117,7 @@ class Assembler:
         return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
 
     def _receptions_s(self, given: Readings, frame: Ints) -> Floats:
-        """When the last reading of each frame came (F,); frames of one chunk of bytes follow by the least step there is."""
+        """When the last reading of each frame came (F,); frames of one chunk follow each other by the least step."""
         last = np.append(np.flatnonzero(np.diff(frame)), len(frame) - 1)
         out = np.maximum.accumulate(given.received_s[last])
         for i, received_s in enumerate(out.tolist()):

@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class WireFormat:
     """Records per second of each station."""
     items: tuple[int, ...] = STANDARD_LIST
     """Output list of every station."""
-    settings: Settings = Settings()
+    settings: Settings = field(default_factory=Settings)
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.stations) <= len(STATION_CHARACTERS):

@@ -30,14 +30,13 @@ class Dropout:
     def spoil(self, sensed: Sensed) -> None:
         lost = np.zeros(sensed.time_s.shape, bool)
         coasting = np.zeros(sensed.time_s.shape, bool)
+        leak_m_s2 = GRAVITY_M_S2 * float(np.sin(self.tilt_rad))
         for row, station in enumerate(sensed.stations):
             time_s = sensed.time_s[:, row]
-            for begin_s, end_s, leak in self.gaps(sensed.draw("dropout", station), float(time_s.max())):
+            for begin_s, end_s, sideways in self.gaps(sensed.draw("dropout", station), float(time_s.max())):
                 coast = (time_s >= begin_s - self.coast_s) & (time_s < begin_s)
                 coasted_s = time_s[coast] - (begin_s - self.coast_s)
-                sensed.position_m[coast, row] += (
-                    0.5 * GRAVITY_M_S2 * np.sin(self.tilt_rad) * coasted_s[:, None] ** 2 * leak
-                )
+                sensed.position_m[coast, row] += leak_m_s2 * 0.5 * coasted_s[:, None] ** 2 * sideways
                 left = 1.0 - coasted_s / self.coast_s
                 sensed.quality[coast, row] = np.minimum(sensed.quality[coast, row], np.maximum(left, 1.0 / 255.0))
                 coasting[:, row] |= coast

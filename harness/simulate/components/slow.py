@@ -34,8 +34,8 @@ class Slow:
 
 
 def gauss_markov(white: Floats, correlation: float) -> Floats:
-    """Unit-variance sequences along the first axis, of this correlation between neighbours, from white ones (N, ...)."""
-    out = white * np.sqrt(1.0 - correlation**2)
+    """Sequences (N, ...) of unit variance and this correlation between neighbours, from white ones."""
+    out: Floats = white * np.sqrt(1.0 - correlation**2)
     out[:1] = white[:1]
     for k in range(1, len(out)):
         out[k] += correlation * out[k - 1]

@@ -10,7 +10,7 @@ from harness.simulate.sensed import Sensed
 
 @dataclass(frozen=True)
 class White:
-    """Independent from record to record, normal on each axis: the resolution floor (PROTOCOL 13.1 and 13.5, unverified)."""
+    """Independent from record to record, normal on each axis: the resolution floor (PROTOCOL 13.5, unverified)."""
 
     position_m: float = 0.00075
     """Standard deviation on each axis [m]."""
