@@ -77,8 +77,10 @@ class Scenario:
     """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
     tracker: Tracker = field(default_factory=Tracker)
     noise: Literal["clean", "noise", "default"] = "default"
-    components: dict[str, dict[str, Any]] = field(default_factory=dict)
-    """Changes to single components of the noise level, such as components.echo.share = 0.05."""
+    profile: str = ""
+    """What tables call the noise when components are changed; "default*" and so on without a name."""
+    components: dict[str, Any] = field(default_factory=dict)
+    """Changes to the noise level (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
 
 
 def load_scenario(path: Path | str) -> Scenario:

@@ -52,7 +52,7 @@ def _stream(clip: Clip) -> Check:
     """Perfect trackers come back through the device's bytes where MuJoCo has them, but for float32."""
     body = humanoid.build(clip.skeleton)
     mounts = [DEFAULTS[station] for station in _SIX]
-    seen = simulate(body, _take(clip), mounts, TrackerConfig(skew_s=0.0), noise.level("clean"), seed=1)
+    seen = simulate(body, _take(clip), mounts, TrackerConfig(slot_s=0.0), noise.level("clean"), seed=1)
     known, kinematics, worst_m = seen.calibration, Kinematics(body), 0.0
     bones = [body.skeleton.index(bone) for bone in known.bones]
     for frame, instant in zip(seen.frames, seen.frame_index, strict=True):

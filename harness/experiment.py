@@ -196,7 +196,7 @@ def judge(setting: Setting, method: Method, name: str, inputs: str, key: str, co
         inputs=inputs,
         protocol=scenario.motion.protocol if method.needs_examples else "none",
         calibration=simulation.calibration.kind,
-        noise=scenario.noise + ("*" if scenario.components else ""),
+        noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,
         defined_by=setting.inputs_of(method, inputs),
         scores=scores,

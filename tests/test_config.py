@@ -8,6 +8,9 @@ import pytest
 from harness.config import changed, load_scenario, shipped_scenarios
 from harness.core.protocol import Part
 from harness.errors import BadFile, HarnessError, UnknownName
+from harness.simulate.components.echo import Echo
+from harness.simulate.components.lost_station import LostStation
+from harness.simulate.noise import level
 
 MINIMAL = """
 methods = ["ik"]
@@ -101,3 +104,10 @@ def test_single_values_of_a_record_can_be_changed() -> None:
     assert changed(_Outer(), {"rate_hz": 60}, "tracker").rate_hz == 60.0
     with pytest.raises(UnknownName, match="share"):
         changed(_Outer(), {"echo": {"shar": 0.1}}, "components")
+
+
+def test_noise_components_are_changed_added_and_listed() -> None:
+    assert changed(level("default"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
+    assert changed(level("clean"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
+    lost = [{"station": "head", "from_s": 1.0, "to_s": 2.0}]
+    assert changed(level("clean"), {"lost": lost}, "components").lost == (LostStation("head", 1.0, 2.0),)
