@@ -1,0 +1,89 @@
+"""Device time goes on, whatever the clock's stamps do."""
+
+import numpy as np
+import pytest
+
+from harness.core.arrays import Floats
+from harness.stream.clock import Unwrapper
+from tests.stream.wire import stamps_s
+
+HOST_S: Floats = stamps_s(50) + 1000.0
+
+
+def unwrapped(stamp_s: Floats, host_s: Floats = HOST_S, pieces: int = 1) -> tuple[Floats, Unwrapper]:
+    clock = Unwrapper()
+    parts = zip(np.array_split(stamp_s, pieces), np.array_split(host_s, pieces), strict=True)
+    return np.concatenate([clock.unwrap(stamp, host) for stamp, host in parts]), clock
+
+
+def zeroed(stamp_s: Floats, at: int) -> Floats:
+    """The same moments on a clock that was set to zero between two records."""
+    return np.where(np.arange(len(stamp_s)) < at, stamp_s, stamp_s - stamp_s[at] + 0.001)
+
+
+def test_a_steady_clock_is_left_alone() -> None:
+    out, clock = unwrapped(stamps_s(50))
+    np.testing.assert_array_equal(out, stamps_s(50))
+    assert clock.resets == 0
+
+
+@pytest.mark.parametrize("at", [1, 7, 100, 198])
+def test_setting_the_clock_to_zero_costs_one_stamp_and_no_time(at: int) -> None:
+    out, clock = unwrapped(zeroed(stamps_s(50), at))
+    assert np.flatnonzero(np.isnan(out)).tolist() == [at]
+    known = ~np.isnan(out)
+    np.testing.assert_allclose(out[known], stamps_s(50)[known], atol=1e-9)
+    assert clock.resets == 1
+
+
+def test_a_clock_may_be_set_to_zero_many_times() -> None:
+    true_s = stamps_s(400)
+    stamp_s = true_s
+    for at in (200, 600, 800, 1500):
+        stamp_s = zeroed(stamp_s, at)
+    out, clock = unwrapped(stamp_s, true_s + 1000.0)
+    assert np.flatnonzero(np.isnan(out)).tolist() == [200, 600, 800, 1500]
+    known = ~np.isnan(out)
+    np.testing.assert_allclose(out[known], true_s[known], atol=1e-9)
+    assert clock.resets == 4
+
+
+@pytest.mark.parametrize("wrong_s", [1e30, -3.0, 0.0, 4000.0, np.inf, np.nan, 11.0])
+@pytest.mark.parametrize("at", [1, 77, 199])
+def test_a_damaged_stamp_costs_itself_alone(wrong_s: float, at: int) -> None:
+    stamp_s = stamps_s(50)
+    stamp_s[at] = wrong_s
+    out, clock = unwrapped(stamp_s)
+    assert np.flatnonzero(np.isnan(out)).tolist() == [at]
+    np.testing.assert_array_equal(np.delete(out, at), np.delete(stamps_s(50), at))
+    assert clock.resets == 0
+
+
+@pytest.mark.parametrize("wrong_s", [1e30, 4000.0, np.nan])
+def test_time_survives_a_damaged_first_stamp(wrong_s: float) -> None:
+    """Whatever the first stamp was, time advances rightly from the third on."""
+    stamp_s = stamps_s(50)
+    stamp_s[0] = wrong_s
+    out, _ = unwrapped(stamp_s)
+    np.testing.assert_allclose(np.diff(out[3:]), np.diff(stamps_s(50)[3:]), atol=1e-6)
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 13, 200])
+def test_pieces_do_not_matter(pieces: int, rng: np.random.Generator) -> None:
+    stamp_s = zeroed(stamps_s(50), 90)
+    stamp_s[rng.integers(0, 200, 8)] = rng.uniform(0.0, 1e6, 8)
+    np.testing.assert_array_equal(unwrapped(stamp_s, pieces=pieces)[0], unwrapped(stamp_s)[0])
+
+
+def test_late_reading_by_the_host_is_no_reason_for_doubt(rng: np.random.Generator) -> None:
+    late_s = np.maximum.accumulate(HOST_S + rng.uniform(0.0, 0.2, len(HOST_S)))
+    out, clock = unwrapped(stamps_s(50), late_s)
+    np.testing.assert_array_equal(out, stamps_s(50))
+    assert clock.resets == 0
+
+
+def test_a_long_silence_is_no_reason_for_doubt() -> None:
+    pause = np.where(np.arange(200) < 80, 0.0, 3600.0)
+    out, clock = unwrapped(stamps_s(50) + pause, HOST_S + pause)
+    np.testing.assert_array_equal(out, stamps_s(50) + pause)
+    assert clock.resets == 0

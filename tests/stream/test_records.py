@@ -1,0 +1,150 @@
+"""Records as bytes and back, by the worked examples of docs/is900.md 5.4 and the lengths of 5.5."""
+
+import numpy as np
+import pytest
+
+from harness.core import rotations
+from harness.errors import UnknownName
+from harness.stream import items
+from harness.stream.readings import Readings, readings
+from harness.stream.records import Said, Settings, encode, pack_14_bit, unpack_14_bit
+
+POSITION_M = np.array([[1.0, -0.5, 1.5]])
+INCHES, CENTIMETRES = Settings(metres_per_unit=0.0254), Settings(metres_per_unit=0.01)
+YAW_90 = np.array([[np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]])
+SAID = Said(np.array([12.3455]), POSITION_M, YAW_90, np.ones(1))
+A = bytes.fromhex("303120 f67a1d42 f67a9dc1 71386c42 f304353f 00000000 00000000 f304353f 20")
+C = bytes.fromhex("303220 0000c842 000048c2 00001643 0000b442 000020c1 0000b040 207f00 0d0a")
+
+
+def _sent(station: str, codes: tuple[int, ...], settings: Settings, said: Said = SAID, **columns: object) -> bytes:
+    table = encode(codes, np.frombuffer(station.encode(), np.uint8), said, settings)
+    for name, value in columns.items():
+        table[name] = value
+    return table.tobytes()
+
+
+def _read(data: bytes, codes: tuple[int, ...], settings: Settings, stations: bytes = b"123") -> Readings:
+    table = np.frombuffer(data, items.record_type(codes))
+    return readings(table, np.zeros(len(table)), stations, settings)
+
+
+def test_example_a_vrpn_in_inches() -> None:
+    assert _sent("1", (2, 11, 0), INCHES) == A
+    read = _read(A, (2, 11, 0), INCHES)
+    np.testing.assert_allclose(read.position_m, POSITION_M, atol=1e-6)
+    np.testing.assert_allclose(read.tracker_from_station, YAW_90, atol=1e-7)
+    assert not read.doubtful.any()
+    assert np.isnan(read.measured_s).all()
+    assert read.quality.tolist() == [1.0]
+
+
+def test_example_b_with_time_buttons_and_joystick() -> None:
+    codes = (2, 11, 21, 22, 23, 0)
+    sent = _sent("1", codes, INCHES, buttons=5, joystick=[127, 255])
+    assert sent == A[:-1] + bytes.fromhex("00e64046 05 7fff 20")
+    assert _read(sent, codes, INCHES).measured_s.tolist() == [12.3455]
+
+
+def test_example_c_vrui_in_centimetres_with_angles() -> None:
+    codes, angles = (2, 4, 22, 23, 1), np.array([[90.0, -10.0, 5.5]])
+    z, y, x = np.deg2rad(angles[0])[:, None] * np.eye(3)[::-1]
+    turned = rotations.multiply(rotations.multiply(rotations.exp(z), rotations.exp(y)), rotations.exp(x))
+    said = Said(np.zeros(1), POSITION_M, turned[None], np.ones(1))
+    sent = _sent("2", codes, CENTIMETRES, said, buttons=0x20, joystick=[127, 0])
+    ours, theirs = (np.frombuffer(data, items.record_type(codes)) for data in (sent, C))
+    np.testing.assert_allclose(ours["yaw_pitch_roll_deg"], theirs["yaw_pitch_roll_deg"], rtol=1e-6)
+    assert sent[:15] + sent[27:] == C[:15] + C[27:]
+    read = _read(C, codes, CENTIMETRES)
+    assert read.station.tolist() == [1]
+    np.testing.assert_allclose(read.position_m, POSITION_M, atol=1e-6)
+    assert rotations.angle_between_rad(read.tracker_from_station[0], turned) < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("full_scale", "values", "hex_bytes", "decoded"),
+    [
+        (3.0, [1.0, -0.5, 1.5], "aa152a750020", [0.99976, -0.50024, 1.5]),
+        (180.0, [90.0, -10.0, 5.5], "8020397c7a01", [90.0, -9.9976, 5.4932]),
+        (1.0, [0.70711, 0.0, 0.0, 0.70711], "a02d00000000202d", [0.70703, 0.0, 0.0, 0.70703]),
+    ],
+    ids=["F position", "G angles", "H quaternion"],
+)
+def test_sixteen_bit_examples(full_scale: float, values: list[float], hex_bytes: str, decoded: list[float]) -> None:
+    packed = np.frombuffer(bytes.fromhex(hex_bytes), np.uint8)[None]
+    np.testing.assert_allclose(full_scale * unpack_14_bit(packed)[0], decoded, atol=6e-5)
+    assert pack_14_bit(np.array([values]) / full_scale).tobytes().hex() == hex_bytes
+
+
+def test_sixteen_bit_form_is_exact_on_its_own_grid() -> None:
+    grid = np.arange(-8192, 8192)[:, None] / 8192.0
+    np.testing.assert_array_equal(unpack_14_bit(pack_14_bit(grid)), grid)
+
+
+@pytest.mark.parametrize(
+    ("codes", "length"),
+    [
+        ((2, 4, 1), 29),
+        ((40, 2, 4, 1), 30),
+        ((40, 2, 4, 22, 23, 1), 33),
+        ((2, 4, 22, 23, 1), 32),
+        ((2, 11, 1), 33),
+        ((2, 11, 0), 32),
+        ((2, 11, 21, 0), 36),
+        ((2, 11, 21, 22, 0), 37),
+        ((2, 11, 21, 22, 23, 0), 39),
+        ((40, 2, 11, 21, 1), 38),
+        ((40, 18, 20, 21, 1), 24),
+    ],
+)
+def test_lengths_are_those_of_the_table(codes: tuple[int, ...], length: int) -> None:
+    assert items.size(codes) == length
+
+
+def test_an_item_without_a_known_size_is_refused() -> None:
+    with pytest.raises(UnknownName, match="output item called '76'"):
+        items.record_type((2, 76, 1))
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("position", np.nan),
+        ("position", np.inf),
+        ("position", 3000.0),
+        ("quaternion", np.nan),
+        ("quaternion", 0.1),
+        ("quaternion", 3e38),
+        ("time", np.nan),
+        ("time", -1.0),
+    ],
+)
+def test_numbers_that_cannot_be_are_doubtful(field: str, value: float) -> None:
+    said = Said(np.array([5.0, 6.0]), np.ones((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.ones(2))
+    table = encode(items.STANDARD_LIST, np.frombuffer(b"12", np.uint8), said, CENTIMETRES)
+    table[field][1] = value
+    read = readings(table, np.zeros(2), b"12", CENTIMETRES)
+    assert read.doubtful.tolist() == [False, True]
+
+
+def test_microseconds() -> None:
+    settings = Settings(seconds_per_tick=1e-6)
+    assert _read(_sent("1", (21, 1), settings), (21, 1), settings).measured_s.tolist() == [12.3455]
+
+
+@pytest.mark.parametrize("codes", [(40, 2, 11, 21, 1), (40, 18, 20, 21, 1), (40, 18, 19, 21, 1), (2, 4, 0)])
+def test_what_was_said_is_what_is_read(codes: tuple[int, ...], rng: np.random.Generator) -> None:
+    turn = rng.normal(size=(200, 4))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    said = Said(rng.uniform(0.0, 100.0, 200), rng.uniform(-2.9, 2.9, (200, 3)), turn, rng.uniform(0.0, 1.0, 200))
+    stations = np.frombuffer(b"123", np.uint8)[rng.integers(0, 3, 200)]
+    read = _read(encode(codes, stations, said, CENTIMETRES).tobytes(), codes, CENTIMETRES)
+    coarse = 18 in codes
+    assert bytes(b"123"[row] for row in read.station) == stations.tobytes()
+    assert np.abs(read.position_m - said.position_m).max() < (3.0 / 8192 if coarse else 1e-6)
+    assert rotations.angle_between_rad(read.tracker_from_station, turn).max() < (1e-3 if coarse else 2e-6)
+    assert not read.doubtful.any()
+    if 21 in codes:
+        assert np.abs(read.measured_s - said.measured_s).max() < 1e-5
+    if 40 in codes:
+        assert np.abs(read.quality - said.quality).max() < 0.5 / 255 + 1e-12

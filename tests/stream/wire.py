@@ -1,0 +1,65 @@
+"""A device's bytes made by hand, for tests: rounds of stations that stand still, each at its own place."""
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.stream.capture import Capture
+from harness.stream.frame import TrackerFrame
+from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS, size
+from harness.stream.reader import FrameReader, WireFormat
+from harness.stream.records import Said, Settings, encode
+
+RATE_HZ, SLOT_S = 40.0, 0.0033
+RECORD = size(STANDARD_LIST)
+FOUR = WireFormat(("head", "torso", "left_wrist", "right_wrist"), RATE_HZ)
+
+
+def stamps_s(rounds: int, stations: int = 4, begin_s: float = 12.0) -> Floats:
+    """(rounds * stations,) device time of each record, in the order of the wire [s]."""
+    out: Floats = (begin_s + np.arange(rounds)[:, None] / RATE_HZ + SLOT_S * np.arange(stations)).ravel()
+    return out
+
+
+def sent(stamp_s: Floats, stations: int = 4, seed: int = 1) -> bytes:
+    """Records of stations that sway a little, so that no two records are equal."""
+    rng = np.random.default_rng(seed)
+    number = np.arange(len(stamp_s)) % stations
+    turn = rng.normal(size=(len(stamp_s), 4))
+    said = Said(
+        measured_s=stamp_s,
+        position_m=number[:, None] + 0.01 * rng.normal(size=(len(stamp_s), 3)),
+        tracker_from_station=turn / np.linalg.norm(turn, axis=1, keepdims=True),
+        quality=rng.uniform(0.1, 1.0, len(stamp_s)),
+    )
+    return encode(STANDARD_LIST, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], said, Settings()).tobytes()
+
+
+def received(data: bytes, stamp_s: Floats, chunk: int = RECORD) -> Capture:
+    """The bytes in chunks, each of which comes 5 ms after the stamp of the record that its last byte belongs to."""
+    ends = np.append(np.arange(chunk, len(data), chunk), len(data))
+    record = np.minimum((ends - 1) // RECORD, len(stamp_s) - 1)
+    return Capture(data, ends, stamp_s[record] - stamp_s[0] + 100.005)
+
+
+def frames_of(capture: Capture, wire: WireFormat = FOUR) -> list[TrackerFrame]:
+    reader = FrameReader(wire)
+    return [*reader.feed_all(capture), *reader.finish()]
+
+
+def columns(frame: TrackerFrame) -> tuple[Floats, ...]:
+    """Everything that a frame says of its stations."""
+    return (
+        frame.measured_s,
+        frame.position_m,
+        frame.tracker_from_station,
+        frame.position_valid,
+        frame.orientation_valid,
+        frame.quality,
+        frame.suspect,
+    )
+
+
+def same(one: TrackerFrame, other: TrackerFrame) -> bool:
+    return one.received_s == other.received_s and all(
+        np.array_equal(a, b, equal_nan=True) for a, b in zip(columns(one), columns(other), strict=True)
+    )
