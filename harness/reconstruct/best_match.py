@@ -21,11 +21,14 @@ from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import Coverage
+from harness.reconstruct.gate import Gate
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 Complexes = NDArray[np.complex128]
 """Horizontal vectors, x + iy."""
+_JUMP_M = 0.3
+"""An example is never as near as a fitted pose, so the gate stands wider open."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,7 @@ class BestMatchSession:
     def __init__(self, fitted: FittedBestMatch, calibration: Calibration) -> None:
         self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._coverage = Coverage()
+        self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), _JUMP_M)
         self._qpos = np.concatenate([take.qpos for take in fitted.takes])
         read = [_station_poses(fitted.body, take, calibration) for take in fitted.takes]
         velocity = [_since_last(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]
@@ -82,14 +85,16 @@ class BestMatchSession:
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
         if any_seen:
-            self._residuals.read(frame)
+            self._gate.read(frame, self._residuals)
             velocity_m_s, moving = self._velocities(frame)
             self._answer = self._nearest(velocity_m_s, moving)
+            self._gate.answered(frame, self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
         """(S, 3) since the last frame [m/s], and where it is known."""
-        now = self._residuals.target_m, frame.measured_s, frame.position_valid
+        here = self._residuals.measured[: len(self._residuals.bones)]
+        now = self._residuals.target_m, frame.measured_s, here
         before, self._before = self._before, now
         if before is None:
             return np.zeros_like(now[0]), np.zeros_like(now[2])

@@ -14,6 +14,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.reconstruct.contract import Method, Reconstructor, Session
+from harness.reconstruct.gate import Gate
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.solver import Prior, Solver, Stopping
@@ -66,6 +67,7 @@ class CleanUpSession:
     def __init__(self, fitted: FittedCleanUp, calibration: Calibration, inner: Session) -> None:
         self._inner = inner
         self._residuals = Residuals(fitted.body, calibration, fitted.options.loss)
+        self._gate = Gate(len(calibration.stations))
         self._limits = HingeLimits(fitted.body)
         self._solver = Solver(self._residuals, self._limits, fitted.options.stopping)
         self._precision = np.zeros(self._residuals.kinematics.nv)
@@ -75,6 +77,8 @@ class CleanUpSession:
         guess = self._inner.step(frame)
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return guess
-        self._residuals.read(frame)
+        self._gate.read(frame, self._residuals)
         start = np.concatenate([guess.qpos[:7], self._limits.clipped(self._limits.principal(guess.qpos[7:]))])
-        return Estimate(self._solver.solve(start, Prior(start, self._precision)).qpos, guess.status)
+        qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
+        self._gate.answered(frame, self._residuals, qpos)
+        return Estimate(qpos, guess.status)

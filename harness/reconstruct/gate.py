@@ -8,7 +8,11 @@ last velocity. When many jump at once the person moved, and after `patience_s` t
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.reconstruct.residuals import Residuals
+from harness.stream.frame import TrackerFrame
 
+JUMP_M, PATIENCE_S = 0.15, 0.25
+"""Farther than motion strays within a period; longer than a burst of echoes (8 records at 40 Hz)."""
 _LONGEST_PERIOD_S = 0.1
 """After a longer gap nothing can be said about where stations should be."""
 
@@ -16,7 +20,7 @@ _LONGEST_PERIOD_S = 0.1
 class Gate:
     """Watches the positions of S stations through one session."""
 
-    def __init__(self, stations: int, jump_m: float, patience_s: float) -> None:
+    def __init__(self, stations: int, jump_m: float = JUMP_M, patience_s: float = PATIENCE_S) -> None:
         self._jump_m, self._patience_s = jump_m, patience_s
         self._station_m: Floats = np.zeros((stations, 3))
         self._velocity_m_s: Floats = np.zeros((stations, 3))
@@ -24,6 +28,18 @@ class Gate:
         self._known_at_s, self._moving = -np.inf, False
         self.all_moved = False
         """Whether at least half of the last frame's positions jumped: the performer is somewhere else."""
+
+    def read(self, frame: TrackerFrame, residuals: Residuals) -> None:
+        """Have the residuals read the frame, but for what jumped."""
+        residuals.read(frame)
+        jumped = self.jumped(frame.received_s, residuals.target_m, frame.position_valid)
+        if jumped.any():
+            residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
+
+    def answered(self, frame: TrackerFrame, residuals: Residuals, qpos: Floats) -> None:
+        """The configuration (55,) that was given for the frame."""
+        residuals.place(qpos)
+        self.settled(frame.received_s, residuals.station_m)
 
     def jumped(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
         """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""

@@ -17,7 +17,7 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import Take
 from harness.reconstruct.coverage import LOST_AFTER_S, Coverage
-from harness.reconstruct.gate import Gate
+from harness.reconstruct.gate import JUMP_M, PATIENCE_S, Gate
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.mean_pose import mean_posture
 from harness.reconstruct.placing import placed, postures
@@ -28,9 +28,7 @@ from harness.stream.frame import TrackerFrame
 _FAR = 2.0
 """A reading contradicts the pose when it is off by more than so many times the Lorentzian's scale: 6 cm, 16 deg."""
 _MANY = 0.25
-"""When this share of the readings does so, the pose is sought anew at once; else once it has lasted `_PATIENCE_S`."""
-_PATIENCE_S = 0.25
-"""Longer than a burst of echoes (8 records at 40 Hz)."""
+"""When this share of the readings does so, the pose is sought anew at once; else once it has lasted `PATIENCE_S`."""
 _WIDENINGS = (10.0, 3.0, 1.0)
 """How much farther the Lorentzian reaches while a cold start closes in."""
 
@@ -50,7 +48,7 @@ class Ik:
     """Of every hinge [rad]."""
     limits: bool = True
     """Keep hinges within the body's limits."""
-    jump_m: float = 0.15
+    jump_m: float = JUMP_M
     """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
     lost_after_s: float = LOST_AFTER_S
     stopping: Stopping = field(default_factory=Stopping)
@@ -96,7 +94,7 @@ class IkSession:
         self._limits = HingeLimits(body, keep=options.limits)
         self._solver = Solver(self._residuals, self._limits, options.stopping)
         self._coverage = Coverage(options.lost_after_s)
-        self._gate = Gate(len(calibration.stations), options.jump_m, _PATIENCE_S)
+        self._gate = Gate(len(calibration.stations), options.jump_m)
         self._mean_qpos = fitted.mean_qpos
         self._precision = np.zeros(self._residuals.kinematics.nv)
         if options.prior != "none":
@@ -109,23 +107,15 @@ class IkSession:
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
         if any_seen:
-            self._read(frame)
+            self._gate.read(frame, self._residuals)
             start_anew = self._gate.all_moved or (
                 not self._following and (status is Status.SOLVED or not self._started)
             )
             self._qpos = self._tidy(self._cold().qpos if start_anew else self._followed(frame.received_s))
             self._started = True
-            self._residuals.place(self._qpos)
-            self._gate.settled(frame.received_s, self._residuals.station_m)
+            self._gate.answered(frame, self._residuals, self._qpos)
         self._following = status is Status.SOLVED or (self._following and status is not Status.LOST)
         return Estimate(self._qpos, status)
-
-    def _read(self, frame: TrackerFrame) -> None:
-        residuals = self._residuals
-        residuals.read(frame)
-        jumped = self._gate.jumped(frame.received_s, residuals.target_m, frame.position_valid)
-        if jumped.any():
-            residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
     def _followed(self, now_s: float) -> Floats:
         """From the previous pose; anew when the readings contradict where that leads."""
@@ -136,7 +126,7 @@ class IkSession:
             return warm.qpos
         if self._contradicted_since_s is None:
             self._contradicted_since_s = now_s
-        if contradicted < _MANY and now_s - self._contradicted_since_s < _PATIENCE_S:
+        if contradicted < _MANY and now_s - self._contradicted_since_s < PATIENCE_S:
             return warm.qpos
         self._contradicted_since_s = now_s
         cold = self._cold()
