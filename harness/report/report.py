@@ -52,6 +52,8 @@ def write_report(out: Path, *, movie: bool = False, rendered: bool = True) -> Pa
     finally:
         rendering.close()
     missing = []
+    if windows and not strips:
+        missing.append("Rendered pictures of the worst two seconds: no method leads")
     if strips and reason:
         missing.append(f"Rendered pictures of the worst two seconds: {reason}")
     if no_view:

@@ -1,6 +1,6 @@
 """The sentence that the page opens on, and the facts that qualify it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from harness.report.run import Run
 from harness.score.metrics import DEFINITIONS
 
-HEADLINE = "joint_angle_mean_deg"
+HEADLINE, SECOND = "joint_angle_mean_deg", "mpjpe_mm"
 Take = tuple[str, str, int]
 """Behaviour, clip and seed."""
 
@@ -34,25 +34,36 @@ def verdict(run: Run) -> Verdict:
         "Not measured": _unmeasured(run),
     }
     facts = {title: text for title, text in facts.items() if text}
-    measured = {name: values for name in run.series if (values := _by_sequence(run, name))}
+    measured = {name: values for name in run.series if (values := _by_sequence(run, name, HEADLINE))}
     if not measured:
         return Verdict(f"Nothing was measured: {_finished(run)}.", None, facts)
-    shared = set.intersection(*(set(values) for values in measured.values()))
+    shared = sorted(set.intersection(*(set(values) for values in measured.values())))
     if not shared:
-        names = ", ".join(measured)
-        return Verdict(f"No two of {names} were measured on the same sequences: none is best.", None, facts)
-    means = {name: float(np.mean([values[k] for k in sorted(shared)])) for name, values in measured.items()}
+        return Verdict(f"{', '.join(measured)} share no measured sequence: none is best.", None, facts)
+    means = {name: float(np.mean([values[k] for k in shared])) for name, values in measured.items()}
     order = sorted(means, key=lambda name: means[name])
     sequences = _many(len(shared), "sequence")
     if len(shared) < max(map(len, measured.values())):
         sequences = f"the {sequences} that all methods were measured on"
     best = f"{order[0]} is best" if len(order) > 1 else order[0]
     start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences} of {_source(run)}"
-    lead = _lead(measured, order[0], order[1], sorted(shared)) if len(order) > 1 else "; no other method was measured"
-    return Verdict(f"{start}{lead}.", order[0], facts)
+    lead = _lead(measured, order[0], order[1], shared) if len(order) > 1 else "; no other method was measured"
+    return Verdict(f"{start}{lead}.{_positions(run, order, shared)}", order[0], facts)
 
 
-def _lead(measured: Mapping[str, Mapping[Take, float]], best: str, second: str, shared: list[Take]) -> str:
+def _positions(run: Run, order: Sequence[str], shared: Sequence[Take]) -> str:
+    """Whether the joints' positions say the same; nothing where they were not measured."""
+    found = {name: _by_sequence(run, name, SECOND) for name in order}
+    means = {name: np.mean([v[k] for k in shared]) for name, v in found.items() if set(shared) <= set(v)}
+    if order[0] not in means:
+        return ""
+    first = min(means, key=lambda name: means[name])
+    if first == order[0]:
+        return f" Its joints are {means[first]:.0f} mm off" + (", the least too." if len(means) > 1 else ".")
+    return f" In joint position {first} is better: {means[first]:.0f} mm off, {order[0]} {means[order[0]]:.0f} mm."
+
+
+def _lead(measured: Mapping[str, Mapping[Take, float]], best: str, second: str, shared: Sequence[Take]) -> str:
     """How far the next one is behind."""
     ours, others = (np.array([measured[name][k] for k in shared]) for name in (best, second))
     less, ahead = float(np.mean(others - ours)), int(np.sum(ours < others))
@@ -63,12 +74,12 @@ def _lead(measured: Mapping[str, Mapping[Take, float]], best: str, second: str, 
     return f", {less:.2f}°{share} less than {second}, the next{how_often}"
 
 
-def _by_sequence(run: Run, series: str) -> dict[Take, float]:
-    """(behaviour, clip, seed) -> the headline error [deg] of the sequences where it was measured."""
+def _by_sequence(run: Run, series: str, metric: str) -> dict[Take, float]:
+    """The metric of every sequence where it was measured."""
     return {
-        (str(row["behaviour"]), str(row["clip"]), int(row["seed"])): float(row[HEADLINE])
+        (str(row["behaviour"]), str(row["clip"]), int(row["seed"])): float(row[metric])
         for row in run.cells
-        if run.series_of(row) == series and row[HEADLINE] is not None
+        if run.series_of(row) == series and row[metric] is not None
     }
 
 

@@ -3,6 +3,7 @@
 import json
 import re
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,22 @@ def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None
     sentence = verdict(read_run(run_folder)).sentence
     assert f"{first:.2f}° mean" in sentence
     assert f"{second - first:.2f}° ({100 * (second - first) / second:.0f} %) less than ik, the next" in sentence
+
+
+def test_the_verdict_says_when_positions_tell_another_story(run_folder: Path) -> None:
+    run = read_run(run_folder)
+    assert verdict(run).sentence.endswith(" mm off, the least too.")
+    cells = [{**row, "mpjpe_mm": 1.0 if row["method"] == "ik" else 60.0} for row in run.cells]
+    told = verdict(replace(run, summary={**run.summary, "cells": cells})).sentence
+    assert told.endswith("In joint position ik is better: 1 mm off, best_match+ik 60 mm.")
+
+
+def test_methods_without_a_common_sequence_are_not_ranked(run_folder: Path) -> None:
+    run = read_run(run_folder)
+    cells = [row for row in run.cells if (row["method"] == "ik") == (row["behaviour"] == "walking")]
+    found = verdict(replace(run, summary={**run.summary, "cells": cells}))
+    assert found.best is None
+    assert found.sentence.endswith("share no measured sequence: none is best.")
 
 
 def test_every_number_of_the_table_is_in_the_summary(run_folder: Path) -> None:
@@ -122,6 +139,7 @@ def test_a_perfect_method_breaks_no_axis(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"oracle": 0.0}, duration_s=4.0)
     said = text_of(write_report(fabricate(tmp_path / "run", plan), rendered=False))
     assert "oracle: 0.00° mean joint-angle error on 1 sequence of the built-in performer; no other" in said
+    assert "Its joints are 0 mm off." in said
 
 
 def test_inputs_and_several_takes_are_told_apart(tmp_path: Path) -> None:

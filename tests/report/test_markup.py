@@ -1,0 +1,27 @@
+"""Text stays text."""
+
+import pytest
+
+from harness.report.markup import Markup, joined, table, tag
+
+
+def test_children_and_attributes_are_escaped() -> None:
+    assert tag("p", "<b>", tag("i", "&"), title='"x"') == '<p title="&quot;x&quot;">&lt;b&gt;<i>&amp;</i></p>'
+
+
+@pytest.mark.parametrize(("written", "read"), [("class_", "class"), ("aria_label", "aria-label"), ("id", "id")])
+def test_attribute_names(written: str, read: str) -> None:
+    assert tag("p", **{written: "x"}) == f'<p {read}="x"></p>'
+
+
+def test_absent_things_leave_no_trace() -> None:
+    assert tag("img", alt="", hidden=False, src=None, async_=True) == '<img alt="" async>'
+    assert joined(None, "a", Markup("<br>"), 1.5) == "a<br>1.5"
+
+
+def test_a_table_names_its_rows_and_columns() -> None:
+    text = table("about <it>", ["method", "n"], [["<ik>", 3]], label="errors")
+    assert '<th scope="col">method</th>' in text
+    assert '<th scope="row">&lt;ik&gt;</th><td>3</td>' in text
+    assert 'tabindex="0"' in text
+    assert "about &lt;it&gt;" in text
