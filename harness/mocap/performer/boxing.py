@@ -119,7 +119,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     rear = habits.hand
     lead = "l" if rear == "r" else "r"
     s = LEFT[lead]
-    size, slow = habits.size * float(rng.uniform(0.93, 1.08)), float(rng.uniform(0.92, 1.12)) / habits.pace
+    size, slow = habits.size * float(rng.uniform(0.93, 1.08)), float(rng.uniform(0.80, 1.0)) / habits.pace
     leg = leg_m(skeleton)
     bladed, crouch = float(rng.uniform(0.45, 0.80)), float(rng.uniform(0.04, 0.09))
 
@@ -212,7 +212,7 @@ def _dance(rng: np.random.Generator, t: Floats, slow: float) -> tuple[Shift, lis
         yaw += rng.normal(0.0, 0.16)
         home = -0.25 * place
         place = place + on_floor(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.08, 0.20), 0.0) + home
-        step_s = rng.uniform(0.20, 0.26) * slow
+        step_s = rng.uniform(0.22, 0.28) * slow
         shifts.append(Shift(now, (float(place[0]), float(place[1])), yaw, step_s, rng.uniform(0.02, 0.08), 0.022))
         now += 2.0 * step_s + 0.1 + rng.uniform(0.05, 0.9)
     return start, shifts

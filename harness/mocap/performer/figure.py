@@ -17,7 +17,7 @@ SIDES = ("l", "r")
 LEFT = {"l": 1.0, "r": -1.0}
 """Sign of a side along the world's y."""
 
-_SPINE = {"lowerback": (0.40, 0.25, 0.40), "upperback": (0.33, 0.40, 0.32), "thorax": (0.27, 0.35, 0.28)}
+_SPINE = {"lowerback": (0.40, 0.28, 0.40), "upperback": (0.33, 0.42, 0.32), "thorax": (0.27, 0.30, 0.28)}
 """Share of bend, twist and lean that each back bone takes; the low back bends most and twists least."""
 _NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
 _NECK_BIAS_RAD = {"lowerneck": -0.28, "upperneck": 0.20, "head": 0.08}

@@ -70,7 +70,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
         lead: (act["lead lift"] + breath, 0.05 + act["lead reach"]),
         trail: (-0.05 + act["trail lift"] + breath, 0.13 + act["trail reach"]),
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits, 1.4))
     for side in (lead, trail):
         figure.leg(side, feet[side])
     _grip(figure, rng, t, facing, act, lead, trail)

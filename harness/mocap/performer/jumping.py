@@ -144,6 +144,7 @@ def _gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
     start_s = jump.down_s - (0.3 if jump.bottom_s == jump.down_s else 0.0)
     at = {
         "start": 0.0,
+        "back": 0.6 * (jump.bottom_s - start_s),
         "bottom": jump.bottom_s - start_s,
         "drive": 0.45 * jump.bottom_s + 0.55 * jump.leave_s - start_s,
         "leave": jump.leave_s - start_s,
@@ -152,13 +153,13 @@ def _gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
         "deep": jump.deep_s - start_s,
         "end": max(jump.up_s, jump.deep_s + 0.45) - start_s,
     }
-    high = min(float(rng.uniform(1.6, 2.2)) * habits.size, 2.15) * (0.55 if jump.rebound else 1.0)
+    high = min(float(rng.uniform(1.2, 1.9)) * habits.size, 2.0) * (0.55 if jump.rebound else 1.0)
     dip, give, far = jump.dip, jump.give, float(np.hypot(*jump.way_m))
     parts = {
         "pelvis": timed(at, bottom=1.5 * dip, leave=0.05, top=-0.03, land=0.04, deep=1.4 * give),
         "bend": timed(at, bottom=0.9 * dip, leave=-0.05, top=0.02, land=0.0, deep=0.8 * give),
         "back": timed(at, bottom=-0.34 * dip, leave=0.02, land=-0.03 - 0.1 * far, deep=-0.36 * give),
-        "swing": timed(at, -0.03, bottom=-0.85, leave=high, land=0.5 * high, deep=0.15),
+        "swing": timed(at, back=-0.70, leave=high, land=0.5 * high, deep=0.15),
         "elbow": timed(at, bottom=-0.05, drive=0.7, leave=0.35, land=0.75, deep=0.55),
         "spread": timed(at, bottom=0.15, leave=0.12, land=0.42, deep=0.35),
         "nod": timed(at, bottom=0.10, leave=-0.16, land=0.20, deep=0.16),

@@ -65,9 +65,9 @@ def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tupl
             turn = float(np.clip(wrapped(home - yaw), -1.5, 1.5))
             along = 0.15
         bottom_s = now if rebound else now + rng.uniform(0.45, 0.65) * slow
-        leave_s = bottom_s + rng.uniform(0.27, 0.33) * slow
+        leave_s = bottom_s + rng.uniform(0.29, 0.36) * slow
         land_s = leave_s + flight_s
-        deep_s = land_s + rng.uniform(0.22, 0.30) * slow
+        deep_s = land_s + rng.uniform(0.25, 0.34) * slow
         left_in_series = max(left_in_series - 1, 0)
         again = left_in_series > 0
         up_s = deep_s if again else deep_s + rng.uniform(0.5, 0.75) * slow

@@ -89,7 +89,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     look = play(t, _glances(rng, t))
     bearing = np.clip(1.1 * (np.interp(t + 0.35, long, way.yaw_rad) - yaw), -0.7, 0.7)
     gaze = columns(
-        yaw + bearing + look["yaw"] + wander(rng, t, 2.5, 0.05),
+        yaw + np.tanh(bearing + look["yaw"]) + wander(rng, t, 2.5, 0.05),
         0.06 + rng.uniform(-0.04, 0.12) + look["pitch"] + wander(rng, t, 2.5, 0.03),
         -0.15 * lean + wander(rng, t, 3.0, 0.012),
     )
@@ -162,7 +162,7 @@ def _glances(rng: np.random.Generator, t: Floats) -> list[Gesture]:
     glances: list[Gesture] = []
     now = float(t[0]) - rng.uniform(0.0, 3.0)
     while now < t[-1]:
-        hold_s, yaw, pitch = rng.uniform(0.5, 1.6), rng.uniform(-0.8, 0.8), rng.uniform(-0.1, 0.3)
+        hold_s, yaw, pitch = rng.uniform(0.5, 1.6), rng.uniform(-0.9, 0.9), rng.uniform(-0.1, 0.3)
         keys = (0.0, 0.0), (0.45, 1.0), (0.45 + hold_s, 0.95), (1.0 + hold_s, 0.0)
         parts = {"yaw": [(s, yaw * v) for s, v in keys], "pitch": [(s, pitch * v) for s, v in keys]}
         glances.append(Gesture(now, parts))
@@ -178,7 +178,7 @@ def _swing_arm(
     bent = gait.elbow_rad
     figure.hang(
         side,
-        0.30 * size * forward - 0.08 + 0.10 * bent + wander(rng, t, 2.5, 0.03),
+        0.26 * size * forward - 0.08 + 0.10 * bent + wander(rng, t, 2.5, 0.03),
         habits.spread_rad + 0.02 * forward + wander(rng, t, 2.5, 0.02),
         0.20 + 0.15 * bent + 0.08 * forward + wander(rng, t, 2.5, 0.03),
         bent + 0.20 * size * forward + 0.05 * forward**2 + wander(rng, t, 2.0, 0.03),
