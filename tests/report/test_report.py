@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -226,3 +228,17 @@ def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tupl
         assert re.search(r"mean_pose: \d+\.\d\d° .*; no other method was measured", said)
         assert "81 of 162 frames matched (50.0 %)" in said
     assert "nan" not in said.lower().split()
+
+
+def test_importing_the_report_draws_in_no_heavy_library_and_no_global_plot_state(tmp_path: Path) -> None:
+    fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=2.0))
+    code = (
+        "import sys; from pathlib import Path; from harness.report.report import write_report;"
+        "assert not {'pyvista', 'vtk', 'matplotlib', 'plotly'} & set(sys.modules);"
+        "import matplotlib; before = dict(matplotlib.rcParams); write_report(Path(sys.argv[1]), rendered=False);"
+        "assert dict(matplotlib.rcParams) == before; assert 'matplotlib.pyplot' not in sys.modules;"
+        "assert 'pyvista' not in sys.modules"
+    )
+    command = [sys.executable, "-c", code, str(tmp_path / "run")]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
