@@ -26,6 +26,8 @@ class Gate:
         self._velocity_m_s: Floats = np.zeros((stations, 3))
         self._believed_at_s: Floats = np.full(stations, -np.inf)
         self._known_at_s, self._moving = -np.inf, False
+        self.left_out = False
+        """Whether anything was left out of the last frame."""
         self.all_moved = False
         """Whether at least half of the last frame's positions jumped: the performer is somewhere else."""
 
@@ -33,7 +35,8 @@ class Gate:
         """Have the residuals read the frame, but for what jumped."""
         residuals.read(frame)
         jumped = self.jumped(frame.received_s, residuals.target_m, frame.position_valid)
-        if jumped.any():
+        self.left_out = bool(jumped.any())
+        if self.left_out:
             residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
     def answered(self, frame: TrackerFrame, residuals: Residuals, qpos: Floats) -> None:

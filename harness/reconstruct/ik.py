@@ -121,12 +121,12 @@ class IkSession:
         """From the previous pose; anew when the readings contradict where that leads."""
         warm = self._solve(self._qpos, self._qpos)
         contradicted = self._contradiction()
-        if contradicted == 0.0:
+        if contradicted == 0.0 and not self._gate.left_out:
             self._contradicted_since_s = None
             return warm.qpos
         if self._contradicted_since_s is None:
             self._contradicted_since_s = now_s
-        if contradicted < _MANY and now_s - self._contradicted_since_s < PATIENCE_S:
+        if contradicted < _MANY and (self._gate.left_out or now_s - self._contradicted_since_s < PATIENCE_S):
             return warm.qpos
         self._contradicted_since_s = now_s
         cold = self._cold()
