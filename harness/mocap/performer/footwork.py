@@ -12,8 +12,6 @@ from harness.mocap.performer.curves import ease, larger, smaller
 from harness.mocap.performer.feet import Plant
 from harness.mocap.performer.figure import SIDES, Foot
 
-LEG_BONES = ("femur", "tibia", "foot")
-
 
 @dataclass(frozen=True)
 class Stance:

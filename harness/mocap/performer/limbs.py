@@ -58,12 +58,6 @@ def euler_xyz(m: Floats) -> Floats:
     return np.stack([a, b, c], axis=-1)
 
 
-def from_euler_xyz(a: Floats, b: Floats, c: Floats) -> Floats:
-    """(..., 3, 3) Rz(c) Ry(b) Rx(a)."""
-    out: Floats = about(2, c) @ about(1, b) @ about(0, a)
-    return out
-
-
 def frame_of(skeleton: Skeleton, bone: str) -> Floats:
     """(3, 3) the three hinge axes of a bone as columns."""
     out: Floats = skeleton.axes[skeleton.dof_of_bone[skeleton.index(bone)]].T

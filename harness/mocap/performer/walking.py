@@ -77,7 +77,7 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + wander(rng, t, 2.0, 0.004)
     place = way.place_m[inside] + on_floor(yaw, -0.03, sway)
     top = highest_root_m(skeleton, place, pelvis, feet, 0.994)
-    root = columns(*place.T, smaller(top, smoothed(top, 1.2 / step_s) - 0.012 - gait.crouch * leg_m(skeleton), 0.04))
+    root = columns(*place.T, smaller(top, smoothed(top, 1.2 / step_s) + 0.004 - gait.crouch * leg_m(skeleton), 0.03))
 
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
     bob = 0.02 * np.cos(2.0 * stride + 0.6) + 0.008 * breath
