@@ -31,7 +31,8 @@ def euler_zyx_deg(rotation: Floats) -> Floats:
     z = np.where(locked, np.arctan2(-r[..., 0, 1], r[..., 1, 1]), np.arctan2(r[..., 1, 0], r[..., 0, 0]))
     y = np.arctan2(-r[..., 2, 0], cos_y)
     x = np.where(locked, 0.0, np.arctan2(r[..., 2, 1], r[..., 2, 2]))
-    return np.rad2deg(np.stack([z, y, x], axis=-1))
+    out: Floats = np.rad2deg(np.stack([z, y, x], axis=-1))
+    return out
 
 
 def _hierarchy(skeleton: Skeleton) -> Iterator[str]:

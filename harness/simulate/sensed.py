@@ -14,6 +14,8 @@ class Sensed:
     """N samples of S stations in the tracker's frame; components change the arrays in place."""
 
     seed: int
+    take: str
+    """Name of the take: noise differs from one to the next."""
     stations: tuple[str, ...]
     time_s: Floats
     """(N, S) true time of each sample [s]."""
@@ -34,8 +36,8 @@ class Sensed:
     """(N, S) readings that a component of this name was at work on, for the record."""
 
     def draw(self, component: str, station: str) -> np.random.Generator:
-        """The generator of one component at one station, independent of all others."""
-        return generator(self.seed, "noise", component, station)
+        """The generator of one component at one station in one take, independent of all others."""
+        return generator(self.seed, "noise", self.take, component, station)
 
     def move(self, offset_m: Floats) -> None:
         """Shift positions by (..., 3) in the tracker's axes."""

@@ -72,7 +72,7 @@ def simulate(
     trajectory = Trajectory(body, take)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     calibration = _exact(body, mounts, tracker)
-    sensed = _sensed(trajectory, mounts, time_s, tracker, calibration, seed)
+    sensed = _sensed(trajectory, mounts, time_s, tracker, calibration, seed, take.name)
     noise.spoil(sensed)
     sent, wire = _transmitted(sensed, wire_format, tracker)
     reader = FrameReader(wire_format)
@@ -119,6 +119,7 @@ def _sensed(
     tracker: TrackerConfig,
     calibration: Calibration,
     seed: int,
+    take: str,
 ) -> Sensed:
     """The truth in the tracker's frame."""
     motion = trajectory.station_motion(calibration, time_s)
@@ -127,6 +128,7 @@ def _sensed(
     along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
     return Sensed(
         seed=seed,
+        take=take,
         stations=calibration.stations,
         time_s=time_s,
         rate_hz=tracker.rate_hz,
