@@ -1,6 +1,6 @@
 """Records into frames: one row per station, in station order."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,18 @@ from harness.stream.readings import Readings, join
 PATIENCE = 1.5
 """A frame that lacks stations is closed after so many periods."""
 _NEVER = -np.inf
+
+
+@dataclass(frozen=True)
+class _Round:
+    """What the device's clock leads to expect of the next reading."""
+
+    began_s: float = _NEVER
+    """Stamp of the first reading of this round of stations."""
+    first: int = 0
+    """Its station."""
+    before_s: float = _NEVER
+    """Stamp of the reading before."""
 
 
 class Assembler:
@@ -26,14 +38,12 @@ class Assembler:
     def __init__(self, stations: int, period_s: float) -> None:
         self._stations = stations
         self._period_s = period_s
-        self._shortest_s = (1.0 - 0.5 / stations) * period_s
-        """Between the first readings of two frames; within a frame they are a station's slot less than that apart."""
         self._open: Readings | None = None
         """The beginning of a frame."""
-        self._began_s, self._before_s = _NEVER, _NEVER
-        """First and last stamp of the frame that was closed last."""
+        self._round, self._after = _Round(), _Round()
+        """As it was before and after that beginning."""
         self._received_s = _NEVER
-        """When that was complete."""
+        """When the frame that was closed last was complete."""
 
     def add(self, more: Readings) -> list[TrackerFrame]:
         """The frames that these readings complete."""
@@ -44,7 +54,7 @@ class Assembler:
         given = replace(given, doubtful=doubtful)
         open_from = int(np.searchsorted(frame, frame[-1]))
         if len(given) - open_from == self._stations:
-            open_from = len(given)
+            open_from, self._round = len(given), self._after
         self._open = given[open_from:] if open_from < len(given) else None
         return self._frames(given[:open_from], frame[:open_from])
 
@@ -55,33 +65,42 @@ class Assembler:
 
     def finish(self) -> list[TrackerFrame]:
         """The unfinished frame."""
-        given, self._open = self._open, None
+        given, self._open, self._round = self._open, None, self._after
         return [] if given is None else self._frames(given, np.zeros(len(given), dtype=np.int64))
 
     def _cut(self, given: Readings) -> tuple[Ints, Bools]:
         """The frame of each reading (N,), from 0, and which ones (N,) are doubtful after a look at their neighbours."""
         frame, doubtful = np.zeros(len(given), dtype=np.int64), given.doubtful.copy()
-        began_s, before_s = (self._began_s, self._before_s) if self._open is None else (_NEVER, _NEVER)
+        began_s, first, before_s = self._round.began_s, self._round.first, self._round.before_s
         station_before, filled, number, arrived_s = self._stations, self._stations, -1, _NEVER
         rows = zip(given.station.tolist(), given.measured_s.tolist(), given.received_s.tolist(), strict=True)
         for i, (station, stamp_s, received_s) in enumerate(rows):
             elapsed_s = stamp_s - began_s
             untimed = elapsed_s != elapsed_s  # NaN: a stamp is missing
-            increases = station > station_before
-            if (not increases and elapsed_s < self._shortest_s) or stamp_s < before_s:
+            increases, back = station > station_before, stamp_s < before_s
+            early = not increases and elapsed_s < self._shortest_s(first, station)
+            if early or back:
                 doubtful[i] = True
                 if filled < self._stations:
                     doubtful[i - 1] = True
             late = received_s - arrived_s > PATIENCE * self._period_s if untimed else elapsed_s >= self._period_s
-            if late or not increases:
-                number, filled, began_s, arrived_s = number + 1, 0, stamp_s, received_s
-            elif began_s != began_s:
-                began_s = stamp_s
+            opens = late or not increases
+            if opens:
+                self._round = _Round(began_s, first, before_s)
+                number, filled, arrived_s = number + 1, 0, received_s
+            if back or began_s != began_s or (opens and not early):
+                began_s, first = stamp_s, station
             if stamp_s == stamp_s:
                 before_s = stamp_s
             station_before, filled = station, filled + 1
             frame[i] = number
+        self._after = _Round(began_s, first, before_s)
         return frame, doubtful
+
+    def _shortest_s(self, first: int, station: int) -> float:
+        """From a reading of one station to the next round's of another, were all slots as long as they may be."""
+        slots_between = max(first - station, 0) + 0.5
+        return (1.0 - slots_between / self._stations) * self._period_s
 
     def _frames(self, given: Readings, frame: Ints) -> list[TrackerFrame]:
         """Whole frames of readings (N,), of which `frame` (N,) tells the frame of each, from 0 without gaps."""
@@ -100,10 +119,9 @@ class Assembler:
             length = np.sqrt(np.sum(given.tracker_from_station**2, axis=1))
             turned = usable & (length > 0.5) & (length < 2.0)
             turn = given.tracker_from_station / length[:, None]
-        measured_s = spread(given.measured_s)
         columns = (
             self._receptions_s(given, frame).tolist(),
-            measured_s,
+            spread(given.measured_s),
             spread(np.where(placed[:, None], given.position_m, np.nan), 3),
             spread(np.where(turned[:, None], turn, np.nan), 4),
             spread(placed, missing=0.0) > 0.0,
@@ -111,9 +129,6 @@ class Assembler:
             spread(given.quality, missing=0.0),
             spread(given.doubtful, missing=0.0) > 0.0,
         )
-        stamps_s = measured_s[-1][~np.isnan(measured_s[-1])]
-        if len(stamps_s):
-            self._began_s, self._before_s = float(stamps_s[0]), float(stamps_s[-1])
         return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
 
     def _receptions_s(self, given: Readings, frame: Ints) -> Floats:

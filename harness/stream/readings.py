@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.stream.clock import LATEST_S
 from harness.stream.records import (
     FULL_SCALE_DEG,
     FULL_SCALE_M,
@@ -80,7 +81,7 @@ def readings(table: Table, received_s: Floats, stations: bytes, settings: Settin
             doubtful |= ~(np.abs(np.sum(turn * turn, axis=1) - 1.0) < slack)
         if "time" in names:
             measured_s = table["time"].astype(float) * settings.seconds_per_tick
-            amiss = ~((measured_s >= 0.0) & np.isfinite(measured_s))
+            amiss = ~((measured_s >= 0.0) & (measured_s < LATEST_S))
             measured_s[amiss] = np.nan
             doubtful |= amiss
     quality = table["quality"] / 255.0 if "quality" in names else np.ones(count)

@@ -63,7 +63,8 @@ def encode(items: tuple[int, ...], stations: NDArray[np.uint8], said: Said, sett
 
 def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
     """The two-byte form (N, 2k) of values (N, k) within -1 to 1 of full scale (section 5.2)."""
-    fourteen = np.clip(np.floor(np.asarray(values) * 8192.0), -8192, 8191).astype(np.int64) & 0x3FFF
+    sixteen = np.clip(np.trunc(np.asarray(values) * 32768.0), -32768, 32767).astype(np.int64)
+    fourteen = (sixteen >> 2) & 0x3FFF
     pairs = np.stack([fourteen & 0x7F, fourteen >> 7], axis=-1).astype(np.uint8).reshape(len(fourteen), -1)
     pairs[:, 0] |= 0x80
     return pairs

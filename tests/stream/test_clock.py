@@ -59,7 +59,7 @@ def test_a_damaged_stamp_costs_itself_alone(wrong_s: float, at: int) -> None:
     assert clock.resets == 0
 
 
-@pytest.mark.parametrize("wrong_s", [1e30, 4000.0, np.nan])
+@pytest.mark.parametrize("wrong_s", [9e6, 4000.0, np.nan])
 def test_time_survives_a_damaged_first_stamp(wrong_s: float) -> None:
     """Whatever the first stamp was, time advances rightly from the third on."""
     stamp_s = stamps_s(50)

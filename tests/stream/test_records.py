@@ -117,6 +117,7 @@ def test_an_item_without_a_known_size_is_refused() -> None:
         ("quaternion", 3e38),
         ("time", np.nan),
         ("time", -1.0),
+        ("time", 1e30),
     ],
 )
 def test_numbers_that_cannot_be_are_doubtful(field: str, value: float) -> None:
