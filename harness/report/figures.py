@@ -68,16 +68,17 @@ def per_joint(run: Run, series: str) -> Chart:
             (right, joints, 1, "position of the far end [mm]"),
         ):
             places = np.arange(len(names))
-            axes.bxp(_boxes(own[part], names), positions=places, orientation="horizontal", **_box_style(run, series))
+            _boxes(axes, own[part], COLOURS[run.series.index(series) % len(COLOURS)])
             for name in others:
                 middle = np.median(_pool(run, name)[part], axis=0)
                 colour = line_style(run.series.index(name))["color"]
                 axes.plot(middle, places, "o", markersize=3.5, color=colour, label=name)
             axes.set_yticks(places, names)
-            axes.invert_yaxis()
+            axes.set_ylim(len(names) - 0.3, -0.7)
             axes.set_xscale("function", functions=(np.sqrt, np.square))
             axes.set_xlim(left=0.0)
-            axes.set_xticks(_root_ticks(axes.get_xlim()[1]))
+            ticks = _root_ticks(axes.get_xlim()[1])
+            axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axes.set_title(title)
             axes.grid(False, axis="y")
         if others:
@@ -158,25 +159,13 @@ def _pool(run: Run, series: str) -> tuple[Floats, Floats]:
     return np.concatenate([t.rotation_deg for t in traces]), np.concatenate([t.position_mm for t in traces])
 
 
-def _boxes(values: Floats, names: Sequence[str]) -> list[dict[str, Any]]:
+def _boxes(axes: "Axes", values: Floats, colour: str) -> None:
+    """One lying box for each column of (N, M) values. Axes.boxplot would pull in pyplot and its global state."""
     low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
-    return [
-        {"label": name, "whislo": low[n], "q1": q1[n], "med": middle[n], "q3": q3[n], "whishi": high[n], "fliers": []}
-        for n, name in enumerate(names)
-    ]
-
-
-def _box_style(run: Run, series: str) -> dict[str, Any]:
-    colour = COLOURS[run.series.index(series) % len(COLOURS)]
-    return {
-        "showfliers": False,
-        "widths": 0.62,
-        "patch_artist": True,
-        "boxprops": {"facecolor": colour, "edgecolor": "none", "alpha": 0.55},
-        "medianprops": {"color": INK, "linewidth": 1.6},
-        "whiskerprops": {"color": FAINT, "linewidth": 1.0},
-        "capprops": {"linewidth": 0.0},
-    }
+    places = np.arange(values.shape[1])
+    axes.hlines(places, low, high, color=FAINT, linewidth=1.0)
+    axes.barh(places, q3 - q1, left=q1, height=0.62, color=colour, alpha=0.55)
+    axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
 
 
 def _legend(names: Sequence[str]) -> dict[str, Any]:

@@ -235,8 +235,8 @@ def test_importing_the_report_draws_in_no_heavy_library_and_no_global_plot_state
     code = (
         "import sys; from pathlib import Path; from harness.report.report import write_report;"
         "assert not {'pyvista', 'vtk', 'matplotlib', 'plotly'} & set(sys.modules);"
-        "import matplotlib; before = dict(matplotlib.rcParams); write_report(Path(sys.argv[1]), rendered=False);"
-        "assert dict(matplotlib.rcParams) == before; assert 'matplotlib.pyplot' not in sys.modules;"
+        "import matplotlib; before = matplotlib.rcParams.copy(); write_report(Path(sys.argv[1]), rendered=False);"
+        "assert matplotlib.rcParams.copy() == before; assert 'matplotlib.pyplot' not in sys.modules;"
         "assert 'pyvista' not in sys.modules"
     )
     command = [sys.executable, "-c", code, str(tmp_path / "run")]
