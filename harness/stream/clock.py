@@ -10,6 +10,8 @@ from harness.core.arrays import Floats
 
 TOLERANCE_S = 0.25
 """Delays of the host's reading differ by less than this [s]; no sound record is farther out of order."""
+LATEST_S = 1e7
+"""By then, 32-bit milliseconds have a step of a second: a stamp beyond is a damaged number [s]."""
 
 
 class Unwrapper:
@@ -46,7 +48,7 @@ class Unwrapper:
         return out
 
     def _one(self, stamp_s: float, received_s: float) -> float:
-        if not np.isfinite(stamp_s):
+        if not 0.0 <= stamp_s < LATEST_S:
             return float("nan")
         now_s = stamp_s + self._epoch_s
         if self._last is None or _follows(self._last, (now_s, received_s)):
