@@ -1,0 +1,56 @@
+"""One boxer, and trackers on a body that does not move."""
+
+from typing import Protocol
+
+import numpy as np
+import pytest
+
+from harness.body import mounts, retarget
+from harness.body.humanoid import Body
+from harness.body.mounts import Mount
+from harness.core.motion import Take
+from harness.core.seeds import generator
+from harness.mocap import performer
+from harness.simulate.sensed import Sensed
+
+SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
+
+
+class Still(Protocol):
+    """Makes trackers that lie still for so long, each somewhere, turned by a quaternion of halves, so that products are exact."""
+
+    def __call__(self, duration_s: float, stations: int = 4, *, seed: int = 1) -> Sensed: ...
+
+
+@pytest.fixture
+def still() -> Still:
+    def made(duration_s: float, stations: int = 4, *, seed: int = 1) -> Sensed:
+        rng = generator(1, "still")
+        time_s = np.repeat(np.arange(round(40.0 * duration_s))[:, None] / 40.0, stations, axis=1)
+        places_m, turns = rng.uniform(0.5, 2.0, (stations, 3)), rng.choice([-0.5, 0.5], (stations, 4))
+        return Sensed(
+            seed=seed,
+            take="still",
+            stations=tuple(f"s{row}" for row in range(stations)),
+            time_s=time_s,
+            rate_hz=40.0,
+            velocity_m_s=np.zeros((*time_s.shape, 3)),
+            radius_m=np.full(stations, 0.05),
+            position_m=np.tile(places_m, (len(time_s), 1, 1)),
+            turn=np.tile(turns, (len(time_s), 1, 1)),
+            quality=np.ones(time_s.shape),
+            device_s=time_s.copy(),
+        )
+
+    return made
+
+
+def worn(*stations: str) -> list[Mount]:
+    """Default mounts of these stations, or of the six."""
+    return [mounts.DEFAULTS[station] for station in stations or SIX]
+
+
+@pytest.fixture(scope="session")
+def boxer() -> tuple[Body, Take]:
+    """Twelve seconds of the built-in performer, on the performer's own body."""
+    return retarget.to_own_body(performer.generate("boxing", "p1", 1, seed=1, duration_s=12.0))

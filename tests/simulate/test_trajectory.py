@@ -1,0 +1,117 @@
+"""The one smooth motion: through every frame, twice differentiable, and what MuJoCo makes of it."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from harness.body.humanoid import Body
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.motion import Take
+from harness.errors import BadInput
+from harness.simulate.noise import level
+from harness.simulate.simulate import TrackerConfig, simulate
+from harness.simulate.trajectory import Trajectory
+from tests.simulate.conftest import worn
+
+STEP_S = 1e-5
+
+
+@pytest.fixture(scope="module")
+def trajectory(boxer: tuple[Body, Take]) -> Trajectory:
+    return Trajectory(*boxer)
+
+
+@pytest.fixture(scope="module")
+def moments_s(trajectory: Trajectory) -> Floats:
+    out: Floats = np.linspace(0.1, trajectory.duration_s - 0.1, 97) + 0.0013
+    return out
+
+
+def test_it_goes_through_every_frame(boxer: tuple[Body, Take], trajectory: Trajectory) -> None:
+    _, take = boxer
+    qpos = trajectory.qpos(np.arange(len(take)) / take.rate_hz)
+    assert np.abs(qpos[:, :3] - take.qpos[:, :3]).max() < 1e-9
+    assert rotations.angle_between_rad(qpos[:, 3:7], take.qpos[:, 3:7]).max() < 1e-9
+    assert np.abs(qpos[:, 7:] - take.qpos[:, 7:]).max() < 1e-9
+    assert trajectory.duration_s == pytest.approx((len(take) - 1) / take.rate_hz)
+
+
+def test_velocity_is_the_slope_of_position(boxer: tuple[Body, Take], trajectory: Trajectory, moments_s: Floats) -> None:
+    body, _ = boxer
+    before, after = trajectory.qpos(moments_s - STEP_S), trajectory.qpos(moments_s + STEP_S)
+    slope = np.empty((len(moments_s), body.model.nv))
+    for row, one, other in zip(slope, before, after, strict=True):
+        mujoco.mj_differentiatePos(body.model, row, 2.0 * STEP_S, one, other)
+    assert np.abs(slope - trajectory.qvel(moments_s)).max() < 1e-5
+
+
+def test_acceleration_is_the_slope_of_velocity(trajectory: Trajectory, moments_s: Floats) -> None:
+    slope = (trajectory.qvel(moments_s + STEP_S) - trajectory.qvel(moments_s - STEP_S)) / (2.0 * STEP_S)
+    assert np.abs(slope - trajectory.qacc(moments_s)).max() < 1e-3 * np.abs(slope).max()
+
+
+def test_acceleration_does_not_jump_at_frames(boxer: tuple[Body, Take], trajectory: Trajectory) -> None:
+    """Twice continuously differentiable: the step over a frame is what the third derivative makes of 2 us."""
+    _, take = boxer
+    frames_s = np.arange(1, len(take) - 1) / take.rate_hz
+    step = np.abs(trajectory.qacc(frames_s + 1e-6) - trajectory.qacc(frames_s - 1e-6)).max()
+    wide = np.abs(trajectory.qacc(frames_s + 1e-3) - trajectory.qacc(frames_s - 1e-3)).max()
+    assert step < 5e-3 * wide
+
+
+@pytest.mark.parametrize("station", ["left_hand", "right_ankle", "left_foot", "torso", "head", "pelvis"])
+def test_stations_move_as_mujoco_says(
+    boxer: tuple[Body, Take], trajectory: Trajectory, moments_s: Floats, station: str
+) -> None:
+    """Place, velocity and acceleration of a station, against mj_forward on the same configuration: under 1e-6."""
+    body, take = boxer
+    calibration = simulate(body, take, worn(station), TrackerConfig(), level("clean"), seed=1).calibration
+    motion = trajectory.station_motion(calibration, moments_s[:, None])
+    model, data = body.model, mujoco.MjData(body.model)
+    bone = int(body.bone_body_ids[body.skeleton.index(calibration.bones[0])])
+    qpos, qvel, qacc = (f(moments_s) for f in (trajectory.qpos, trajectory.qvel, trajectory.qacc))
+    for i in range(0, len(moments_s), 8):
+        data.qpos[:], data.qvel[:] = qpos[i], qvel[i]
+        mujoco.mj_forward(model, data)
+        data.qacc[:] = qacc[i]
+        mujoco.mj_rnePostConstraint(model, data)
+        bone_turn, reach_m = data.xmat[bone].reshape(3, 3), calibration.mount_m[0]
+        reach_m = bone_turn @ reach_m
+        both = np.empty(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, bone, both, 0)
+        turning, speed = both[:3].copy(), both[3:].copy()
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, bone, both, 0)
+        swelling, thrust = both[:3].copy(), both[3:] + model.opt.gravity
+        swing = np.cross(turning, reach_m)
+        expected = (
+            data.xpos[bone] + reach_m,
+            speed + swing,
+            thrust + np.cross(swelling, reach_m) + np.cross(turning, swing),
+            turning,
+        )
+        found = (motion.position_m, motion.velocity_m_s, motion.acceleration_m_s2, motion.turn_rad_s)
+        for ours, theirs in zip(found, expected, strict=True):
+            assert np.abs(ours[i, 0] - theirs).max() < 1e-6
+        turned = rotations.multiply(data.xquat[bone], calibration.bone_from_station[0])
+        assert rotations.angle_between_rad(motion.world_from_station[i, 0], turned) < 1e-6
+
+
+def test_orientation_has_no_flips(trajectory: Trajectory, boxer: tuple[Body, Take]) -> None:
+    body, take = boxer
+    seen = simulate(body, take, worn(), TrackerConfig(), level("clean"), seed=1)
+    time_s = np.repeat(np.linspace(0.0, trajectory.duration_s, 2000)[:, None], 6, axis=1)
+    turn = trajectory.station_motion(seen.calibration, time_s).world_from_station
+    assert (np.sum(turn[1:] * turn[:-1], axis=-1) > 0.9).all()
+
+
+@pytest.mark.parametrize("moment_s", [-0.01, 1e6, np.nan])
+def test_moments_outside_the_take_are_refused(trajectory: Trajectory, moment_s: float) -> None:
+    with pytest.raises(BadInput, match="outside the take"):
+        trajectory.qpos(np.array([1.0, moment_s]))
+
+
+def test_one_frame_is_no_motion(boxer: tuple[Body, Take]) -> None:
+    body, take = boxer
+    with pytest.raises(BadInput, match="two at least"):
+        Trajectory(body, Take("short", "p1", "test", "", 120.0, take.qpos[:1]))
