@@ -17,7 +17,7 @@ SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head"
 
 
 class Still(Protocol):
-    """Makes trackers that lie still for so long, each somewhere, turned by a quaternion of halves, so that products are exact."""
+    """Makes trackers that lie still for so long, each somewhere, with quaternions of halves: products are exact."""
 
     def __call__(self, duration_s: float, stations: int = 4, *, seed: int = 1) -> Sensed: ...
 

@@ -23,7 +23,7 @@ class Dropout:
     gap_s: tuple[float, float] = (0.1, 0.5)
     """Shortest and longest gap [s]."""
     coast_s: float = 0.5
-    """Time without ranges before each gap [s]."""
+    """Time without ranges before each gap, at most back to the one before [s]."""
     tilt_rad: float = float(np.deg2rad(0.25))
     """Tilt error while coasting [rad]: the RMS of pitch and roll."""
 
@@ -32,15 +32,17 @@ class Dropout:
         coasting = np.zeros(sensed.time_s.shape, bool)
         leak_m_s2 = GRAVITY_M_S2 * float(np.sin(self.tilt_rad))
         for row, station in enumerate(sensed.stations):
-            time_s = sensed.time_s[:, row]
+            time_s, sighted_s = sensed.time_s[:, row], -np.inf
             for begin_s, end_s, sideways in self.gaps(sensed.draw("dropout", station), float(time_s.max())):
-                coast = (time_s >= begin_s - self.coast_s) & (time_s < begin_s)
-                coasted_s = time_s[coast] - (begin_s - self.coast_s)
+                blocked_s = max(begin_s - self.coast_s, sighted_s)
+                coast = (time_s >= blocked_s) & (time_s < begin_s)
+                coasted_s = time_s[coast] - blocked_s
                 sensed.position_m[coast, row] += leak_m_s2 * 0.5 * coasted_s[:, None] ** 2 * sideways
                 left = 1.0 - coasted_s / self.coast_s
                 sensed.quality[coast, row] = np.minimum(sensed.quality[coast, row], np.maximum(left, 1.0 / 255.0))
                 coasting[:, row] |= coast
                 lost[:, row] |= (time_s >= begin_s) & (time_s < end_s)
+                sighted_s = end_s
         sensed.lose(lost)
         sensed.hits["coast"] = coasting & ~lost
 
