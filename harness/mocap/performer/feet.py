@@ -16,8 +16,9 @@ from harness.mocap.performer.curves import ease, pulse, through, travel
 from harness.mocap.performer.figure import Foot
 
 ANKLE_M = 0.080
-"""Height of the ankle of a flat foot [m]; the balls of real clips stand at 0.03 and the ankles at 0.07 to 0.08."""
-BALL_M = 0.032
+"""Height of the ankle of a flat foot [m]; the ankles of real clips in stance are at 0.07 to 0.09 ..."""
+BALL_M = 0.047
+"""... and the balls at 0.03 to 0.05; a flat foot of the body (`body.anatomy`) has its ball at 0.049."""
 HEEL_BEHIND_M = 0.045
 """How far the heel's sole lies behind the ankle [m]."""
 
