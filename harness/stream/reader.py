@@ -59,6 +59,11 @@ class FrameReader:
         self._fed = 0
 
     @property
+    def pending(self) -> int:
+        """Bytes that wait for more; a record or a reply at most."""
+        return self._decoder.pending
+
+    @property
     def clock_resets(self) -> int:
         """How often the device's clock was set anew."""
         return self._clock.resets

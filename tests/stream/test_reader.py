@@ -1,7 +1,11 @@
 """The whole way from bytes to frames."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from harness.errors import BadInput
 from harness.stream.capture import Capture
@@ -147,3 +151,73 @@ def test_a_capture_can_be_read_again_and_closed() -> None:
     next(reading)
     stream.close()
     assert list(reading) == []
+
+
+def require_sound(frames: list[TrackerFrame]) -> None:
+    """What is valid can be used, whatever came in; what is not valid is NaN."""
+    for f in frames:
+        assert np.isfinite(f.position_m[f.position_valid]).all()
+        assert np.isnan(f.position_m[~f.position_valid]).all()
+        assert np.allclose(np.linalg.norm(f.tracker_from_station[f.orientation_valid], axis=1), 1.0)
+        assert np.isnan(f.tracker_from_station[~f.orientation_valid]).all()
+        assert ((f.quality >= 0.0) & (f.quality <= 1.0)).all()
+        assert (f.suspect | ~(np.isnan(f.measured_s) & f.position_valid)).all(), "valid without a time, unmarked"
+    received_s = [f.received_s for f in frames]
+    assert all(a < b for a, b in pairwise(received_s)), "host times strictly increase"
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.data())
+def test_whatever_records_hold_frames_are_sound(choose: st.DataObject) -> None:
+    """Well-formed records with any bytes in them: signalling NaN, infinities, times that jump about, any order."""
+    records = choose.draw(
+        st.lists(st.tuples(st.sampled_from(b"1234"), st.binary(min_size=33, max_size=33)), min_size=1, max_size=20)
+    )
+    data = b"".join(b"0" + bytes([station]) + b" " + body + b"\r\n" for station, body in records)
+    reader = FrameReader(FOUR)
+    frames = [
+        frame
+        for k in range(0, len(data), RECORD)
+        for frame in reader.feed(data[k : k + RECORD], 100.0 + 0.005 * k / RECORD)
+    ]
+    require_sound([*frames, *reader.finish()])
+
+
+@pytest.mark.parametrize("share", [0.001, 0.01, 0.1])
+def test_many_damaged_bytes_make_no_frame_unsound(share: float) -> None:
+    for trial in range(30):
+        stamp_s, rng = stamps_s(100), np.random.default_rng(trial)
+        data = np.frombuffer(sent(stamp_s, seed=trial), np.uint8).copy()
+        hurt = rng.random(len(data)) < share
+        data[hurt] ^= rng.integers(1, 256, int(hurt.sum()), dtype=np.uint8)
+        capture = received(data.tobytes(), stamp_s)
+        frames = frames_of(capture)
+        require_sound(frames)
+        intact = 400 - len(np.unique(np.flatnonzero(hurt) // RECORD))
+        assert sum(int(f.position_valid.sum()) for f in frames) >= 0.9 * intact
+
+
+@pytest.mark.slow
+def test_a_million_mutations() -> None:
+    """Bytes lost, added, changed, swapped and repeated all over long captures: no crash, nothing kept, frames sound."""
+    rng, mutations = np.random.default_rng(1), 0
+    while mutations < 1_000_000:
+        stamp_s = stamps_s(500)
+        data = bytearray(sent(stamp_s, seed=mutations))
+        for _ in range(int(rng.integers(1, 2000))):
+            at = int(rng.integers(len(data)))
+            kind = int(rng.integers(4))
+            if kind == 0:
+                del data[at]
+            elif kind == 1:
+                data.insert(at, int(rng.integers(256)))
+            elif kind == 2:
+                data[at] = int(rng.integers(256))
+            else:
+                data[at : at + 50] = data[at : at + 50] * 2
+            mutations += 1
+        reader, frames = FrameReader(FOUR), []
+        for k in range(0, len(data), 1000):
+            frames += reader.feed(bytes(data[k : k + 1000]), 100.0 + k / 1000.0 * 0.2)
+            assert reader.pending < 300
+        require_sound([*frames, *reader.finish()])
