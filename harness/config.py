@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 from harness.core.share import share_folder
 from harness.errors import BadFile, HarnessError, UnknownName
+from harness.simulate.link import TrackerConfig
 
 T = TypeVar("T")
 
@@ -53,15 +54,6 @@ class Station:
 
 
 @dataclass(frozen=True)
-class Tracker:
-    """The device: see `harness.simulate.simulate.TrackerConfig`."""
-
-    rate_hz: float = 40.0
-    latency_s: float = 0.004
-    baud: int = 115200
-
-
-@dataclass(frozen=True)
 class Scenario:
     """One experiment: every test clip, with every method and every choice of inputs."""
 
@@ -75,7 +67,8 @@ class Scenario:
     calibration: Literal["exact"] = "exact"
     mount: str = "tibia"
     """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
-    tracker: Tracker = field(default_factory=Tracker)
+    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    """The device and its line."""
     noise: Literal["clean", "noise", "default"] = "default"
     profile: str = ""
     """What tables call the noise when components are changed; "default*" and so on without a name."""

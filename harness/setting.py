@@ -1,6 +1,6 @@
 """What the cells of one clip share: the body, the true motion on it, its simulation, and what may be learnt from."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import cached_property
 
 import numpy as np
@@ -30,7 +30,10 @@ def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
 
 
 def tracker_of(scenario: Scenario) -> TrackerConfig:
-    return changed(TrackerConfig(), asdict(scenario.tracker), "tracker")
+    """The device; sampling in turn belongs to the clock's errors, so that at level `clean` all stations are sampled
+    at one moment unless the scenario's `tracker.slot_s` says otherwise (docs/is900.md 13.5)."""
+    together = scenario.noise == "clean" and scenario.tracker.slot_s is None
+    return replace(scenario.tracker, slot_s=0.0) if together else scenario.tracker
 
 
 def noise_of(scenario: Scenario) -> Noise:

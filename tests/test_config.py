@@ -63,7 +63,8 @@ def test_a_minimal_scenario_takes_its_name_from_the_file(tmp_path: Path) -> None
         ('methods = ["ik"]', 'methods = ["ik"]\nschema = 2', "schema"),
         ('["walking"]', '["walking", "boxing"]', "behaviours"),
         ('["walking_p1_01"]', "[]", "no test clips"),
-        ("[stations]", "[tracker]\nrate_hz = 0.0\n[stations]", "1 to 1000"),
+        ("[stations]", "[tracker]\nrate_hz = 2000.0\n[stations]", "1 to 1000"),
+        ("[stations]", "[tracker]\nrate_hz = 0.0\n[stations]", "positive"),
         ("[motion]", "[motion", "not TOML"),
     ],
 )
