@@ -8,7 +8,7 @@
 Each rule is one function that returns what it found amiss, so that a stream is told everything at once.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from itertools import islice, pairwise
 
@@ -32,24 +32,22 @@ def check_stream(opened: Callable[[], TrackerStream], *, rate_hz: float, at_most
     """
     stream = opened()
     stations = stream.stations
-    frames = list(islice(_frames(stream), at_most))
+    frames = list(islice(iter(stream), at_most))
     broken = [] if len(frames) >= 2 else [f"gave {len(frames)} frames, two are needed to judge it"]
     if stream.stations != stations or len(set(stations)) < len(stations):
         broken.append(f"stations were {stations}, became {stream.stations}, and must be distinct and never change")
     stream.close()
-    for rule in (_rows, _locked, _times, _rates, _validity, _repeats):
-        broken += rule(frames, len(stations), 1.0 / rate_hz)
+    broken += _rows(frames, len(stations))
+    whole = [frame for frame in frames if len(frame.measured_s) == len(stations)]
+    for rule in (_locked, _times, _spans, _validity, _repeats):
+        broken += rule(whole, len(stations), 1.0 / rate_hz)
     broken += _closing(opened)
     if broken:
         raise BrokenStream("\n".join(broken))
     return frames
 
 
-def _frames(stream: TrackerStream) -> Iterator[TrackerFrame]:
-    return iter(stream)
-
-
-def _rows(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _rows(frames: Sequence[TrackerFrame], stations: int) -> list[str]:
     """Every frame has a row for every station."""
     return [
         f"frame {i} has {len(frame.measured_s)} rows for {stations} stations"
@@ -82,7 +80,7 @@ def _times(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> li
     return broken
 
 
-def _rates(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _spans(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
     """A frame is one instant: its stations were measured within 1.5 periods."""
     spans_s = [
         _span_s(f.measured_s[~f.suspect & ~np.isnan(f.measured_s)]) for f in frames if len(f.suspect) == stations
@@ -131,7 +129,7 @@ def _closing(opened: Callable[[], TrackerStream]) -> list[str]:
     broken = []
     for read in (0, 1):
         stream = opened()
-        iteration = _frames(stream)
+        iteration = iter(stream)
         try:
             seen = len(list(islice(iteration, read)))
             stream.close()

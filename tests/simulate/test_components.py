@@ -6,6 +6,7 @@ the seed, so a test that passes once passes always, and a component that is off 
 
 import dataclasses
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -329,7 +330,8 @@ def test_one_component_less_leaves_the_draws_of_the_others_alone(still: Still, l
         return shift
 
     whole = dataclasses.replace(level("default"), dropout=None, session=Session(scale=0.0))
-    rest = dataclasses.replace(whole, **{left_out: None})
+    nothing: dict[str, Any] = {left_out: None}
+    rest = dataclasses.replace(whole, **nothing)
     alone = dataclasses.replace(Noise(), **{left_out: getattr(whole, left_out)})
     np.testing.assert_allclose(offset(rest) + offset(alone), offset(whole), atol=1e-12)
 
