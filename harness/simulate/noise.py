@@ -1,4 +1,4 @@
-"""How an IS-900 errs: components put together, and the named levels of PROTOCOL.md 13.5."""
+"""How an IS-900 errs: components put together, and the named levels of docs/is900.md 13.5."""
 
 from dataclasses import dataclass
 

@@ -24,7 +24,7 @@ from harness.stream.records import Said, encode
 __all__ = ["Simulation", "TrackerConfig", "simulate"]
 
 WORLD_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
-"""The tracker's axes are x forward, y right, z down (PROTOCOL 5.3): half a turn about x from the world's."""
+"""The tracker's axes are x forward, y right, z down (docs/is900.md 5.3): half a turn about x from the world's."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,6 @@
 """The device's clock made continuous: it may be set to zero at any time, and single stamps may be damaged.
 
-Stamps are 32-bit floats of milliseconds (PROTOCOL section 8), so their resolution falls with the time since `MZ`:
+Stamps are 32-bit floats of milliseconds (docs/is900.md 8), so their resolution falls with the time since `MZ`:
 0.001 ms after 10 s, 0.25 ms after an hour, 8 ms after a day. Nothing can restore that; re-zeroing can prevent it.
 """
 

@@ -1,4 +1,4 @@
-"""What a data record may hold: the items of an output list, as data (PROTOCOL section 5.1).
+"""What a data record may hold: the items of an output list, as data (docs/is900.md 5.1).
 
 Sizes and layouts are those of the binary form; a structured numpy type per list does the packing.
 """

@@ -1,4 +1,4 @@
-"""Binary data records, to be sent: SI units into the items of an output list (PROTOCOL section 5)."""
+"""Binary data records, to be sent: SI units into the items of an output list (docs/is900.md 5)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -214,7 +214,7 @@ def test_dropout(still: Still) -> None:
     gaps = runs(lost)
     lengths_s = np.array([(b - a) / rate_hz for _, a, b in gaps])
     assert 0.1 - 1.0 / rate_hz <= lengths_s.min()
-    assert lengths_s.max() <= 0.5 + 1.0 / rate_hz + 0.1, "two gaps may touch"
+    assert np.quantile(lengths_s, 0.98) <= 0.5 + 1.0 / rate_hz, "one gap in 600 touches the next"
     assert abs(lengths_s.mean() - 0.3) < Z * np.sqrt((0.4**2 + 1.0 / rate_hz**2) / 12.0 / len(lengths_s)) + 0.01
     shift, _ = errors(true, seen)
     coasts = 0
@@ -242,7 +242,7 @@ def test_dropout(still: Still) -> None:
     [(0.1, 0.5, 0.2), (0.1, 5.0, 21.0), (0.25, 1.0, 2.1), (0.25, 2.0, 8.6), (0.5, 0.5, 1.1), (0.5, 2.0, 17.0)],
 )
 def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coast_s: float, error_cm: float) -> None:
-    """The table of PROTOCOL 13.4, to the digits it has."""
+    """The table of docs/is900.md 13.4, to the digits it has."""
     true, seen = still(400.0, 2), still(400.0, 2)
     Dropout(share=0.005, coast_s=coast_s, tilt_rad=np.deg2rad(tilt_deg)).spoil(seen)
     alone = ~seen.hits["lost"]
@@ -346,7 +346,7 @@ def test_noise_differs_by_seed_take_and_station(still: Still) -> None:
 
 
 def test_levels_are_the_table_of_the_protocol() -> None:
-    """PROTOCOL 13.5, number by number."""
+    """docs/is900.md 13.5, number by number."""
     assert level("clean") == Noise()
     noise, default = level("noise"), level("default")
     assert {name for name, part in vars(noise).items() if part} == {"white", "slow", "session", "clock"}
