@@ -10,7 +10,7 @@ from harness.errors import BadInput
 from harness.stream.items import STANDARD_LIST, size
 
 BITS_PER_BYTE = 10
-"""8N1: a start bit, eight bits, a stop bit (PROTOCOL section 2)."""
+"""8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
 
 
 @dataclass(frozen=True)
@@ -20,20 +20,22 @@ class TrackerConfig:
     rate_hz: float = 40.0
     """Records per second of each station (Liu et al. 2011)."""
     latency_s: float = 0.004
-    """From the sample to the first bit on the line, when the line is free (PROTOCOL 13.1, unverified)."""
+    """From the sample to the first bit on the line, when the line is free (docs/is900.md 13.1, unverified)."""
     baud: int = 115200
-    """Bits per second of the line (PROTOCOL section 2)."""
+    """Bits per second of the line (docs/is900.md 2)."""
     slot_s: float | None = None
     """Stations are sampled in turn, this much apart [s]; by default as fast as the line takes their records."""
     items: tuple[int, ...] = STANDARD_LIST
     """Output list of every station."""
     queue_records: int = 12
-    """Records that wait for the line before the oldest is dropped (PROTOCOL section 14; the size is a choice)."""
+    """Records that wait for the line before the oldest is dropped (docs/is900.md 14; the size is a choice)."""
     origin_m: tuple[float, float, float] = (0.0, 0.0, 2.5)
     """Origin of the tracker's frame in the world [m]: a constellation under the ceiling."""
 
     def __post_init__(self) -> None:
-        if not (self.rate_hz > 0.0 and self.baud > 0 and self.latency_s >= 0.0 and self.queue_records >= 1):
+        if not (
+            0.0 < self.rate_hz < 1e5 and self.baud > 0 and 0.0 <= self.latency_s < 60.0 and self.queue_records >= 1
+        ):
             raise BadInput(f"Not a tracker: {self}.", "Rate and baud are positive, latency is not negative.")
         if 21 not in self.items:
             raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")

@@ -33,6 +33,8 @@ class WireFormat:
     def __post_init__(self) -> None:
         if not 1 <= len(self.stations) <= len(STATION_CHARACTERS):
             raise BadInput(f"{len(self.stations)} stations.", f"An IS-900 has 1 to {len(STATION_CHARACTERS)}.")
+        if len(set(self.stations)) < len(self.stations):
+            raise BadInput(f"Stations {', '.join(self.stations)}: a name twice.", "Each has a name of its own.")
 
     @property
     def characters(self) -> bytes:

@@ -2,12 +2,13 @@
 
 from dataclasses import dataclass
 
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock that was set to zero some time before the take and does not run at the host's pace (PROTOCOL 13.5).
+    """A clock that was set to zero some time before the take and does not run at the host's pace (docs/is900.md 13.5).
 
     Rounding to 32-bit milliseconds is the wire's doing and happens at every level.
     """
@@ -16,6 +17,9 @@ class Clock:
     """What it shows when the take begins [s]."""
     drift_ppm: float = 20.0
     """How much faster it runs [1e-6]."""
+
+    def __post_init__(self) -> None:
+        require(self, offset_s=(0.0, 1e6), drift_ppm=(-1e5, 1e5))
 
     def spoil(self, sensed: Sensed) -> None:
         sensed.device_s = self.offset_s + (1.0 + 1e-6 * self.drift_ppm) * sensed.time_s

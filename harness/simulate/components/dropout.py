@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 GRAVITY_M_S2 = 9.81
@@ -14,8 +15,8 @@ GRAVITY_M_S2 = 9.81
 class Dropout:
     """Gaps of quality 0, each after a stretch of falling quality and growing error.
 
-    While it coasts, a tilt error leaks gravity into the horizontal: 0.5 g sin(tilt) t^2 (PROTOCOL 13.4). In the gap,
-    records keep coming with what the filter believed last (section 7). Share and lengths are inferred (13.5).
+    While it coasts, a tilt error leaks gravity into the horizontal: 0.5 g sin(tilt) t^2 (docs/is900.md 13.4). In the
+    gap, records keep coming with what the filter believed last (section 7). Share and lengths are inferred (13.5).
     """
 
     share: float = 0.01
@@ -26,6 +27,9 @@ class Dropout:
     """Time without ranges before each gap, at most back to the one before [s]."""
     tilt_rad: float = float(np.deg2rad(0.25))
     """Tilt error while coasting [rad]: the RMS of pitch and roll."""
+
+    def __post_init__(self) -> None:
+        require(self, share=(0.0, 0.99), gap_s=(1e-3, 1e6), coast_s=(1e-3, 60.0), tilt_rad=(0.0, 1.0))
 
     def spoil(self, sensed: Sensed) -> None:
         lost = np.zeros(sensed.time_s.shape, bool)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.simulate.components.excursion import direction
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 _WARM_UP = 64
@@ -16,7 +17,7 @@ class Echo:
     """Bursts of readings that are pushed away from one direction, each burst by its own distance.
 
     A reflection lengthens a range, never shortens it (National Academy Press; rate and size are inferred,
-    PROTOCOL 13.3 and 13.5). The "outlier rate" of a study is `share`.
+    docs/is900.md 13.3 and 13.5). The "outlier rate" of a study is `share`.
     """
 
     share: float = 0.03
@@ -25,6 +26,9 @@ class Echo:
     """Fewest and most readings in a burst, all as likely."""
     size_m: tuple[float, float] = (0.05, 0.30)
     """Smallest and largest push [m]."""
+
+    def __post_init__(self) -> None:
+        require(self, share=(0.0, 0.99), burst_records=(1, 100_000), size_m=(0.0, 10.0))
 
     def spoil(self, sensed: Sensed) -> None:
         hit = np.zeros(sensed.time_s.shape, bool)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
@@ -24,6 +25,9 @@ class Excursion:
     """Shortest and longest time from onset to the beginning of the return [s]."""
     ramp_s: float = 0.2
     """Time to get there, and to get back [s]."""
+
+    def __post_init__(self) -> None:
+        require(self, onsets_per_min=(0.0, 600.0), size_m=(0.0, 10.0), stay_s=(0.0, 1e6), ramp_s=(0.0, 60.0))
 
     def spoil(self, sensed: Sensed) -> None:
         hit = np.zeros(sensed.time_s.shape, bool)

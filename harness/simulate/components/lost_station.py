@@ -1,18 +1,23 @@
 """A station that is out for a while, or for good."""
 
+import math
 from dataclasses import dataclass
 
 from harness.errors import UnknownName
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
 @dataclass(frozen=True)
 class LostStation:
-    """Quality 0 from one moment to another; records keep coming (PROTOCOL section 7). A fault that scenarios name."""
+    """Quality 0 from one moment to another; records keep coming (docs/is900.md 7). A fault that scenarios name."""
 
     station: str
     from_s: float = 0.0
     to_s: float = float("inf")
+
+    def __post_init__(self) -> None:
+        require(self, to_s=(self.from_s, math.inf))
 
     def spoil(self, sensed: Sensed) -> None:
         if self.station not in sensed.stations:

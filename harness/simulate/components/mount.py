@@ -1,11 +1,13 @@
 """Trackers that are not where the calibration says: put on badly, or slipping on their straps."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core import rotations
 from harness.errors import UnknownName
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
@@ -17,6 +19,9 @@ class MountOffset:
     """Standard deviation along each axis of the station [m]."""
     orientation_rad: float = 0.0
     """Standard deviation about each axis of the station [rad]."""
+
+    def __post_init__(self) -> None:
+        require(self, position_m=(0.0, 1.0), orientation_rad=(0.0, math.pi))
 
     def spoil(self, sensed: Sensed) -> None:
         for row, station in enumerate(sensed.stations):
@@ -39,6 +44,9 @@ class MountSlip:
     """Angle about the bone that it ends with, by the right-hand rule about the bone's direction [rad]."""
     along_m: float = 0.0
     """Distance along the bone, towards its far end, that it ends with [m]."""
+
+    def __post_init__(self) -> None:
+        require(self, over_s=(0.0, math.inf))
 
     def spoil(self, sensed: Sensed) -> None:
         if self.station not in sensed.stations:

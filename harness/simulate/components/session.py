@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from harness.core import rotations
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
@@ -10,13 +11,16 @@ from harness.simulate.sensed import Sensed
 class Session:
     """The scale of space, by temperature (0.17 % per deg C), and where in its housing each station believes to be.
 
-    Both normal, drawn once (PROTOCOL 13.3 and 13.5; the sizes are inferred).
+    Both normal, drawn once (docs/is900.md 13.3 and 13.5; the sizes are inferred).
     """
 
     scale: float = 0.001
     """Standard deviation of the scale error about the tracker's origin, common to all stations."""
     station_offset_m: float = 0.001
     """Standard deviation on each axis of a station [m]."""
+
+    def __post_init__(self) -> None:
+        require(self, scale=(0.0, 0.1), station_offset_m=(0.0, 1.0))
 
     def spoil(self, sensed: Sensed) -> None:
         for row, station in enumerate(sensed.stations):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
@@ -13,8 +14,8 @@ class Slow:
     """First-order Gauss-Markov on each axis, stationary from the start.
 
     1.5 mm is what Gilson et al. 2006 measured at rest; the angles are the maker's, unverified; a correlation time
-    of 0.2 to 2 s is inferred from ranges correcting inertia (PROTOCOL 13.1, 13.2 and 13.5). Gravity holds pitch and
-    roll better than ranges hold yaw.
+    of 0.2 to 2 s is inferred from ranges correcting inertia (docs/is900.md 13.1, 13.2 and 13.5). Gravity holds pitch
+    and roll better than ranges hold yaw.
     """
 
     position_m: float = 0.0015
@@ -25,6 +26,9 @@ class Slow:
     """RMS about the vertical axis [rad]."""
     correlation_s: float = 1.0
     """Time after which the correlation is 1/e [s]."""
+
+    def __post_init__(self) -> None:
+        require(self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6))
 
     def spoil(self, sensed: Sensed) -> None:
         draws = [sensed.draw("slow", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]

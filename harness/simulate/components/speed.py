@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
 
@@ -9,11 +10,14 @@ from harness.simulate.sensed import Sensed
 class Speed:
     """Ranges are measured at another moment than the record's: an error along the velocity.
 
-    Gilson et al. 2006 found errors that grow with speed; the size is inferred (PROTOCOL 13.3 and 13.5).
+    Gilson et al. 2006 found errors that grow with speed; the size is inferred (docs/is900.md 13.3 and 13.5).
     """
 
     ahead_s: float = 0.002
     """Motion that is added [s]; negative lags behind."""
+
+    def __post_init__(self) -> None:
+        require(self, ahead_s=(-1.0, 1.0))
 
     def spoil(self, sensed: Sensed) -> None:
         sensed.move(self.ahead_s * sensed.velocity_m_s)
