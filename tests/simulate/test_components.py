@@ -155,6 +155,13 @@ def test_excursion(still: Still) -> None:
     assert np.abs(np.mean(ways, axis=0)).max() < Z / np.sqrt(3.0 * len(ways))
 
 
+def test_excursions_that_meet_stay_below_the_largest_size(still: Still) -> None:
+    true, seen = still(600.0), still(600.0)
+    Excursion(onsets_per_min=60.0).spoil(seen)
+    size_m = np.linalg.norm(errors(true, seen)[0], axis=2)
+    assert 0.0299 < size_m.max() <= 0.03 + 1e-12
+
+
 def test_excursions_may_be_under_way_when_the_take_begins(still: Still) -> None:
     begun = []
     for seed in range(100):

@@ -11,10 +11,10 @@ from harness.simulate.sensed import Sensed
 
 @dataclass(frozen=True)
 class Excursion:
-    """ "Now and then off by up to 3 cm for several seconds, then back" (Gilson et al. 2006; the rate is inferred).
+    """Now and then off by up to 3 cm for several seconds, then back (Gilson et al. 2006; the rate is inferred).
 
     Onsets are a Poisson process for each station, going on since before the take; size, stay and direction are
-    uniform and drawn anew each time. Where two meet they add up.
+    uniform and drawn anew each time. Where two meet they add up, but never to more than the largest size.
     """
 
     onsets_per_min: float = 1.0
@@ -33,10 +33,14 @@ class Excursion:
         hit = np.zeros(sensed.time_s.shape, bool)
         for row, station in enumerate(sensed.stations):
             time_s = sensed.time_s[:, row]
-            for begin_s, stay_s, offset_m in self.events(sensed.draw("excursion", station), float(time_s.max())):
+            offset_m = np.zeros((len(time_s), 3))
+            for begin_s, stay_s, whole_m in self.events(sensed.draw("excursion", station), float(time_s.max())):
                 share = self.course(time_s - begin_s, stay_s)
-                sensed.position_m[:, row] += share[:, None] * offset_m
+                offset_m += share[:, None] * whole_m
                 hit[:, row] |= share > 0.0
+            largest_m = max(self.size_m[1], 1e-12)
+            size_m = np.sqrt(np.sum(offset_m**2, axis=1, keepdims=True))
+            sensed.position_m[:, row] += offset_m * (largest_m / np.maximum(size_m, largest_m))
         sensed.hits["excursion"] = hit
 
     def events(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, float, Floats]]:
