@@ -26,9 +26,7 @@ BENCHMARKS: dict[str, Callable[[int], list[Row]]] = {
 }
 
 
-def bench(
-    what: Sequence[str], *, seed: int, progress: Callable[[str, int, int], None]
-) -> tuple[list[Row], list[str]]:
+def bench(what: Sequence[str], *, seed: int, progress: Callable[[str, int, int], None]) -> tuple[list[Row], list[str]]:
     """The rows of the named benchmarks, or of all, and why some of all could not be run; UnknownName, MissingExtra."""
     for name in what:
         if name not in BENCHMARKS:

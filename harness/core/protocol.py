@@ -1,4 +1,4 @@
-"""Which motion may be learnt from: a test clip is never among its own examples (ALGORITHMS.md F1)."""
+"""Which motion may be learnt from: a test clip is never among its own examples (docs/methods.md F1)."""
 
 import re
 from collections.abc import Iterable

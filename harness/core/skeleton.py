@@ -124,7 +124,7 @@ def bone_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
 def unwrapped(skeleton: Skeleton, angles_rad: Floats) -> Floats:
     """The same rotations (T, D) with each bone's angles as near as possible to the frame before.
 
-    Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi) (ALGORITHMS.md F9). What that
+    Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi) (docs/methods.md F9). What that
     leaves open is settled for the clip as a whole: each column's median lies in (-pi, pi], and of a bone's two twin
     courses the one whose medians are nearer to zero is taken. A single frame takes what is nearest to zero.
     """

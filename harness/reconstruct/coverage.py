@@ -1,4 +1,4 @@
-"""Status of an estimate, from how many of the configured stations report (ALGORITHMS.md E, "lost tracker")."""
+"""Status of an estimate, from how many of the configured stations report (docs/methods.md E, "lost tracker")."""
 
 from harness.core.estimate import Status
 from harness.stream.frame import TrackerFrame

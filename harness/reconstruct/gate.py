@@ -1,4 +1,4 @@
-"""Leaves out a position that jumps away from where the body's own motion carries its station (ALGORITHMS.md F7).
+"""Leaves out a position that jumps away from where the body's own motion carries its station (docs/methods.md F7).
 
 A robust loss alone cannot reject an echo: under a wide prior the limb simply follows it. Readings are held against
 the estimated body, not against their own past: over one period at 40 Hz even a punch (100 m/s^2) strays 6 cm from its

@@ -1,4 +1,4 @@
-"""Inverse kinematics: the whole body fitted to the trackers, frame by frame (ALGORITHMS.md C1).
+"""Inverse kinematics: the whole body fitted to the trackers, frame by frame (docs/methods.md C1).
 
 The prior only settles what the trackers leave open: a wide Gaussian, 30 deg per hinge, about the previous pose or
 about the mean of examples. The root has none.

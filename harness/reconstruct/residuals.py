@@ -1,7 +1,7 @@
 """What separates a pose from the readings of one frame, as the solvers weigh it.
 
 One residual per tracker and kind: the vector from the modelled to the measured position, and the rotation vector
-from the modelled to the measured orientation, both along world axes (ALGORITHMS.md A5, E). Its norm e enters either
+from the modelled to the measured orientation, both along world axes (docs/methods.md A5, E). Its norm e enters either
 squared, e^2 / 2 sd^2, or through the Lorentzian of Liu et al. 2011, eq. 12, with a scale sL of its own:
 rho(e) = sL^2/sd^2 log(1 + e^2 / 2 sL^2), which is the square for small e and lets go of large ones.
 """
