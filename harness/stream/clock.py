@@ -17,9 +17,9 @@ LATEST_S = 1e7
 class Unwrapper:
     """Turns stamps into seconds that go on where the clock was set back.
 
-    A stamp is believed when, since the last one believed, it did not step back and advanced no more than the host's
-    clock did, both within `TOLERANCE_S`. Others are damaged (NaN), unless the next stamp agrees with them: then the
-    device set its clock anew, and time goes on from there by the host's clock.
+    A stamp is believed when, since the last one believed or the one before, it did not step back and advanced no more
+    than the host's clock did, both within `TOLERANCE_S`. Others are damaged (NaN), unless the next stamp agrees with
+    them: then the device set its clock anew, and time goes on from there by the host's clock.
     """
 
     def __init__(self) -> None:
@@ -27,6 +27,8 @@ class Unwrapper:
         """Added to stamps."""
         self._last: tuple[float, float] | None = None
         """Unwrapped stamp and host time of the last record believed [s]."""
+        self._before: tuple[float, float] | None = None
+        """The same of the one before, in case the last one should not have been believed."""
         self._odd: tuple[float, float] | None = None
         """Raw stamp and host time of the last one, where it was not believed [s]."""
         self.resets = 0
@@ -41,6 +43,7 @@ class Unwrapper:
             before = self._last or (float(out[0]), float(received_s[0]))
             device, host = np.diff(out, prepend=before[0]), np.diff(received_s, prepend=before[1])
             if bool(np.all((device > -TOLERANCE_S) & (device < host + TOLERANCE_S))):
+                self._before = self._last if len(out) < 2 else (float(out[-2]), float(received_s[-2]))
                 self._last = float(out[-1]), float(received_s[-1])
                 return out
         for i, (stamp, received) in enumerate(zip(stamp_s.tolist(), received_s.tolist(), strict=True)):
@@ -51,13 +54,14 @@ class Unwrapper:
         if not 0.0 <= stamp_s < LATEST_S:
             return float("nan")
         now_s = stamp_s + self._epoch_s
-        if self._last is None or _follows(self._last, (now_s, received_s)):
-            self._last, self._odd = (now_s, received_s), None
+        believed = [known for known in (self._last, self._before) if known is not None]
+        if self._last is None or any(_follows(known, (now_s, received_s)) for known in believed):
+            self._before, self._last, self._odd = self._last, (now_s, received_s), None
             return now_s
         if self._odd is not None and _follows(self._odd, (stamp_s, received_s)):
             self._epoch_s = self._last[0] + (received_s - self._last[1]) - stamp_s
             self.resets += 1
-            self._last, self._odd = (stamp_s + self._epoch_s, received_s), None
+            self._before, self._last, self._odd = None, (stamp_s + self._epoch_s, received_s), None
             return self._last[0]
         self._odd = stamp_s, received_s
         return float("nan")

@@ -87,3 +87,15 @@ def test_a_long_silence_is_no_reason_for_doubt() -> None:
     out, clock = unwrapped(stamps_s(50) + pause, HOST_S + pause)
     np.testing.assert_array_equal(out, stamps_s(50) + pause)
     assert clock.resets == 0
+
+
+@pytest.mark.parametrize("off_s", [-0.256, -0.249, -0.128, 0.128, 0.249, 0.256])
+@pytest.mark.parametrize("at", [1, 77, 198])
+def test_a_stamp_at_the_edge_of_belief_shifts_no_other(off_s: float, at: int) -> None:
+    """A flipped bit is worth 256 ms: believed or not, time must not go on from there."""
+    stamp_s = stamps_s(50)
+    stamp_s[at] += off_s
+    for pieces in (1, 7, 200):
+        out, clock = unwrapped(stamp_s, pieces=pieces)
+        np.testing.assert_array_equal(np.delete(out, at), np.delete(stamps_s(50), at))
+        assert clock.resets == 0

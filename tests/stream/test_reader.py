@@ -62,11 +62,7 @@ def test_pieces_change_nothing_but_when_they_came(chunk: int) -> None:
 def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
     kind: str, rng: np.random.Generator
 ) -> None:
-    """Readings that are missing, changed or no longer trusted: at most two in 99 % of 600 trials, never over six.
-
-    A damaged record counts for one: either it is missing, or its station or time is wrong and its neighbours share
-    the suspicion.
-    """
+    """Readings that are missing, changed or no longer trusted: that one, rarely another, in 600 trials never a third."""
     costs = []
     for trial in range(600):
         stamp_s = stamps_s(ROUNDS)
@@ -83,8 +79,8 @@ def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
             row for f in frames for row in rows([f]) if not f.suspect[row[-1]]
         }
         costs.append(len(truth - trusted))
-    assert np.mean(np.array(costs) > 2) <= 0.01, np.bincount(costs)
-    assert max(costs) <= 6, np.bincount(costs)
+    assert np.mean(np.array(costs) > 1) < 0.05, np.bincount(costs)
+    assert max(costs) <= 2, np.bincount(costs)
 
 
 def test_a_wrong_station_is_never_passed_unmarked_inside_a_round(rng: np.random.Generator) -> None:
