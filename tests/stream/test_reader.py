@@ -62,7 +62,7 @@ def test_pieces_change_nothing_but_when_they_came(chunk: int) -> None:
 def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
     kind: str, rng: np.random.Generator
 ) -> None:
-    """Readings that are missing, changed or no longer trusted: that one, rarely another, in 600 trials never a third."""
+    """Readings missing, changed or no longer trusted: that one, rarely another, in 600 trials never a third."""
     costs = []
     for trial in range(600):
         stamp_s = stamps_s(ROUNDS)
