@@ -2,6 +2,7 @@
 
 import warnings
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -135,7 +136,7 @@ def bvh_text(motion: Clip, *, t_pose: bool = True, unit_m: float = UNIT_M) -> st
 def amass_arrays(motion: Clip) -> dict[str, Floats]:
     """The motion as AMASS would hold it; the joints that drive no bone do not move."""
     world = _world_from_bone(motion)
-    joints = {drive.joint: bone for bone, drive in reversed(SMPL_MAP.items())}
+    joints = {drive.joint: bone for bone, drive in reversed(list(SMPL_MAP.items()))}
     joints |= {"left_elbow": "lwrist", "right_elbow": "rwrist", "neck": "upperneck"}
     turned = np.zeros((len(motion), len(JOINTS), 4))
     poses = np.zeros((len(motion), 156))
@@ -214,7 +215,7 @@ def _zyx_deg(quaternion: Floats) -> Floats:
     return _euler_deg(matrix, "ZYX")
 
 
-def _euler_deg(matrix: Floats, order: str) -> Floats:
+def _euler_deg(matrix: Floats, order: Literal["xyz", "ZYX"]) -> Floats:
     """scipy's Euler angles [deg]; at gimbal lock any of the many will do."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)

@@ -37,7 +37,8 @@ class Scene:
     def off_m(self, estimates: list[Estimate], truth: Floats) -> Floats:
         """(T,) mean distance over the joint centres [m]."""
         found = joint_centres_m(self.body.skeleton, np.array([e.qpos for e in estimates]))
-        return np.linalg.norm(found - joint_centres_m(self.body.skeleton, truth), axis=2).mean(axis=1)
+        off: Floats = np.linalg.norm(found - joint_centres_m(self.body.skeleton, truth), axis=2).mean(axis=1)
+        return off
 
     def residuals(self, estimates: list[Estimate], frames: list[TrackerFrame]) -> tuple[Floats, Floats]:
         """(T, S) position [m] and orientation [rad] residuals, 0 where not measured."""

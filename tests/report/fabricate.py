@@ -128,7 +128,8 @@ def _wrong(truth: Floats, error_deg: float, valid: Bools, rng: np.random.Generat
 
     def smooth(width: int) -> Floats:
         noise: Floats = gaussian_filter1d(rng.normal(size=(len(truth), width)), 6.0, axis=0)
-        return noise / noise.std()
+        unit: Floats = noise / noise.std()
+        return unit
 
     angles_rad = angles_rad + np.deg2rad(error_deg) * worse * smooth(angles_rad.shape[1])
     return pack(root_m + 0.003 * error_deg * worse * smooth(3), quaternion, angles_rad)

@@ -47,6 +47,11 @@ def seen() -> dict[str, list[str]]:
     return {"requests": [], "errors": []}
 
 
+def _noted(dialog: Any, errors: list[str]) -> None:
+    errors.append(dialog.message)
+    dialog.dismiss()
+
+
 @pytest.fixture(params=[1280, 390])
 def page(request: pytest.FixtureRequest, browser: Any, page_file: Path, seen: dict[str, list[str]]) -> Iterator[Any]:
     """The page at desktop and at phone width."""
@@ -55,7 +60,7 @@ def page(request: pytest.FixtureRequest, browser: Any, page_file: Path, seen: di
     opened.on("request", lambda r: None if r.url.startswith(outside) else seen["requests"].append(r.url))
     opened.on("console", lambda m: seen["errors"].append(m.text) if m.type == "error" else None)
     opened.on("pageerror", lambda error: seen["errors"].append(str(error)))
-    opened.on("dialog", lambda dialog: (seen["errors"].append(dialog.message), dialog.dismiss()))
+    opened.on("dialog", lambda dialog: _noted(dialog, seen["errors"]))
     opened.goto(page_file.as_uri())
     yield opened
     opened.close()

@@ -274,6 +274,17 @@ def test_a_lost_station_keeps_sending_what_it_said_last(still: Still) -> None:
         LostStation("s9").spoil(seen)
 
 
+def test_quality_falls_before_a_station_is_lost(still: Still) -> None:
+    seen = still(10.0)
+    LostStation("s2", from_s=4.0, fade_s=2.0).spoil(seen)
+    time_s, quality = seen.time_s[:, 2], seen.quality[:, 2]
+    assert (quality[time_s <= 2.0] == 1.0).all()
+    falling = (time_s > 2.0) & (time_s < 3.9)
+    np.testing.assert_allclose(quality[falling], (4.0 - time_s[falling]) / 2.0)
+    assert (quality[(time_s > 3.9) & (time_s < 4.0)] > 0.0).all()
+    assert (quality[time_s >= 4.0] == 0.0).all()
+
+
 def test_speed(still: Still, rng: np.random.Generator) -> None:
     true, seen = still(1.0), still(1.0)
     seen.velocity_m_s = rng.normal(size=seen.velocity_m_s.shape)

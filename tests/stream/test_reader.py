@@ -25,7 +25,7 @@ def clean() -> Capture:
 def rows(frames: list[TrackerFrame]) -> set[tuple[float, ...]]:
     """What valid stations said, without where in which frame."""
     return {
-        (float(f.measured_s[s]), *f.position_m[s].tolist(), float(f.quality[s]), s)
+        (float(f.measured_s[s]), *f.position_m[s].tolist(), float(f.quality[s]), float(s))
         for f in frames
         for s in np.flatnonzero(f.position_valid)
     }
@@ -76,7 +76,7 @@ def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
             data = data[:at] + byte * (kind == "added") + data[at + (kind == "lost") :]
         frames = frames_of(received(data, stamp_s))
         trusted = rows([f for f in frames if not f.suspect.any()]) | {
-            row for f in frames for row in rows([f]) if not f.suspect[row[-1]]
+            row for f in frames for row in rows([f]) if not f.suspect[int(row[-1])]
         }
         costs.append(len(truth - trusted))
     assert np.mean(np.array(costs) > 1) < 0.05, np.bincount(costs)

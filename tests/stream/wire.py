@@ -1,6 +1,9 @@
 """A device's bytes made by hand, for tests: rounds of stations that stand still, each at its own place."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.core.arrays import Floats
 from harness.stream.capture import Capture
@@ -46,7 +49,7 @@ def frames_of(capture: Capture, wire: WireFormat = FOUR) -> list[TrackerFrame]:
     return [*reader.feed_all(capture), *reader.finish()]
 
 
-def columns(frame: TrackerFrame) -> tuple[Floats, ...]:
+def columns(frame: TrackerFrame) -> tuple[NDArray[Any], ...]:
     """Everything that a frame says of its stations."""
     return (
         frame.measured_s,

@@ -29,7 +29,8 @@ class Standing:
     name, summary, needs_examples = "standing", "the T-pose, always", False
 
     def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Standing":
-        self.body, self.memory = body, []
+        self.body = body
+        self.memory: list[Any] = []
         return self
 
     def begin(self, calibration: Calibration) -> "StandingSession":

@@ -3,6 +3,8 @@
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from harness.errors import UnknownName
 from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
@@ -14,14 +16,20 @@ class LostStation:
 
     station: str
     from_s: float = 0.0
-    to_s: float = float("inf")
+    to_s: float = math.inf
+    fade_s: float = 0.5
+    """Quality falls for so long before `from_s`, as ranges become fewer (docs/is900.md 13.3; length: a choice)."""
 
     def __post_init__(self) -> None:
-        require(self, to_s=(self.from_s, math.inf))
+        require(self, to_s=(self.from_s, math.inf), fade_s=(0.0, math.inf))
 
     def spoil(self, sensed: Sensed) -> None:
         if self.station not in sensed.stations:
             raise UnknownName("station", self.station, sensed.stations)
+        row = sensed.stations.index(self.station)
+        left = np.clip((self.from_s - sensed.time_s[:, row]) / max(self.fade_s, 1e-9), 1.0 / 255.0, 1.0)
+        fading = sensed.time_s[:, row] < self.from_s
+        sensed.quality[fading, row] = np.minimum(sensed.quality[fading, row], left[fading])
         lost = (sensed.time_s >= self.from_s) & (sensed.time_s < self.to_s)
-        lost[:, [row for row, name in enumerate(sensed.stations) if name != self.station]] = False
+        lost[:, np.arange(len(sensed.stations)) != row] = False
         sensed.lose(lost)
