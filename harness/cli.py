@@ -18,7 +18,13 @@ Action = Callable[[argparse.Namespace], Outcome]
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; the exit code says how it ended (see `errors.Outcome`)."""
-    args = build_parser().parse_args(argv)
+    try:
+        args = build_parser().parse_args(argv)
+    except SystemExit as ended:  # argparse has said what is wrong, or helped
+        if ended.code:
+            word = Outcome.REFUSED.word
+            print(json.dumps({"outcome": word}) if "--json" in (argv or sys.argv) else word)
+        raise
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
     sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie where they work
@@ -33,6 +39,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         outcome = Outcome.INTERRUPTED
         print("harness: stopped; what was finished is kept, the same command goes on from there", file=sys.stderr)
+        if args.json:
+            print(json.dumps({"outcome": outcome.word}))
     except BrokenPipeError:  # the reader of our output went away, as `| head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return Outcome.PASS.exit_code
@@ -94,21 +102,21 @@ def add_run(verbs: Verbs) -> None:
 
 
 def run_scenario(args: argparse.Namespace) -> Outcome:
+    from contextlib import redirect_stdout
     from dataclasses import replace
 
     from harness import experiment
-    from harness.config import load_scenario
+    from harness.config import check_scenario, load_scenario
 
     scenario = load_scenario(args.scenario)
     if args.seed is not None:
         scenario = replace(scenario, seed=args.seed)
     if args.methods is not None:
-        scenario = replace(scenario, methods=tuple(args.methods.split(",")))
+        scenario = replace(scenario, methods=tuple(name.strip() for name in args.methods.split(",")))
+        check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
-    with progress_bar("cells") as progress:
-        outcome = experiment.run(
-            scenario, out, folder=args.mocap, jobs=args.jobs, command=this_command(), progress=progress
-        )
+    with progress_bar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+        outcome = experiment.run(scenario, out, folder=args.mocap, jobs=args.jobs, command=this_command(), progress=bar)
     page = None
     if args.report:
         from harness.report.report import write_report
@@ -185,13 +193,12 @@ def list_library(args: argparse.Namespace) -> Outcome:
     from harness.mocap.sources import library_folder
 
     entries = MotionLibrary(library_folder(args.mocap)).entries()
-    if args.json:
-        print(json.dumps({"clips": [entry.as_dict() for entry in entries], "outcome": Outcome.PASS.word}))
-        return Outcome.PASS
-    for entry in entries:
-        print(entry.line())
     if not entries:
         raise BadInput("There are no clips in it.", "Looked for .amc with .asf, .bvh, .npz and .c3d files.")
+    if args.json:
+        print(json.dumps({"clips": [entry.as_dict() for entry in entries], "outcome": Outcome.PASS.word}))
+    else:
+        print("\n".join(entry.line() for entry in entries))
     return Outcome.PASS
 
 

@@ -1,6 +1,7 @@
 """Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
 
 import dataclasses
+import math
 import tomllib
 import types
 from collections.abc import Mapping
@@ -123,20 +124,33 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         refuse("no stations", "a table [stations] with at least one", "For example: head = { bone = 'head' }.")
     if not scenario.methods:
         refuse("no methods", "names in methods", "`harness list` names them.")
+    if not scenario.inputs:
+        refuse("no inputs", "names in inputs", "`harness list` names them.")
+    if scenario.name != Path(scenario.name).name:
+        refuse(f"name = {scenario.name!r}", "a plain name", "Results are written to a folder of that name.")
     if len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
         refuse(
             f"{len(scenario.motion.behaviours)} behaviours for {len(scenario.motion.test)} test clips",
             "one for all of them, or one for each",
             "Give motion.behaviours one word.",
         )
-    for what, repeated in (("motion.test", scenario.motion.test), ("methods", scenario.methods)):
+    for what, repeated in (
+        ("motion.test", scenario.motion.test),
+        ("methods", scenario.methods),
+        ("inputs", scenario.inputs),
+    ):
         if len(set(repeated)) < len(repeated):
             refuse(f"{what} names something twice", "each name once", "Remove the second.")
     if not 1.0 <= scenario.tracker.rate_hz <= 1000.0:
         refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
+    for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):
+        if value < 0.0:
+            refuse(f"motion.{key} = {value}", "0 or more", "0 stands for all of it, or for none recorded.")
     for name, station in scenario.stations.items():
         if not 0.0 <= station.along <= 1.0:
             refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
+        if station.stand_off_m < 0.0:
+            refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Trackers sit on the skin.")
 
 
 def build(kind: type[T], content: Any, where: str) -> T:
@@ -204,6 +218,8 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return float(value)
     if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
         raise TypeError(f"{where}: expected {hint.__name__}, found {value!r}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise TypeError(f"{where}: expected a finite number, found {value}")
     return value
 
 

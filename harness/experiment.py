@@ -5,6 +5,7 @@ written whole or not at all, so that a run can be stopped at any moment and goes
 """
 
 import signal
+import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -128,7 +129,7 @@ def _cells(todo: list[Job], out: Path, jobs: int) -> Iterator[Ended]:
         for job in todo:
             yield from run_job(job, out)
         return
-    with ProcessPoolExecutor(min(jobs, len(todo)), get_context("spawn"), _leave_ctrl_c_to_the_parent) as pool:
+    with ProcessPoolExecutor(min(jobs, len(todo)), get_context("spawn"), _start_worker) as pool:
         running = {pool.submit(_run_whole_job, job, out): job for job in todo}
         try:
             for future in as_completed(running):
@@ -140,8 +141,9 @@ def _cells(todo: list[Job], out: Path, jobs: int) -> Iterator[Ended]:
             pool.shutdown(wait=True, cancel_futures=True)  # what runs is finished and kept
 
 
-def _leave_ctrl_c_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _start_worker() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's
+    sys.stdout = sys.stderr  # what a method prints is talk, not data
 
 
 def _run_whole_job(job: Job, out: Path) -> list[Ended]:
@@ -163,7 +165,7 @@ def run_job(job: Job, out: Path) -> Iterator[Ended]:
             yield Ended(cell, key)
         except HarnessError as error:
             yield Ended(cell, failure=str(error), refused=True)
-        except Exception:  # a method under test may raise anything: its cell fails, the run goes on
+        except (Exception, SystemExit):  # a method under test may raise anything: its cell fails, the run goes on
             yield Ended(cell, failure=traceback.format_exc())
 
 

@@ -11,10 +11,12 @@ from harness.config import Scenario, changed
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip, Take
 from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
+from harness.errors import BadInput
 from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.score import manifest, results
+from harness.score.score import WARM_UP_S
 from harness.simulate import noise as noises
 from harness.simulate.noise import Noise
 from harness.simulate.simulate import Simulation, TrackerConfig, simulate
@@ -37,8 +39,11 @@ def tracker_of(scenario: Scenario) -> TrackerConfig:
 
 
 def noise_of(scenario: Scenario) -> Noise:
-    """The level, with the scenario's changes to single components; UnknownName, TypeError."""
-    return changed(noises.level(scenario.noise), scenario.components, "components")
+    """The level, with the scenario's changes to single components; UnknownName, BadInput."""
+    try:
+        return changed(noises.level(scenario.noise), scenario.components, "components")
+    except TypeError as error:
+        raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
 
 class Setting:
@@ -71,7 +76,11 @@ class Setting:
     def simulation(self) -> Simulation:
         scenario = self.scenario
         tracker, noise = tracker_of(scenario), noise_of(scenario)
-        return simulate(self.body, self.take, mounts_of(scenario), tracker, noise, seed=scenario.seed)
+        seen = simulate(self.body, self.take, mounts_of(scenario), tracker, noise, seed=scenario.seed)
+        if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
+            found = f"{self.part} is judged for {len(seen.truth_s) / tracker.rate_hz:.2f} s"
+            raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
+        return seen
 
     @cached_property
     def example_clips(self) -> list[Clip]:

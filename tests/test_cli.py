@@ -39,6 +39,8 @@ def test_a_verb_that_does_not_exist_is_refused(tmp_path: Path) -> None:
     ended = run("frobnicate", cwd=tmp_path)
     assert ended.returncode == 2
     assert "invalid choice" in ended.stderr
+    assert ended.stdout.strip() == "refused"
+    assert json.loads(run("run", "--json", cwd=tmp_path).stdout) == {"outcome": "refused"}
 
 
 def test_real_motion_is_never_replaced_by_built_in(tmp_path: Path) -> None:
@@ -55,6 +57,29 @@ def test_errors_are_json_when_json_is_asked_for(tmp_path: Path) -> None:
     said = json.loads(ended.stdout)
     assert said["outcome"] == "refused"
     assert "boxing" in said["error"]
+
+
+def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(tmp_path: Path) -> None:
+    (tmp_path / "noisy.py").write_text(
+        "from dataclasses import dataclass\n"
+        "from harness.reconstruct.mean_pose import MeanPose\n"
+        "@dataclass(frozen=True)\n"
+        "class Chatty(MeanPose):\n"
+        "    def fit(self, body, examples, rng):\n"
+        "        print('hello')\n"
+        "        return super().fit(body, examples, rng)\n"
+        "@dataclass(frozen=True)\n"
+        "class Stopped(MeanPose):\n"
+        "    def fit(self, body, examples, rng):\n"
+        "        raise KeyboardInterrupt\n"
+    )
+    for jobs in ("1", "2"):
+        words = ("--methods", "noisy:Chatty", "--no-report", "--json", "--jobs", jobs, "--out", f"chatty{jobs}")
+        ended = run("run", "demo", *words, cwd=tmp_path)
+        assert json.loads(ended.stdout)["outcome"] == "pass"
+        assert "hello" in ended.stderr
+    ended = run("run", "demo", "--methods", "noisy:Stopped", "--json", "--out", "stopped", cwd=tmp_path)
+    assert (ended.returncode, json.loads(ended.stdout)) == (130, {"outcome": "interrupted"})
 
 
 def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:

@@ -66,6 +66,13 @@ def test_a_minimal_scenario_takes_its_name_from_the_file(tmp_path: Path) -> None
         ("[stations]", "[tracker]\nrate_hz = 2000.0\n[stations]", "1 to 1000"),
         ("[stations]", "[tracker]\nrate_hz = 0.0\n[stations]", "positive"),
         ("[motion]", "[motion", "not TOML"),
+        ('methods = ["ik"]', 'methods = ["ik"]\ninputs = []', "no inputs"),
+        ('methods = ["ik"]', 'methods = ["ik"]\ninputs = ["pos", "pos"]', "twice"),
+        ('methods = ["ik"]', 'methods = ["ik"]\nname = "../other"', "plain name"),
+        ("[motion]", "[motion]\nlongest_s = -1.0", "0 or more"),
+        ("[motion]", "[motion]\nlongest_s = nan", "finite"),
+        ('bone = "head"', 'bone = "head", around_deg = inf', "finite"),
+        ('bone = "head"', 'bone = "head", stand_off_m = -0.1', "0 or more"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:

@@ -115,13 +115,26 @@ class Broken:
         raise ZeroDivisionError("on purpose")
 
 
-def test_a_failing_method_fails_alone(tmp_path: Path) -> None:
-    scenario = replace(SMALL, methods=("tests.test_experiment:Broken", "mean_pose"))
+class Exits(Broken):
+    """A method that ends the program."""
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        raise SystemExit("on purpose")
+
+
+@pytest.mark.parametrize("method", ["tests.test_experiment:Broken", "tests.test_experiment:Exits"])
+def test_a_failing_method_fails_alone(tmp_path: Path, method: str) -> None:
+    scenario = replace(SMALL, methods=(method, "mean_pose"))
     assert experiment.run(scenario, tmp_path / "run") is Outcome.INCOMPLETE
     summary = read_summary(tmp_path / "run")
     assert (summary["cells_finished"], summary["cells_planned"]) == (2, 4)
     assert len(summary["failures"]) == 2
     assert all("on purpose" in text for text in summary["failures"].values())
+
+
+def test_what_is_all_warm_up_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="warm-up"):
+        experiment.run(replace(SMALL, motion=replace(SMALL.motion, longest_s=1.0)), tmp_path / "run")
 
 
 @pytest.mark.parametrize("protocol", ["sequence", "subject", "block"])
@@ -151,6 +164,13 @@ def test_names_that_do_not_exist_are_refused_before_anything_is_written(
     with pytest.raises(UnknownName) as caught:
         experiment.run(replace(SMALL, **change), tmp_path / "run")  # type: ignore[arg-type]
     assert message in str(caught.value)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("wrong", [{"echo": {"share": "much"}}, {"echo": {"share": float("nan")}}, {"lost": 3}])
+def test_values_of_components_are_checked(tmp_path: Path, wrong: dict[str, object]) -> None:
+    with pytest.raises(BadInput, match=r"components.*expected"):
+        experiment.run(replace(SMALL, components=wrong), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
@@ -200,4 +220,5 @@ def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
     found = {str(row["method"]): row for row in rows(tmp_path / "run")}
     assert found["ik"]["motion_source"] == "cmu"
     assert found["best_match"]["protocol"] == "block"
+    assert all(row["joint_angle_mean_deg"] is not None for row in rows(tmp_path / "run"))
     assert os.path.exists(tmp_path / "run" / "summary.csv")

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
 
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadInput, HarnessError, UnknownName
 from harness.reconstruct import ik
 from harness.reconstruct.best_match import BestMatch
 from harness.reconstruct.clean_up import SUFFIX, CleanUp
@@ -44,10 +44,17 @@ def resolve(name: str) -> Method:
     module, colon, attribute = name.partition(":")
     if not colon or not attribute or module in known or not _exists(module):
         raise UnknownName("method", name, known)
-    found = getattr(importlib.import_module(module), attribute, None)
-    if found is None:
-        raise UnknownName(f"method in {module}", attribute, _public(module))
-    method: Method = found()
+    try:
+        found = getattr(importlib.import_module(module), attribute, None)
+        if found is None:
+            raise UnknownName(f"method in {module}", attribute, _public(module))
+        method: Method = found()
+    except HarnessError:
+        raise
+    except (Exception, SystemExit) as error:  # anyone's own code may raise anything
+        raise BadInput(
+            f"{name} cannot be made: {type(error).__name__}: {error}.", "Does it import, and need no arguments?"
+        ) from error
     missing = [m for m in ("name", "summary", "needs_examples", "fit") if not hasattr(method, m)]
     if missing:
         raise BadInput(
@@ -78,7 +85,7 @@ def source_hash(method: Method) -> str:
 def _exists(module: str) -> bool:
     try:
         return importlib.util.find_spec(module) is not None
-    except (ModuleNotFoundError, ValueError):
+    except (ImportError, ValueError):
         return False
 
 

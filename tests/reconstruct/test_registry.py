@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
 import pytest
 
@@ -37,7 +38,9 @@ def test_anyones_own_class_by_module() -> None:
     assert registry.resolve("harness.reconstruct.mean_pose:MeanPose") == MeanPose()
 
 
-@pytest.mark.parametrize("name", ["", "ik:gausian", "ik:", "mean", "no_such_module:Class", "ik2+ik", ":Class", "+ik"])
+@pytest.mark.parametrize(
+    "name", ["", "ik:gausian", "ik:", "../x:Class", "mean", "no_such_module:Class", "ik2+ik", ":Class", "+ik"]
+)
 def test_unknown_names_are_refused_with_the_choices(name: str) -> None:
     with pytest.raises(UnknownName) as caught:
         registry.resolve(name)
@@ -54,6 +57,30 @@ def test_a_module_without_that_class_and_a_class_that_is_no_method() -> None:
         registry.resolve("harness.reconstruct.mean_pose:MeanPoze")
     with pytest.raises(BadInput, match="no summary"):
         registry.resolve("fractions:Fraction")
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "message"),
+    [
+        ("def broken(:", "Any", "SyntaxError"),
+        ("import no_such_package", "Any", "no_such_package"),
+        ("raise SystemExit(5)", "Any", "SystemExit"),
+        ("class Needy:\n    def __init__(self, what): ...", "Needy", "what"),
+        ("value = 3", "value", "not callable"),
+    ],
+)
+def test_a_module_or_class_that_cannot_be_used(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    text: str,
+    name: str,
+    message: str,
+) -> None:
+    module = f"somebodys_{tmp_path.name}"
+    (tmp_path / f"{module}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(BadInput, match=message):
+        registry.resolve(f"{module}:{name}")
 
 
 def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPatch) -> None:
