@@ -14,7 +14,7 @@ EVERYTHING = {p.name for p in PACKAGE.iterdir() if p.is_dir() and (p / "__init__
 MAY_IMPORT: dict[str, set[str]] = {
     "core": set(),
     "mocap": set(),
-    "body": {"mocap"},
+    "body": set(),
     "stream": set(),
     "simulate": {"body", "stream"},
     "calibrate": {"body", "stream"},

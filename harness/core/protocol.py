@@ -5,6 +5,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from harness.errors import BadInput
 
 Protocol = Literal["block", "sequence", "subject"]
@@ -37,11 +39,18 @@ class Part:
         return cls(clip, start, end)
 
     def __str__(self) -> str:
-        return self.clip if (self.start, self.end) == (0.0, 1.0) else f"{self.clip}@{self.start:.2f}-{self.end:.2f}"
+        """As `parse` reads it; parts that differ at all print differently."""
+        return self.clip if (self.start, self.end) == (0.0, 1.0) else f"{self.clip}@{_text(self.start)}-{_text(self.end)}"
 
     def frames(self, count: int) -> range:
         """The frames of a take of `count` frames that lie in it."""
         return range(round(self.start * count), round(self.end * count))
+
+
+def _text(share: float) -> str:
+    """At least two decimals, and as many as it takes."""
+    short = f"{share:.2f}"
+    return short if float(short) == share else np.format_float_positional(share)
 
 
 def examples_of(test: Part, candidates: Iterable[str], protocol: Protocol, subjects: dict[str, str]) -> list[str]:

@@ -93,12 +93,6 @@ def continuous(quaternions: Floats) -> Floats:
     return q
 
 
-def slerp(p: Floats, q: Floats, share: float | Floats) -> Floats:
-    """`share` of the way from p to q along the shorter arc; `share` broadcasts against (...,)."""
-    turn = log(multiply(inverse(p), q))
-    return multiply(p, exp(np.asarray(share)[..., None] * turn))
-
-
 def yaw_rad(world_from_body: Floats) -> Floats:
     """Heading (...,) about the world's z of the body's x axis (forward) [rad]."""
     w, x, y, z = np.moveaxis(np.asarray(world_from_body, dtype=float), -1, 0)

@@ -38,11 +38,6 @@ class Skeleton:
         return len(self.names)
 
     @cached_property
-    def dof_bone(self) -> tuple[int, ...]:
-        """(D,) bone that each hinge turns."""
-        return tuple(b for b, channels in enumerate(self.hinges) for _ in channels)
-
-    @cached_property
     def dof_names(self) -> tuple[str, ...]:
         """(D,) such as "lfemur.rx"."""
         return tuple(f"{n}.{c}" for n, channels in zip(self.names, self.hinges, strict=True) for c in channels)

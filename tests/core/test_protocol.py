@@ -49,5 +49,13 @@ def test_a_part_that_is_none_is_refused(text: str) -> None:
 
 
 def test_a_part_prints_as_it_was_written() -> None:
-    for text in ("13_17", "13_17@0.20-0.40"):
+    for text in ("13_17", "13_17@0.20-0.40", "13_17@0.204-0.40"):
         assert str(Part.parse(text)) == text
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_a_part_is_told_by_its_name(one: float, other: float) -> None:
+    """Cells are kept by it: parts that print alike would share results."""
+    if one != other:
+        part = Part("a_1", min(one, other), max(one, other))
+        assert Part.parse(str(part)) == part
