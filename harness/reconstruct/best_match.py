@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.body import kinematics
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
@@ -21,6 +20,7 @@ from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import Coverage
+from harness.reconstruct.examples import station_poses
 from harness.reconstruct.gate import Gate
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
@@ -73,7 +73,7 @@ class BestMatchSession:
         self._residuals = Residuals(fitted.body, calibration, Loss())
         self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), _JUMP_M)
         self._qpos = np.concatenate([take.qpos for take in fitted.takes])
-        read = [_station_poses(fitted.body, take, calibration) for take in fitted.takes]
+        read = [station_poses(fitted.body, take, calibration) for take in fitted.takes]
         velocity = [_since_last(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]
         self._position = _Vectors(np.concatenate([m for m, _ in read]))
         self._velocity = _Vectors(np.concatenate(velocity))
@@ -171,13 +171,6 @@ class _Vectors:
             far -= count * (middle.real**2 + middle.imag**2)
         pull: Complexes = (self.flat @ (2.0 * seen[:, 0] - 2.0j * seen[:, 1])).conj()
         return far, pull
-
-
-def _station_poses(body: Body, take: Take, worn: Calibration) -> tuple[Floats, Floats]:
-    """Positions (T, S, 3) [m] of the stations, and orientations (T, S, 4) of the bones that carry them."""
-    start_m, turned = kinematics.bone_poses(body.skeleton, take.qpos)
-    bones = [body.skeleton.index(bone) for bone in worn.bones]
-    return start_m[:, bones] + rotations.rotate(turned[:, bones], worn.mount_m), turned[:, bones]
 
 
 def _since_last(points_m: Floats) -> Floats:

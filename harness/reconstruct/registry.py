@@ -17,6 +17,7 @@ from harness.reconstruct import ik
 from harness.reconstruct.best_match import BestMatch
 from harness.reconstruct.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.contract import Method
+from harness.reconstruct.kernel_ridge import KernelRidge
 from harness.reconstruct.mean_pose import MeanPose
 
 GROUP = "harness.methods"
@@ -30,6 +31,7 @@ def methods() -> dict[str, Callable[[], Method]]:
         "ik:gaussian": lambda: ik.GAUSSIAN,
         "ik:mean": lambda: ik.MEAN,
         "mean_pose": MeanPose,
+        "kernel_ridge": KernelRidge,
         "best_match": BestMatch,
     }
 

@@ -1,0 +1,25 @@
+"""What the demo's methods make of built-in motion: data helps threefold, and does not help completely."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from harness import experiment
+from harness.config import load_scenario
+from harness.mocap import performer
+from harness.score.results import read_summary
+
+
+@pytest.mark.parametrize("behaviour", performer.BEHAVIOURS)
+def test_the_mean_pose_errs_three_times_as_much_as_what_was_learnt(tmp_path: Path, behaviour: str) -> None:
+    """Perfect trackers, the demo's clips and examples, through the whole loop."""
+    demo = load_scenario("demo")
+    motion = replace(demo.motion, test=(f"{behaviour}_p1_01",), behaviours=(behaviour,))
+    methods = ("mean_pose", "kernel_ridge", "kernel_ridge+ik")
+    experiment.run(replace(demo, motion=motion, noise="clean", methods=methods), tmp_path / "run")
+    rows = read_summary(tmp_path / "run")["cells"]
+    mean, *learnt = (row["joint_angle_mean_deg"] for row in rows)
+    for error in learnt:
+        assert 0.5 < error < 4.0
+        assert mean > 3.0 * error
