@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from harness.body import humanoid, retarget
-from harness.body.mounts import Mount
+from harness.body.mounts import Mount, place
 from harness.config import Scenario, changed
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip, Take
@@ -16,6 +16,7 @@ from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.score import manifest, results
+from harness.score.metrics import VERSIONS
 from harness.score.score import WARM_UP_S
 from harness.simulate import noise as noises
 from harness.simulate.noise import Noise
@@ -104,21 +105,28 @@ class Setting:
         return takes
 
     def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
-        """Everything that defines a cell; two results with other inputs are not comparable."""
-        content = asdict(self.scenario)
-        for many in ("methods", "inputs", "name"):
+        """Everything that defines a cell; two results with other inputs are not comparable.
+
+        Device and noise stand as numbers, motion, body and mounts as digests of theirs: names and defaults mean
+        what the code of their day made of them.
+        """
+        scenario, body = self.scenario, self.body
+        content = asdict(scenario)
+        for many in ("methods", "inputs", "name", "components"):
             del content[many]
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
+        worn = [array for mount in mounts_of(scenario) for array in place(body.skeleton, mount)]
         return {
             **content,
+            "tracker": asdict(tracker_of(scenario)),
+            "components": asdict(noise_of(scenario)),
             "clip": str(self.part),
-            "motion_digest": results.digest(self.clip.root_m, self.clip.world_from_root, self.clip.angles_rad),
-            "body_digest": results.digest(self.clip.skeleton.bone_m),
-            "examples": {
-                c.name: results.digest(c.root_m, c.world_from_root, c.angles_rad)
-                for c in (self.example_clips if method.needs_examples else [])
-            },
+            "motion_digest": _motion_digest(self.clip),
+            "body_digest": results.digest(body.skeleton.bone_m, body.skeleton.axes, body.limits_rad),
+            "mounts_digest": results.digest(*worn),
+            "examples": {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])},
             "inputs": inputs,
+            "metric_versions": VERSIONS,
         }
 
     def key(self, method: Method, name: str, inputs: str) -> str:
@@ -129,6 +137,12 @@ class Setting:
         if clip.name == self.clip.name and self.scenario.motion.body == "own":
             return retarget.to_own_body(clip)[1]
         return retarget.to_common_body(clip, self.body.skeleton)[0]
+
+
+def _motion_digest(clip: Clip) -> str:
+    skeleton = clip.skeleton
+    where = np.array([clip.rate_hz]), skeleton.bone_m, skeleton.axes
+    return results.digest(*where, clip.root_m, clip.world_from_root, clip.angles_rad)
 
 
 def _cut(take: Take, frames: range, name: str) -> Take:

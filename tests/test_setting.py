@@ -1,0 +1,51 @@
+"""What defines a cell is told in numbers, so that results of different days are compared only when they may be."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from harness.config import Motion, Scenario, Station
+from harness.core.protocol import Part
+from harness.mocap.sources import open_source
+from harness.reconstruct.ik import Ik
+from harness.setting import Setting
+from harness.simulate import noise
+from harness.simulate.components.white import White
+
+SCENARIO = Scenario(
+    name="small",
+    motion=Motion("builtin", ("walking_p1_01",), ("walking",), longest_s=2.5),
+    stations={"head": Station("head"), "torso": Station("thorax")},
+    methods=("ik",),
+)
+
+
+def inputs(scenario: Scenario = SCENARIO) -> dict[str, object]:
+    source = open_source("builtin", None, seed=1, rate_hz=None)
+    return Setting(scenario, source, Part("walking_p1_01"), "walking").inputs_of(Ik(), "pos+ori")
+
+
+def test_equal_scenarios_have_equal_inputs() -> None:
+    assert inputs() == inputs(replace(SCENARIO, name="other", methods=("ik:gaussian",)))
+
+
+@pytest.mark.parametrize(
+    ("changed", "key"),
+    [
+        (replace(SCENARIO, noise="noise"), "components"),
+        (replace(SCENARIO, noise="clean"), "tracker"),
+        (replace(SCENARIO, stations={"head": Station("head", along=0.9), "torso": Station("thorax")}), "mounts_digest"),
+        (replace(SCENARIO, motion=replace(SCENARIO.motion, body="standard")), "body_digest"),
+    ],
+)
+def test_what_a_scenario_changes_is_named(changed: Scenario, key: str) -> None:
+    assert inputs(changed)[key] != inputs()[key]
+
+
+def test_a_level_that_the_code_redefines_is_another_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = inputs()
+    level: Callable[[str], noise.Noise] = noise.level
+    monkeypatch.setattr(noise, "level", lambda name: replace(level(name), white=White(position_m=0.001)))
+    assert inputs()["components"] != before["components"]
+    assert {k for k, v in inputs().items() if v != before[k]} == {"components"}
