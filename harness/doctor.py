@@ -8,12 +8,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from harness.body import humanoid
+from harness.body import humanoid, retarget
 from harness.body.kinematics import Kinematics
 from harness.body.mounts import DEFAULTS
 from harness.core import rotations
-from harness.core.humanoid24 import pack, standard_skeleton
-from harness.core.motion import Clip, Take
+from harness.core.humanoid24 import standard_skeleton
+from harness.core.motion import Clip
 from harness.errors import HarnessError
 from harness.mocap import performer
 from harness.mocap.library import MotionLibrary
@@ -40,19 +40,15 @@ def examine(folder: Path | None) -> list[Check]:
     A missing optional part is told and is no failure; a library that was named and cannot be read is one.
     """
     clips = [performer.generate(b, "p1", 1, seed=1, duration_s=6.0) for b in performer.BEHAVIOURS]
-    return [*check_scores([_take(clip) for clip in clips]), _stream(clips[0]), *_optional(), _library(folder)]
-
-
-def _take(clip: Clip) -> Take:
-    qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)
-    return Take(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz, qpos)
+    takes = [retarget.to_own_body(clip)[1] for clip in clips]
+    return [*check_scores(takes), _stream(clips[0]), *_optional(), _library(folder)]
 
 
 def _stream(clip: Clip) -> Check:
     """Perfect trackers come back through the device's bytes where MuJoCo has them, but for float32."""
-    body = humanoid.build(clip.skeleton)
+    body, take = retarget.to_own_body(clip)
     mounts = [DEFAULTS[station] for station in _SIX]
-    seen = simulate(body, _take(clip), mounts, TrackerConfig(slot_s=0.0), noise.level("clean"), seed=1)
+    seen = simulate(body, take, mounts, TrackerConfig(slot_s=0.0), noise.level("clean"), seed=1)
     known, kinematics, worst_m = seen.calibration, Kinematics(body), 0.0
     bones = [body.skeleton.index(bone) for bone in known.bones]
     for frame, instant in zip(seen.frames, seen.frame_index, strict=True):
