@@ -4,14 +4,11 @@ A job is one test clip: simulated once, then shown to every method with every ch
 written whole or not at all, so that a run can be stopped at any moment and goes on where it was.
 """
 
-import signal
-import sys
 import time
 import traceback
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, ProcessPoolExecutor, as_completed
+from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +19,7 @@ from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.protocol import Part
 from harness.core.seeds import generator
+from harness.core.workers import call_each
 from harness.errors import BadInput, HarnessError, Outcome
 from harness.mocap.sources import MotionSource, open_source
 from harness.reconstruct import registry
@@ -129,21 +127,11 @@ def _cells(todo: list[Job], out: Path, jobs: int) -> Iterator[Ended]:
         for job in todo:
             yield from run_job(job, out)
         return
-    with ProcessPoolExecutor(min(jobs, len(todo)), get_context("spawn"), _start_worker) as pool:
-        running = {pool.submit(_run_whole_job, job, out): job for job in todo}
+    for which, done in call_each(_run_whole_job, [(job, out) for job in todo], min(jobs, len(todo))):
         try:
-            for future in as_completed(running):
-                try:
-                    yield from future.result()
-                except BrokenExecutor:
-                    yield from (Ended(cell, failure="a worker process died") for cell, _, _ in running[future].cells())
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)  # what runs is finished and kept
-
-
-def _start_worker() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's
-    sys.stdout = sys.stderr  # what a method prints is talk, not data
+            yield from done.result()
+        except BrokenExecutor:
+            yield from (Ended(cell, failure="a worker process died") for cell, _, _ in todo[which].cells())
 
 
 def _run_whole_job(job: Job, out: Path) -> list[Ended]:

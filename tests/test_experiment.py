@@ -214,6 +214,25 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     assert 0 < summary["cells_finished"] < summary["cells_planned"]
 
 
+@pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
+def test_workers_end_with_the_run(tmp_path: Path, end: signal.Signals, code: int) -> None:
+    out = tmp_path / "run"
+    command = [sys.executable, "-m", "harness.cli", "run", "demo", "--no-report", "--jobs", "2", "--out", str(out)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as program:
+        deadline = time.monotonic() + 60.0
+        while len(list(out.glob("cells/*/cell.json"))) < 2 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        if end is signal.SIGINT:
+            os.killpg(program.pid, end)  # as a terminal does
+        else:
+            program.kill()
+        _, complained = program.communicate(timeout=20)  # returns when no process holds our pipes any more
+    assert program.returncode == code
+    assert "Traceback" not in complained
+
+
 def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
     scenario = load_scenario("golf")
     assert experiment.run(scenario, tmp_path / "run", folder=mocap) is Outcome.PASS
