@@ -115,6 +115,8 @@ class KernelRidgeSession:
     def _filled(self) -> tuple[Floats, Floats]:
         """Positions (1, S, 3) and bone orientations (1, S, 4), from the last answer where nothing was read."""
         residuals, count = self._residuals, len(self._residuals.bones)
+        if residuals.measured.all():
+            return residuals.target_m[None], residuals.world_from_target[None]
         here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
         residuals.kinematics.set(nearest_placed(residuals, self._answer))
         at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, _no_turn(count))
