@@ -4,10 +4,8 @@ import numpy as np
 
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Floats
+from harness.core.hinges import are_gimbal, hinge_angles, twin
 from harness.core.skeleton import Skeleton
-
-_SWEEPS = 6
-"""Two hinges are fitted in turn; each sweep leaves less than a tenth of the error."""
 
 
 def pointing_alike(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
@@ -28,12 +26,11 @@ def pointing_alike(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
         if len(axes):
             wanted = meant[:, bone] @ _shortest_turn(target.bone_m[bone], own.bone_m[bone])
             local = np.swapaxes(above, 1, 2) @ wanted
-            if len(axes) == 3:
-                out[:, where] = _three_hinges(axes, local, start)
-            else:
+            fitted = _nearest_name(axes, hinge_angles(axes, rotations.from_matrix(local)), start)
+            if len(axes) < 3:
                 low, high = limits_rad[where].T
-                fitted = _few_hinges(axes, local, start)
-                out[:, where] = np.clip(fitted, np.minimum(low, start), np.maximum(high, start))
+                fitted = np.clip(fitted, np.minimum(low, start), np.maximum(high, start))
+            out[:, where] = fitted
         turned[:, bone] = above @ skeleton.bone_rotation(target, bone, out)
     return out
 
@@ -47,43 +44,15 @@ def _shortest_turn(a: Floats, b: Floats) -> Floats:
     return rotations.to_matrix(half / np.sqrt(half @ half))
 
 
-def _three_hinges(axes: Floats, local: Floats, near_rad: Floats) -> Floats:
-    """Angles (T, 3) about three orthogonal axes, last outermost, that make `local` (T, 3, 3); of the two
-    answers the one nearer to `near_rad`."""
-    m = axes @ local @ axes.T
-    first = np.stack(
-        [
-            np.arctan2(m[:, 2, 1], m[:, 2, 2]),
-            np.arcsin(np.clip(-m[:, 2, 0], -1.0, 1.0)),
-            np.arctan2(m[:, 1, 0], m[:, 0, 0]),
-        ],
-        axis=1,
-    )
-    twin = first * [1.0, -1.0, 1.0] + np.pi
-    first, twin = _nearest(first, near_rad), _nearest(twin, near_rad)
-    closer = np.sum((first - near_rad) ** 2, axis=1) <= np.sum((twin - near_rad) ** 2, axis=1)
-    out: Floats = np.where(closer[:, None], first, twin)
+def _nearest_name(axes: Floats, angle_rad: Floats, near_rad: Floats) -> Floats:
+    """The same rotations (T, N), each angle within half a turn of `near_rad`; of twins the nearer one."""
+    found = _nearest(angle_rad, near_rad)
+    if not are_gimbal(axes):
+        return found
+    other = _nearest(twin(angle_rad), near_rad)
+    closer = np.sum((found - near_rad) ** 2, axis=1) <= np.sum((other - near_rad) ** 2, axis=1)
+    out: Floats = np.where(closer[:, None], found, other)
     return out
-
-
-def _few_hinges(axes: Floats, local: Floats, start_rad: Floats) -> Floats:
-    """Angles (T, 1 or 2) whose rotation is nearest to `local` (T, 3, 3), each hinge in turn solved in closed form."""
-    angles = np.array(start_rad)
-    for _ in range(1 if len(axes) == 1 else _SWEEPS):
-        for k, axis in enumerate(axes):
-            rest = local
-            for outer in range(len(axes) - 1, k, -1):
-                rest = _turn(axes[outer], -angles[:, outer]) @ rest
-            for inner in range(k):
-                rest = rest @ _turn(axes[inner], -angles[:, inner])
-            skew = np.stack([rest[:, i, j] - rest[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=1)
-            along = np.einsum("i,tij,j->t", axis, rest, axis)
-            angles[:, k] = np.arctan2(skew @ axis, np.trace(rest, axis1=1, axis2=2) - along)
-    return _nearest(angles, start_rad)
-
-
-def _turn(axis: Floats, angle_rad: Floats) -> Floats:
-    return rotations.to_matrix(rotations.exp(angle_rad[:, None] * axis))
 
 
 def _nearest(angle_rad: Floats, near_rad: Floats) -> Floats:

@@ -13,6 +13,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, freeze
+from harness.core.hinges import are_gimbal, twin
 from harness.errors import UnknownName
 
 
@@ -128,24 +129,19 @@ def unwrapped(skeleton: Skeleton, angles_rad: Floats) -> Floats:
         column = out[:, where]
         if column.size == 0:
             continue
-        if column.shape[1] == 3 and _is_gimbal(skeleton.axes[where]):
+        if are_gimbal(skeleton.axes[where]):
             # The distance between two frames is the same for both twins, so whether to change over does not depend
             # on which of them the frame before took.
             kept = _turn_squared(column[1:] - column[:-1])
-            changed = _turn_squared(_twin(column[1:]) - column[:-1])
+            changed = _turn_squared(twin(column[1:]) - column[:-1])
             over = np.concatenate([[False], np.cumsum(changed < kept) % 2 == 1])
-            column = np.where(over[:, None], _twin(column), column)
-            courses = [_near_zero(np.unwrap(c, axis=0)) for c in (column, _twin(column))]
+            column = np.where(over[:, None], twin(column), column)
+            courses = [_near_zero(np.unwrap(c, axis=0)) for c in (column, twin(column))]
             column = min(courses, key=lambda c: float(np.sum(np.median(c, axis=0) ** 2)))
         else:
             column = _near_zero(np.unwrap(column, axis=0))
         out[:, where] = column
     return out
-
-
-def _twin(angles_rad: Floats) -> Floats:
-    """The other angles (..., 3) of three orthogonal hinges that give the same rotation."""
-    return angles_rad * [1.0, -1.0, 1.0] + np.pi
 
 
 def _turn_squared(difference_rad: Floats) -> Floats:
@@ -158,7 +154,3 @@ def _near_zero(angles_rad: Floats) -> Floats:
     """Columns (T, N) shifted by whole turns so that each median lies in (-pi, pi]."""
     out: Floats = angles_rad - 2 * np.pi * np.ceil(np.median(angles_rad, axis=0) / (2 * np.pi) - 0.5)
     return out
-
-
-def _is_gimbal(axes: Floats) -> bool:
-    return bool(np.allclose(axes @ axes.T, np.eye(3), atol=1e-9))

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
+from harness.core.hinges import twin
 from harness.core.humanoid24 import BONES, limits_rad, standard_skeleton
 from harness.core.skeleton import Skeleton
 
@@ -110,7 +111,7 @@ def principal(skeleton: Skeleton, angles_rad: Floats) -> Floats:
     for where in skeleton.dof_of_bone:
         if where.stop - where.start == 3:
             over = np.abs(out[:, where.start + 1]) > 0.5 * np.pi
-            out[over, where] = _wrapped(out[over, where] * [1.0, -1.0, 1.0] + np.pi)
+            out[over, where] = _wrapped(twin(out[over, where]))
     return out
 
 

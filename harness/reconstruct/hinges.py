@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
+from harness.core.hinges import are_gimbal, twin
 from harness.core.humanoid24 import QPOS_OF_DOF
 
 _ALL_ROUND_RAD = np.deg2rad(350.0)
@@ -27,11 +28,7 @@ class HingeLimits:
         self.high_rad: Floats = np.where(free, np.inf, high)
         self._middle_rad: Floats = np.where(free, 0.0, 0.5 * (low + high))
         self._gimbals: Ints = np.array(
-            [
-                QPOS_OF_DOF[where]
-                for where in body.skeleton.dof_of_bone
-                if np.shape(axes := body.skeleton.axes[where]) == (3, 3) and np.allclose(axes @ axes.T, np.eye(3))
-            ]
+            [QPOS_OF_DOF[where] for where in body.skeleton.dof_of_bone if are_gimbal(body.skeleton.axes[where])]
         )
 
     def clipped(self, angles_rad: Floats) -> Floats:
@@ -54,15 +51,15 @@ class HingeLimits:
         Twins that are equally lawful are told apart by the middle hinge, which stays within 90 deg.
         """
         plain = self._wrapped(angles_rad)
-        twin = np.array(plain)
-        twin[..., self._gimbals] = plain[..., self._gimbals] * [1.0, -1.0, 1.0] + np.pi
-        twin = self._wrapped(twin)
+        other = np.array(plain)
+        other[..., self._gimbals] = twin(plain[..., self._gimbals])
+        other = self._wrapped(other)
         beyond = np.abs(plain[..., self._gimbals[:, 1]]) > 0.5 * np.pi
         outside, outside_twin = (
-            np.sum(self.excess_rad(angles)[..., self._gimbals], axis=-1) for angles in (plain, twin)
+            np.sum(self.excess_rad(angles)[..., self._gimbals], axis=-1) for angles in (plain, other)
         )
         better = (outside_twin < outside - 1e-9) | (beyond & (outside_twin <= outside + 1e-9))
-        plain[..., self._gimbals] = np.where(better[..., None], twin[..., self._gimbals], plain[..., self._gimbals])
+        plain[..., self._gimbals] = np.where(better[..., None], other[..., self._gimbals], plain[..., self._gimbals])
         return plain
 
     def near(self, angles_rad: Floats, other_rad: Floats) -> Floats:

@@ -5,13 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.skeleton import forward
 from harness.errors import BadFile, BadInput
 from harness.mocap import amass, bvh
-from harness.mocap.joints import fit_hinges, hinge_angles, hinge_rotation
+from harness.mocap.joints import fit_hinges
 from harness.mocap.library import MotionLibrary
 from tests.mocap.synthetic import LEFT_OUT, UNIT_M, amass_arrays, bvh_text, clip
 
@@ -19,36 +18,6 @@ SHARED = ["02_01", "02_05", "05_13", "07_05", "14_08", "16_16", "29_01", "49_06"
 """Staged takes that are there as AMC and as BVH."""
 LEGS = {"LeftLeg": "lfemur", "RightLeg": "rfemur", "LeftFoot": "ltibia", "RightFoot": "rtibia", "LeftToeBase": "lfoot"}
 ABOVE = {"Neck": "thorax", "Head_end": "head", "LeftForeArm": "lhumerus", "LeftHand": "lradius", "RightHand": "rradius"}
-
-
-@pytest.mark.parametrize("bone", ["lfemur", "lhand", "lclavicle", "rtibia", "lwrist", "lhipjoint"])
-def test_angles_of_any_bone_come_back(bone: str, rng: np.random.Generator) -> None:
-    skeleton = standard_skeleton()
-    axes = skeleton.axes[skeleton.dof_of_bone[skeleton.index(bone)]]
-    angles = rng.uniform(-1.5, 1.5, size=(200, len(axes)))
-    found = hinge_angles(axes, hinge_rotation(axes, angles))
-    assert found.shape == angles.shape
-    np.testing.assert_allclose(np.exp(1j * found), np.exp(1j * angles), atol=1e-9)
-
-
-@pytest.mark.parametrize("bone", ["lfemur", "lhand", "rclavicle", "rtibia", "lwrist"])
-def test_no_other_angles_come_nearer(bone: str, rng: np.random.Generator) -> None:
-    skeleton = standard_skeleton()
-    axes = skeleton.axes[skeleton.dof_of_bone[skeleton.index(bone)]]
-    wanted = rotations.exp(rng.normal(size=(40, 3)))
-    best = hinge_angles(axes, wanted)
-    error = rotations.angle_between_rad(hinge_rotation(axes, best), wanted)
-    for _ in range(300):
-        other = best + rng.normal(size=best.shape) * rng.choice([0.01, 0.3, 3.0])
-        assert np.all(rotations.angle_between_rad(hinge_rotation(axes, other), wanted) > error - 1e-9)
-
-
-@pytest.mark.parametrize("middle_rad", [np.pi / 2, -np.pi / 2])
-def test_gimbal_lock_still_gives_the_rotation(middle_rad: float) -> None:
-    axes = np.eye(3)
-    locked = hinge_rotation(axes, np.array([[0.4, middle_rad, -0.7]]))
-    again = hinge_rotation(axes, hinge_angles(axes, locked))
-    assert rotations.angle_between_rad(again, locked).max() < 1e-7
 
 
 def test_bvh_comes_back_as_angles(tmp_path: Path) -> None:
