@@ -40,7 +40,8 @@ class Part:
 
     def __str__(self) -> str:
         """As `parse` reads it; parts that differ at all print differently."""
-        return self.clip if (self.start, self.end) == (0.0, 1.0) else f"{self.clip}@{_text(self.start)}-{_text(self.end)}"
+        whole = (self.start, self.end) == (0.0, 1.0)
+        return self.clip if whole else f"{self.clip}@{_text(self.start)}-{_text(self.end)}"
 
     def frames(self, count: int) -> range:
         """The frames of a take of `count` frames that lie in it."""
