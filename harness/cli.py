@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from harness import __version__
-from harness.errors import BadInput, HarnessError, Outcome
+from harness.errors import BadInput, HarnessError, Outcome, was_interrupted
 
 Verbs = Any  # argparse's subparsers object has no public type
 Action = Callable[[argparse.Namespace], Outcome]
@@ -36,14 +36,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         outcome = error.outcome
         if args.json:
             print(json.dumps({"outcome": outcome.word, "error": str(error)}))
-    except KeyboardInterrupt:
+    except BrokenPipeError:  # the reader of our output went away, as `| head` does
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Outcome.PASS.exit_code
+    except (KeyboardInterrupt, Exception) as error:
+        if not was_interrupted(error):
+            raise
         outcome = Outcome.INTERRUPTED
         print("harness: stopped; what was finished is kept, the same command goes on from there", file=sys.stderr)
         if args.json:
             print(json.dumps({"outcome": outcome.word}))
-    except BrokenPipeError:  # the reader of our output went away, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return Outcome.PASS.exit_code
     if not args.json:
         print(outcome.word, flush=True)
     return outcome.exit_code

@@ -29,6 +29,13 @@ class Outcome(Enum):
         return int(self.value[1])
 
 
+def was_interrupted(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: what it strikes may raise another one on the way out."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
+
+
 class HarnessError(Exception):
     """Anything this package raises on purpose; the command line prints it without a traceback."""
 

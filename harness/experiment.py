@@ -20,7 +20,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.protocol import Part
 from harness.core.seeds import generator
 from harness.core.workers import call_each
-from harness.errors import BadInput, HarnessError, Outcome
+from harness.errors import BadInput, HarnessError, Outcome, was_interrupted
 from harness.mocap.sources import MotionSource, open_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
@@ -153,7 +153,9 @@ def run_job(job: Job, out: Path) -> Iterator[Ended]:
             yield Ended(cell, key)
         except HarnessError as error:
             yield Ended(cell, failure=str(error), refused=True)
-        except (Exception, SystemExit):  # a method under test may raise anything: its cell fails, the run goes on
+        except (Exception, SystemExit) as error:  # a method may raise anything: its cell fails, the run goes on
+            if was_interrupted(error):
+                raise KeyboardInterrupt from error
             yield Ended(cell, failure=traceback.format_exc())
 
 

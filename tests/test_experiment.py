@@ -132,6 +132,21 @@ def test_a_failing_method_fails_alone(tmp_path: Path, method: str) -> None:
     assert all("on purpose" in text for text in summary["failures"].values())
 
 
+class Struck(Broken):
+    """A method whose files complain when Ctrl-C strikes them."""
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        try:
+            raise KeyboardInterrupt
+        finally:
+            raise ValueError("seek of closed file")
+
+
+def test_ctrl_c_behind_another_error_is_still_ctrl_c(tmp_path: Path) -> None:
+    with pytest.raises(KeyboardInterrupt):
+        experiment.run(replace(SMALL, methods=("tests.test_experiment:Struck",)), tmp_path / "run")
+
+
 def test_what_is_all_warm_up_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="warm-up"):
         experiment.run(replace(SMALL, motion=replace(SMALL.motion, longest_s=1.0)), tmp_path / "run")

@@ -4,6 +4,7 @@ On disk a cell is `cells/<key>/cell.json` and `frames.npz`, written under anothe
 a folder that is there is finished.
 """
 
+import io
 import os
 import shutil
 import zipfile
@@ -136,8 +137,10 @@ def write_cell(out: Path, cell: Cell) -> Path:
     write_json(beside / "cell.json", content)
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
     columns |= {_ERROR + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
+    packed = io.BytesIO()  # first, for a file that is closed under an archive complains
+    np.savez_compressed(packed, allow_pickle=False, scored=cell.scores.scored, **columns)
     with open(beside / "frames.npz", "wb") as file:
-        np.savez_compressed(file, allow_pickle=False, scored=cell.scores.scored, **columns)
+        file.write(packed.getbuffer())
         file.flush()
         os.fsync(file.fileno())
     try:
