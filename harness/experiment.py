@@ -196,7 +196,7 @@ def judge(setting: Setting, method: Method, name: str, inputs: str, key: str, co
         bone_m=setting.body.skeleton.bone_m,
         source_hash=manifest.source_hash(),
         reproduce=command,
-        notes=setting.clip.notes,
+        notes=setting.notes(method),
         time_s=simulation.truth_s[simulation.frame_index],
         truth_qpos=simulation.truth_qpos[simulation.frame_index],
         estimate_qpos=qpos,

@@ -53,6 +53,8 @@ class Setting:
     def __init__(self, scenario: Scenario, source: MotionSource, part: Part, behaviour: str) -> None:
         self.scenario, self.source, self.part, self.behaviour = scenario, source, part, behaviour
         self.clip = source.load(part.clip)
+        self._retargeted: dict[str, retarget.RetargetReport] = {}
+        """What each clip that is not on its own body lost on the way."""
 
     @cached_property
     def body(self) -> humanoid.Body:
@@ -129,6 +131,22 @@ class Setting:
             "metric_versions": VERSIONS,
         }
 
+    def notes(self, method: Method) -> tuple[str, ...]:
+        """What a reader should know of the motion: notes of the clip, and what retargeting to another body cost."""
+        used = [self.clip, *(self.example_clips if method.needs_examples else [])]
+        reports = [self._retargeted[clip.name] for clip in used if clip.name in self._retargeted]
+        if not reports:
+            return self.clip.notes
+        deviation_mm = np.mean([report.deviation_mm for report in reports])
+        worst = max(reports, key=lambda report: report.deviation_mm)
+        soles_mm = [x for report in reports for x in (report.float_mm, report.sink_mm) if np.isfinite(x)]
+        note = (
+            f"{len(reports)} of {len(used)} clips (test and examples) retargeted to the body under test: joint centres "
+            f"{deviation_mm:.0f} mm off on average, {worst.deviation_mm:.0f} mm in {worst.clip}"
+        )
+        soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
+        return (*self.clip.notes, note + soles)
+
     def key(self, method: Method, name: str, inputs: str) -> str:
         described = {"name": name, "options": repr(method), "source": registry.source_hash(method)}
         return results.cell_key(self.inputs_of(method, inputs), described, manifest.source_hash())
@@ -136,7 +154,8 @@ class Setting:
     def _on_body(self, clip: Clip) -> Take:
         if clip.name == self.clip.name and self.scenario.motion.body == "own":
             return retarget.to_own_body(clip)[1]
-        return retarget.to_common_body(clip, self.body.skeleton)[0]
+        take, self._retargeted[clip.name] = retarget.to_common_body(clip, self.body.skeleton)
+        return take
 
 
 def _motion_digest(clip: Clip) -> str:

@@ -9,6 +9,7 @@ from harness.config import Motion, Scenario, Station
 from harness.core.protocol import Part
 from harness.mocap.sources import open_source
 from harness.reconstruct.ik import Ik
+from harness.reconstruct.mean_pose import MeanPose
 from harness.setting import Setting
 from harness.simulate import noise
 from harness.simulate.components.white import White
@@ -24,6 +25,20 @@ SCENARIO = Scenario(
 def inputs(scenario: Scenario = SCENARIO) -> dict[str, object]:
     source = open_source("builtin", None, seed=1, rate_hz=None)
     return Setting(scenario, source, Part("walking_p1_01"), "walking").inputs_of(Ik(), "pos+ori")
+
+
+def test_what_retargeting_cost_is_told() -> None:
+    motion = replace(SCENARIO.motion, examples=("walking_p1_02", "walking_p2_01"), body="standard")
+    source = open_source("builtin", None, seed=1, rate_hz=None)
+    own, common = (
+        Setting(replace(SCENARIO, motion=m), source, Part("walking_p1_01"), "walking")
+        for m in (SCENARIO.motion, motion)
+    )
+    assert len(own.take) == len(common.take)
+    assert own.notes(Ik()) == ()
+    assert "1 of 1 clips" in common.notes(Ik())[0]
+    assert len(common.examples) == 2
+    assert "3 of 3 clips" in common.notes(MeanPose())[0]
 
 
 def test_equal_scenarios_have_equal_inputs() -> None:
