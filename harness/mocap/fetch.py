@@ -48,6 +48,8 @@ def fetch_cmu(
         if not re.fullmatch(r"[0-9]{1,3}", subject):
             raise BadInput(f"{subject!r} is no subject of CMU.", "Subjects are numbers, such as 02 or 13.")
         wanted += _files_of(subject.zfill(2), base_url)
+    if not wanted:
+        raise BadInput("No subjects are named.", "For example: --subjects 13,14.")
     fetched = []
     for done, name in enumerate(wanted):
         progress(name, done, len(wanted))
@@ -113,7 +115,12 @@ def _fetch(name: str, top: Path, base_url: str) -> Path:
     listed = shipped_sha256().get(name)
     if place.is_file() and listed in (None, sha256_of(place)):
         return place
-    place.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadInput(
+            f"{place.parent} cannot be made ({error.strerror}).", "Name another folder with --out."
+        ) from error
     with tempfile.TemporaryDirectory(dir=place.parent, prefix=".fetch-") as folder:
         url = f"{base_url}/subjects/{name}"
         try:

@@ -4,12 +4,14 @@ Presence of a cell means that it is finished; the same run again goes on where i
 the method and the source of both, so edited code never meets stale results.
 """
 
+import os
+import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from harness.errors import BadInput, Outcome
+from harness.errors import BadFile, BadInput, Outcome
 from harness.score.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
 from harness.score.files import TEMPORARY, content_key, digest, read_json, write_json, write_text
 from harness.score.manifest import Manifest
@@ -28,6 +30,9 @@ __all__ = [
     "write_cell",
     "write_summary",
 ]
+
+
+_SUMMARY = ("outcome", "cells_finished", "cells_planned", "failures", "methods", "behaviours", "cells")
 
 
 def cell_key(inputs: Mapping[str, Any], method: Mapping[str, Any], source_hash: str) -> str:
@@ -51,16 +56,25 @@ def open_run(out: Path, manifest: Manifest) -> None:
     elif held:
         raise BadInput(f"{out} holds files that are no run ({', '.join(sorted(held)[:3])}).", advice)
     try:
-        (out / "cells").mkdir(parents=True, exist_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(out / "manifest.json", manifest.as_dict())  # first: without it a folder is no run
+        (out / "cells").mkdir(exist_ok=True)
         _clear(out)
-        write_json(out / "manifest.json", manifest.as_dict())
     except OSError as error:
         raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
 
 
 def read_summary(out: Path) -> dict[str, Any]:
-    """What `write_summary` wrote; BadFile when there is none."""
-    return read_json(out / "summary.json", "the summary of a run")
+    """What `write_summary` wrote; BadFile when it is none, or names cells that are no folder of the run."""
+    path, expected = out / "summary.json", "the summary of a run"
+    content = read_json(path, expected)
+    advice = "Give the command of the run again."
+    if missing := [name for name in _SUMMARY if name not in content]:
+        raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
+    for row in content["cells"]:
+        if not re.fullmatch(r"\w+", str(row.get("key"))):
+            raise BadFile(path, f"a cell called {row.get('key')!r}", "names of folders in cells/", advice)
+    return content
 
 
 def read_cells(out: Path) -> Iterator[Cell]:
@@ -72,7 +86,7 @@ def read_cells(out: Path) -> Iterator[Cell]:
         keys = [str(row["key"]) for row in read_summary(out)["cells"]]
     else:
         Manifest.read(out / "manifest.json")
-        keys = sorted(path.name for path in (out / "cells").iterdir() if not path.name.startswith(TEMPORARY))
+        keys = sorted(path.name for path in (out / "cells").glob("*") if not path.name.startswith(TEMPORARY))
     return (read_cell(cell_folder(out, key)) for key in keys)
 
 
@@ -115,7 +129,23 @@ def write_summary(
 def _clear(out: Path) -> None:
     for folder in (out, out / "cells"):
         for path in folder.glob(f"{TEMPORARY}*"):
+            if _still_written(path):
+                continue
             if path.is_dir():
                 shutil.rmtree(path)
             else:
                 path.unlink()
+
+
+def _still_written(path: Path) -> bool:
+    """Whether the process whose number is in the name lives: another run of the same scenario into the same folder."""
+    number = path.name.removeprefix(TEMPORARY).partition("-")[0]
+    if not number.isdigit() or int(number) == os.getpid():
+        return False
+    try:
+        os.kill(int(number), 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True

@@ -142,6 +142,17 @@ def test_a_subject_is_a_number(tmp_path: Path, subject: str) -> None:
     assert not (tmp_path / "out").exists()
 
 
+def test_some_subject_must_be_named(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="No subjects"):
+        fetch_cmu([], tmp_path / "out")
+
+
+def test_a_file_in_the_place_of_the_folder_is_one_clear_line(site: Site, tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    with pytest.raises(BadInput, match="cannot be made"):
+        fetch_cmu(["91"], tmp_path / "out", base_url=site.url)
+
+
 def test_an_unknown_subject_is_one_clear_line(site: Site, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="lists no motions of subject 07"):
         fetch_cmu(["7"], tmp_path / "out", base_url=site.url)

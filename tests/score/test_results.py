@@ -25,6 +25,10 @@ ISSUE_COLUMNS = (
 )
 
 
+NOBODY = 2**22 + 1
+"""A number that Linux gives to no process."""
+
+
 def manifest(**changes: object) -> manifests.Manifest:
     scenario = {"name": "demo", "seed": 1, "motion": {"test": ["a", "b"]}, "methods": ["ik"], **changes}
     return manifests.of_run(scenario, motion_source="built-in performer", command="harness run demo")
@@ -107,10 +111,10 @@ def test_a_run_goes_on_where_it_was_and_clears_what_a_kill_left(run_folder: Path
     results.open_run(run_folder, manifest())
     cell = make_cell()
     results.write_cell(run_folder, cell)
-    half = run_folder / "cells" / f"{TEMPORARY}1-abc"
+    half = run_folder / "cells" / f"{TEMPORARY}{NOBODY}-abc"
     half.mkdir()
     (half / "cell.json").write_text("{")
-    (run_folder / f"{TEMPORARY}1-summary.json").write_text("{")
+    (run_folder / f"{TEMPORARY}{NOBODY}-summary.json").write_text("{")
     results.open_run(run_folder, manifest(methods=["ik", "local_pca"]))
     assert sorted(os.listdir(run_folder)) == ["cells", "manifest.json"]
     assert os.listdir(run_folder / "cells") == [cell.key]
@@ -217,6 +221,30 @@ def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:
     np.savez(folder / "frames.npz", time_s=np.array([{"a": 1}], dtype=object))
     with pytest.raises(BadFile, match="pickle"):
         results.read_cell(folder)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"), [({"cells": None}, "no cells"), ({"cells": [{"key": "../../elsewhere"}]}, "elsewhere")]
+)
+def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
+    run_folder: Path, make_cell: MakeCell, change: dict[str, object], message: str
+) -> None:
+    key = make_cell().key
+    results.write_cell(run_folder, make_cell())
+    content = results.write_summary(run_folder, keys=[key], planned=1) | change
+    text = json.dumps({name: value for name, value in content.items() if value is not None})
+    (run_folder / "summary.json").write_text(text)
+    with pytest.raises(BadFile, match=message):
+        results.read_cells(run_folder)
+
+
+def test_what_another_run_is_writing_is_left_alone(run_folder: Path) -> None:
+    results.open_run(run_folder, manifest())
+    theirs, left_behind = f"{TEMPORARY}{os.getppid()}-cell", f"{TEMPORARY}{NOBODY}-cell"
+    for name in (theirs, left_behind):
+        (run_folder / "cells" / name).mkdir()
+    results.open_run(run_folder, manifest())
+    assert os.listdir(run_folder / "cells") == [theirs]
 
 
 def test_no_run_in_a_folder_is_said_at_once(tmp_path: Path) -> None:
