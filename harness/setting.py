@@ -92,7 +92,11 @@ class Setting:
         names = examples_of(test, motion.examples, motion.protocol, subjects)
         if motion.database == "behaviour":
             names = [name for name in names if self.source.behaviour(name) == self.behaviour]
-        return [self.source.load(name) for name in names]
+        clips, judged = [self.source.load(name) for name in names], _motion_digest(self.clip)
+        for clip in clips:
+            if clip.name != test.clip and _motion_digest(clip) == judged:
+                raise BadInput(f"{clip.name} is {test.clip} under another name.", "Remove it from motion.examples.")
+        return clips
 
     @cached_property
     def examples(self) -> list[Take]:

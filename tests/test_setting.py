@@ -7,6 +7,7 @@ import pytest
 
 from harness.config import Motion, Scenario, Station
 from harness.core.protocol import Part
+from harness.errors import BadInput
 from harness.mocap.sources import open_source
 from harness.reconstruct.ik import Ik
 from harness.reconstruct.mean_pose import MeanPose
@@ -39,6 +40,21 @@ def test_what_retargeting_cost_is_told() -> None:
     assert "1 of 1 clips" in common.notes(Ik())[0]
     assert len(common.examples) == 2
     assert "3 of 3 clips" in common.notes(MeanPose())[0]
+
+
+def test_a_copy_of_the_test_clip_is_no_example() -> None:
+    clip = open_source("builtin", None, seed=1, rate_hz=None).load("walking_p1_01")
+
+    class Copying:
+        title = "copies"
+
+        def __getattr__(self, asked: str) -> Callable[[str], object]:
+            return {"load": lambda name: replace(clip, name=name), "subject": lambda name: name}[asked]
+
+    motion = replace(SCENARIO.motion, examples=("sneaky_01",))
+    setting = Setting(replace(SCENARIO, motion=motion), Copying(), Part("walking_p1_01"), "walking")  # type: ignore[arg-type]
+    with pytest.raises(BadInput, match="under another name"):
+        _ = setting.examples
 
 
 def test_equal_scenarios_have_equal_inputs() -> None:

@@ -4,10 +4,12 @@ A package adds its own through the entry-point group `harness.methods`: name -> 
 `+ik` after a name adds the final clean-up of `clean_up`.
 """
 
+import ast
 import hashlib
 import importlib
 import importlib.util
 import inspect
+import sys
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -79,9 +81,27 @@ def source_hash(method: Method) -> str:
         file = inspect.getsourcefile(type(inner))
         if file is None or not Path(file).is_file():
             raise BadInput(f"The source of {method.name} cannot be found.", "Define the method in a file.")
-        digest.update(Path(file).read_bytes())
+        for part in [Path(file), *_sources(type(inner).__module__, Path(file))]:
+            digest.update(part.name.encode() + b"\0" + part.read_bytes())
         inner = getattr(inner, "method", None)
     return digest.hexdigest()
+
+
+def _sources(module: str, file: Path) -> list[Path]:
+    """A method's file and its own others: all of its package, or what a lone file imports from its folder."""
+    top = sys.modules.get(module.partition(".")[0])
+    if top is not None and hasattr(top, "__path__"):
+        return sorted(part for folder in top.__path__ for part in Path(folder).rglob("*.py"))
+    found, waiting = set(), [file]
+    while waiting:
+        if (part := waiting.pop()) not in found:
+            found.add(part)
+            nodes = list(ast.walk(ast.parse(part.read_bytes())))
+            names = [a.name for node in nodes if isinstance(node, ast.Import) for a in node.names]
+            names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
+            beside = [part.parent / f"{name.partition('.')[0]}.py" for name in names]
+            waiting += [other for other in beside if other.is_file()]
+    return sorted(found)
 
 
 def _exists(module: str) -> bool:

@@ -94,6 +94,24 @@ def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPa
     assert registry.resolve("ik") == Ik()
 
 
+def test_the_source_hash_follows_a_method_into_its_own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lone file, and what it imports from beside itself, however deep; nothing else that lies there."""
+    monkeypatch.syspath_prepend(tmp_path)
+    for name, text in {
+        "split_method": "import split_options\nfrom harness.reconstruct.ik import Ik\n\n\nclass Mine(Ik): ...\n",
+        "split_options": "from split_numbers import *\n",
+        "split_numbers": "SIGMA = 1.0\n",
+        "split_stranger": "",
+    }.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    mine = registry.resolve("split_method:Mine")
+    before = registry.source_hash(mine)
+    (tmp_path / "split_stranger.py").write_text("OTHER = 2.0\n")
+    assert registry.source_hash(mine) == before
+    (tmp_path / "split_numbers.py").write_text("SIGMA = 2.0\n")
+    assert registry.source_hash(mine) != before
+
+
 def test_the_source_hash_tells_methods_and_what_they_wrap_apart() -> None:
     hashes = {
         registry.source_hash(registry.resolve(n)) for n in ("ik", "mean_pose", "best_match", "mean_pose+ik", "ik+ik")
