@@ -11,6 +11,7 @@ from typing import Any
 
 from harness import __version__
 from harness.errors import BadInput, HarnessError, Outcome, was_interrupted
+from harness.progress import ProgressBar
 
 Verbs = Any  # argparse's subparsers object has no public type
 Action = Callable[[argparse.Namespace], Outcome]
@@ -117,14 +118,15 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         scenario = replace(scenario, methods=tuple(name.strip() for name in args.methods.split(",")))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
-    with progress_bar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
         outcome = experiment.run(scenario, out, folder=args.mocap, jobs=args.jobs, command=this_command(), progress=bar)
     page = None
     if args.report:
         from harness.report.report import write_report
 
         print("writing the report", file=sys.stderr)
-        page = write_report(out, movie=args.movie)
+        with ProgressBar("movies") as bar:
+            page = write_report(out, movie=args.movie, progress=bar)
     print_run(args, out, page, outcome)
     return outcome
 
@@ -209,7 +211,7 @@ def fetch_library(args: argparse.Namespace) -> Outcome:
 
     subjects = [s.strip() for s in args.subjects.split(",") if s.strip()]
     where = {"base_url": args.url} if args.url else {}
-    with progress_bar("files") as progress:
+    with ProgressBar("files") as progress:
         files = fetch_cmu(subjects, args.out, progress=progress, **where)
     if args.json:
         print(json.dumps({"files": [str(f) for f in files], "outcome": Outcome.PASS.word}))
@@ -247,7 +249,8 @@ def add_report(verbs: Verbs) -> None:
 def report_run(args: argparse.Namespace) -> Outcome:
     from harness.report.report import write_report
 
-    page = write_report(args.run, movie=args.movie)
+    with ProgressBar("movies") as bar:
+        page = write_report(args.run, movie=args.movie, progress=bar)
     print(json.dumps({"report": str(page), "outcome": Outcome.PASS.word}) if args.json else f"report: {page}")
     return Outcome.PASS
 
@@ -261,7 +264,7 @@ def run_bench(args: argparse.Namespace) -> Outcome:
     from harness.bench.bench import bench
     from harness.bench.rows import as_text
 
-    with progress_bar("benchmarks") as progress:
+    with ProgressBar("benchmarks") as progress:
         rows, left_out = bench(tuple(args.what), seed=args.seed if args.seed is not None else 1, progress=progress)
     outcome = Outcome.INCOMPLETE if left_out else Outcome.PASS
     if args.json:
@@ -287,29 +290,6 @@ def run_doctor(args: argparse.Namespace) -> Outcome:
         for check in checks:
             print(f"{'ok  ' if check.ok else 'FAIL'}  {check.name}: {check.detail}")
     return outcome
-
-
-class progress_bar:
-    """A bar on stderr when that is a terminal; nothing otherwise. Calling it says what was done last."""
-
-    def __init__(self, unit: str) -> None:
-        self.unit = unit
-        self.bar: Any = None
-
-    def __enter__(self) -> "progress_bar":
-        return self
-
-    def __call__(self, last: str, done: int, planned: int) -> None:
-        if self.bar is None:
-            from tqdm import tqdm
-
-            self.bar = tqdm(total=planned, unit=f" {self.unit}", disable=None, leave=False, file=sys.stderr)
-        self.bar.set_postfix_str(last, refresh=False)
-        self.bar.update(done - self.bar.n)
-
-    def __exit__(self, *_: object) -> None:
-        if self.bar is not None:
-            self.bar.close()
 
 
 def this_command() -> str:

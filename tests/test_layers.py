@@ -24,7 +24,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "bench": EVERYTHING - {"study", "testing"},
     "testing": EVERYTHING - {"study", "bench"},
 }
-TOP = {"cli", "catalogue", "config", "doctor", "errors", "experiment", "setting", "__init__", "__main__"}
+TOP = {"cli", "catalogue", "config", "doctor", "errors", "experiment", "progress", "setting", "__init__", "__main__"}
 USES_MUJOCO = {"body", "simulate", "bench"}
 
 

@@ -4,7 +4,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,6 +18,10 @@ from harness.errors import MissingExtra
 
 _START_S, _EACH_S = 60.0, 2.0
 """Patience: until the first picture, and for every one [s]."""
+_TICK_S = 0.5
+
+Progress = Callable[[str, int, int], None]
+"""Called with what was done last, how many are finished and how many were planned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +54,27 @@ class Rendering:
         if jobs and not self._reason:
             self._process = self._started()
 
-    def finish(self) -> str:
-        """Wait for the pictures: those that could be made are there. Why others are missing, "" if none is."""
+    def finish(self, progress: Progress = lambda last, done, planned: None) -> str:
+        """Wait for the pictures: those that could be made are there. Why others are missing, "" if none is.
+
+        `progress` is told what was made last, how many are there and how many there shall be.
+        """
         if self._process is not None:
             frames = sum(len(job.truth_qpos) for job in self._jobs)
-            try:
-                _, said = self._process.communicate(timeout=_START_S + _EACH_S * frames)
-                self._reason = "" if self._process.returncode == 0 else _why(self._process.returncode, said)
-            except subprocess.TimeoutExpired:
+            until_s = time.monotonic() + _START_S + _EACH_S * frames
+            said: str | None = None
+            while said is None and time.monotonic() < until_s:
+                try:
+                    _, said = self._process.communicate(timeout=_TICK_S)
+                except subprocess.TimeoutExpired:
+                    made = [job.output.name for job in self._jobs if job.output.exists()]
+                    progress(made[-1] if made else "", len(made), len(self._jobs))
+            if said is None:
                 self._process.kill()
                 self._process.communicate()
                 self._reason = "the renderer did not finish in time"
+            else:
+                self._reason = "" if self._process.returncode == 0 else _why(self._process.returncode, said)
         self.close()
         return self._reason
 

@@ -9,7 +9,7 @@ import numpy as np
 from harness.core.arrays import Ints
 from harness.core.humanoid24 import standard_skeleton
 from harness.report import figures
-from harness.report.apart import Job, Rendering
+from harness.report.apart import Job, Progress, Rendering
 from harness.report.markup import Markup
 from harness.report.page import Content, Strip, page
 from harness.report.run import WORST_METRICS, Run, file_name, read_run
@@ -25,11 +25,18 @@ _INSTANTS = 5
 _MOVIE_FPS = (20.0, 30.0)
 
 
-def write_report(out: Path, *, movie: bool = False, rendered: bool = True) -> Path:
+def write_report(
+    out: Path,
+    *,
+    movie: bool = False,
+    rendered: bool = True,
+    progress: Progress = lambda last, done, planned: None,
+) -> Path:
     """Write OUT/plots and OUT/report.html of the run in `out`; returns the page.
 
     `movie` adds OUT/movie_*.mp4 of each method's worst cell. Without `rendered`, OpenGL or an extra, the page says
-    which pictures are missing and why. Raises BadFile when the folder holds no finished run.
+    which pictures are missing and why. `progress` follows the movies. Raises BadFile when the folder holds no
+    finished run.
     """
     run = read_run(out)
     plots = out / "plots"
@@ -58,7 +65,7 @@ def write_report(out: Path, *, movie: bool = False, rendered: bool = True) -> Pa
         missing.append(f"Rendered pictures of the worst two seconds: {reason}")
     if no_view:
         missing.append(f"Interactive view: {no_view}")
-    movies, no_movies = _movies(run, reader) if movie else ([], "")
+    movies, no_movies = _movies(run, reader, progress) if movie else ([], "")
     if no_movies:
         missing.append(f"Movies: {no_movies}")
     for chart in (*over_time, *(chart for chart in (per_joint, distribution) if chart)):
@@ -132,7 +139,7 @@ def _shot(run: Run, series: str, windows: Sequence[Window], cell: Cell) -> Shot:
     return Shot(title, cell.time_s[rows].tolist(), truth, estimate)
 
 
-def _movies(run: Run, reader: Callable[[str], Cell]) -> tuple[list[Path], str]:
+def _movies(run: Run, reader: Callable[[str], Cell], progress: Progress) -> tuple[list[Path], str]:
     """The whole worst cell of each method, in real time; the files that could be made, and why not the others."""
     jobs = []
     for series in run.series:
@@ -142,7 +149,7 @@ def _movies(run: Run, reader: Callable[[str], Cell]) -> tuple[list[Path], str]:
             jobs.append(_movie_job(reader(str(worst["key"])), series, run.out))
     rendering = Rendering(jobs)
     try:
-        reason = rendering.finish()
+        reason = rendering.finish(progress)
     finally:
         rendering.close()
     return [job.output for job in jobs if job.output.is_file()], reason

@@ -1,4 +1,4 @@
-"""How often real motion that the limits were not made from lies outside of them (DESIGN.md: limits never clip it)."""
+"""How often real motion that the limits were not made from lies outside of them (they never clip it)."""
 
 from pathlib import Path
 

@@ -1,0 +1,27 @@
+"""How far long work has come, for whoever watches a terminal."""
+
+import sys
+from typing import Any
+
+
+class ProgressBar:
+    """A bar on stderr when that is a terminal; nothing otherwise. Calling it says what was done last."""
+
+    def __init__(self, unit: str) -> None:
+        self.unit = unit
+        self.bar: Any = None
+
+    def __enter__(self) -> "ProgressBar":
+        return self
+
+    def __call__(self, last: str, done: int, planned: int) -> None:
+        if self.bar is None:
+            from tqdm import tqdm
+
+            self.bar = tqdm(total=planned, unit=f" {self.unit}", disable=None, leave=False, file=sys.stderr)
+        self.bar.set_postfix_str(last, refresh=False)
+        self.bar.update(done - self.bar.n)
+
+    def __exit__(self, *_: object) -> None:
+        if self.bar is not None:
+            self.bar.close()
