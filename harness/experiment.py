@@ -29,6 +29,7 @@ from harness.score.score import score
 from harness.setting import Setting, mounts_of, noise_of
 from harness.simulate.simulate import Simulation
 from harness.stream.inputs import Inputs, combination
+from harness.stream.reader import WireFormat
 
 Progress = Callable[[str, int, int], None]
 """Called with what was done last, how many cells are finished and how many were planned."""
@@ -80,6 +81,7 @@ def run(
 
     `out` is made, or resumed when it holds this very scenario, else refused (BadInput). A cell that fails is
     listed with its traceback and never stops the rest; when nothing but refusals came out, the first one is raised.
+    NOT_COMPARABLE when every cell came below the floor of coverage, so that nothing was measured.
     Names that do not exist are refused before anything is written.
     """
     parts = [Part.parse(text) for text in scenario.motion.test]
@@ -98,10 +100,13 @@ def run(
         in_order = [ended[cell] for cell in planned if cell in ended]
         failed = {cell.cell: cell.failure for cell in in_order if cell.failure}
         keys = [cell.key for cell in in_order if not cell.failure]
-        results.write_summary(out, keys=keys, planned=len(planned), failures=failed)
+        summary = results.write_summary(out, keys=keys, planned=len(planned), failures=failed)
     if failed and all(cell.refused for cell in in_order):
         raise BadInput(f"Nothing could be run. {next(iter(failed.values()))}", "")
-    return Outcome.INCOMPLETE if failed else Outcome.PASS
+    if failed:
+        return Outcome.INCOMPLETE
+    measured = any(row["joint_angle_mean_deg"] is not None for row in summary["cells"])
+    return Outcome.PASS if measured else Outcome.NOT_COMPARABLE
 
 
 def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:
@@ -117,6 +122,7 @@ def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> 
         registry.resolve(name)
     for name in scenario.inputs:
         combination(name, tuple(scenario.stations))
+    WireFormat(tuple(scenario.stations), scenario.tracker.rate_hz, scenario.tracker.items)
     for mount in mounts_of(scenario):
         place(standard_skeleton(), mount)
     noise_of(scenario)

@@ -69,11 +69,12 @@ class Setting:
 
     @cached_property
     def take(self) -> Take:
-        """The part of it that is judged."""
-        frames = self.part.frames(len(self.whole))
+        """The part of it that is judged, and before a part the second of warm-up, which is nobody's example either."""
+        frames, rate_hz = self.part.frames(len(self.whole)), self.whole.rate_hz
+        start = max(frames.start - round(WARM_UP_S * rate_hz), 0)
         longest_s = self.scenario.motion.longest_s
-        stop = min(frames.stop, frames.start + round(longest_s * self.whole.rate_hz) + 1) if longest_s else frames.stop
-        return _cut(self.whole, range(frames.start, stop), str(self.part))
+        stop = min(frames.stop, start + round(longest_s * rate_hz) + 1) if longest_s else frames.stop
+        return _cut(self.whole, range(start, stop), str(self.part))
 
     @cached_property
     def simulation(self) -> Simulation:

@@ -21,6 +21,7 @@ from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.reconstruct.contract import Reconstructor, Session
+from harness.report.text import table
 from harness.score.files import TEMPORARY
 from harness.score.results import read_cells, read_summary
 from harness.stream.frame import TrackerFrame
@@ -256,3 +257,19 @@ def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
     assert found["best_match"]["protocol"] == "block"
     assert all(row["joint_angle_mean_deg"] is not None for row in rows(tmp_path / "run"))
     assert os.path.exists(tmp_path / "run" / "summary.csv")
+
+
+def test_a_line_that_is_too_slow_is_told_and_measures_nothing(tmp_path: Path) -> None:
+    """Six stations at 1000 Hz are nineteen times what 115200 baud carry."""
+    fast = replace(SMALL, methods=("mean_pose",), tracker=replace(SMALL.tracker, rate_hz=1000.0))
+    assert experiment.run(fast, tmp_path / "run") is Outcome.NOT_COMPARABLE
+    said = table(read_summary(tmp_path / "run"))
+    assert "THE LINE IS TOO SLOW: 9" in said
+    assert "not measured" in said
+
+
+def test_more_stations_than_the_device_has_are_refused_at_once(tmp_path: Path) -> None:
+    many = replace(SMALL, stations={f"s{k}": Station("head") for k in range(13)})
+    with pytest.raises(BadInput, match="12"):
+        experiment.run(many, tmp_path / "run")
+    assert not (tmp_path / "run").exists()

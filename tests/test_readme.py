@@ -4,10 +4,13 @@ import re
 import shlex
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import harness
 from harness.cli import build_parser, main
+from harness.config import load_scenario
+from harness.report.text import table
 from harness.score.results import read_summary
 
 ROOT = Path(harness.__file__).parent.parent
@@ -27,6 +30,19 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     assert set(methods) == {"ik", "upright:Upright", "upright:Upright+ik"}
     errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
     assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
+
+
+def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path) -> None:
+    """Every figure but times, to 5 %: another machine's arithmetic may differ in the last bits."""
+    shown = README.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
+    assert main(["run", "demo", "--no-report", "--out", str(tmp_path / "demo"), "--json"]) == 0
+    made = table(read_summary(tmp_path / "demo"))
+    rows, again = ([line.split() for line in text.splitlines() if "/" in line] for text in (shown, made))
+    demo = load_scenario("demo")
+    assert len(rows) == 1 + len(demo.methods) * len(demo.motion.test)  # the title first
+    for row, other in zip(rows[1:], again[1:], strict=True):
+        assert row[:5] == other[:5]
+        np.testing.assert_allclose([float(x) for x in row[5:-1]], [float(x) for x in other[5:-1]], rtol=0.05)
 
 
 def test_every_command_of_the_readme_parses() -> None:

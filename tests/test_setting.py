@@ -80,3 +80,15 @@ def test_a_level_that_the_code_redefines_is_another_input(monkeypatch: pytest.Mo
     monkeypatch.setattr(noise, "level", lambda name: replace(level(name), white=White(position_m=0.001)))
     assert inputs()["components"] != before["components"]
     assert {k for k, v in inputs().items() if v != before[k]} == {"components"}
+
+
+def test_a_part_is_warmed_up_on_what_comes_before_it() -> None:
+    """The second before a block is guarded, so no method has learnt from it, and the whole block is scored."""
+    source = open_source("builtin", None, seed=1, rate_hz=None)
+    scenario = replace(SCENARIO, motion=replace(SCENARIO.motion, longest_s=0.0, protocol="block"))
+    part = Part("walking_p1_01", 0.4, 0.6)
+    setting = Setting(scenario, source, part, "walking")
+    block = part.frames(len(setting.whole))
+    rate_hz = setting.whole.rate_hz
+    assert len(setting.take) == len(block) + round(rate_hz)
+    assert (setting.take.qpos[-1] == setting.whole.qpos[block.stop - 1]).all()

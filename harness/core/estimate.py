@@ -18,7 +18,10 @@ class Status(IntEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """One pose of the body: every output can be posed, rendered, exported and scored in one way."""
+    """One pose of the body: every output can be posed, rendered, exported and scored in one way.
+
+    ShapeError for a pose that is no vector, ValueError for a status that there is not.
+    """
 
     qpos: Floats
     """(55,) root position [m], root quaternion (w, x, y, z), 48 hinge angles [rad]."""
@@ -26,3 +29,4 @@ class Estimate:
 
     def __post_init__(self) -> None:
         freeze(self, qpos=("Q",))
+        object.__setattr__(self, "status", Status(self.status))

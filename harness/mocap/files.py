@@ -14,7 +14,7 @@ LARGEST = 1e6
 def check_size(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> None:
     """BadFile unless `path` is a file that is neither empty nor larger than the limit; reads nothing."""
     if not path.is_file():
-        found = "a folder" if path.is_dir() else "no such file"
+        found = "a folder" if path.is_dir() else "no regular file" if path.exists() else "no such file"
         raise BadFile(path, found, expected, "Check the path.")
     size = path.stat().st_size
     if size == 0:

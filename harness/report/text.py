@@ -11,6 +11,7 @@ COLUMNS = (
     ("step p50 [ms]", "step_p50_ms", 2),
 )
 """Title, metric and decimals."""
+_RECORDS = ("records_sent", "records_dropped")
 
 
 def table(summary: Mapping[str, Any]) -> str:
@@ -27,7 +28,15 @@ def table(summary: Mapping[str, Any]) -> str:
         figures = [_figure(row["metrics"][name], decimals) for _, name, decimals in COLUMNS]
         lines.append([row["behaviour"], row["method"], *varying, str(row["sequences"]), matched, *figures])
     return "\n".join(
-        [_setting(cells), "", *_aligned(lines, text_columns=2 + len(_varying(cells))), "", finished, *failed]
+        [
+            _setting(cells),
+            *_line(cells),
+            "",
+            *_aligned(lines, text_columns=2 + len(_varying(cells))),
+            "",
+            finished,
+            *failed,
+        ]
     )
 
 
@@ -40,6 +49,14 @@ def _setting(cells: Sequence[Mapping[str, Any]]) -> str:
         f"{one['rate_hz']:g} Hz, noise {one['noise']}, calibration {one['calibration']}, seed {one['seed']}; "
         "mean over sequences ± standard deviation, nothing aligned"
     )
+
+
+def _line(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the line between tracker and host could not carry."""
+    sent, lost = (sum(float(cell["health"].get(name, 0.0)) for cell in cells) for name in _RECORDS)
+    if not lost:
+        return []
+    return [f"THE LINE IS TOO SLOW: {100.0 * lost / (sent + lost):.0f} % of the records were dropped"]
 
 
 def _varying(cells: Sequence[Mapping[str, Any]]) -> list[str]:

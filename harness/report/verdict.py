@@ -31,6 +31,7 @@ def verdict(run: Run) -> Verdict:
         "Tracker": _tracker(run),
         "Learning": _learning(run),
         "Coverage": _coverage(run),
+        "Line": _line(run),
         "Not measured": _unmeasured(run),
     }
     facts = {title: text for title, text in facts.items() if text}
@@ -127,6 +128,15 @@ def _coverage(run: Run) -> str:
     expected = sum(int(row["frames_expected"]) for row in run.cells)
     share = f" ({100.0 * matched / expected:.1f} %)" if expected else ""
     return f"{matched:,} of {expected:,} frames matched{share}; {_finished(run)}"
+
+
+def _line(run: Run) -> str:
+    """What the line between tracker and host could not carry."""
+    totals = [
+        [float(row["health"].get(name, 0.0)) for row in run.cells] for name in ("records_sent", "records_dropped")
+    ]
+    sent, lost = map(sum, totals)
+    return f"too slow: {100.0 * lost / (sent + lost):.0f} % of the records were dropped" if lost else ""
 
 
 def _unmeasured(run: Run) -> str:

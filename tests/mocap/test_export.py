@@ -213,3 +213,13 @@ def test_what_cannot_be_exported_is_refused(cell: Written, tmp_path: Path) -> No
     (tmp_path / "file").write_text("")
     with pytest.raises(BadInput, match="cannot be written"):
         export([cell], "csv", tmp_path / "file")
+
+
+def test_files_are_written_together_or_not_at_all(cell: Written, tmp_path: Path) -> None:
+    there = replace(cell, clip="there", key="1" * 16)
+    export([there], "csv", tmp_path)
+    before = {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()}
+    with pytest.raises(BadInput, match="exists"):
+        export([cell, there], "csv", tmp_path)
+    assert {path.name: path.stat().st_mtime_ns for path in tmp_path.iterdir()} == before
+    assert len(export([cell, there], "csv", tmp_path, force=True)) == 4
