@@ -7,13 +7,16 @@ import types
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from harness.core.share import share_folder
 from harness.errors import BadFile, HarnessError, UnknownName
 from harness.simulate.link import TrackerConfig
 
-T = TypeVar("T")
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
 
 SCHEMA = 1
 
@@ -158,7 +161,7 @@ def build(kind: type[T], content: Any, where: str) -> T:
     if not isinstance(content, Mapping):
         raise TypeError(f"{where}: expected a table, found {content!r}")
     hints = get_type_hints(kind)
-    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}  # type: ignore[arg-type]
+    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     for key in content:
         if key not in fields:
             raise UnknownName(f"key in {where}", str(key), fields)
@@ -175,18 +178,18 @@ def build(kind: type[T], content: Any, where: str) -> T:
 def changed(instance: T, content: Mapping[str, Any], where: str) -> T:
     """A copy of a dataclass with the given fields replaced, checked as `build` does."""
     hints = get_type_hints(type(instance))
-    fields = [f.name for f in dataclasses.fields(instance) if f.init]  # type: ignore[arg-type]
+    fields = [f.name for f in dataclasses.fields(instance) if f.init]
     for key in content:
         if key not in fields:
             raise UnknownName(f"key in {where}", str(key), fields)
     values = {}
     for key, value in content.items():
         now = getattr(instance, key)
-        if dataclasses.is_dataclass(now) and isinstance(value, Mapping):
+        if dataclasses.is_dataclass(now) and not isinstance(now, type) and isinstance(value, Mapping):
             values[key] = changed(now, value, f"{where}.{key}")
         else:
             values[key] = convert(hints[key], value, f"{where}.{key}")
-    return dataclasses.replace(instance, **values)  # type: ignore[type-var]
+    return dataclasses.replace(instance, **values)
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:
@@ -213,7 +216,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
             raise TypeError(f"{where}: expected a table, found {value!r}")
         return {str(key): convert(args[1], item, f"{where}.{key}") for key, item in value.items()}
     if dataclasses.is_dataclass(hint):
-        return build(hint, value, where)  # type: ignore[arg-type]
+        return build(cast("type[DataclassInstance]", hint), value, where)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
@@ -52,7 +53,7 @@ def test_a_copy_of_the_test_clip_is_no_example() -> None:
             return {"load": lambda name: replace(clip, name=name), "subject": lambda name: name}[asked]
 
     motion = replace(SCENARIO.motion, examples=("sneaky_01",))
-    setting = Setting(replace(SCENARIO, motion=motion), Copying(), Part("walking_p1_01"), "walking")  # type: ignore[arg-type]
+    setting = Setting(replace(SCENARIO, motion=motion), cast(Any, Copying()), Part("walking_p1_01"), "walking")
     with pytest.raises(BadInput, match="under another name"):
         _ = setting.examples
 

@@ -140,7 +140,7 @@ def test_a_body_is_the_same_bytes_every_time_and_in_every_process(lanky: Skeleto
     shipped = pickle.dumps(first)
     assert humanoid.build(lanky, trackers) is first
     humanoid._built.cache_clear()
-    again = pickle.loads(shipped)  # noqa: S301
+    again = pickle.loads(shipped)  # noqa: S301  # our own bytes: the way a body takes to a worker process
     assert again is not first
     assert len(shipped) < 5000
     for name, body in (("a", first), ("b", again)):

@@ -22,7 +22,7 @@ def folder(tmp_path: Path) -> Path:
     for name in ("91_01", "91_02"):
         (tmp_path / "deep" / f"{name}.bvh").write_text(bvh_text(motion))
     for name in ("91_01", "91_03"):
-        np.savez(tmp_path / "deep" / "down" / f"{name}_poses.npz", **amass_arrays(motion))  # type: ignore[arg-type]
+        np.savez(tmp_path / "deep" / "down" / f"{name}_poses.npz", allow_pickle=False, **amass_arrays(motion))
     (tmp_path / "deep" / "91_04.c3d").write_bytes(b"not read before it is asked for")
     (tmp_path / "readme.txt").write_text("no motion")
     return tmp_path

@@ -17,6 +17,7 @@ from harness.mocap import performer
 from harness.reconstruct.contract import Method
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
+from harness.stream.inputs import combination
 from harness.testing.frames import exact_frames, worn
 
 
@@ -33,6 +34,11 @@ class Scene:
         examples = [self.take] if method.needs_examples else []
         session = method.fit(self.body, examples, np.random.default_rng(1)).begin(self.calibration)
         return [session.step(frame) for frame in (self.frames if frames is None else frames)]
+
+    def only(self, inputs: str) -> list[TrackerFrame]:
+        """The frames with nothing but these inputs."""
+        kept = combination(inputs, self.calibration.stations)
+        return [kept.masked(frame) for frame in self.frames]
 
     def off_m(self, estimates: list[Estimate], truth: Floats) -> Floats:
         """(T,) mean distance over the joint centres [m]."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +53,7 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., results.Cell]:
     def cell(off_m: float = 0.01, frames: int = FRAMES, **fields: object) -> results.Cell:
         estimate = truth_qpos[:frames].copy()
         estimate[:, 0] += off_m
-        content: dict[str, object] = {
+        content: dict[str, Any] = {
             "method": "ik",
             "behaviour": "walking",
             "clip": "walk_01",
@@ -85,7 +86,7 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., results.Cell]:
         } | fields
         described = {name: content[name] for name in IDENTITY}
         key = results.cell_key(described, {"off_m": off_m, "frames": frames}, "source")
-        return results.Cell(key=key, **content)  # type: ignore[arg-type]
+        return results.Cell(key=key, **content)
 
     return cell
 
