@@ -1,7 +1,7 @@
 """What a reconstructor is: a configured method, trained once, then one causal session per take."""
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -10,6 +10,9 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.stream.frame import TrackerFrame
+
+if TYPE_CHECKING:
+    from harness.reconstruct.database import MotionDatabase
 
 
 class Session(Protocol):
@@ -44,4 +47,16 @@ class Method(Protocol):
 
     def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Reconstructor:
         """Learn from takes at the tracker's rate, retargeted to `body`; never from the take under test."""
+        ...
+
+
+@runtime_checkable
+class LearnsFromDatabase(Method, Protocol):
+    """A method that can also learn from a database on disk, for which takes would not fit into memory.
+
+    `fit(body, examples, rng)` of such a method is `fit_database(body, MotionDatabase.build(body, examples), rng)`.
+    """
+
+    def fit_database(self, body: Body, database: "MotionDatabase", rng: np.random.Generator) -> Reconstructor:
+        """Learn from poses on `body` at the tracker's rate; they may be memory-mapped: copy none that need not be."""
         ...
