@@ -19,21 +19,22 @@ _LEVER_M = 0.3
 def placed(residuals: Residuals, qpos: Floats) -> tuple[Floats, Floats]:
     """The configuration (55,) moved as a whole to the readings: turned about the vertical only, and freely.
 
-    Least squares over positions and orientations (Kabsch 1976). Without positions it turns about its own root.
+    Least squares over positions and orientations (Kabsch 1976), each counting as it is trusted. Without positions it
+    turns about its own root.
     """
     count = len(residuals.bones)
     residuals.kinematics.set(qpos)
     at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, residuals.bone_from_station)
     target = rotations.multiply(residuals.world_from_target, residuals.bone_from_station)
-    positions, orientations = residuals.measured[:count], residuals.measured[count:]
+    positions, orientations = residuals.trust[:count], residuals.trust[count:]
     middle_m, target_middle_m = qpos[:3], qpos[:3]
     moment = np.zeros((3, 3))
-    if positions.any():
-        middle_m, target_middle_m = at_m[positions].mean(axis=0), residuals.target_m[positions].mean(axis=0)
-        moment += (residuals.target_m[positions] - target_middle_m).T @ (at_m[positions] - middle_m)
+    if total := float(positions.sum()):
+        middle_m, target_middle_m = positions @ at_m / total, positions @ residuals.target_m / total
+        moment += (positions[:, None] * (residuals.target_m - target_middle_m)).T @ (at_m - middle_m)
     if orientations.any():
-        turns = rotations.to_matrix(target[orientations]) @ rotations.to_matrix(rotations.inverse(turned[orientations]))
-        moment += _LEVER_M**2 * turns.sum(axis=0)
+        turns = rotations.to_matrix(target) @ rotations.to_matrix(rotations.inverse(turned))
+        moment += _LEVER_M**2 * np.tensordot(orientations, turns, axes=1)
     yaw = rotations.about_z(np.arctan2(moment[1, 0] - moment[0, 1], moment[0, 0] + moment[1, 1]))
     left, _, right = np.linalg.svd(moment)
     free = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right

@@ -31,6 +31,10 @@ class Loss:
     position_scale_m: float = 0.03
     """Where the Lorentzian starts to let go [m]."""
     orientation_scale_rad: float = math.radians(8.0)
+    quality: bool = True
+    """Weigh every reading by its station's quality, 0 to 1: a standard deviation of sigma / sqrt(quality)."""
+    suspect_weight: float = 0.1
+    """What a suspect reading counts beside that; 1 takes it for any other, 0 leaves it out."""
 
 
 class Residuals:
@@ -47,6 +51,8 @@ class Residuals:
         self.mount_m, self.bone_from_station = calibration.mount_m, calibration.bone_from_station
         self.measured: Bools = np.zeros(2 * count, bool)
         """(2S,) which rows the last frame measured."""
+        self.trust: Floats = np.zeros(2 * count)
+        """(2S,) how much each row counts, by quality and suspicion: 1 fully; 0 where not measured."""
         self.target_m: Floats = np.zeros((count, 3))
         """(S, 3) measured station positions in the world [m]; 0 where not measured."""
         self.world_from_target: Floats = np.tile(rotations.IDENTITY, (count, 1))
@@ -77,7 +83,8 @@ class Residuals:
         self._turn_vector, self._turn_cosine = self._turn[:, 1:, 0], self._turn[:, 0, 0]
         self._position_error, self._turn_error = self.error[:count], self.error[count:]
 
-        self._robust = loss.robust
+        self._robust, self._by_quality, self._suspect_weight = loss.robust, loss.quality, loss.suspect_weight
+        self._said_trust = np.ones((2, count))
         self._own_precision = np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count)
         self._precision, self._weight, self._root_weight = np.zeros((3, 2 * count))
         self._squared, self._twice_scale_squared = np.zeros(2 * count), 2.0 * self.scale**2
@@ -105,6 +112,9 @@ class Residuals:
             turned = np.where(self.measured[count:, None], turned, rotations.IDENTITY)
         self.target_m, self.world_from_target = target_m, turned
         self._turn_from_model = (turned @ _TIMES_CONJUGATE).reshape(count, 4, 4)
+        self._said_trust[:] = frame.quality if self._by_quality else 1.0
+        if frame.suspect.any():
+            self._said_trust[:, frame.suspect] *= self._suspect_weight
         self._weigh()
 
     def leave_out(self, rows: Bools) -> None:
@@ -113,7 +123,8 @@ class Residuals:
         self._weigh()
 
     def _weigh(self) -> None:
-        self._precision = self._own_precision * self.measured
+        np.multiply(self._said_trust.reshape(-1), self.measured, out=self.trust)
+        np.multiply(self._own_precision, self.trust, out=self._precision)
         np.copyto(self._weight, self._precision)
         np.sqrt(self._weight, out=self._root_weight)
         self.widen(1.0)

@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.solver import Prior, Solver, Stopping
 from harness.testing.frames import without
 
 from .conftest import Scene
@@ -98,3 +100,42 @@ def test_rows_that_were_not_measured_count_nothing(walk: Scene) -> None:
     residuals.leave_out(np.arange(12) < 6)
     assert residuals.place(elsewhere) == pytest.approx(0.0, abs=1e-9)
     assert whole > 100.0
+
+
+def test_a_station_of_low_quality_pulls_less(walk: Scene) -> None:
+    """One head 10 cm off: the solved head comes the nearer the better its quality, as 1 / sd^2 should."""
+    loss, frame, truth = Loss(robust=False, position_sigma_m=0.05), walk.frames[0], walk.take.qpos[0]
+    limits = HingeLimits(walk.body)
+    shift, pulled_m = np.zeros((6, 3)), []
+    shift[5] = [0.0, 0.1, 0.0]
+    for quality in (1.0, 0.1):
+        residuals = Residuals(walk.body, walk.calibration, loss)
+        said = np.ones(6)
+        said[5] = quality
+        residuals.read(replace(frame, position_m=frame.position_m + shift, quality=said))
+        assert residuals.trust == pytest.approx(np.tile(said, 2))
+        assert residuals.place(truth) == pytest.approx(quality * 0.5 * (0.1 / 0.05) ** 2, rel=1e-6)
+        qpos = Solver(residuals, limits, Stopping()).solve(truth, Prior(truth, np.full(54, 30.0))).qpos
+        residuals.place(truth)
+        at_m = residuals.station_m[5].copy()
+        residuals.place(qpos)
+        pulled_m.append(float(np.linalg.norm(residuals.station_m[5] - at_m)))
+    assert pulled_m[1] < 0.5 * pulled_m[0]
+    assert pulled_m[0] > 0.01
+
+
+def test_quality_and_suspicion_may_be_ignored_or_taken_in_earnest(walk: Scene) -> None:
+    doubted = replace(walk.frames[0], quality=np.full(6, 0.5), suspect=np.arange(6) == 2)
+    for loss, expected in (
+        (Loss(), [0.5, 0.5, 0.05, 0.5, 0.5, 0.5]),
+        (Loss(quality=False), [1.0, 1.0, 0.1, 1.0, 1.0, 1.0]),
+        (Loss(suspect_weight=0.0), [0.5, 0.5, 0.0, 0.5, 0.5, 0.5]),
+        (Loss(quality=False, suspect_weight=1.0), [1.0] * 6),
+    ):
+        residuals = Residuals(walk.body, walk.calibration, loss)
+        residuals.read(doubted)
+        assert residuals.trust == pytest.approx(np.tile(expected, 2))
+        residuals.leave_out(np.arange(12) == 0)
+        assert residuals.trust == pytest.approx([0.0, *expected[1:], *expected])
+        residuals.read(walk.frames[0])
+        assert residuals.trust == pytest.approx(np.ones(12))
