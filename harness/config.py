@@ -36,8 +36,9 @@ class Motion:
     database: Literal["all", "behaviour"] = "all"
     """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
     protocol: Literal["block", "sequence", "subject"] = "sequence"
-    body: Literal["own", "standard"] = "own"
-    """Judge on the performer's own proportions or on the mean skeleton."""
+    body: Literal["own", "standard", "common"] = "own"
+    """Judge on the performer's own proportions; or on the mean skeleton, `standard` with bones that point as the
+    performer's do, `common` with the recorded angles kept and the root's path scaled by the legs."""
     longest_s: float = 0.0
     """Only the first so many seconds of each test clip [s]; 0 is all of it."""
     rate_hz: float = 0.0

@@ -58,9 +58,9 @@ class Setting:
 
     @cached_property
     def body(self) -> humanoid.Body:
-        if self.scenario.motion.body == "standard":
-            return humanoid.build(standard_skeleton())
-        return humanoid.build(self.clip.skeleton.subset(BONES)[0])
+        if self.scenario.motion.body == "own":
+            return humanoid.build(self.clip.skeleton.subset(BONES)[0])
+        return humanoid.build(standard_skeleton())
 
     @cached_property
     def whole(self) -> Take:
@@ -145,9 +145,10 @@ class Setting:
         deviation_mm = np.mean([report.deviation_mm for report in reports])
         worst = max(reports, key=lambda report: report.deviation_mm)
         soles_mm = [x for report in reports for x in (report.float_mm, report.sink_mm) if np.isfinite(x)]
+        how = ", every angle kept" if self.scenario.motion.body == "common" else ""
         note = (
-            f"{len(reports)} of {len(used)} clips (test and examples) retargeted to the body under test: joint centres "
-            f"{deviation_mm:.0f} mm off on average, {worst.deviation_mm:.0f} mm in {worst.clip}"
+            f"{len(reports)} of {len(used)} clips (test and examples) retargeted to the body under test{how}: joint "
+            f"centres {deviation_mm:.0f} mm off on average, {worst.deviation_mm:.0f} mm in {worst.clip}"
         )
         soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
         return (*self.clip.notes, note + soles)
@@ -157,9 +158,11 @@ class Setting:
         return results.cell_key(self.inputs_of(method, inputs), described, manifest.source_hash())
 
     def _on_body(self, clip: Clip) -> Take:
-        if clip.name == self.clip.name and self.scenario.motion.body == "own":
+        kind = self.scenario.motion.body
+        if clip.name == self.clip.name and kind == "own":
             return retarget.to_own_body(clip)[1]
-        take, self._retargeted[clip.name] = retarget.to_common_body(clip, self.body.skeleton)
+        onto = retarget.with_angles_kept if kind == "common" else retarget.to_common_body
+        take, self._retargeted[clip.name] = onto(clip, self.body.skeleton)
         return take
 
 

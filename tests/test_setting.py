@@ -4,9 +4,13 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from harness.config import Motion, Scenario, Station
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import BONES, standard_skeleton, unpack
+from harness.core.motion import Clip
 from harness.core.protocol import Part
 from harness.errors import BadInput
 from harness.mocap.sources import open_source
@@ -43,6 +47,22 @@ def test_what_retargeting_cost_is_told() -> None:
     assert "3 of 3 clips" in common.notes(MeanPose())[0]
 
 
+def test_the_common_body_keeps_the_angles_of_test_clip_and_examples() -> None:
+    motion = replace(SCENARIO.motion, examples=("walking_p1_02", "walking_p2_01"), body="common")
+    source = open_source("builtin", None, seed=1, rate_hz=None)
+    setting = Setting(replace(SCENARIO, motion=motion), source, Part("walking_p1_01"), "walking")
+    np.testing.assert_array_equal(setting.body.skeleton.bone_m, standard_skeleton().bone_m)
+    np.testing.assert_array_equal(unpack(setting.whole.qpos)[2], _angles(setting.clip))
+    for clip, take in zip(setting.example_clips, setting.examples, strict=True):
+        np.testing.assert_allclose(unpack(take.qpos)[2][0], _angles(clip)[0], atol=1e-12)
+    assert "every angle kept" in setting.notes(MeanPose())[0]
+    assert "3 of 3 clips" in setting.notes(MeanPose())[0]
+
+
+def _angles(clip: Clip) -> Floats:
+    return clip.angles_rad[:, clip.skeleton.subset(BONES)[1]]
+
+
 def test_a_copy_of_the_test_clip_is_no_example() -> None:
     clip = open_source("builtin", None, seed=1, rate_hz=None).load("walking_p1_01")
 
@@ -69,6 +89,7 @@ def test_equal_scenarios_have_equal_inputs() -> None:
         (replace(SCENARIO, noise="clean"), "tracker"),
         (replace(SCENARIO, stations={"head": Station("head", along=0.9), "torso": Station("thorax")}), "mounts_digest"),
         (replace(SCENARIO, motion=replace(SCENARIO.motion, body="standard")), "body_digest"),
+        (replace(SCENARIO, motion=replace(SCENARIO.motion, body="common")), "body_digest"),
     ],
 )
 def test_what_a_scenario_changes_is_named(changed: Scenario, key: str) -> None:

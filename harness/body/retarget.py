@@ -1,4 +1,5 @@
-"""Captured motion onto a body: the performer's own, exactly, or a common one, as closely as its proportions allow."""
+"""Captured motion onto a body: the performer's own, exactly, or a common one: as closely as its proportions allow, or
+with every angle kept."""
 
 from dataclasses import dataclass
 
@@ -7,7 +8,7 @@ import numpy as np
 from harness.body import ground, humanoid, refit
 from harness.body.humanoid import Body
 from harness.core import humanoid24, rotations, skeleton
-from harness.core.arrays import Floats
+from harness.core.arrays import Bools, Floats
 from harness.core.motion import Clip, Take
 from harness.core.skeleton import Pose, Skeleton
 
@@ -55,39 +56,85 @@ def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
     """
     own, kept_rad = _humanoid_part(clip)
     turns = clip.world_from_root
-    seen = skeleton.forward(own, clip.root_m, turns, kept_rad)
-    soles_m, standing = ground.sole_heights_m(own, seen), ground.stance(own, seen, clip.rate_hz)
-    floor_m, scale = ground.floor_m(soles_m, standing), _leg_m(target) / _leg_m(own)
-    level_m = np.array([0.0, 0.0, floor_m])
-    meant_m, meant_soles_m = scale * (seen.end_m - level_m), scale * (soles_m - floor_m)
-
+    meant = _Meant.on(target, own, kept_rad, clip)
     angles_rad = refit.pointing_alike(own, humanoid24.pack(clip.root_m, turns, kept_rad), target)
-    root_m = scale * (clip.root_m - level_m)
+    moved = skeleton.forward(target, meant.root_m, turns, angles_rad)
+    root_m = meant.root_m + _best_offset_m(meant.joints_m - moved.end_m, turns)
     moved = skeleton.forward(target, root_m, turns, angles_rad)
-    root_m = root_m + _best_offset_m(meant_m - moved.end_m, turns)
-    moved = skeleton.forward(target, root_m, turns, angles_rad)
-    root_m[:, 2] += ground.settled(meant_soles_m - ground.sole_heights_m(target, moved), standing, clip.rate_hz)
-    moved = skeleton.forward(target, root_m, turns, angles_rad)
+    root_m[:, 2] += ground.settled(meant.soles_m - ground.sole_heights_m(target, moved), meant.standing, clip.rate_hz)
+    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(root_m, angles_rad)
 
-    plain = skeleton.forward(target, scale * clip.root_m, turns, kept_rad)
-    deviation_mm = 1e3 * np.linalg.norm(moved.end_m - meant_m, axis=2)
-    feet_mm = 1e3 * (ground.sole_heights_m(target, moved) - meant_soles_m)[standing]
-    plain_feet_mm = 1e3 * (ground.sole_heights_m(target, plain) - meant_soles_m)[standing]
-    report = RetargetReport(
-        clip=clip.name,
-        leg_scale=scale,
-        floor_m=floor_m,
-        stance_share=float(np.mean(np.any(standing, axis=1))),
-        deviation_plain_mm=float(1e3 * np.mean(np.linalg.norm(plain.end_m - scale * seen.end_m, axis=2))),
-        deviation_mm=float(np.mean(deviation_mm)),
-        deviation_p95_mm=float(np.percentile(deviation_mm, 95)),
-        proportions_mm=_proportions_mm(own, seen, target, scale, clip),
-        float_plain_mm=_beyond(plain_feet_mm),
-        sink_plain_mm=_beyond(-plain_feet_mm),
-        float_mm=_beyond(feet_mm),
-        sink_mm=_beyond(-feet_mm),
-    )
-    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), report
+
+def with_angles_kept(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
+    """The clip's own angles, to the bit, on the body of another skeleton, and what that cost.
+
+    The root's path grows with the legs and is lowered once, so that half of the soles in stance are below where the
+    performer's are over a floor at z = 0 and half above. Hands and feet are then not where the performer's were.
+    """
+    own, angles_rad = _humanoid_part(clip)
+    turns = clip.world_from_root
+    meant = _Meant.on(target, own, angles_rad, clip)
+    moved = skeleton.forward(target, meant.root_m, turns, angles_rad)
+    soles_m = (ground.sole_heights_m(target, moved) - meant.soles_m)[meant.standing]
+    root_m = meant.root_m - np.array([0.0, 0.0, np.median(soles_m) if soles_m.size else 0.0])
+    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(root_m, angles_rad)
+
+
+@dataclass(frozen=True, eq=False)
+class _Meant:
+    """What a clip asks of a common body: the performer's joints and soles, enlarged by the legs, over z = 0."""
+
+    clip: Clip
+    own: Skeleton
+    kept_rad: Floats
+    """(T, 48) the clip's angles."""
+    target: Skeleton
+    seen: Pose
+    """The clip on its own skeleton."""
+    standing: Bools
+    """(T, 2) feet in stance."""
+    floor_m: float
+    scale: float
+    root_m: Floats
+    """(T, 3)"""
+    joints_m: Floats
+    """(T, 24, 3)"""
+    soles_m: Floats
+    """(T, 2)"""
+
+    @classmethod
+    def on(cls, target: Skeleton, own: Skeleton, kept_rad: Floats, clip: Clip) -> "_Meant":
+        seen = skeleton.forward(own, clip.root_m, clip.world_from_root, kept_rad)
+        soles_m, standing = ground.sole_heights_m(own, seen), ground.stance(own, seen, clip.rate_hz)
+        floor_m, scale = ground.floor_m(soles_m, standing), _leg_m(target) / _leg_m(own)
+        level_m = np.array([0.0, 0.0, floor_m])
+        root_m, joints_m = scale * (clip.root_m - level_m), scale * (seen.end_m - level_m)
+        low_m = scale * (soles_m - floor_m)
+        return cls(clip, own, kept_rad, target, seen, standing, floor_m, scale, root_m, joints_m, low_m)
+
+    def report(self, root_m: Floats, angles_rad: Floats) -> RetargetReport:
+        """How far a motion of the common body (T, 3), (T, 48) is from it."""
+        clip, target, scale = self.clip, self.target, self.scale
+        moved = skeleton.forward(target, root_m, clip.world_from_root, angles_rad)
+        plain = skeleton.forward(target, scale * clip.root_m, clip.world_from_root, self.kept_rad)
+        deviation_mm = 1e3 * np.linalg.norm(moved.end_m - self.joints_m, axis=2)
+        feet_mm, plain_feet_mm = (
+            1e3 * (ground.sole_heights_m(target, pose) - self.soles_m)[self.standing] for pose in (moved, plain)
+        )
+        return RetargetReport(
+            clip=clip.name,
+            leg_scale=scale,
+            floor_m=self.floor_m,
+            stance_share=float(np.mean(np.any(self.standing, axis=1))),
+            deviation_plain_mm=float(1e3 * np.mean(np.linalg.norm(plain.end_m - scale * self.seen.end_m, axis=2))),
+            deviation_mm=float(np.mean(deviation_mm)),
+            deviation_p95_mm=float(np.percentile(deviation_mm, 95)),
+            proportions_mm=_proportions_mm(self.own, self.seen, target, scale, clip),
+            float_plain_mm=_beyond(plain_feet_mm),
+            sink_plain_mm=_beyond(-plain_feet_mm),
+            float_mm=_beyond(feet_mm),
+            sink_mm=_beyond(-feet_mm),
+        )
 
 
 def _humanoid_part(clip: Clip) -> tuple[Skeleton, Floats]:

@@ -143,6 +143,42 @@ def test_other_proportions_are_met_as_far_as_they_allow() -> None:
     assert np.max(np.abs(lowest_mm)) < 8.0
 
 
+def test_a_common_body_may_keep_every_angle() -> None:
+    own = STANDARD.with_bones(1.1 * STANDARD.bone_m)
+    clip = walking_in_place(own)
+    raised = replace(clip, root_m=clip.root_m + np.array([0.0, 0.0, 0.04]))
+    take, report = retarget.with_angles_kept(raised, STANDARD)
+    np.testing.assert_array_equal(humanoid24.unpack(take.qpos)[2], clip.angles_rad)
+    np.testing.assert_array_equal(take.qpos[:, 3:7], clip.world_from_root)
+    np.testing.assert_allclose(take.qpos[:, :3], clip.root_m / 1.1, atol=1e-3)
+    assert report.deviation_mm < 1.0
+    assert max(report.float_mm, report.sink_mm) < 1.0
+
+
+def test_the_root_s_path_grows_with_the_legs_and_soles_stand_on_the_floor(lanky: Skeleton) -> None:
+    clip = walking_in_place(lanky)
+    take, report = retarget.with_angles_kept(clip, STANDARD)
+    np.testing.assert_allclose(take.qpos[:, :2], report.leg_scale * clip.root_m[:, :2], atol=1e-12)
+    np.testing.assert_allclose(np.diff(take.qpos[:, 2]), report.leg_scale * np.diff(clip.root_m[:, 2]), atol=1e-12)
+    pose = kinematics.pose(STANDARD, take.qpos)
+    standing = ground.stance(lanky, kinematics.pose(lanky, retarget.to_own_body(clip)[1].qpos), clip.rate_hz)
+    assert np.median(ground.sole_heights_m(STANDARD, pose)[standing]) == pytest.approx(0.0, abs=5e-3)
+
+
+def test_angles_of_files_are_kept_on_the_common_body(mocap: Path) -> None:
+    """To the bit; what `unwrapped` does on the way in changes no rotation of a bone."""
+    for path in amcs(mocap)[::20]:
+        clip = as_recorded(path, mocap)
+        own, dofs = clip.skeleton.subset(humanoid24.BONES)
+        np.testing.assert_allclose(own.axes, STANDARD.axes, atol=1e-9)
+        kept = humanoid24.unpack(retarget.with_angles_kept(clip, STANDARD)[0].qpos)[2]
+        np.testing.assert_array_equal(kept, clip.angles_rad[:, dofs])
+        take, _ = retarget.with_angles_kept(unwrapped(clip), STANDARD)
+        recorded = skeleton.forward(STANDARD, clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])
+        found = kinematics.pose(STANDARD, take.qpos)
+        np.testing.assert_allclose(found.world_from_bone, recorded.world_from_bone, atol=1e-9)
+
+
 def test_feet_that_never_stand_are_not_measured() -> None:
     clip = walking_in_place(STANDARD)
     flying = replace(clip, root_m=clip.root_m + 3.0 * np.arange(len(clip))[:, None] / clip.rate_hz)
