@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from harness.errors import UnknownName
 from harness.simulate.components.clock import Clock
+from harness.simulate.components.displaced import Displaced
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
@@ -12,6 +13,7 @@ from harness.simulate.components.mount import MountOffset, MountSlip
 from harness.simulate.components.session import Session
 from harness.simulate.components.slow import Slow
 from harness.simulate.components.speed import Speed
+from harness.simulate.components.turned import Turned
 from harness.simulate.components.white import White
 from harness.simulate.sensed import Sensed
 
@@ -30,6 +32,8 @@ class Noise:
     white: White | None = None
     excursion: Excursion | None = None
     echo: Echo | None = None
+    displaced: tuple[Displaced, ...] = ()
+    turned: tuple[Turned, ...] = ()
     dropout: Dropout | None = None
     lost: tuple[LostStation, ...] = ()
     clock: Clock | None = None
@@ -45,6 +49,8 @@ class Noise:
             self.white,
             self.excursion,
             self.echo,
+            *self.displaced,
+            *self.turned,
             self.dropout,
             *self.lost,
             self.clock,

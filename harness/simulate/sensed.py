@@ -1,5 +1,6 @@
 """What the tracker believes, before it is written to the wire: the truth, spoilt by one component after another."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
+from harness.errors import UnknownName
 
 
 @dataclass(eq=False)
@@ -38,6 +40,15 @@ class Sensed:
     def draw(self, component: str, station: str) -> np.random.Generator:
         """The generator of one component at one station in one take, independent of all others."""
         return generator(self.seed, "noise", self.take, component, station)
+
+    def during(self, stations: Collection[str], from_s: float, to_s: float) -> Bools:
+        """(N, S) readings of these stations, () for all of them, within a stretch of time; UnknownName."""
+        for station in stations:
+            if station not in self.stations:
+                raise UnknownName("station", station, self.stations)
+        named = np.array([not stations or station in stations for station in self.stations])
+        out: Bools = named & (self.time_s >= from_s) & (self.time_s < to_s)
+        return out
 
     def move(self, offset_m: Floats) -> None:
         """Shift positions by (..., 3) in the tracker's axes."""

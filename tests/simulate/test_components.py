@@ -14,8 +14,9 @@ from scipy import stats
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.errors import UnknownName
+from harness.errors import BadInput, UnknownName
 from harness.simulate.components.clock import Clock
+from harness.simulate.components.displaced import Displaced
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
@@ -24,6 +25,7 @@ from harness.simulate.components.mount import MountOffset, MountSlip
 from harness.simulate.components.session import Session
 from harness.simulate.components.slow import Slow
 from harness.simulate.components.speed import Speed
+from harness.simulate.components.turned import Turned
 from harness.simulate.components.white import White
 from harness.simulate.noise import Noise, level
 from harness.simulate.sensed import Sensed
@@ -283,6 +285,34 @@ def test_quality_falls_before_a_station_is_lost(still: Still) -> None:
     np.testing.assert_allclose(quality[falling], (4.0 - time_s[falling]) / 2.0)
     assert (quality[(time_s > 3.9) & (time_s < 4.0)] > 0.0).all()
     assert (quality[time_s >= 4.0] == 0.0).all()
+
+
+def test_displaced_stations_are_off_for_a_while_and_by_so_much(still: Still) -> None:
+    true, seen = still(6.0), still(6.0)
+    Displaced(("s1", "s3"), from_s=2.0, to_s=4.0, offset_m=(0.0, -0.3, 0.1)).spoil(seen)
+    off = (true.time_s >= 2.0) & (true.time_s < 4.0) & np.array([False, True, False, True])
+    moved_m, turned_rad = errors(true, seen)
+    np.testing.assert_allclose(moved_m[off], np.tile([0.0, -0.3, 0.1], (off.sum(), 1)), atol=1e-12)
+    assert np.abs(moved_m[~off]).max() == np.abs(turned_rad).max() == 0.0
+    assert (seen.quality == 1.0).all()  # it does not know
+    np.testing.assert_array_equal(seen.hits["displaced"], off)
+    with pytest.raises(UnknownName, match="'s9'"):
+        Displaced(("s9",)).spoil(seen)
+    with pytest.raises(BadInput, match="to_s"):
+        Displaced((), from_s=2.0, to_s=1.0)
+
+
+def test_turned_stations_face_elsewhere_for_a_while_and_stay_in_place(still: Still) -> None:
+    true, seen = still(6.0), still(6.0)
+    Turned((), from_s=1.0, to_s=3.0, angle_rad=0.5).spoil(seen)
+    off = (true.time_s >= 1.0) & (true.time_s < 3.0)
+    moved_m, turned_rad = errors(true, seen)
+    np.testing.assert_allclose(turned_rad[off], np.tile([0.0, 0.0, 0.5], (off.sum(), 1)), atol=1e-12)
+    assert np.abs(turned_rad[~off]).max() < 1e-12
+    assert np.abs(moved_m).max() == 0.0
+    np.testing.assert_array_equal(seen.hits["turned"], off)
+    with pytest.raises(UnknownName, match="'s9'"):
+        Turned(("s9",)).spoil(seen)
 
 
 def test_speed(still: Still, rng: np.random.Generator) -> None:

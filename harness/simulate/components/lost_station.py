@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.errors import UnknownName
 from harness.simulate.limits import require
 from harness.simulate.sensed import Sensed
 
@@ -24,12 +23,9 @@ class LostStation:
         require(self, to_s=(self.from_s, math.inf), fade_s=(0.0, math.inf))
 
     def spoil(self, sensed: Sensed) -> None:
-        if self.station not in sensed.stations:
-            raise UnknownName("station", self.station, sensed.stations)
+        lost = sensed.during((self.station,), self.from_s, self.to_s)
         row = sensed.stations.index(self.station)
         left = np.clip((self.from_s - sensed.time_s[:, row]) / max(self.fade_s, 1e-9), 1.0 / 255.0, 1.0)
         fading = sensed.time_s[:, row] < self.from_s
         sensed.quality[fading, row] = np.minimum(sensed.quality[fading, row], left[fading])
-        lost = (sensed.time_s >= self.from_s) & (sensed.time_s < self.to_s)
-        lost[:, np.arange(len(sensed.stations)) != row] = False
         sensed.lose(lost)
