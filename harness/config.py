@@ -33,6 +33,9 @@ class Motion:
     """What the clips show: one word for all of them, or one for each."""
     examples: tuple[str, ...] = ()
     """Clips that methods may learn from; what the protocol forbids is left out clip by clip."""
+    withheld: tuple[str, ...] = ()
+    """Clips and parts of clips that nothing is learnt from under any protocol, nor within 1 s of them: the test clips,
+    while constants are chosen on others."""
     database: Literal["all", "behaviour"] = "all"
     """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
     protocol: Literal["block", "sequence", "subject"] = "sequence"

@@ -116,7 +116,8 @@ def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:
 
 def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> None:
     """Everything that a scenario names exists: clips, methods, inputs, bones, components. UnknownName, BadInput."""
-    for name in {part.clip for part in parts} | set(scenario.motion.examples):
+    withheld = {Part.parse(text).clip for text in scenario.motion.withheld}
+    for name in {part.clip for part in parts} | set(scenario.motion.examples) | withheld:
         source.check(name)
     for name in scenario.methods:
         registry.resolve(name)

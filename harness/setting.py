@@ -87,10 +87,16 @@ class Setting:
         return seen
 
     @cached_property
+    def closed(self) -> tuple[Part, ...]:
+        """What nothing is learnt from: the part that is judged, and what the scenario withholds."""
+        return (self.part, *map(Part.parse, self.scenario.motion.withheld))
+
+    @cached_property
     def example_clips(self) -> list[Clip]:
         motion, test = self.scenario.motion, self.part
         subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
         names = examples_of(test, motion.examples, motion.protocol, subjects)
+        names = [name for name in names if Part(name) not in self.closed]
         if motion.database == "behaviour":
             names = [name for name in names if self.source.behaviour(name) == self.behaviour]
         clips, judged = [self.source.load(name) for name in names], _motion_digest(self.clip)
@@ -102,13 +108,12 @@ class Setting:
     @cached_property
     def examples(self) -> list[Take]:
         """What the protocol lets a method learn from, on this body and at the tracker's rate."""
-        learnt, takes = [], []
+        takes = []
         for clip in self.example_clips:
+            runs = allowed_frames(self.closed, clip.name, len(clip), clip.rate_hz)
+            refuse_leak(self.closed, clip.name, runs, len(clip), clip.rate_hz)
             whole = self._on_body(clip)
-            for frames in allowed_frames(self.part, clip.name, len(clip), clip.rate_hz):
-                learnt.append((clip.name, frames))
-                takes.append(_at_rate(self.body, _cut(whole, frames, clip.name), self.scenario.tracker.rate_hz))
-        refuse_leak(self.part, learnt, len(self.clip), self.clip.rate_hz)
+            takes += [_at_rate(self.body, _cut(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
         return takes
 
     def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
@@ -122,6 +127,8 @@ class Setting:
         for many in ("methods", "inputs", "name", "components"):
             del content[many]
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
+        del content["motion"]["withheld"]
+        learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}
         worn = [array for mount in mounts_of(scenario) for array in place(body.skeleton, mount)]
         return {
             **content,
@@ -131,7 +138,8 @@ class Setting:
             "motion_digest": _motion_digest(self.clip),
             "body_digest": results.digest(body.skeleton.bone_m, body.skeleton.axes, body.limits_rad),
             "mounts_digest": results.digest(*worn),
-            "examples": {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])},
+            "examples": learnt,
+            "withheld": sorted(str(part) for part in self.closed[1:] if part.clip in learnt),
             "inputs": inputs,
             "metric_versions": VERSIONS,
         }

@@ -59,6 +59,27 @@ def test_the_common_body_keeps_the_angles_of_test_clip_and_examples() -> None:
     assert "3 of 3 clips" in setting.notes(MeanPose())[0]
 
 
+def test_what_is_withheld_is_in_no_example() -> None:
+    """Whole takes are gone; of a part, its frames and a second on both sides, exactly."""
+    motion = replace(SCENARIO.motion, examples=("walking_p1_02", "walking_p1_03", "walking_p2_01"))
+    held = replace(motion, withheld=("walking_p1_02@0.40-0.60", "walking_p2_01", "walking_p3_01"))
+    source = open_source("builtin", None, seed=1, rate_hz=None)
+    free, closed = (
+        Setting(replace(SCENARIO, motion=m), source, Part("walking_p1_01"), "walking") for m in (motion, held)
+    )
+    assert [c.name for c in closed.example_clips] == ["walking_p1_02", "walking_p1_03"]
+    assert [t.name for t in closed.examples] == ["walking_p1_02", "walking_p1_02", "walking_p1_03"]
+    whole, (before, after, other) = free.examples[0], closed.examples
+    clip = closed.example_clips[0]
+    block, guard = Part("walking_p1_02", 0.4, 0.6).frames(len(clip)), round(clip.rate_hz)
+    assert before.qpos[-1, :3] == pytest.approx(whole.qpos[len(before) - 1, :3], abs=1e-9)
+    assert (len(before) - 1) / 40.0 == pytest.approx((block.start - guard - 1) / clip.rate_hz, abs=1 / 40.0)
+    assert (len(after) - 1) / 40.0 == pytest.approx((len(clip) - block.stop - guard - 1) / clip.rate_hz, abs=1 / 40.0)
+    np.testing.assert_array_equal(other.qpos, free.examples[1].qpos)
+    assert closed.inputs_of(MeanPose(), "pos+ori")["withheld"] == ["walking_p1_02@0.40-0.60"]
+    assert closed.inputs_of(Ik(), "pos+ori") == free.inputs_of(Ik(), "pos+ori")
+
+
 def _angles(clip: Clip) -> Floats:
     return clip.angles_rad[:, clip.skeleton.subset(BONES)[1]]
 

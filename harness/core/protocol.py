@@ -65,23 +65,26 @@ def examples_of(test: Part, candidates: Iterable[str], protocol: Protocol, subje
             return sorted({name for name in candidates if subjects[name] != subjects[test.clip]})
 
 
-def allowed_frames(test: Part, example: str, count: int, rate_hz: float) -> list[range]:
-    """The runs of frames of an example that may be learnt from: all, but for the guarded block of the test clip.
+def allowed_frames(closed: Iterable[Part], example: str, count: int, rate_hz: float) -> list[range]:
+    """The runs of frames of an example that may be learnt from: all, but for the closed parts and their guard time.
 
-    A test clip that is not cut into a block gives nothing, whatever the protocol.
+    A clip that is closed whole gives nothing, whatever the protocol.
     """
-    if example != test.clip:
-        return [range(count)]
-    tested, guard = test.frames(count), round(GUARD_S * rate_hz)
-    return [run for run in (range(0, tested.start - guard), range(tested.stop + guard, count)) if len(run) > 1]
+    guard, first, runs = round(GUARD_S * rate_hz), 0, []
+    for shut in sorted((p.frames(count) for p in closed if p.clip == example), key=lambda shut: shut.start):
+        runs.append(range(first, shut.start - guard))
+        first = max(first, shut.stop + guard)
+    return [run for run in (*runs, range(first, count)) if len(run) > 1]
 
 
-def refuse_leak(test: Part, learnt: Iterable[tuple[str, range]], count: int, rate_hz: float) -> None:
-    """BadInput when any frame that was learnt from lies in the test part or within the guard time of it."""
-    tested, guard = test.frames(count), GUARD_S * rate_hz
-    for clip, run in learnt:
-        if clip == test.clip and run.start < tested.stop + guard - 0.5 and run.stop > tested.start - guard + 0.5:
-            raise BadInput(
-                f"{test} is judged, but frames {run.start} to {run.stop} of that take are among its examples.",
-                "A test clip can never be among its own examples: remove it, or use protocol block with a part.",
-            )
+def refuse_leak(closed: Iterable[Part], example: str, runs: Iterable[range], count: int, rate_hz: float) -> None:
+    """BadInput when any frame that is learnt from lies in a closed part of the example or in the guard time of it."""
+    guard, used = GUARD_S * rate_hz, list(runs)
+    for part in closed:
+        shut = part.frames(count)
+        for run in used if part.clip == example else ():
+            if run.start < shut.stop + guard - 0.5 and run.stop > shut.start - guard + 0.5:
+                raise BadInput(
+                    f"{part} is judged or withheld, but frames {run.start} to {run.stop} of that take are examples.",
+                    "A test clip can never be among its own examples: remove it, or use protocol block with a part.",
+                )

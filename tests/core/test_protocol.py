@@ -20,9 +20,34 @@ def test_a_subject_is_left_out() -> None:
 
 def test_a_block_keeps_the_rest_of_its_take_a_second_away() -> None:
     part = Part.parse("13_17@0.40-0.60")
-    runs = allowed_frames(part, "13_17", 1000, 40.0)
+    runs = allowed_frames([part], "13_17", 1000, 40.0)
     assert runs == [range(0, 360), range(640, 1000)]
-    refuse_leak(part, [("13_17", run) for run in runs], 1000, 40.0)
+    refuse_leak([part], "13_17", runs, 1000, 40.0)
+
+
+def test_what_is_withheld_is_left_out_like_what_is_judged() -> None:
+    """Test blocks stay unseen while constants are chosen on other blocks of the same takes."""
+    closed = [Part.parse(text) for text in ("13_17@0.80-0.90", "13_17@0.20-0.40", "13_17@0.60-0.70", "14_02")]
+    runs = allowed_frames(closed, "13_17", 1000, 40.0)
+    assert runs == [
+        range(0, 160),
+        range(440, 560),
+        range(940, 1000),
+    ]  # 0.70 to 0.80 is all guard time, but a frame of none
+    assert allowed_frames(closed, "14_02", 1000, 40.0) == []
+    assert allowed_frames(closed, "02_05", 1000, 40.0) == [range(1000)]
+
+
+@given(st.lists(st.tuples(st.floats(0.0, 0.95), st.floats(0.01, 0.5)), max_size=4), st.integers(2, 3000))
+def test_learnt_frames_are_all_that_are_far_from_every_closed_part(shares: list[tuple[float, float]], n: int) -> None:
+    closed = [Part("a_1", start, min(start + length, 1.0)) for start, length in shares]
+    runs = allowed_frames(closed, "a_1", n, 40.0)
+    learnt = {frame for run in runs for frame in run}
+    far = {k for k in range(n) if all(k < p.frames(n).start - 40 or k >= p.frames(n).stop + 40 for p in closed)}
+    assert sum(map(len, runs)) == len(learnt)
+    assert learnt <= far
+    assert all(frame - 1 not in far and frame + 1 not in far for frame in far - learnt)  # single frames are no motion
+    refuse_leak(closed, "a_1", runs, n, 40.0)
 
 
 @given(st.floats(0, 0.9), st.floats(0.01, 1.0), st.integers(2, 5000), st.integers(0, 5000), st.integers(1, 3000))
@@ -33,13 +58,13 @@ def test_a_leak_is_refused(start: float, length: float, count: int, first: int, 
     near = learnt.start < tested.stop + 40 and learnt.stop > tested.start - 40
     if near:
         with pytest.raises(BadInput, match="own examples"):
-            refuse_leak(part, [("a_1", learnt)], count, 40.0)
+            refuse_leak([part], "a_1", [learnt], count, 40.0)
     else:
-        refuse_leak(part, [("a_1", learnt)], count, 40.0)
+        refuse_leak([part], "a_1", [learnt], count, 40.0)
 
 
 def test_a_whole_take_leaves_nothing_to_learn_from() -> None:
-    assert allowed_frames(Part("13_17"), "13_17", 1000, 40.0) == []
+    assert allowed_frames([Part("13_17")], "13_17", 1000, 40.0) == []
 
 
 @pytest.mark.parametrize("text", ["a@", "a@0.5", "a@0.6-0.4", "a@x-y", "a@0.5-1.5", "a@.-."])
