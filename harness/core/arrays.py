@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 from harness.errors import ShapeError
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+"""Single precision, for what is kept in great numbers."""
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 

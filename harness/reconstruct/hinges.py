@@ -62,6 +62,19 @@ class HingeLimits:
         plain[..., self._gimbals] = np.where(better[..., None], other[..., self._gimbals], plain[..., self._gimbals])
         return plain
 
+    def course(self, angles_rad: Floats) -> Floats:
+        """The same motion (T, 48), changed as a whole to the representation that is `principal` on most frames.
+
+        What is continuous stays so, and takes of one body agree with each other, whatever their files began with.
+        """
+        out, principal = np.array(angles_rad, dtype=float), self.principal(angles_rad)
+        for gimbal in self._gimbals:
+            plain, other, lawful = out[:, gimbal], twin(out[:, gimbal]), principal[:, gimbal]
+            if 2 * np.count_nonzero(_turn(lawful - other) < _turn(lawful - plain)) > len(out):
+                out[:, gimbal] = other
+        out += _TURN * np.round(np.median(principal - out, axis=0) / _TURN)
+        return out
+
     def near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
         """`angles_rad` with every hinge that has no limits turned as near to the other as whole turns bring it."""
         turns = np.where(np.isinf(self.high_rad), np.round((other_rad - angles_rad) / _TURN), 0.0)
@@ -78,3 +91,9 @@ class HingeLimits:
         """Whole turns added until every angle is within pi of the middle of its limits."""
         out: Floats = angles_rad - _TURN * np.round((angles_rad - self._middle_rad) / _TURN)
         return out
+
+
+def _turn(difference_rad: Floats) -> Floats:
+    """Size (T,) of differences (T, 3) of angles, each taken the short way round."""
+    out: Floats = np.sum(np.abs(difference_rad - _TURN * np.round(difference_rad / _TURN)), axis=-1)
+    return out

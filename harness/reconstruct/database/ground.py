@@ -1,0 +1,67 @@
+"""Poses without place and heading: a ground frame (x, y, yaw), and the posture that stands on it.
+
+The ground frame lies on the floor below the root and is turned about the vertical by the root's twist about it, the
+`yaw` of q = about_z(yaw) tilt, where tilt turns about a horizontal axis. That heading is smooth for every posture but
+one upside down, while the direction of the root's x axis flips as soon as someone bends over. A turn or a shift of
+the room changes the ground frame alone.
+
+Arrays of ground frames are (..., 3): x, y [m] and yaw [rad]. Postures are (..., 52): height [m], tilt as a rotation
+vector (its z is 0) [rad], 48 hinges in the order of `qpos[7:]` [rad].
+"""
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Singles
+
+POSTURE = 52
+HEIGHT, TILT, HINGES = 0, slice(1, 4), slice(4, 52)
+"""Where a posture has what."""
+
+
+def ground_of(qpos: Floats) -> Floats:
+    """Ground frames (..., 3) of configurations (..., 55)."""
+    return np.stack([qpos[..., 0], qpos[..., 1], 2.0 * np.arctan2(qpos[..., 6], qpos[..., 3])], axis=-1)
+
+
+def posture_of(qpos: Floats) -> Floats:
+    """Postures (..., 52) of configurations (..., 55); hinge angles as they are."""
+    out = np.empty((*qpos.shape[:-1], POSTURE))
+    w, x, y, z = np.moveaxis(qpos[..., 3:7], -1, 0)
+    level, lean = np.hypot(w, z), np.hypot(x, y)
+    # about_z(-yaw) q = (level, (x w + y z) / level, (y w - x z) / level, 0)
+    along = 2.0 * np.arctan2(lean, level) / np.maximum(level * lean, 1e-30)
+    out[..., HEIGHT] = qpos[..., 2]
+    out[..., 1] = along * (x * w + y * z)
+    out[..., 2] = along * (y * w - x * z)
+    out[..., 3] = 0.0
+    out[..., HINGES] = qpos[..., 7:]
+    return out
+
+
+def standing(posture: Floats | Singles, ground: Floats) -> Floats:
+    """Configurations (..., 55) of postures (..., 52) on ground frames (..., 3): undoes `posture_of` and `ground_of`."""
+    tilt = np.asarray(posture[..., TILT], dtype=float)
+    out = np.empty((*np.broadcast_shapes(posture.shape[:-1], ground.shape[:-1]), 55))
+    out[..., :2] = ground[..., :2]
+    out[..., 2] = posture[..., HEIGHT]
+    out[..., 3:7] = rotations.multiply(rotations.about_z(ground[..., 2]), rotations.exp(tilt))
+    out[..., 7:] = posture[..., HINGES]
+    return out
+
+
+def seen_from(ground: Floats, other: Floats) -> Floats:
+    """Ground frames `other` (..., 3) in the axes of `ground` (..., 3): forward, left [m], turn within +-pi [rad]."""
+    cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
+    x, y = other[..., 0] - ground[..., 0], other[..., 1] - ground[..., 1]
+    turn = other[..., 2] - ground[..., 2]
+    turn = turn - 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
+    return np.stack([cosine * x + sine * y, cosine * y - sine * x, turn], axis=-1)
+
+
+def moved(ground: Floats, step: Floats) -> Floats:
+    """The ground frame (..., 3) a step (..., 3) away: undoes `seen_from` up to whole turns."""
+    cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
+    forward, left = step[..., 0], step[..., 1]
+    x, y = ground[..., 0] + cosine * forward - sine * left, ground[..., 1] + sine * forward + cosine * left
+    return np.stack([x, y, ground[..., 2] + step[..., 2]], axis=-1)

@@ -1,0 +1,190 @@
+"""A database on disk: `posture.npy`, `step.npy` and `database.json`, read as memory maps; nothing is ever unpickled.
+
+Frames are written as they come to a folder beside the final one, which takes its name once all is there. So a killed
+run leaves nothing that looks finished, and nothing is overwritten.
+"""
+
+import json
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, fields, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from harness.core.arrays import Singles
+from harness.errors import BadFile, BadInput
+from harness.reconstruct.database.database import MotionDatabase, Run
+from harness.reconstruct.database.ground import POSTURE
+
+FORMAT, VERSION = "tracker-harness motion database", 1
+COLUMNS = {"posture": POSTURE, "step": 3}
+_CARD = "database.json"
+_ADVICE = "Build the database again."
+
+
+class Kept:
+    """Collects runs in memory."""
+
+    def __init__(self) -> None:
+        self.runs: list[Run] = []
+        self.rate_hz = 0.0
+        self._parts: dict[str, list[Singles]] = {name: [] for name in COLUMNS}
+
+    def __enter__(self) -> "Kept":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def add(self, run: Run, rate_hz: float, posture: Singles, step: Singles) -> None:
+        """Append a run; BadInput when its rate is another than the others'."""
+        if self.runs and rate_hz != self.rate_hz:
+            found = f"{run.take} has {rate_hz:g} frames a second, and {self.runs[0].take} {self.rate_hz:g}."
+            raise BadInput(found, "Bring all takes to the tracker's rate first.")
+        start = self.runs[-1].stop if self.runs else 0
+        self.rate_hz = rate_hz
+        self.runs.append(replace(run, start=start, stop=start + len(posture)))
+        self._store("posture", posture)
+        self._store("step", step)
+
+    def _store(self, name: str, rows: Singles) -> None:
+        self._parts[name].append(rows)
+
+    def result(self) -> MotionDatabase:
+        posture, step = (np.concatenate(self._parts.pop(name)) for name in COLUMNS)
+        for array in (posture, step):
+            array.setflags(write=False)
+        return MotionDatabase(self.rate_hz, posture, step, tuple(self.runs))
+
+
+class Writer(Kept):
+    """Appends runs to files."""
+
+    def __init__(self, folder: Path, beside: Path) -> None:
+        super().__init__()
+        self._folder, self._beside = folder, beside
+        self._files: dict[str, BinaryIO] = {name: open(beside / f"{name}.npy", "w+b") for name in COLUMNS}  # noqa: SIM115
+        for name in COLUMNS:
+            self._header(name, 0)
+
+    def _store(self, name: str, rows: Singles) -> None:
+        self._files[name].write(np.ascontiguousarray(rows, "<f4").data)
+
+    def _header(self, name: str, count: int) -> None:
+        """The same length for any count: numpy leaves room for the first axis to grow."""
+        card = {"descr": "<f4", "fortran_order": False, "shape": (count, COLUMNS[name])}
+        self._files[name].seek(0)
+        np.lib.format.write_array_header_1_0(self._files[name], card)
+
+    def finish(self) -> None:
+        """All files complete and on the disk."""
+        for name, file in self._files.items():
+            self._header(name, self.runs[-1].stop)
+            file.flush()
+            os.fsync(file.fileno())
+        card = {"format": FORMAT, "version": VERSION, "rate_hz": self.rate_hz, "runs": [asdict(r) for r in self.runs]}
+        with open(self._beside / _CARD, "w", encoding="utf-8") as text:
+            json.dump(card, text, indent=0, allow_nan=False, ensure_ascii=False)
+            text.flush()
+            os.fsync(text.fileno())
+
+    def close(self) -> None:
+        for file in self._files.values():
+            file.close()
+
+    def result(self) -> MotionDatabase:
+        return open_folder(self._folder)
+
+
+@contextmanager
+def writing(folder: Path) -> Iterator[Writer]:
+    """A writer whose folder appears when all went well; BadFile when something of that name is there already."""
+    taken = BadFile(folder, "is there already", "a name for a new folder", "Nothing is overwritten: choose another.")
+    if os.path.lexists(folder):
+        raise taken
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    beside = folder.with_name(f".unfinished-{os.getpid()}-{folder.name}")
+    beside.mkdir()
+    try:
+        writer = Writer(folder, beside)
+        try:
+            yield writer
+            writer.finish()
+        finally:
+            writer.close()
+        try:
+            beside.rename(folder)  # fails on a folder that has anything in it
+        except OSError as error:
+            raise taken from error
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+def save(database: MotionDatabase, folder: Path) -> None:
+    """`MotionDatabase.save`."""
+    with writing(folder) as writer:
+        for run in database.runs:
+            where = slice(run.start, run.stop)
+            writer.add(run, database.rate_hz, database.posture[where], database.step[where])
+
+
+def open_folder(folder: Path) -> MotionDatabase:
+    """`MotionDatabase.open`."""
+    card = _card(folder / _CARD)
+    runs = _runs(folder / _CARD, card)
+    arrays = {name: _mapped(folder / f"{name}.npy", (runs[-1].stop, width)) for name, width in COLUMNS.items()}
+    return MotionDatabase(float(card["rate_hz"]), arrays["posture"], arrays["step"], runs)
+
+
+def _card(path: Path) -> dict[str, Any]:
+    expected = f"the card of a motion database, version {VERSION}"
+    try:
+        card = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadFile(path, f"cannot be read ({error.strerror})", expected, "Is this a motion database?") from error
+    except ValueError as error:
+        raise BadFile(path, f"not JSON: {error}", expected, _ADVICE) from error
+    if not isinstance(card, dict) or card.get("format") != FORMAT:
+        raise BadFile(path, "of some other kind", expected, "Is this a motion database?")
+    if card.get("version") != VERSION:
+        raise BadFile(path, f"version {card.get('version')!r}", expected, _ADVICE)
+    rate_hz = card.get("rate_hz")
+    if not isinstance(rate_hz, int | float) or isinstance(rate_hz, bool) or not 0.0 < rate_hz < np.inf:
+        raise BadFile(path, f"a rate of {rate_hz!r}", "rate_hz above 0", _ADVICE)
+    return card
+
+
+def _runs(path: Path, card: dict[str, Any]) -> tuple[Run, ...]:
+    """Runs that follow each other from row 0 on, or BadFile."""
+    known = {field.name: field.type for field in fields(Run)}
+    runs: list[Run] = []
+    entries = card.get("runs")
+    for which, entry in enumerate(entries if isinstance(entries, list) else []):
+        if not isinstance(entry, dict) or entry.keys() != known.keys():
+            raise BadFile(path, f"run {which} is {entry!r:.80}", f"an entry of {', '.join(known)}", _ADVICE)
+        if any(type(entry[name]) is not kind for name, kind in known.items()):
+            raise BadFile(path, f"run {which} has fields of the wrong kind", "texts and whole numbers", _ADVICE)
+        run = Run(**entry)
+        if run.start != (runs[-1].stop if runs else 0) or run.stop <= run.start or run.first_frame < 0:
+            raise BadFile(path, f"run {which} has rows {run.start} to {run.stop}", "runs that join", _ADVICE)
+        runs.append(run)
+    if not runs:
+        raise BadFile(path, "no runs", "one or more", _ADVICE)
+    return tuple(runs)
+
+
+def _mapped(path: Path, shape: tuple[int, int]) -> Singles:
+    expected = f"an array of {shape[0]} x {shape[1]} float32"
+    try:
+        array: Singles = np.load(path, mmap_mode="r", allow_pickle=False)
+    except OSError as error:
+        raise BadFile(path, f"cannot be read ({error.strerror or error})", expected, _ADVICE) from error
+    except (ValueError, EOFError) as error:
+        raise BadFile(path, f"damaged: {error}", expected, _ADVICE) from error
+    if array.dtype != np.dtype("<f4") or array.shape != shape or not array.flags.c_contiguous:
+        raise BadFile(path, f"{' x '.join(map(str, array.shape))} {array.dtype}", expected, _ADVICE)
+    return array

@@ -1,0 +1,41 @@
+"""Exact search by looking at every vector: for small sets, and the judge of all others."""
+
+import numpy as np
+
+from harness.core.arrays import Ints, Singles
+from harness.reconstruct.index.protocol import CHUNK, Vectors
+
+
+class Flat:
+    """An `Index`: |q - x|^2 = |q|^2 - 2 q x + |x|^2 for all x at once, then exactly for the few that are left.
+
+    Vectors are kept about their mean, so that little is lost to rounding in the first pass.
+    """
+
+    def __init__(self, vectors: Vectors) -> None:
+        count = len(vectors)
+        self._values = np.empty((count, vectors.size), np.float32)
+        for start in range(0, count, CHUNK):
+            self._values[start : start + CHUNK] = vectors.gather(slice(start, start + CHUNK))
+        self._mean = self._values.mean(axis=0, dtype=np.float64).astype(np.float32)
+        self._values -= self._mean
+        self._half_squares = 0.5 * np.vecdot(self._values, self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """As `Index`."""
+        asked = np.asarray(query, np.float32) - self._mean
+        score = self._half_squares - self._values @ asked
+        count = min(count, len(score))
+        spare = min(count + 8, len(score))  # rounding may have swapped those about the last place
+        rows = np.argpartition(score, spare - 1)[:spare] if spare < len(score) else np.arange(spare)
+        return ranked(rows, self._values[rows] - asked, count)
+
+
+def ranked(rows: Ints, away: Singles, count: int) -> tuple[Ints, Singles]:
+    """The nearest of candidates (M,) whose differences from the query are (M, D), nearest first."""
+    squared = np.vecdot(away, away)
+    order = np.lexsort((rows, squared))[:count]
+    return rows[order], squared[order]

@@ -1,0 +1,53 @@
+"""What an index searches, and what it answers."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from harness.core.arrays import Ints, Singles
+
+CHUNK = 4096
+"""Vectors gathered at a time while an index is made."""
+
+
+class Vectors(Protocol):
+    """N vectors of D numbers, made on demand (`Windows`, `StationFeatures`) or in memory (`Table`)."""
+
+    def __len__(self) -> int: ...
+
+    @property
+    def size(self) -> int:
+        """D."""
+        ...
+
+    def gather(self, rows: Ints | slice) -> Singles:
+        """(K, D) of some rows."""
+        ...
+
+
+class Index(Protocol):
+    """A search among N vectors; immutable, but for `follow`ing sessions, and deterministic."""
+
+    def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """Rows (count,) of the nearest vectors to a query (D,), and their squared Euclidean distances (count,).
+
+        Nearest first, of equals the lower row first. There are fewer when N is smaller.
+        """
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """`Vectors` that are all in memory."""
+
+    values: Singles
+    """(N, D)"""
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    @property
+    def size(self) -> int:
+        return int(self.values.shape[1])
+
+    def gather(self, rows: Ints | slice) -> Singles:
+        return self.values[rows]
