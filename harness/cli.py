@@ -98,7 +98,7 @@ def add_run(verbs: Verbs) -> None:
     text = "run a scenario: every test clip, every method; resumes what was interrupted"
     verb = add_verb(verbs, "run", text, run_scenario, "seed", "out", "jobs", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
-    text = "replaces the scenario's methods, such as ik,best_match+ik,my_module:MyMethod"
+    text = "replaces the scenario's methods, such as ik,best_match+ik,my_module:MyMethod[option=3]"
     verb.add_argument("--methods", metavar="A,B", help=text)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
     verb.add_argument("--no-report", dest="report", action="store_false", help="leave out report.html and plots")
@@ -110,12 +110,14 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
 
     from harness import experiment
     from harness.config import check_scenario, load_scenario
+    from harness.core.options import alternatives, split
 
     scenario = load_scenario(args.scenario)
     if args.seed is not None:
         scenario = replace(scenario, seed=args.seed)
     if args.methods is not None:
-        scenario = replace(scenario, methods=tuple(name.strip() for name in args.methods.split(",")))
+        named = (name for text in split(args.methods, ",") for name in alternatives(text))
+        scenario = replace(scenario, methods=tuple(named))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk

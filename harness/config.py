@@ -1,22 +1,15 @@
 """Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
 
-import dataclasses
-import math
 import tomllib
-import types
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import Any, Literal
 
+from harness.core.fields import build
+from harness.core.options import alternatives
 from harness.core.share import share_folder
-from harness.errors import BadFile, HarnessError, UnknownName
+from harness.errors import BadFile, UnknownName
 from harness.simulate.link import TrackerConfig
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
-
-T = TypeVar("T", bound="DataclassInstance")
 
 SCHEMA = 1
 
@@ -69,6 +62,7 @@ class Scenario:
     motion: Motion
     stations: dict[str, Station]
     methods: tuple[str, ...]
+    """By name, with options and alternatives in brackets (see `harness.core.options`)."""
     schema: int = SCHEMA
     seed: int = 1
     inputs: tuple[str, ...] = ("pos+ori",)
@@ -94,6 +88,7 @@ def load_scenario(path: Path | str) -> Scenario:
     content.setdefault("name", path.stem)
     try:
         scenario = build(Scenario, content, "scenario")
+        scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in alternatives(text)))
     except (TypeError, ValueError) as error:
         raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
     check_scenario(path, scenario)
@@ -158,86 +153,3 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
             refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
         if station.stand_off_m < 0.0:
             refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Trackers sit on the skin.")
-
-
-def build(kind: type[T], content: Any, where: str) -> T:
-    """A dataclass from a mapping, by its annotations; UnknownName for keys, TypeError for values."""
-    if not isinstance(content, Mapping):
-        raise TypeError(f"{where}: expected a table, found {content!r}")
-    hints = get_type_hints(kind)
-    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
-    for key in content:
-        if key not in fields:
-            raise UnknownName(f"key in {where}", str(key), fields)
-    missing = [
-        f.name
-        for f in fields.values()
-        if f.name not in content and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
-    ]
-    if missing:
-        raise TypeError(f"{where}: missing {', '.join(missing)}")
-    return kind(**{key: convert(hints[key], value, f"{where}.{key}") for key, value in content.items()})
-
-
-def changed(instance: T, content: Mapping[str, Any], where: str) -> T:
-    """A copy of a dataclass with the given fields replaced, checked as `build` does."""
-    hints = get_type_hints(type(instance))
-    fields = [f.name for f in dataclasses.fields(instance) if f.init]
-    for key in content:
-        if key not in fields:
-            raise UnknownName(f"key in {where}", str(key), fields)
-    values = {}
-    for key, value in content.items():
-        now = getattr(instance, key)
-        if dataclasses.is_dataclass(now) and not isinstance(now, type) and isinstance(value, Mapping):
-            values[key] = changed(now, value, f"{where}.{key}")
-        else:
-            values[key] = convert(hints[key], value, f"{where}.{key}")
-    return dataclasses.replace(instance, **values)
-
-
-def convert(hint: Any, value: Any, where: str) -> Any:
-    """`value` as the annotation wants it; TypeError says where and what was expected."""
-    origin, args = get_origin(hint), get_args(hint)
-    if hint is Any:
-        return value
-    if origin in (Union, types.UnionType):
-        return _first_that_fits(args, value, where)
-    if origin is Literal:
-        if value not in args:
-            raise UnknownName(where, str(value), [str(a) for a in args])
-        return value
-    if origin is tuple:
-        if not isinstance(value, list):
-            raise TypeError(f"{where}: expected a list, found {value!r}")
-        if args[-1] is not Ellipsis and len(args) != len(value):
-            raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
-        kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
-        pairs = enumerate(zip(kinds, value, strict=True))
-        return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
-    if origin is dict:
-        if not isinstance(value, Mapping):
-            raise TypeError(f"{where}: expected a table, found {value!r}")
-        return {str(key): convert(args[1], item, f"{where}.{key}") for key, item in value.items()}
-    if dataclasses.is_dataclass(hint):
-        return build(cast("type[DataclassInstance]", hint), value, where)
-    if hint is float and isinstance(value, int) and not isinstance(value, bool):
-        return float(value)
-    if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
-        raise TypeError(f"{where}: expected {hint.__name__}, found {value!r}")
-    if isinstance(value, float) and not math.isfinite(value):
-        raise TypeError(f"{where}: expected a finite number, found {value}")
-    return value
-
-
-def _first_that_fits(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
-    if value is None and type(None) in kinds:
-        return None
-    complaints: list[Exception] = []
-    for kind in kinds:
-        if kind is not type(None):
-            try:
-                return convert(kind, value, where)
-            except (TypeError, HarnessError) as complaint:
-                complaints.append(complaint)
-    raise complaints[0]

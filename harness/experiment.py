@@ -171,7 +171,9 @@ def judge(setting: Setting, method: Method, name: str, inputs: str, key: str, co
     scenario, simulation = setting.scenario, setting.simulation
     seen = combination(inputs, simulation.stations)
     examples = setting.examples if method.needs_examples else []
-    reconstructor = method.fit(setting.body, examples, generator(scenario.seed, "method", name))
+    reconstructor = method.fit(
+        setting.body, examples, generator(scenario.seed, "method", registry.without_options(name))
+    )
     qpos, status, step_ms = reconstruct(reconstructor, simulation, seen)
     scores = score(
         setting.body.skeleton,

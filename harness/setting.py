@@ -7,7 +7,8 @@ import numpy as np
 
 from harness.body import humanoid, retarget
 from harness.body.mounts import Mount, place
-from harness.config import Scenario, changed
+from harness.config import Scenario
+from harness.core.fields import changed
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip, Take
 from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.config import changed, load_scenario, shipped_scenarios
+from harness.config import load_scenario, shipped_scenarios
+from harness.core.fields import changed
 from harness.core.protocol import Part
 from harness.errors import BadFile, HarnessError, UnknownName
 from harness.simulate.components.echo import Echo

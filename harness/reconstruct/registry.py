@@ -1,19 +1,23 @@
 """Methods by name: the built-in ones, those of installed packages, and anyone's own as `module:Class`.
 
 A package adds its own through the entry-point group `harness.methods`: name -> a callable that makes the method.
-`+ik` after a name adds the final clean-up of `clean_up`.
+`+ik` after a name adds the final clean-up of `clean_up`. Options follow in brackets (`harness.core.options`).
 """
 
 import ast
+import dataclasses
 import hashlib
 import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
+from typing import Any, cast
 
+from harness.core.fields import changed
+from harness.core.options import named, split
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.reconstruct import ik
 from harness.reconstruct.best_match import BestMatch
@@ -23,6 +27,8 @@ from harness.reconstruct.kernel_ridge import KernelRidge
 from harness.reconstruct.mean_pose import MeanPose
 
 GROUP = "harness.methods"
+_SAYS = ("name", "summary", "needs_examples", "fit")
+"""What everything that is a method has; none of it is an option."""
 
 
 def methods() -> dict[str, Callable[[], Method]]:
@@ -39,9 +45,44 @@ def methods() -> dict[str, Callable[[], Method]]:
 
 
 def resolve(name: str) -> Method:
-    """The method of that name with its default options; UnknownName, BadInput for what is not a method."""
-    if name.endswith(SUFFIX):
-        return CleanUp(resolve(name.removesuffix(SUFFIX)))
+    """The method of that name, with options as in `best_match[matching=tree]+ik`; UnknownName, BadInput."""
+    base, *suffixes = split(name, "+")
+    plain, options = named(base)
+    method = configured(_plain(plain), options, base)
+    for suffix in suffixes:
+        plain, options = named(suffix)
+        if f"+{plain}" != SUFFIX:
+            raise UnknownName("method", name, methods())
+        method = configured(CleanUp(method), options, method.name + SUFFIX)
+    return method
+
+
+def without_options(name: str) -> str:
+    """`best_match[matching=tree]+ik` as `best_match+ik`."""
+    return "+".join(named(part)[0] for part in split(name, "+"))
+
+
+def configured(method: Method, options: Mapping[str, Any], name: str) -> Method:
+    """A copy of that name with other options, the fields of its dataclass; UnknownName, BadInput."""
+    if not options:
+        return method
+    if not dataclasses.is_dataclass(method) or isinstance(method, type):
+        raise BadInput(f"{method.name} takes no options.", "Those of a method are the fields of its dataclass.")
+    fields = [field.name for field in dataclasses.fields(method) if field.init]
+    known = [field for field in fields if field not in _SAYS]
+    for option in options:
+        if option not in known:
+            raise UnknownName(f"option of {method.name}", option, known)
+    try:
+        copy = changed(method, options, method.name, infinite=True)
+        return cast(Method, dataclasses.replace(copy, name=name) if "name" in fields else copy)
+    except HarnessError:
+        raise
+    except Exception as error:  # anyone's own code may raise anything
+        raise BadInput(f"{error}.", f"Options of {method.name}: {', '.join(known)}.") from error
+
+
+def _plain(name: str) -> Method:
     known = methods()
     if name in known:
         return known[name]()
@@ -59,7 +100,7 @@ def resolve(name: str) -> Method:
         raise BadInput(
             f"{name} cannot be made: {type(error).__name__}: {error}.", "Does it import, and need no arguments?"
         ) from error
-    missing = [m for m in ("name", "summary", "needs_examples", "fit") if not hasattr(method, m)]
+    missing = [m for m in _SAYS if not hasattr(method, m)]
     if missing:
         raise BadInput(
             f"{name} is not a method: it has no {' and no '.join(missing)}.",

@@ -1,6 +1,8 @@
 """Methods by name."""
 
+import math
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -118,3 +120,68 @@ def test_the_source_hash_tells_methods_and_what_they_wrap_apart() -> None:
     }
     assert len(hashes) == 5
     assert registry.source_hash(Ik()) == registry.source_hash(GAUSSIAN)
+
+
+def test_options_are_the_fields_of_a_method() -> None:
+    method = registry.resolve("ik[loss.robust=false]")
+    assert method == replace(Ik(), loss=replace(Ik().loss, robust=False), name="ik[loss.robust=false]")
+    assert method.name == "ik[loss.robust=false]"
+    assert registry.resolve("ik") == Ik()
+    assert repr(registry.resolve("ik[jump_m=inf]")) == repr(replace(Ik(), jump_m=math.inf, name="ik[jump_m=inf]"))
+
+
+def test_options_of_a_method_and_of_its_clean_up() -> None:
+    method = registry.resolve("ik:gaussian[stopping.most_steps=3]+ik[prior_sigma_rad=0.25]")
+    assert isinstance(method, CleanUp)
+    assert isinstance(method.method, Ik)
+    assert method.prior_sigma_rad == 0.25
+    assert method.method.stopping.most_steps == 3
+    assert method.name == "ik:gaussian[stopping.most_steps=3]+ik"
+
+
+def test_options_of_anyone_s_own_class() -> None:
+    name = "harness.reconstruct.ik:Ik[stopping.most_steps=2]"
+    method = registry.resolve(name)
+    assert isinstance(method, Ik)
+    assert (method.stopping.most_steps, method.name) == (2, name)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("ik[lss.robust=true]", "Did you mean 'loss'"),
+        ("ik[loss.robus=true]", "Did you mean 'robust'"),
+        ("ik[name=other]", "no option of ik called 'name'"),
+        ("mean_pose+ik[sigma=3]", r"no option of mean_pose\+ik called 'sigma'"),
+        ("ikk[loss.robust=true]", "Did you mean 'ik'"),
+        ("ik+ok[x=1]", "no method called"),
+    ],
+)
+def test_wrong_options_get_a_suggestion(name: str, message: str) -> None:
+    with pytest.raises(UnknownName, match=message):
+        registry.resolve(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("ik[loss.robust=3]", "expected bool"),
+        ("ik[stopping.most_steps=0.5]", "expected int"),
+        ("ik[stopping=3]", "expected a table"),
+        ("ik[jump_m=nan]", "finite"),
+        ("tests.reconstruct.test_registry:Plain[k=3]", "takes no options"),
+    ],
+)
+def test_values_of_options_are_checked(name: str, message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        registry.resolve(name)
+
+
+class Plain:
+    """A method with nothing to set."""
+
+    name, summary, needs_examples, fit = "plain", "nothing", False, None
+
+
+def test_the_same_draws_whatever_the_options() -> None:
+    assert registry.without_options("best_match[size=3]+ik[prior_sigma_rad=1]") == "best_match+ik"

@@ -1,0 +1,102 @@
+"""Frozen dataclasses from mappings, such as TOML's, checked against their annotations."""
+
+import dataclasses
+import math
+import types
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+
+from harness.errors import HarnessError, UnknownName
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+T = TypeVar("T", bound="DataclassInstance")
+
+NONE = "none"
+"""Where a value may be None, this word stands for it: TOML has no other."""
+
+
+def build(kind: type[T], content: Any, where: str) -> T:
+    """A dataclass from a mapping, by its annotations; UnknownName for keys, TypeError for values."""
+    if not isinstance(content, Mapping):
+        raise TypeError(f"{where}: expected a table, found {content!r}")
+    hints = get_type_hints(kind)
+    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
+    for key in content:
+        if key not in fields:
+            raise UnknownName(f"key in {where}", str(key), fields)
+    missing = [
+        f.name
+        for f in fields.values()
+        if f.name not in content and f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
+    ]
+    if missing:
+        raise TypeError(f"{where}: missing {', '.join(missing)}")
+    return kind(**{key: convert(hints[key], value, f"{where}.{key}") for key, value in content.items()})
+
+
+def changed(instance: T, content: Mapping[str, Any], where: str, infinite: bool = False) -> T:
+    """A copy of a dataclass with the given fields replaced, checked as `build` does; `infinite` allows such numbers."""
+    hints = get_type_hints(type(instance))
+    fields = [f.name for f in dataclasses.fields(instance) if f.init]
+    for key in content:
+        if key not in fields:
+            raise UnknownName(f"key in {where}", str(key), fields)
+    values: dict[str, Any] = {}
+    for key, value in content.items():
+        now = getattr(instance, key)
+        if dataclasses.is_dataclass(now) and not isinstance(now, type) and isinstance(value, Mapping):
+            values[key] = changed(now, value, f"{where}.{key}", infinite)
+        elif infinite and hints[key] is float and isinstance(value, float) and math.isinf(value):
+            values[key] = value
+        else:
+            values[key] = convert(hints[key], value, f"{where}.{key}")
+    return dataclasses.replace(instance, **values)
+
+
+def convert(hint: Any, value: Any, where: str) -> Any:
+    """`value` as the annotation wants it; TypeError says where and what was expected."""
+    origin, args = get_origin(hint), get_args(hint)
+    if hint is Any:
+        return value
+    if origin in (Union, types.UnionType):
+        return _first_that_fits(args, value, where)
+    if origin is Literal:
+        if value not in args:
+            raise UnknownName(where, str(value), [str(a) for a in args])
+        return value
+    if origin is tuple:
+        if not isinstance(value, list):
+            raise TypeError(f"{where}: expected a list, found {value!r}")
+        if args[-1] is not Ellipsis and len(args) != len(value):
+            raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
+        kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
+        pairs = enumerate(zip(kinds, value, strict=True))
+        return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
+    if origin is dict:
+        if not isinstance(value, Mapping):
+            raise TypeError(f"{where}: expected a table, found {value!r}")
+        return {str(key): convert(args[1], item, f"{where}.{key}") for key, item in value.items()}
+    if dataclasses.is_dataclass(hint):
+        return build(cast("type[DataclassInstance]", hint), value, where)
+    if hint is float and isinstance(value, int) and not isinstance(value, bool):
+        return float(value)
+    if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
+        raise TypeError(f"{where}: expected {hint.__name__}, found {value!r}")
+    if isinstance(value, float) and not math.isfinite(value):
+        raise TypeError(f"{where}: expected a finite number, found {value}")
+    return value
+
+
+def _first_that_fits(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
+    if type(None) in kinds and value in (None, NONE):
+        return None
+    complaints: list[Exception] = []
+    for kind in kinds:
+        if kind is not type(None):
+            try:
+                return convert(kind, value, where)
+            except (TypeError, HarnessError) as complaint:
+                complaints.append(complaint)
+    raise complaints[0]
