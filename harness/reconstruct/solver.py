@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.box import BoxQP
 from harness.core.arrays import Floats
+from harness.reconstruct import descent
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Residuals
 
@@ -50,85 +50,32 @@ class Solution:
     converged: bool
 
 
-_DAMPING, _RAISE, _LOWER = 0.3, 10.0, 3.0
-_MODEST = 30.0
-"""Damping that still lets a step go where it wants: as a prior, 10 deg about the present pose [1/rad^2]."""
-_GOOD, _FAIR = 0.9, 0.5
-"""Shares of a step's promise kept: the plain model will do from the one, damping may fall from the other."""
-_LONGEST_TURN_RAD = 1.0
-_SMALL = 1e-2
-"""A step that promises next to nothing is still taken when it is no larger [m, rad]."""
-
-
 class Solver:
     """Solves for whatever frame its residuals have read; deterministic, each call by itself."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
-        nv = residuals.kinematics.nv
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
-        self._program = BoxQP(nv)
-        self._hessian, self._bent = np.zeros((nv, nv)), np.zeros((nv, nv))
-        self._diagonal = self._hessian.reshape(-1)[:: nv + 1]
-        self._least, self._most = np.full(nv, -np.inf), np.full(nv, np.inf)
-        self._least_hinge, self._most_hinge = self._least[6:], self._most[6:]
-        self._away = np.zeros(nv)
+        nv = residuals.kinematics.nv
+        self._model = descent.unsolved(nv)
+        self._trust = descent.Trust(
+            mean=np.zeros(nv + 1),
+            precision=np.zeros(nv),
+            low_rad=np.array(limits.low_rad),
+            high_rad=np.array(limits.high_rad),
+            step=stopping.step,
+            decrease=stopping.decrease,
+            most_steps=stopping.most_steps,
+        )
 
     def solve(self, start: Floats, prior: Prior) -> Solution:
         """From a configuration (55,), clipped to the limits, downhill to a minimum."""
-        stopping, residuals, kinematics = self.stopping, self.residuals, self.residuals.kinematics
+        residuals, trust = self.residuals, self._trust
+        trust.mean[:] = prior.qpos
+        trust.precision[:] = 0.0 if prior.precision is None else prior.precision
         qpos = np.array(start, dtype=float)
-        qpos[7:] = self.limits.clipped(qpos[7:])
-        cost = residuals.place(qpos) + self._prior_cost(qpos, prior)
-        damping, kept, fresh = _DAMPING, 1.0, False
-        for steps in range(1, stopping.most_steps + 1):
-            if not fresh:
-                gradient = self._linearise(prior, damping)
-                fresh = True
-            step = self._step(qpos, gradient, curved=kept < _GOOD)
-            promised, longest = -0.5 * float(gradient @ step), float(abs(step).max())
-            if longest > _LONGEST_TURN_RAD:
-                step[3:] *= min(1.0, _LONGEST_TURN_RAD / float(abs(step[3:]).max()))
-            moved = kinematics.moved(qpos, step)
-            if damping <= _MODEST and (longest < stopping.step or promised < stopping.decrease):
-                return Solution(moved if longest < _SMALL else qpos, cost, steps, True)
-            new_cost = residuals.place(moved) + self._prior_cost(moved, prior)
-            kept = (cost - new_cost) / promised
-            if new_cost < cost:
-                qpos, cost, fresh = moved, new_cost, False
-                damping = max(_DAMPING, damping / _LOWER) if kept > _FAIR else damping
-                if cost < stopping.decrease:
-                    return Solution(qpos, cost, steps, True)
-            else:
-                more = max(_RAISE, damping * _RAISE)
-                self._diagonal += more - damping
-                damping = more
-        return Solution(qpos, cost, stopping.most_steps, False)
-
-    def _prior_cost(self, qpos: Floats, prior: Prior) -> float:
-        if prior.precision is None:
-            return 0.0
-        self._away = self.residuals.kinematics.difference(qpos, prior.qpos)
-        return 0.5 * float(prior.precision @ (self._away * self._away))
-
-    def _linearise(self, prior: Prior, damping: float) -> Floats:
-        gradient = -self.residuals.normal_equations(self._hessian)
-        if prior.precision is not None:
-            gradient -= prior.precision * self._away
-            self._diagonal += prior.precision
-        self._diagonal += damping
-        return gradient
-
-    def _step(self, qpos: Floats, gradient: Floats, curved: bool) -> Floats:
-        """(54,) the minimum of the damped model within the limits."""
-        np.subtract(self.limits.low_rad, qpos[7:], out=self._least_hinge)
-        np.subtract(self.limits.high_rad, qpos[7:], out=self._most_hinge)
-        step: Floats | None = None
-        if curved:
-            np.copyto(self._bent, self._hessian)
-            self.residuals.add_curvature(self._bent)
-            step = self._program.solve(self._bent, gradient, self._least, self._most)
-        if step is None:
-            step = self._program.solve(self._hessian, gradient, self._least, self._most)
-        if step is None:
+        cost, steps, converged = descent.descend(
+            residuals.chain, residuals.readings, residuals.placed, self._model, trust, qpos
+        )
+        if steps < 0:
             raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
-        return step
+        return Solution(qpos, cost, steps, converged)

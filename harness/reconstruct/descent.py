@@ -1,0 +1,530 @@
+"""The inner loop of the solvers, compiled: residuals of stations, their slopes, and steps within the joint limits.
+
+A hinge moves only what lies beyond it, so the normal equations of trackers couple two hinges only when one lies
+beyond the other. Eliminated from the limbs inwards, such a matrix fills nowhere else (Featherstone 2008, ch. 8.3): a
+step for 54 degrees of freedom costs a few microseconds. `residuals` and `solver` say what is minimised.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from harness.body.humanoid import Body
+from harness.core.arrays import Bools, Floats, Ints
+from harness.core.compiled import compiled
+
+Vector = tuple[float, float, float]
+Pull = tuple[float, float, float, float, float, float]
+
+
+class Chain(NamedTuple):
+    """B bodies, parents first and the root first of all; their V = 6 + hinges directions; S stations on them."""
+
+    parent: Ints
+    """(B,)"""
+    start_m: Floats
+    """(B, 3) where each joint lies in its parent's frame."""
+    first_hinge: Ints
+    """(B + 1,) where each body's run of hinges begins among the V."""
+    axis: Floats
+    """(V, 3) of hinges, in the body's frame; rows 0 to 5, the root's, mean nothing."""
+    body: Ints
+    """(V,) that each direction moves."""
+    before: Ints
+    """(V,) the next direction inwards, -1 for the first."""
+    station_body: Ints
+    """(S,)"""
+    last: Ints
+    """(S,) the outermost direction that moves each station."""
+    mount_m: Floats
+    """(S, 3)"""
+
+
+class Readings(NamedTuple):
+    """What one frame asks for: rows are S positions, then S orientations."""
+
+    target_m: Floats
+    """(S, 3)"""
+    world_from_target: Floats
+    """(S, 4)"""
+    precision: Floats
+    """(2S,) one over variance, 0 where not measured."""
+    twice_scale_squared: Floats
+    """(2S,) of the Lorentzian; inf for plain squares."""
+
+
+class Placed(NamedTuple):
+    """Where a configuration puts the body."""
+
+    at_m: Floats
+    """(B, 3)"""
+    turned: Floats
+    """(B, 4)"""
+    axis: Floats
+    """(V, 3) of turning, in the world."""
+    station_m: Floats
+    """(S, 3)"""
+    error: Floats
+    """(2S, 3) target minus station [m]; rotation vector from station to target [rad]."""
+    squared: Floats
+    """(2S,) of the errors' lengths."""
+    weight: Floats
+    """(2S,) precision as the Lorentzian leaves it."""
+    slope: Floats
+    """(V, 6) of the station at hand: how it moves, then how it turns."""
+
+
+def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
+    """Of a body, with stations on these bones (S,) at `mount_m` (S, 3)."""
+    model, stations = body.model, body.bone_body_ids[np.asarray(bones)]
+    hinges = np.array(model.body_dofnum[1:])
+    hinges[0] = 6
+    before, last = np.array(model.dof_parentid, dtype=np.int64), []
+    for station in stations:
+        while model.body_dofnum[station] == 0:
+            station = model.body_parentid[station]
+        last.append(model.body_dofadr[station] + model.body_dofnum[station] - 1)
+    return Chain(
+        parent=np.array(model.body_parentid[1:] - 1, dtype=np.int64),
+        start_m=np.array(model.body_pos[1:]),
+        first_hinge=np.concatenate([[6], np.cumsum(hinges)]),
+        axis=np.concatenate([np.zeros((6, 3)), model.jnt_axis[1:]]),
+        body=np.array(model.dof_bodyid - 1, dtype=np.int64),
+        before=before,
+        station_body=stations - 1,
+        last=np.array(last, dtype=np.int64),
+        mount_m=np.array(mount_m, dtype=float),
+    )
+
+
+def unplaced(chain: Chain) -> Placed:
+    """Arrays for one session."""
+    bodies, directions, stations = len(chain.parent), len(chain.before), len(chain.station_body)
+    return Placed(
+        at_m=np.zeros((bodies, 3)),
+        turned=np.zeros((bodies, 4)),
+        axis=np.zeros((directions, 3)),
+        station_m=np.zeros((stations, 3)),
+        error=np.zeros((2 * stations, 3)),
+        squared=np.zeros(2 * stations),
+        weight=np.zeros(2 * stations),
+        slope=np.zeros((directions, 6)),
+    )
+
+
+@compiled
+def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> float:
+    """Forward kinematics of a configuration, errors and weights; the data cost."""
+    at_m, turned, axis = placed.at_m, placed.turned, placed.axis
+    at_m[0] = qpos[:3]
+    length = np.sqrt(qpos[3] ** 2 + qpos[4] ** 2 + qpos[5] ** 2 + qpos[6] ** 2)
+    turned[0] = qpos[3:7] / length
+    axis[3], axis[4], axis[5] = (
+        _rotated(turned[0], 1.0, 0.0, 0.0),
+        _rotated(turned[0], 0.0, 1.0, 0.0),
+        _rotated(turned[0], 0.0, 0.0, 1.0),
+    )
+    for body in range(1, len(chain.parent)):
+        parent, start = chain.parent[body], chain.start_m[body]
+        x, y, z = _rotated(turned[parent], start[0], start[1], start[2])
+        at_m[body, 0], at_m[body, 1], at_m[body, 2] = at_m[parent, 0] + x, at_m[parent, 1] + y, at_m[parent, 2] + z
+        turned[body] = turned[parent]
+        for hinge in range(chain.first_hinge[body], chain.first_hinge[body + 1]):
+            own, half = chain.axis[hinge], 0.5 * qpos[hinge + 1]
+            axis[hinge] = _rotated(turned[body], own[0], own[1], own[2])
+            sine = np.sin(half)
+            turned[body] = _times(turned[body], np.cos(half), sine * own[0], sine * own[1], sine * own[2])
+
+    count, cost = len(chain.station_body), 0.0
+    for s in range(count):
+        body, mount = chain.station_body[s], chain.mount_m[s]
+        x, y, z = _rotated(turned[body], mount[0], mount[1], mount[2])
+        placed.station_m[s] = at_m[body, 0] + x, at_m[body, 1] + y, at_m[body, 2] + z
+        placed.error[s] = readings.target_m[s] - placed.station_m[s]
+        q = turned[body]
+        placed.error[count + s] = _rotation_vector(*_times(readings.world_from_target[s], q[0], -q[1], -q[2], -q[3]))
+    for row in range(2 * count):
+        error, precision, scale = placed.error[row], readings.precision[row], readings.twice_scale_squared[row]
+        squared = error[0] ** 2 + error[1] ** 2 + error[2] ** 2
+        placed.squared[row], placed.weight[row] = squared, precision
+        if np.isinf(scale):
+            cost += 0.5 * precision * squared
+        else:
+            cost += 0.5 * precision * scale * np.log1p(squared / scale)
+            placed.weight[row] = precision / (1.0 + squared / scale)
+    return cost
+
+
+@compiled
+def normal_equations(chain: Chain, placed: Placed, hessian: Floats, descent: Floats) -> None:
+    """Gauss and Newton's matrix (V, V), lower triangle, zero elsewhere; the descent (V,)."""
+    hessian[:], descent[:] = 0.0, 0.0
+    count, slope = len(chain.station_body), placed.slope
+    for s in range(count):
+        moving, turning = placed.weight[s], placed.weight[count + s]
+        if moving == 0.0 and turning == 0.0:
+            continue
+        _slopes(chain, placed, s)
+        off, twist = placed.error[s], placed.error[count + s]
+        i = chain.last[s]
+        while i >= 0:
+            a0, a1, a2 = moving * slope[i, 0], moving * slope[i, 1], moving * slope[i, 2]
+            b0, b1, b2 = turning * slope[i, 3], turning * slope[i, 4], turning * slope[i, 5]
+            descent[i] += a0 * off[0] + a1 * off[1] + a2 * off[2] + b0 * twist[0] + b1 * twist[1] + b2 * twist[2]
+            j = i
+            while j >= 0:
+                hessian[i, j] += a0 * slope[j, 0] + a1 * slope[j, 1] + a2 * slope[j, 2]
+                hessian[i, j] += b0 * slope[j, 3] + b1 * slope[j, 4] + b2 * slope[j, 5]
+                j = chain.before[j]
+            i = chain.before[i]
+
+
+@compiled
+def add_curvature(chain: Chain, placed: Placed, hessian: Floats) -> None:
+    """Adds to the lower triangle what Gauss and Newton leave out.
+
+    A hinge j turns the slope J_i of everything beyond it: the derivative of J_i by q_j is a_j x J_i where i lies
+    beyond j, half of it between axes of orientations. Trackers pin a pose so stiffly against so weak a prior that
+    this term outweighs the prior as soon as residuals reach 1 mm.
+    """
+    count, slope = len(chain.station_body), placed.slope
+    for s in range(count):
+        moving, turning = placed.weight[s], 0.5 * placed.weight[count + s]
+        if moving == 0.0 and turning == 0.0:
+            continue
+        _slopes(chain, placed, s)
+        off, twist = placed.error[s], placed.error[count + s]
+        pull = (
+            *(moving * off[0], moving * off[1], moving * off[2]),
+            *(turning * twist[0], turning * twist[1], turning * twist[2]),
+        )
+        i = chain.last[s]
+        while i >= 3:
+            x, y, z = _across(pull, slope[i])
+            j = i
+            while j >= 3:
+                here = x * slope[j, 3] + y * slope[j, 4] + z * slope[j, 5]
+                if i < 6:  # the root turns all three ways at once: the mean of both orders
+                    x1, y1, z1 = _across(pull, slope[j])
+                    here = 0.5 * (here + x1 * slope[i, 3] + y1 * slope[i, 4] + z1 * slope[i, 5])
+                hessian[i, j] += here
+                j = chain.before[j]
+            i = chain.before[i]
+
+
+@compiled
+def _across(pull: Pull, slope: Floats) -> Vector:
+    """What moves times how a station moves, plus what turns times how it turns (6,)."""
+    p0, p1, p2, t0, t1, t2 = pull
+    return (
+        p1 * slope[2] - p2 * slope[1] + t1 * slope[5] - t2 * slope[4],
+        p2 * slope[0] - p0 * slope[2] + t2 * slope[3] - t0 * slope[5],
+        p0 * slope[1] - p1 * slope[0] + t0 * slope[4] - t1 * slope[3],
+    )
+
+
+@compiled
+def _slopes(chain: Chain, placed: Placed, station: int) -> None:
+    """How the station moves and turns by every direction that moves it."""
+    slope, at = placed.slope, placed.station_m[station]
+    i = chain.last[station]
+    while i >= 3:
+        a, start = placed.axis[i], placed.at_m[chain.body[i]]
+        x, y, z = at[0] - start[0], at[1] - start[1], at[2] - start[2]
+        slope[i, 0], slope[i, 1], slope[i, 2] = a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x
+        slope[i, 3], slope[i, 4], slope[i, 5] = a[0], a[1], a[2]
+        i = chain.before[i]
+    while i >= 0:
+        slope[i] = 0.0
+        slope[i, i] = 1.0
+        i = chain.before[i]
+
+
+class Model(NamedTuple):
+    """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, and what finding its minimum takes."""
+
+    hessian: Floats
+    """(V, V) Gauss and Newton's with prior and damping, lower triangle."""
+    bent: Floats
+    """(V, V) the same with the full curvature."""
+    gradient: Floats
+    low: Floats
+    high: Floats
+    step: Floats
+    """The minimum."""
+    away: Floats
+    """From the configuration to the prior's mean."""
+    moved: Floats
+    """(V + 1,) the configuration after the step."""
+    factor: Floats
+    """(V, V)"""
+    clamped: Bools
+    """Which lie at a bound."""
+    slope: Floats
+    toward: Floats
+    there: Floats
+    bend: Floats
+
+
+def unsolved(directions: int) -> Model:
+    """Arrays for one solver."""
+    gradient, step, away, slope, toward, there, bend = np.zeros((7, directions))
+    hessian, bent, factor = np.zeros((3, directions, directions))
+    return Model(
+        hessian,
+        bent,
+        gradient,
+        np.full(directions, -np.inf),
+        np.full(directions, np.inf),
+        step,
+        away,
+        np.zeros(directions + 1),
+        factor,
+        np.zeros(directions, bool),
+        slope,
+        toward,
+        there,
+        bend,
+    )
+
+
+class Trust(NamedTuple):
+    """A Gaussian prior, the hinges' limits, and when to stop."""
+
+    mean: Floats
+    """(V + 1,)"""
+    precision: Floats
+    """(V,)"""
+    low_rad: Floats
+    """(V - 6,)"""
+    high_rad: Floats
+    step: float
+    decrease: float
+    most_steps: int
+
+
+_DAMPING, _RAISE, _LOWER = 0.3, 10.0, 3.0
+_MODEST = 30.0
+"""Damping that still lets a step go where it wants: as a prior, 10 deg about the present pose [1/rad^2]."""
+_GOOD, _FAIR = 0.9, 0.5
+"""Shares of a step's promise kept: the plain model will do from the one, damping may fall from the other."""
+_LONGEST_TURN_RAD = 1.0
+_SMALL = 1e-2
+"""A step that promises next to nothing is still taken when it is no larger [m, rad]."""
+_NOTHING = 1e-12
+"""A promise, as a log likelihood, that rounding makes."""
+
+
+@compiled
+def descend(
+    chain: Chain, readings: Readings, placed: Placed, model: Model, trust: Trust, qpos: Floats
+) -> tuple[float, int, bool]:
+    """Takes a configuration (V + 1,) downhill, in place: the cost before the last step, the steps, if it converged.
+
+    -1 steps when the normal equations are not positive definite, which takes a reading that is not finite.
+    """
+    for i in range(7, len(qpos)):
+        qpos[i] = min(max(qpos[i], trust.low_rad[i - 7]), trust.high_rad[i - 7])
+    hessian, gradient, step, moved = model.hessian, model.gradient, model.step, model.moved
+    cost = place(chain, readings, placed, qpos) + _prior_cost(trust, qpos, model.away)
+    damping, kept, fresh = _DAMPING, 1.0, False
+    for steps in range(1, trust.most_steps + 1):
+        if not fresh:
+            normal_equations(chain, placed, hessian, gradient)
+            for i in range(len(step)):
+                gradient[i] = -gradient[i] - trust.precision[i] * model.away[i]
+                hessian[i, i] += trust.precision[i] + damping
+            for i in range(6, len(step)):
+                model.low[i] = min(trust.low_rad[i - 6] - qpos[i + 1], 0.0)
+                model.high[i] = max(trust.high_rad[i - 6] - qpos[i + 1], 0.0)
+            fresh = True
+        solved = False
+        if kept < _GOOD:
+            model.bent[:] = hessian
+            add_curvature(chain, placed, model.bent)
+            solved = lowest(chain.before, model, model.bent)
+        if not solved and not lowest(chain.before, model, hessian):
+            return cost, -1, False
+        promised, longest = -0.5 * _dot(gradient, step), np.abs(step).max()
+        if longest > _LONGEST_TURN_RAD:
+            step[3:] *= min(1.0, _LONGEST_TURN_RAD / np.abs(step[3:]).max())
+        _move(qpos, step, moved)
+        if damping <= _MODEST and (longest < trust.step or promised < trust.decrease):
+            if longest < _SMALL:
+                qpos[:] = moved
+            return cost, steps, True
+        new_cost = place(chain, readings, placed, moved) + _prior_cost(trust, moved, model.away)
+        kept = (cost - new_cost) / promised
+        if new_cost < cost:
+            qpos[:] = moved
+            cost, fresh = new_cost, False
+            damping = max(_DAMPING, damping / _LOWER) if kept > _FAIR else damping
+            if cost < trust.decrease:
+                return cost, steps, True
+        else:
+            place(chain, readings, placed, qpos)
+            more = max(_RAISE, damping * _RAISE)
+            for i in range(len(step)):
+                hessian[i, i] += more - damping
+            damping = more
+    return cost, trust.most_steps, False
+
+
+@compiled
+def _prior_cost(trust: Trust, qpos: Floats, away: Floats) -> float:
+    """Fills in the tangent step from a configuration to the prior's mean."""
+    mean, q, cost = trust.mean, qpos[3:7], 0.0
+    away[:3] = mean[:3] - qpos[:3]
+    w, x, y, z = mean[3], mean[4], mean[5], mean[6]
+    inverse = np.array([q[0], -q[1], -q[2], -q[3]])
+    away[3], away[4], away[5] = _rotation_vector(*_times(inverse, w, x, y, z))
+    away[6:] = mean[7:] - qpos[7:]
+    for i in range(len(away)):
+        cost += 0.5 * trust.precision[i] * away[i] ** 2
+    return cost
+
+
+@compiled
+def _move(qpos: Floats, step: Floats, moved: Floats) -> None:
+    """The configuration one tangent step on: root translation in world axes, root turn in its own, hinges."""
+    moved[:3] = qpos[:3] + step[:3]
+    angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
+    sine = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
+    turned = _times(qpos[3:7], np.cos(0.5 * angle), sine * step[3], sine * step[4], sine * step[5])
+    moved[3], moved[4], moved[5], moved[6] = turned
+    moved[3:7] /= np.sqrt(_dot(moved[3:7], moved[3:7]))
+    moved[7:] = qpos[7:] + step[6:]
+
+
+@compiled
+def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
+    """Fills in `model.step` by projected Newton steps (Tassa et al. 2014); 0 must lie within the bounds.
+
+    False unless H is positive definite on the directions that the bounds leave free.
+    """
+    x, slope, toward, there, bend = model.step, model.slope, model.toward, model.there, model.bend
+    x[:] = 0.0
+    slope[:] = model.gradient
+    whole = False
+    for attempt in range(100):
+        changed = attempt == 0
+        for i in range(len(x)):
+            clamped = (x[i] <= model.low[i] and slope[i] > 0.0) or (x[i] >= model.high[i] and slope[i] < 0.0)
+            changed = changed or clamped != model.clamped[i]
+            model.clamped[i] = clamped
+            toward[i] = 0.0 if clamped else -slope[i]
+        if whole and not changed:
+            return True
+        if changed and not _factored(before, hessian, model.clamped, model.factor):
+            return False
+        _solve(before, model.factor, toward)
+        if not _dot(slope, toward) < -_NOTHING:
+            return True
+        share = 1.0
+        while True:
+            whole = share == 1.0
+            for i in range(len(x)):
+                free = x[i] + share * toward[i]
+                there[i] = min(max(free, model.low[i]), model.high[i])
+                whole = whole and there[i] == free
+            _product(before, hessian, there - x, bend)
+            promised = _dot(slope, there - x)
+            if whole or promised + 0.5 * _dot(there - x, bend) <= 0.1 * promised or share < 1e-9:
+                break
+            share *= 0.5
+        x[:] = there
+        slope += bend
+    return True
+
+
+@compiled
+def _factored(before: Ints, hessian: Floats, clamped: Bools, factor: Floats) -> bool:
+    """L^T D L of the free directions, D on the diagonal; False unless positive definite (Featherstone 2008, 6.5)."""
+    for k in range(len(before)):
+        i = k
+        while i >= 0:
+            factor[k, i] = 0.0 if clamped[k] or clamped[i] else hessian[k, i]
+            i = before[i]
+        if clamped[k]:
+            factor[k, k] = 1.0
+    for k in range(len(before) - 1, -1, -1):
+        if not factor[k, k] > 0.0:
+            return False
+        i = before[k]
+        while i >= 0:
+            share = factor[k, i] / factor[k, k]
+            if share != 0.0:
+                j = i
+                while j >= 0:
+                    factor[i, j] -= share * factor[k, j]
+                    j = before[j]
+                factor[k, i] = share
+            i = before[i]
+    return True
+
+
+@compiled
+def _solve(before: Ints, factor: Floats, x: Floats) -> None:
+    """x := (L^T D L)^-1 x"""
+    for k in range(len(x) - 1, -1, -1):
+        i = before[k]
+        while i >= 0:
+            x[i] -= factor[k, i] * x[k]
+            i = before[i]
+    for k in range(len(x)):
+        x[k] /= factor[k, k]
+        i = before[k]
+        while i >= 0:
+            x[k] -= factor[k, i] * x[i]
+            i = before[i]
+
+
+@compiled
+def _product(before: Ints, hessian: Floats, x: Floats, out: Floats) -> None:
+    """H x, from the lower triangle."""
+    for k in range(len(x)):
+        out[k] = hessian[k, k] * x[k]
+        i = before[k]
+        while i >= 0:
+            out[k] += hessian[k, i] * x[i]
+            out[i] += hessian[k, i] * x[k]
+            i = before[i]
+
+
+@compiled
+def _dot(a: Floats, b: Floats) -> float:
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def _times(q: Floats, w: float, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+    """The product of two quaternions."""
+    return (
+        q[0] * w - q[1] * x - q[2] * y - q[3] * z,
+        q[0] * x + q[1] * w + q[2] * z - q[3] * y,
+        q[0] * y - q[1] * z + q[2] * w + q[3] * x,
+        q[0] * z + q[1] * y - q[2] * x + q[3] * w,
+    )
+
+
+@compiled
+def _rotated(q: Floats, x: float, y: float, z: float) -> Vector:
+    """A vector turned by a unit quaternion."""
+    u, v, w = q[2] * z - q[3] * y, q[3] * x - q[1] * z, q[1] * y - q[2] * x
+    return (
+        x + 2.0 * (q[0] * u + q[2] * w - q[3] * v),
+        y + 2.0 * (q[0] * v + q[3] * u - q[1] * w),
+        z + 2.0 * (q[0] * w + q[1] * v - q[2] * u),
+    )
+
+
+@compiled
+def _rotation_vector(w: float, x: float, y: float, z: float) -> Vector:
+    """`rotations.log` of one quaternion, the short way round."""
+    sine = np.sqrt(x * x + y * y + z * z) + 1e-12
+    factor = np.arctan2(sine, abs(w)) / sine * (2.0 if w >= 0.0 else -2.0)
+    return factor * x, factor * y, factor * z
