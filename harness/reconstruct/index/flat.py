@@ -5,6 +5,9 @@ import numpy as np
 from harness.core.arrays import Ints, Singles
 from harness.reconstruct.index.protocol import CHUNK, Vectors
 
+_ROUNDING = 1e-6
+"""Of the first pass, beside the largest of its terms."""
+
 
 class Flat:
     """An `Index`: |q - x|^2 = |q|^2 - 2 q x + |x|^2 for all x at once, then exactly for the few that are left.
@@ -19,7 +22,8 @@ class Flat:
             self._values[start : start + CHUNK] = vectors.gather(slice(start, start + CHUNK))
         self._mean = self._values.mean(axis=0, dtype=np.float64).astype(np.float32)
         self._values -= self._mean
-        self._half_squares = 0.5 * np.vecdot(self._values, self._values)
+        self._half_squares: Singles = 0.5 * np.vecdot(self._values, self._values)
+        self._largest = float(self._half_squares.max(initial=0.0))
 
     def __len__(self) -> int:
         return len(self._values)
@@ -29,8 +33,9 @@ class Flat:
         asked = np.asarray(query, np.float32) - self._mean
         score = self._half_squares - self._values @ asked
         count = min(count, len(score))
-        spare = min(count + 8, len(score))  # rounding may have swapped those about the last place
-        rows = np.argpartition(score, spare - 1)[:spare] if spare < len(score) else np.arange(spare)
+        last = np.partition(score, count - 1)[count - 1]
+        rounding = _ROUNDING * float(self._largest + asked @ asked)
+        rows = np.flatnonzero(score <= last + rounding)
         return ranked(rows, self._values[rows] - asked, count)
 
 

@@ -25,12 +25,12 @@ class Vectors(Protocol):
 
 
 class Index(Protocol):
-    """A search among N vectors; immutable, but for `follow`ing sessions, and deterministic."""
+    """A search among N vectors: immutable, deterministic, shared by sessions."""
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """Rows (count,) of the nearest vectors to a query (D,), and their squared Euclidean distances (count,).
 
-        Nearest first, of equals the lower row first. There are fewer when N is smaller.
+        Nearest first, of equals that were found the lower row first. There are fewer when N is smaller.
         """
         ...
 
