@@ -94,7 +94,7 @@ class BestMatchSession:
     def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
         """(S, 3) since the last frame [m/s], and where it is known."""
         here = self._residuals.measured[: len(self._residuals.bones)]
-        now = self._residuals.target_m, frame.measured_s, here
+        now = self._residuals.target_m.copy(), frame.measured_s, here
         before, self._before = self._before, now
         if before is None:
             return np.zeros_like(now[0]), np.zeros_like(now[2])

@@ -23,8 +23,10 @@ from harness.reconstruct import ik
 from harness.reconstruct.best_match import BestMatch
 from harness.reconstruct.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.contract import Method
+from harness.reconstruct.kernel_cca import KernelCca
 from harness.reconstruct.kernel_ridge import KernelRidge
 from harness.reconstruct.mean_pose import MeanPose
+from harness.reconstruct.weighted_blend import WeightedBlend
 
 GROUP = "harness.methods"
 _SAYS = ("name", "summary", "needs_examples", "fit")
@@ -41,6 +43,8 @@ def methods() -> dict[str, Callable[[], Method]]:
         "mean_pose": MeanPose,
         "kernel_ridge": KernelRidge,
         "best_match": BestMatch,
+        "weighted_blend": WeightedBlend,
+        "kernel_cca": KernelCca,
     }
 
 

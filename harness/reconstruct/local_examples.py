@@ -1,0 +1,114 @@
+"""What trackers would have read in every frame of a database, and the frames in which they read most like now.
+
+Features are those of Kim et al. 2012, eq. 2: position, velocity and orientation of each station, times the square roots
+of their weights, so that squared Euclidean distances are eq. 2's. They are seen from an anchor (`viewpoint`).
+Columns: 3 S positions, 4 S orientations, 3 S velocities.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.body import kinematics
+from harness.body.humanoid import Body
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.calibration import Calibration
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.ground import seen_from
+from harness.reconstruct.index import Flat, Index
+from harness.reconstruct.index.protocol import Table
+from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
+
+_CHUNK = 2048
+"""Frames whose kinematics are worked out at a time."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Of eq. 2, for metres, metres per second and unit quaternions."""
+
+    position: float = 0.6
+    velocity: float = 0.2
+    orientation: float = 0.2
+
+
+class LocalExamples:
+    """N frames of examples with S stations worn as a calibration says."""
+
+    def __init__(self, body: Body, database: MotionDatabase, worn: Calibration, weights: Weights) -> None:
+        self.count, self.anchor = len(worn.stations), anchor_of(worn.bones)
+        self.scale: Floats = np.sqrt(
+            np.repeat([weights.position, weights.orientation, weights.velocity], np.multiply([3, 4, 3], self.count))
+        )
+        """(10 S,)"""
+        self.features: Singles = np.empty((len(database), 10 * self.count), np.float32)
+        self.root: Singles = np.empty((len(database), 3), np.float32)
+        """(N, 3) the root's ground frame as seen from the anchor: forward, left [m], turn [rad]."""
+        self._body, self._database, self._worn = body, database, worn
+        self._bones = [body.skeleton.index(bone) for bone in worn.bones]
+        self._indexes: dict[bytes, Index] = {}
+        for run in database.runs:
+            for start in range(run.start, run.stop, _CHUNK):
+                self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
+        first = self._quaternions(slice(0, 1))
+        self._hemisphere: Floats = first[0].astype(float)
+        """(S, 4) quaternions are taken with the sign that is nearer to it."""
+        for start in range(0, len(database), _CHUNK):
+            near = self._quaternions(slice(start, start + _CHUNK))
+            near *= np.copysign(1.0, np.vecdot(near, first))[..., None]
+
+    def query(self, position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View) -> Floats:
+        """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3) in the world."""
+        count, turn = self.count, view.turn()
+        out = np.empty(10 * count)
+        np.matmul(position_m - [view.x_m, view.y_m, 0.0], turn, out=out[: 3 * count].reshape(count, 3))
+        np.matmul(velocity_m_s, turn, out=out[7 * count :].reshape(count, 3))
+        seen = turned @ view.unturn_quaternions()
+        seen *= np.copysign(1.0, np.vecdot(seen, self._hemisphere))[:, None]
+        out[3 * count : 7 * count] = seen.reshape(-1)
+        out *= self.scale
+        return out
+
+    def nearest(self, query: Floats, known: Bools, count: int) -> Ints:
+        """Rows of the frames nearest to a query (10 S,) in the `known` columns."""
+        key = known.tobytes()
+        if key not in self._indexes:
+            self._indexes[key] = Flat(Table(np.ascontiguousarray(self.features[:, known])))
+        return self._indexes[key].nearest(query[known].astype(np.float32), count)[0]
+
+    def poses(self, rows: Ints) -> Floats:
+        """(K, 55) what is learnt: posture (52), and the root's ground frame seen from the anchor (3)."""
+        out = np.empty((len(rows), 55))
+        out[:, :52] = self._database.posture[rows]
+        out[:, 52:] = self.root[rows]
+        return out
+
+    def _quaternions(self, rows: slice) -> Singles:
+        return self.features[rows, 3 * self.count : 7 * self.count].reshape(-1, self.count, 4)
+
+    def _fill(self, first: int, start: int, stop: int) -> None:
+        """Rows from start to stop; `first` is the frame before, or start where a run begins."""
+        count, rows = self.count, slice(first, stop)
+        begins = first == start
+        start_m, turned = kinematics.bone_poses(self._body.skeleton, self._database.qpos(rows, np.zeros(3)))
+        turned = turned[:, self._bones]
+        at_m = start_m[:, self._bones] + rotations.rotate(turned, self._worn.mount_m)
+        # where the stations were a frame before, seen from the ground frame of this one
+        back = seen_from(self._database.step[rows].astype(float)[1:], np.zeros(3))[:, None]
+        before = rotations.rotate(rotations.about_z(back[..., 2]), at_m[:-1])
+        before[..., :2] += back[..., :2]
+        velocity = np.diff(at_m, axis=0, prepend=at_m[:1])
+        velocity[1:] = (at_m[1:] - before) * self._database.rate_hz
+        if begins and len(velocity) > 1:
+            velocity[0] = velocity[1]
+        kept = slice(start - first, stop - first)
+        at_m, turned, velocity = at_m[kept], turned[kept], velocity[kept]
+        anchor = np.concatenate([at_m[:, self.anchor, :2], twist_rad(turned[:, self.anchor])[:, None]], axis=1)
+        level, flat = rotations.about_z(-anchor[:, None, 2]), anchor[:, None] * [1.0, 1.0, 0.0]
+        out = self.features[start:stop]
+        out[:, : 3 * count] = rotations.rotate(level, at_m - flat).reshape(len(out), -1)
+        out[:, 3 * count : 7 * count] = rotations.multiply(level, turned).reshape(len(out), -1)
+        out[:, 7 * count :] = rotations.rotate(level, velocity).reshape(len(out), -1)
+        out *= self.scale
+        self.root[start:stop] = seen_from(anchor, np.zeros(3))

@@ -1,0 +1,24 @@
+"""The weighted blend of the neighbours: the baseline of Kim, Seol and Lee 2012 (docs/methods.md C3)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.reconstruct.local_regression import LocalRegression
+
+
+@dataclass(frozen=True)
+class WeightedBlend(LocalRegression):
+    """A `Method`."""
+
+    name: str = "weighted_blend"
+    summary: str = "the nearest examples blended by their closeness, smoothed, then fitted to the trackers"
+    power: float = 1.0
+    """Weights fall with this power of the distance."""
+
+    def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
+        away = inputs - query
+        closeness = np.maximum(np.vecdot(away, away), 1e-12) ** (-0.5 * self.power)
+        out: Floats = closeness / closeness.sum()
+        return out

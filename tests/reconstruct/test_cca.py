@@ -1,0 +1,89 @@
+"""Kernel CCA against the problem as it is written, and against regressions whose answer is known."""
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from harness.core.arrays import Floats
+from harness.reconstruct import cca
+
+PAIRS, KAPPA = 14, 1e-2
+
+
+def planted(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """Inputs (m, 7), outputs (m, 5) that follow from them but for some noise, and a new input (7,)."""
+    x = rng.normal(size=(PAIRS, 7))
+    y = np.tanh(x @ rng.normal(size=(7, 5))) + 0.1 * rng.normal(size=(PAIRS, 5))
+    return x, y, 0.5 * rng.normal(size=7)
+
+
+def grams(x: Floats, y: Floats, new: Floats) -> tuple[Floats, Floats, Floats]:
+    kernel_x, sharpness = cca.gaussian(cca.squared_distances(x), 0.7)
+    kernel_y, _ = cca.gaussian(cca.squared_distances(y), 0.7)
+    return kernel_x, kernel_y, np.exp(-sharpness * np.sum((x - new) ** 2, axis=1))
+
+
+def as_written(h: Floats, f: Floats, k: Floats, y: Floats, bases: int) -> tuple[Floats, Floats]:
+    """Correlations (l,) and the answer by eq. 3 to 5, as one generalised symmetric eigenproblem on both blocks."""
+    within = scipy.linalg.null_space(np.ones((1, PAIRS)))
+    n = PAIRS - 1
+    centred_h, centred_f = within.T @ h @ within, within.T @ f @ within
+    ridge_h, ridge_f = (KAPPA * np.trace(g) / n * np.eye(n) for g in (centred_h, centred_f))
+    nothing = np.zeros((n, n))
+    values, vectors = scipy.linalg.eigh(
+        np.block([[nothing, centred_h @ centred_f], [centred_f @ centred_h, nothing]]),
+        np.block([[centred_h @ (centred_h + ridge_h), nothing], [nothing, centred_f @ (centred_f + ridge_f)]]),
+    )
+    best = vectors[:, ::-1][:, :bases]
+    reduced_x, reduced_y = within @ centred_h @ best[:n], within @ centred_f @ best[n:]
+    first = np.linalg.lstsq(reduced_x, reduced_y)[0]  # eq. 4
+    second = np.linalg.lstsq(reduced_y, y - y.mean(axis=0))[0]  # eq. 5
+    new = (k - h.mean(axis=1)) @ within @ best[:n]
+    return values[::-1][:bases], y.mean(axis=0) + new @ first @ second
+
+
+def test_correlations_and_answer_are_those_of_the_problem_as_written(rng: np.random.Generator) -> None:
+    x, y, new = planted(rng)
+    h, f, k = grams(x, y, new)
+    correlations, answer = as_written(h, f, k, y, bases=6)
+    np.testing.assert_allclose(cca.correlations(h, f, bases=6, kappa=KAPPA), correlations, atol=1e-9)
+    np.testing.assert_allclose(cca.weights(h, f, k, bases=6, kappa=KAPPA) @ y, answer, atol=1e-9)
+
+
+def test_a_planted_linear_system_comes_back(rng: np.random.Generator) -> None:
+    x, new = rng.normal(size=(PAIRS, 4)), rng.normal(size=4)
+    linear, offset = rng.normal(size=(4, 6)), rng.normal(size=6)
+    y = x @ linear + offset
+    weights = cca.weights(x @ x.T, y @ y.T, x @ new, bases=4, kappa=KAPPA)
+    np.testing.assert_allclose(weights @ y, new @ linear + offset, atol=1e-9)
+
+
+def test_weights_sum_to_one_and_unite_at_an_example_when_nothing_is_held_back(rng: np.random.Generator) -> None:
+    x, y, _ = planted(rng)
+    h, f, k = grams(x, y, x[3])
+    np.testing.assert_allclose(cca.weights(h, f, k, bases=3, kappa=KAPPA).sum(), 1.0, atol=1e-12)
+    np.testing.assert_allclose(cca.weights(h, f, k, bases=PAIRS, kappa=1e-13), np.eye(PAIRS)[3], atol=1e-9)
+
+
+def test_without_regularisation_every_direction_correlates_fully(rng: np.random.Generator) -> None:
+    x, y, new = planted(rng)
+    h, f, _ = grams(x, y, new)
+    np.testing.assert_allclose(cca.correlations(h, f, bases=PAIRS, kappa=1e-13), 1.0, atol=1e-9)
+    assert cca.correlations(h, f, bases=PAIRS, kappa=KAPPA)[-1] < 0.9
+
+
+def test_two_pairs_are_enough() -> None:
+    gram = np.array([[1.0, 0.2], [0.2, 1.0]])
+    weights = cca.weights(gram, gram, np.array([1.0, 0.2]), bases=6, kappa=1e-13)
+    np.testing.assert_allclose(weights, [1.0, 0.0], atol=1e-9)
+
+
+def test_pairs_that_are_the_same_are_refused() -> None:
+    with pytest.raises(ArithmeticError, match="same"):
+        cca.weights(np.ones((3, 3)), np.eye(3), np.ones(3), bases=2, kappa=KAPPA)
+
+
+def test_distances_are_pairwise(rng: np.random.Generator) -> None:
+    x = rng.normal(size=(5, 3))
+    expected = np.sum((x[:, None] - x) ** 2, axis=2)
+    np.testing.assert_allclose(cca.squared_distances(x), expected, atol=1e-12)
