@@ -6,6 +6,7 @@ import os
 import shlex
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,18 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"harness {__version__}")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for add in (add_demo, add_run, add_list, add_inspect, add_mocap, add_export, add_report, add_bench, add_doctor):
+    for add in (
+        add_demo,
+        add_run,
+        add_list,
+        add_inspect,
+        add_mocap,
+        add_export,
+        add_report,
+        add_check,
+        add_bench,
+        add_doctor,
+    ):
         add(verbs)
     return parser
 
@@ -105,7 +117,6 @@ def add_run(verbs: Verbs) -> None:
 
 
 def run_scenario(args: argparse.Namespace) -> Outcome:
-    from contextlib import redirect_stdout
     from dataclasses import replace
 
     from harness import experiment
@@ -274,6 +285,37 @@ def run_bench(args: argparse.Namespace) -> Outcome:
         print(json.dumps(found))
     else:
         print("\n".join([as_text(rows), *left_out]))
+    return outcome
+
+
+def add_check(verbs: Verbs) -> None:
+    verb = add_verb(verbs, "check", "try methods for the contract: causality, lost stations, recovery", run_check)
+    text = "names as in scenarios, or my_module:MyMethod (default: all that are registered)"
+    verb.add_argument("methods", nargs="*", metavar="METHOD", help=text)
+
+
+def run_check(args: argparse.Namespace) -> Outcome:
+    from harness.reconstruct import registry
+    from harness.testing.method_checks import RULES, Finding, examine
+
+    found: dict[str, list[Finding]] = {}
+    with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+        methods = {name: registry.resolve(name) for name in args.methods or sorted(registry.methods())}
+        for name, method in methods.items():
+            found[name] = []
+            for finding in examine(method):
+                found[name].append(finding)
+                bar(f"{name}: {finding.rule}", sum(map(len, found.values())), len(methods) * len(RULES))
+    broken = any(not finding.ok for findings in found.values() for finding in findings)
+    outcome = Outcome.REGRESSED if broken else Outcome.PASS
+    if args.json:
+        content = {name: [finding.as_dict() for finding in findings] for name, findings in found.items()}
+        print(json.dumps({"methods": content, "outcome": outcome.word}))
+        return outcome
+    for name, findings in found.items():
+        print(name)
+        for finding in findings:
+            print(f"  {'ok  ' if finding.ok else 'FAIL'}  {finding.rule}: {finding.seen}")
     return outcome
 
 

@@ -1,7 +1,12 @@
-"""The contract suite passes every shipped method, and catches methods broken on purpose."""
+"""The contract suite passes sound methods, and each of its rules alone catches one broken on purpose."""
 
+import json
+import random
+import threading
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,45 +14,49 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body, tpose
+from harness.cli import main
+from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import Take
-from harness.reconstruct import registry
 from harness.reconstruct.coverage import Coverage
 from harness.stream.frame import TrackerFrame
-from harness.testing.method_checks import MethodBroken, check_method
+from harness.testing.method_checks import RULES, MethodBroken, check_method, examine
 
 
-@pytest.mark.parametrize("name", [*sorted(registry.methods()), "mean_pose+ik"])
-def test_every_shipped_method_keeps_the_contract(name: str) -> None:
-    check_method(registry.resolve(name))
-
-
+@dataclass(frozen=True)
 class Standing:
     """A sound method that always answers with the T-pose; the broken ones each spoil one thing."""
 
-    name, summary, needs_examples = "standing", "the T-pose, always", False
+    session: type["StandingSession"]
+    name: str = "standing"
+    summary: str = "the T-pose, always"
+    needs_examples: bool = False
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Standing":
-        self.body = body
-        self.memory: list[Any] = []
-        return self
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Stood":
+        return Stood(self.session, body)
+
+
+class Stood:
+    """Something to share, for those that share what they should not."""
+
+    def __init__(self, session: type["StandingSession"], body: Body) -> None:
+        self.session, self.body = session, body
+        self.memory: dict[str, Any] = {}
+        session.fitted_once(self)
 
     def begin(self, calibration: Calibration) -> "StandingSession":
-        return self.session(self)
-
-    @property
-    def session(self) -> type["StandingSession"]:
-        return StandingSession
+        return self.session(self, calibration)
 
 
-@dataclass
 class StandingSession:
-    fitted: Standing
-
-    def __post_init__(self) -> None:
-        self.qpos, self.coverage = tpose(self.fitted.body.skeleton), Coverage()
+    def __init__(self, fitted: Stood, calibration: Calibration) -> None:
+        self.fitted, self.known = fitted, calibration
+        self.qpos, self.coverage = tpose(fitted.body.skeleton), Coverage()
         self.start()
+
+    @classmethod
+    def fitted_once(cls, fitted: Stood) -> None: ...
 
     def start(self) -> None: ...
 
@@ -58,62 +67,126 @@ class StandingSession:
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         return self.qpos
 
-
-class Dicing(StandingSession):
-    """Draws from no generator of its own."""
-
-    def answer(self, frame: TrackerFrame) -> np.ndarray:
+    def bent(self, by_rad: float) -> np.ndarray:
         out = self.qpos.copy()
-        out[7] = np.random.default_rng().random()
+        out[7:] += by_rad
         return out
 
 
-class Remembering(StandingSession):
-    """Starts where the session before it ended."""
-
-    def answer(self, frame: TrackerFrame) -> np.ndarray:
-        self.fitted.memory.append(frame)
-        out = self.qpos.copy()
-        out[7] = 1e-3 * len(self.fitted.memory)
-        return out
-
-
-class Entangled(StandingSession):
-    """Sessions write into one array."""
+class Drifting(StandingSession):
+    """A quaternion that is not normed again: after 1.4 s of good frames it is off."""
 
     def start(self) -> None:
-        self.fitted.memory = [0.0]
+        self.length = 1.0
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
-        self.fitted.memory[0] += 1e-3
+        good = frame.position_valid.all() and frame.orientation_valid.all() and frame.quality.min() == 1.0
+        self.length = self.length + 1.8e-8 if good and len(frame.quality) == 6 else 1.0
         out = self.qpos.copy()
-        out[7] = self.fitted.memory[0]
+        out[3:7] *= self.length
+        return out
+
+
+class Lopsided(StandingSession):
+    """Takes the middle of the positions, though there may be orientations alone."""
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        out = self.qpos.copy()
+        if frame.orientation_valid.any() and not frame.position_valid.any():
+            out[:3] = np.nan
         return out
 
 
 class Swallowing(StandingSession):
-    """Takes NaN for a number."""
+    """Divides by the number of stations that report."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
-        out = self.qpos.copy()
-        out[:3] = frame.position_m.mean(axis=0)
-        return out
+        reporting = np.count_nonzero(frame.position_valid | frame.orientation_valid)
+        return self.bent(0.0 if reporting else np.nan)
 
 
 class ZeroFed(StandingSession):
     """Takes lost stations for stations at the origin of a far-away tracker frame."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
-        out = self.qpos.copy()
-        out[:2] = 0.0 if frame.position_valid.all() else 50.0
+        out, lost = self.qpos.copy(), np.count_nonzero(frame.quality == 0.0)
+        out[:2] = 50.0 if lost == 1 else 0.0
         return out
 
 
-class Unnormalised(StandingSession):
+class Ticking(StandingSession):
+    """Divides by how much longer a period was than usual."""
+
+    def start(self) -> None:
+        self.last_s = -0.025
+
     def answer(self, frame: TrackerFrame) -> np.ndarray:
-        out = self.qpos.copy()
-        out[3:7] *= 1.01
-        return out
+        gap_s, self.last_s = frame.received_s - self.last_s, frame.received_s
+        return self.bent(0.0 if abs(gap_s - 0.025) < 1e-9 or gap_s > 0.1 or gap_s < 0.0 else np.nan)
+
+
+class Fastidious(StandingSession):
+    """Takes the logarithm of what quality is left above a fifth."""
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        poor = (frame.quality > 0.0) & (frame.quality < 0.2)
+        return self.bent(np.nan if poor.any() else 0.0)
+
+
+class Liuist(StandingSession):
+    """Knows of six stations and no other number."""
+
+    def start(self) -> None:
+        self.head = self.known.stations[5]
+
+
+class Dicing(StandingSession):
+    """Fits with chance of its own."""
+
+    @classmethod
+    def fitted_once(cls, fitted: Stood) -> None:
+        fitted.memory["bend"] = 1e-3 * np.random.default_rng().random()
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        return self.bent(self.fitted.memory["bend"])
+
+
+class Remembering(StandingSession):
+    """Begins where the session before it ended."""
+
+    def start(self) -> None:
+        self.bend = self.fitted.memory.get("bend", 0.0)
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        self.bend += 1e-4
+        self.fitted.memory["bend"] = self.bend
+        return self.bent(self.bend)
+
+
+class Entangled(StandingSession):
+    """Keeps the time of the last frame where another session finds it."""
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        last_s = self.fitted.memory.get("last_s", 0.0) if frame.received_s > 0.0 else 0.0
+        self.fitted.memory["last_s"] = frame.received_s
+        return self.bent(1e-3 if frame.received_s < last_s else 0.0)
+
+
+class Racing(StandingSession):
+    """Works in an array that all sessions share; long enough for another to come in between."""
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        self.fitted.memory["mine"] = id(self)
+        time.sleep(1e-3)
+        return self.bent(0.0 if self.fitted.memory["mine"] == id(self) else 1e-3)
+
+
+class Rooted(StandingSession):
+    """Holds what cannot leave its process."""
+
+    @classmethod
+    def fitted_once(cls, fitted: Stood) -> None:
+        fitted.memory["lock"] = threading.Lock()
 
 
 class Rewriting(StandingSession):
@@ -123,7 +196,7 @@ class Rewriting(StandingSession):
         self.live = self.qpos.copy()
 
     def step(self, frame: TrackerFrame) -> Any:
-        self.live[7] += 1e-3
+        self.live[7] += 1e-6
         return SimpleNamespace(qpos=self.live, status=self.coverage.seen(frame)[0])
 
 
@@ -146,10 +219,35 @@ class Late:
 
     @property
     def qpos(self) -> np.ndarray:
-        out = self.session.qpos.copy()
         ahead = self.session.seen[min(self.frame, len(self.session.seen) - 1)]
-        out[7] = 1e-3 * np.nan_to_num(ahead.position_m[0, 0])
-        return out
+        return self.session.bent(1e-3 * float(np.nan_to_num(ahead.tracker_from_station[0, 0])))
+
+
+@dataclass(frozen=True)
+class Tampering(Standing):
+    """Thinks the examples are its own."""
+
+    needs_examples: bool = True
+
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Stood:
+        for take in examples:
+            take.qpos.flags.writeable = True
+            take.qpos[:, :3] = 0.0
+        return Stood(self.session, body)
+
+
+class Seeding(StandingSession):
+    """Makes everybody's chance its own."""
+
+    def start(self) -> None:
+        np.random.seed(1)  # noqa: NPY002  # just so
+
+
+class Shuffling(StandingSession):
+    """The same with Python's."""
+
+    def start(self) -> None:
+        random.seed(1)
 
 
 class Boasting(StandingSession):
@@ -157,6 +255,14 @@ class Boasting(StandingSession):
 
     def step(self, frame: TrackerFrame) -> Any:
         return Estimate(self.qpos, Status.SOLVED)
+
+
+class Hasty(StandingSession):
+    """Gives up at once."""
+
+    def step(self, frame: TrackerFrame) -> Any:
+        status, _ = self.coverage.seen(frame)
+        return Estimate(self.qpos, Status.LOST if status is Status.HELD else status)
 
 
 class Despairing(StandingSession):
@@ -170,47 +276,113 @@ class Despairing(StandingSession):
         return Estimate(self.qpos, self.worst)
 
 
-class Ticking(StandingSession):
-    """Divides by the time since the last frame, and takes the period for granted."""
+class Undemanding(StandingSession):
+    """One station is enough for it."""
+
+    def step(self, frame: TrackerFrame) -> Any:
+        some = frame.position_valid.any() or frame.orientation_valid.any()
+        return Estimate(self.qpos, Status.SOLVED if some else self.coverage.seen(frame)[0])
+
+
+class Offended(StandingSession):
+    """Never gets over a jump of its first station."""
 
     def start(self) -> None:
-        self.last_s = -1.0
+        self.last_m, self.away_m = np.zeros(3), 0.0
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
-        out, gap_s = self.qpos.copy(), frame.received_s - self.last_s
-        self.last_s = frame.received_s
-        out[7] = 0.0 if abs(gap_s - 0.025) < 1e-9 or frame.received_s == 0.0 else np.nan
+        here_m = np.nan_to_num(frame.position_m[0])
+        if frame.received_s > 0.0 and np.linalg.norm(here_m - self.last_m) > 0.2:
+            self.away_m = 1.0
+        self.last_m = here_m
+        out = self.qpos.copy()
+        out[2] += self.away_m
         return out
 
 
-def test_the_sound_one_passes() -> None:
-    check_method(Standing())
+class Homesick(StandingSession):
+    """Bends the more, the farther it is from where it was fitted."""
+
+    def answer(self, frame: TrackerFrame) -> np.ndarray:
+        where_m = rotations.rotate(self.known.world_from_tracker, np.nan_to_num(frame.position_m[0]))
+        return self.bent(0.05 * float(np.tanh(where_m[0] + self.known.tracker_origin_m[0])))
 
 
-@pytest.mark.parametrize(
-    ("session", "rule"),
-    [
-        (Dicing, "equal input gives equal answers"),
-        (Remembering, "starts from nothing"),
-        (Entangled, "do not meet"),
-        (Swallowing, "every answer is a pose"),
-        (ZeroFed, "every answer is a pose"),
-        (Unnormalised, "every answer is a pose"),
-        (Rewriting, "not changed afterwards"),
-        (Foreseeing, "no later frame"),
-        (Boasting, "the status tells"),
-        (Despairing, "the status tells"),
-        (Ticking, "every answer is a pose"),
-    ],
+BROKEN: tuple[tuple[type[StandingSession], str], ...] = (
+    (Drifting, "every answer is a pose"),
+    (Lopsided, "poor input is borne"),
+    (Swallowing, "losses are borne"),
+    (ZeroFed, "losses are borne"),
+    (Ticking, "irregular time is borne"),
+    (Fastidious, "any quality is borne"),
+    (Liuist, "any set of stations is borne"),
+    (Dicing, "equal input gives equal answers"),
+    (Remembering, "a session starts from nothing"),
+    (Entangled, "sessions do not meet"),
+    (Racing, "sessions may run in threads"),
+    (Rooted, "what was fitted may go to another process"),
+    (Rewriting, "an answer rests on no later frame"),
+    (Foreseeing, "an answer rests on no later frame"),
+    (Seeding, "chance is the generator given"),
+    (Shuffling, "chance is the generator given"),
+    (Boasting, "the status tells what the answer rests on"),
+    (Hasty, "the status tells what the answer rests on"),
+    (Despairing, "the status tells what the answer rests on"),
+    (Undemanding, "the status tells what the answer rests on"),
+    (Offended, "the error comes back to what it was"),
+    (Homesick, "the posture does not depend on the place"),
 )
-def test_each_broken_one_is_caught(session: type[StandingSession], rule: str) -> None:
-    class Broken(Standing):
-        name = "broken"
 
-        @property
-        def session(self) -> type[StandingSession]:
-            return session
 
-    with pytest.raises(MethodBroken, match=rule) as caught:
-        check_method(Broken())
-    assert str(caught.value).startswith("broken breaks the rule that ")
+def amiss(method: Standing) -> dict[str, str]:
+    return {finding.rule: finding.seen for finding in examine(method) if not finding.ok}
+
+
+def test_the_sound_one_passes() -> None:
+    assert amiss(Standing(StandingSession)) == {}
+    check_method(Standing(StandingSession))
+
+
+@pytest.mark.parametrize(("session", "rule"), BROKEN, ids=lambda value: getattr(value, "__name__", None))
+def test_one_rule_alone_catches_each_broken_one(session: type[StandingSession], rule: str) -> None:
+    assert list(amiss(Standing(session))) == [rule]
+
+
+def test_tampering_with_the_examples_is_caught_by_its_rule_alone() -> None:
+    assert list(amiss(Tampering(StandingSession))) == ["examples stay as they are"]
+
+
+def test_every_rule_has_its_broken_one() -> None:
+    assert {rule for _, rule in BROKEN} | {"examples stay as they are"} == set(RULES)
+
+
+def test_the_first_rule_that_is_broken_is_raised_by_name() -> None:
+    with pytest.raises(MethodBroken, match="standing breaks the rule that losses are borne: ") as caught:
+        check_method(Standing(ZeroFed))
+    assert "far from every station" in caught.value.seen
+
+
+def test_the_verb_prints_a_line_for_each_rule(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "mean_pose"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert (lines[0], lines[-1]) == ("mean_pose", "pass")
+    assert [line.split(": ")[0] for line in lines[1:-1]] == [f"  ok    {rule}" for rule in RULES]
+    assert all(line.split(": ", 1)[1] for line in lines[1:-1])
+
+
+def test_the_verb_tells_what_anyones_own_method_breaks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`module:Class` from the folder where one works; a broken one regresses, one that does not exist is refused."""
+    (tmp_path / "boaster.py").write_text(
+        "from tests.testing.test_method_checks import Boasting, Standing\n\n\n"
+        "def Mine():\n    print('hello')\n    return Standing(Boasting)\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(["check", "boaster:Mine", "--json"]) == 1
+    content = json.loads(capsys.readouterr().out)
+    assert content["outcome"] == "regressed"
+    (broken,) = [finding for finding in content["methods"]["boaster:Mine"] if not finding["ok"]]
+    assert broken["rule"] == "the status tells what the answer rests on"
+    assert "SOLVED while 4 of 6 stations were silent" in broken["seen"]
+    assert main(["check", "boaster:Yours"]) == 2
