@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.arrays import Floats, Ints, Singles
+from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
+from harness.reconstruct.index.principal import Principal, chunks
 from harness.reconstruct.index.protocol import CHUNK, Vectors
 
 PROBES = 12
 """Cells looked into: a recall of 0.97 and more at 66,000 and at 1,000,000 frames (`harness bench index`)."""
 KEPT = 0.9995
 """Share of the variance that the axes keep."""
-_AXES_SAMPLE, _PER_CELL, _ROUNDS = 20_000, 48, 8
-_LANES = 8
-"""faiss is quick when the number of axes is a multiple of it."""
+_PER_CELL, _ROUNDS = 48, 8
+"""Of the clustering: vectors that each centroid is found from, and rounds."""
 
 
 class InvertedFile:
@@ -31,10 +31,8 @@ class InvertedFile:
     def __init__(self, vectors: Vectors, probes: int = PROBES) -> None:
         count = len(vectors)
         rng = generator(0, "inverted file", count)
-        self._mean: Singles
-        self._axes: Singles
-        self._mean, self._axes = principal_axes(vectors, rng, KEPT)
-        width = self._axes.shape[1]
+        self._principal = Principal(vectors, rng, KEPT)
+        width = self._principal.width
         cells = max(1, min(round(2.0 * np.sqrt(count)), count // _PER_CELL))
         sample = np.sort(rng.choice(count, min(count, _PER_CELL * cells), replace=False))
         with _one_thread() as faiss:
@@ -44,9 +42,9 @@ class InvertedFile:
             self._file.cp.seed, self._file.cp.niter = 1, _ROUNDS
             self._file.cp.min_points_per_centroid = 1
             self._file.cp.max_points_per_centroid = _PER_CELL
-            self._file.train(np.concatenate([self._seen(vectors.gather(rows)) for rows in _chunks(sample)]))
+            self._file.train(np.concatenate([self._principal.seen(vectors.gather(rows)) for rows in chunks(sample)]))
             for start in range(0, count, CHUNK):
-                self._file.add(self._seen(vectors.gather(slice(start, start + CHUNK))))
+                self._file.add(self._principal.seen(vectors.gather(slice(start, start + CHUNK))))
             self._file.nprobe = self._probes = min(probes, cells)
             self._all = faiss.SearchParametersIVF(nprobe=cells)
 
@@ -56,45 +54,12 @@ class InvertedFile:
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """As `Index`; most of the nearest, not always all."""
         count = min(count, len(self))
-        asked = self._seen(np.asarray(query, np.float32)[None])
+        asked = self._principal.seen(np.asarray(query, np.float32)[None])
         squared, rows = self._file.search(asked, count)
         if rows[0, -1] < 0:  # the cells looked into hold fewer: look into all
             squared, rows = self._file.search(asked, count, params=self._all)
         order: Ints = np.lexsort((rows[0], squared[0]))
         return rows[0, order], squared[0, order]
-
-    def _seen(self, vectors: Singles) -> Singles:
-        out: Singles = np.matmul(vectors - self._mean, self._axes, dtype=np.float32)
-        return out
-
-
-def principal_axes(vectors: Vectors, rng: np.random.Generator, kept: float) -> tuple[Singles, Singles]:
-    """The mean (D,) of a sample and orthonormal axes (D, d) that keep a share of its variance, strongest first.
-
-    d is a multiple of 8; columns beyond D are 0.
-    """
-    count = len(vectors)
-    sample = np.sort(rng.choice(count, min(count, _AXES_SAMPLE), replace=False))
-    total: Floats = np.zeros(vectors.size)
-    products: Floats = np.zeros((vectors.size, vectors.size))
-    for rows in _chunks(sample):
-        values: Floats = vectors.gather(rows).astype(float)
-        total += values.sum(axis=0)
-        products += values.T @ values
-    mean = total / len(sample)
-    variance, axes = np.linalg.eigh(products / len(sample) - np.outer(mean, mean))
-    share = np.cumsum(variance[::-1]) / max(float(variance.sum()), 1e-30)
-    needed = int(np.searchsorted(share, kept)) + 1
-    width = _LANES * -(-min(needed, vectors.size) // _LANES)
-    out = np.zeros((vectors.size, width), np.float32)
-    strongest = axes[:, ::-1][:, :width]
-    out[:, : strongest.shape[1]] = strongest
-    return mean.astype(np.float32), out
-
-
-def _chunks(rows: Ints) -> Iterator[Ints]:
-    for start in range(0, len(rows), CHUNK):
-        yield rows[start : start + CHUNK]
 
 
 @contextmanager

@@ -7,9 +7,10 @@ import pytest
 
 from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
-from harness.reconstruct.index import Flat, Index, InvertedFile, Table, Vectors
+from harness.errors import UnknownName
+from harness.reconstruct.index import Flat, Index, InvertedFile, KDTree, Table, Vectors, choose, nearest_known
 
-EXACT: dict[str, Callable[[Vectors], Index]] = {"flat": Flat}
+EXACT: dict[str, Callable[[Vectors], Index]] = {"flat": Flat, "kd_tree": KDTree}
 ALL = EXACT | {"inverted_file": InvertedFile}
 
 
@@ -41,7 +42,7 @@ def test_an_exact_index_finds_the_nearest(name: str, rng: np.random.Generator) -
 
 @pytest.mark.parametrize("name", ALL)
 def test_most_of_the_nearest_are_found_in_order(name: str, rng: np.random.Generator) -> None:
-    values = paths(20_000, 30)
+    values = paths(8000, 30)
     index, found, spread = ALL[name](Table(values)), [], float(np.sum(np.var(values, axis=0)))
     for row in rng.integers(0, len(values), 50):
         query = values[row] + rng.normal(0.0, 0.05, 30).astype(np.float32)
@@ -81,7 +82,38 @@ def test_the_same_vectors_give_the_same_answers(name: str) -> None:
 
 def test_nothing_is_far_away_in_a_set_that_never_varies() -> None:
     values = np.full((500, 9), 3.0, np.float32)
-    for name, make in EXACT.items():
-        rows, squared = make(Table(values)).nearest(values[0], 4)
-        assert rows.tolist() == [0, 1, 2, 3], name
-        np.testing.assert_allclose(squared, 0.0, atol=1e-6)
+    rows, _ = Flat(Table(values)).nearest(values[0], 4)
+    assert rows.tolist() == [0, 1, 2, 3]
+    for make in ALL.values():
+        np.testing.assert_allclose(make(Table(values)).nearest(values[0], 4)[1], 0.0, atol=1e-6)
+
+
+def test_unknown_columns_decide_nothing(rng: np.random.Generator) -> None:
+    values = paths(3000, 12)
+    table, known = Table(values), np.array([1.0] * 8 + [0.0] * 4, np.float32)
+    for row in (10, 1500, 2990):
+        query = values[row] + rng.normal(0.0, 0.1, 12).astype(np.float32)
+        query[8:] += rng.normal(0.0, 0.5, 4).astype(np.float32)
+        rows, squared = nearest_known(Flat(table), table, query, known, 10)
+        wanted, distances = truth(values[:, :8], query[:8], 10)
+        assert len(set(rows.tolist()) & set(wanted.tolist())) >= 8
+        assert rows[0] == wanted[0]
+        np.testing.assert_allclose(squared[0], distances[0], rtol=1e-4)
+        np.testing.assert_allclose(squared, np.sum((values[rows, :8] - query[:8]) ** 2, axis=1), rtol=1e-5)
+
+
+def test_weighing_every_column_alike_is_plain_search() -> None:
+    values = paths(2000, 12)
+    index, table = Flat(Table(values)), Table(values)
+    query = values[700] + np.float32(0.02)
+    weighed = nearest_known(index, table, query, np.ones(12, np.float32), 9)
+    np.testing.assert_array_equal(weighed[0], index.nearest(query, 9)[0])
+
+
+def test_the_index_is_chosen_by_size_or_by_name() -> None:
+    assert isinstance(choose("auto", Table(paths(500, 107))), Flat)
+    assert isinstance(choose("auto", Table(paths(4000, 60))), KDTree)
+    assert isinstance(choose("auto", Table(paths(4000, 107))), InvertedFile)
+    assert isinstance(choose("flat", Table(paths(4000, 107))), Flat)
+    with pytest.raises(UnknownName, match="Did you mean 'kd_tree'"):
+        choose("kdtree", Table(paths(10, 3)))
