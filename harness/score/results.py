@@ -15,6 +15,7 @@ from harness.errors import BadFile, BadInput, Outcome
 from harness.score.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
 from harness.score.files import TEMPORARY, content_key, digest, read_json, write_json, write_text
 from harness.score.manifest import Manifest
+from harness.score.recovery import Recoveries
 from harness.score.summary import GROUP, Tally, as_csv
 
 __all__ = [
@@ -101,16 +102,18 @@ def write_summary(
     """Write summary.csv (a row for each cell) and summary.json, whose content is returned.
 
     `keys` are the finished cells in the order of the table, `failures` cell -> what went wrong. summary.json has
-    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `Tally.rows`).
+    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `Tally.rows`), and
+    recovery (see `recovery.Recoveries`), which is empty unless the scenario varies a disturbance.
     """
     failures = dict(failures or {})
-    methods, behaviours = Tally(*GROUP), Tally(*GROUP, "behaviour")
+    methods, behaviours, recoveries = Tally(*GROUP), Tally(*GROUP, "behaviour"), Recoveries()
     rows = []
     for key in keys:
         cell = read_cell(cell_folder(out, key))
         rows.append(as_row(cell))
         methods.add(cell)
         behaviours.add(cell)
+        recoveries.add(cell)
     whole = len(rows) == planned and not failures
     content = {
         "outcome": (Outcome.PASS if whole else Outcome.INCOMPLETE).word,
@@ -119,6 +122,7 @@ def write_summary(
         "failures": failures,
         "methods": methods.rows(),
         "behaviours": behaviours.rows(),
+        "recovery": recoveries.rows(),
         "cells": rows,
     }
     write_text(out / "summary.csv", as_csv(rows))
