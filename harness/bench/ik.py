@@ -18,11 +18,13 @@ import numpy as np
 from harness.bench.rows import Row
 from harness.body import humanoid, mounts
 from harness.body.kinematics import Kinematics
+from harness.body.retarget import to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.humanoid24 import pack
+from harness.core.motion import Take
 from harness.core.seeds import generator
 from harness.mocap import performer
 from harness.reconstruct.hinges import HingeLimits
@@ -53,6 +55,8 @@ class Setting:
     frames: list[TrackerFrame]
     starts: Floats
     """(T, 55) for each frame the true pose of the one before."""
+    example: Take
+    """Another walk of the same performer."""
 
 
 def bench_ik(seed: int = 1, frames: int = 400) -> list[Row]:
@@ -99,7 +103,9 @@ def make_setting(seed: int, frames: int) -> Setting:
     qpos[:, 7:] = HingeLimits(body).principal(qpos[:, 7:])
     rng, kinematics = generator(seed, "bench", "ik"), Kinematics(body)
     readings = [_reading(kinematics, calibration, q, t / RATE_HZ, rng) for t, q in enumerate(qpos)]
-    return Setting(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]))
+    other = performer.generate("walking", who, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
+    example = to_own_body(other)[1]
+    return Setting(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), example)
 
 
 def _reading(
@@ -123,7 +129,7 @@ def _reading(
 
 def used(setting: Setting) -> Follower:
     """The registered method: cold start, then always from its own last pose."""
-    session = Ik().fit(setting.body, [], np.random.default_rng(0)).begin(setting.calibration)
+    session = Ik().fit(setting.body, [setting.example], np.random.default_rng(0)).begin(setting.calibration)
 
     def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         begin = time.perf_counter()

@@ -23,6 +23,7 @@ from harness.reconstruct import ik
 from harness.reconstruct.best_match import BestMatch
 from harness.reconstruct.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.contract import Method
+from harness.reconstruct.dynamic_map import DynamicMap
 from harness.reconstruct.kernel_cca import KernelCca
 from harness.reconstruct.kernel_ridge import KernelRidge
 from harness.reconstruct.mean_pose import MeanPose
@@ -38,11 +39,13 @@ def methods() -> dict[str, Callable[[], Method]]:
     known: dict[str, Callable[[], Method]] = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
     return known | {
         "ik": ik.Ik,
-        "ik:gaussian": lambda: ik.GAUSSIAN,
+        "ik:previous": lambda: ik.PREVIOUS,
         "ik:mean": lambda: ik.MEAN,
+        "ik:gaussian": lambda: ik.GAUSSIAN,
         "mean_pose": MeanPose,
         "kernel_ridge": KernelRidge,
         "best_match": BestMatch,
+        "dynamic_map": DynamicMap,
         "weighted_blend": WeightedBlend,
         "kernel_cca": KernelCca,
     }
