@@ -1,0 +1,110 @@
+"""Laws that hold for every method that can be named: parametrised over the registry, so that a new one is held to them.
+
+Frames are exact, so that what is left is the method's own error. Bounds follow from what a method is: one that
+learns and has seen the very take gives it back; a null and a method that learns nothing cannot.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from harness.body.kinematics import joint_centres_m
+from harness.body.retarget import to_common_body
+from harness.core.estimate import Status
+from harness.core.motion import Take
+from harness.mocap import performer
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Method
+from harness.score.angles import wrapped
+from harness.testing.frames import exact_frames
+from harness.testing.method_checks import check_method
+
+from .conftest import Scene, moved, scene
+
+NAMES = sorted(registry.methods())
+ALSO = ("mean_pose+ik", "best_match+ik")
+_OTHERS = (("walking", 1), ("boxing", 2))
+LEARNERS = [name for name in NAMES if registry.resolve(name).needs_examples]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Of a take that is among the examples, warm-up left out."""
+
+    hinge_deg: float
+    """Mean error of the hinges [deg]."""
+    joint_mm: float
+    """Mean distance of the joint centres [mm]."""
+
+
+SEEN_IT = Bound(1.0, 10.0)
+"""For whatever learns from examples, unless it is named below."""
+BOUNDS = {
+    "mean_pose": Bound(9.0, 150.0),  # one posture for all
+    "ik": Bound(4.0, 8.0),  # what no station shows is only held to a prior
+    "ik:mean": Bound(4.0, 8.0),
+    "ik:previous": Bound(4.0, 8.0),
+    "ik:gaussian": Bound(4.0, 8.0),
+}
+
+
+@cache
+def walk() -> Scene:
+    return scene("walking", seconds=4.0)
+
+
+@cache
+def others() -> tuple[Take, ...]:
+    """Two takes of other people, on the body of the one who walks."""
+    clips = [
+        performer.generate(b, performer.performers()[p], 1, seed=1, duration_s=4.0, rate_hz=40.0) for b, p in _OTHERS
+    ]
+    return tuple(to_common_body(clip, walk().body.skeleton)[0] for clip in clips)
+
+
+def errors(method: Method, examples: list[Take], shown: Scene) -> tuple[float, float]:
+    """Mean hinge error [deg] and joint distance [mm] after the first half second."""
+    session = method.fit(shown.body, examples if method.needs_examples else [], np.random.default_rng(1)).begin(
+        shown.calibration
+    )
+    estimates = [session.step(frame) for frame in shown.frames]
+    assert estimates[-1].status is Status.SOLVED
+    said, true = np.array([e.qpos for e in estimates])[20:], shown.take.qpos[20:]
+    skeleton = shown.body.skeleton
+    off_m = np.linalg.norm(joint_centres_m(skeleton, said) - joint_centres_m(skeleton, true), axis=2)
+    return float(np.rad2deg(np.abs(wrapped(said[:, 7:] - true[:, 7:]))).mean()), 1e3 * float(off_m.mean())
+
+
+@cache
+def at_home(name: str) -> tuple[float, float]:
+    return errors(registry.resolve(name), [walk().take, *others()], walk())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_noiseless_take_that_is_among_the_examples_is_recovered(name: str) -> None:
+    hinge_deg, joint_mm = at_home(name)
+    bound = BOUNDS.get(name, SEEN_IT)
+    assert hinge_deg <= bound.hinge_deg
+    assert joint_mm <= bound.joint_mm
+
+
+@pytest.mark.parametrize("name", LEARNERS)
+def test_scores_do_not_change_when_the_room_of_the_examples_is_turned_and_shifted(name: str) -> None:
+    examples = [replace(take, qpos=moved(take.qpos, 2.5, (-4.0, 7.0, 0.0))) for take in (walk().take, *others())]
+    assert errors(registry.resolve(name), examples, walk()) == pytest.approx(at_home(name), rel=0.02, abs=0.02)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> None:
+    home = walk()
+    take = replace(home.take, qpos=moved(home.take.qpos, -1.2, (3.0, -8.0, 0.0)))
+    away = Scene(home.body, home.calibration, take, exact_frames(home.body, home.calibration, take.qpos))
+    found = errors(registry.resolve(name), [home.take, *others()], away)
+    assert found == pytest.approx(at_home(name), rel=0.02, abs=0.02)
+
+
+@pytest.mark.parametrize("name", [*NAMES, *ALSO])
+def test_the_contract_is_kept(name: str) -> None:
+    check_method(registry.resolve(name))
