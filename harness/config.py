@@ -1,17 +1,21 @@
 """Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
 
+import itertools
 import tomllib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.fields import build
+from harness.core.fields import build, changed
 from harness.core.options import alternatives
 from harness.core.share import share_folder
-from harness.errors import BadFile, UnknownName
+from harness.errors import BadFile, BadInput, UnknownName
+from harness.score.cell import varied_text
 from harness.simulate.link import TrackerConfig
 
 SCHEMA = 1
+_FIXED = ("schema", "name", "methods", "inputs", "vary")
 
 
 @dataclass(frozen=True)
@@ -76,6 +80,9 @@ class Scenario:
     """What tables call the noise when components are changed; "default*" and so on without a name."""
     components: dict[str, Any] = field(default_factory=dict)
     """Changes to the noise level (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
+    vary: dict[str, Any] = field(default_factory=dict)
+    """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
+    or with each combination of them when there are several keys."""
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -93,6 +100,42 @@ def load_scenario(path: Path | str) -> Scenario:
         raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
     check_scenario(path, scenario)
     return scenario
+
+
+def variants(scenario: Scenario) -> list[tuple[dict[str, Any], Scenario]]:
+    """Every combination of the varied values and the scenario that it makes; one and nothing varied without any.
+
+    UnknownName for a key that does not exist, BadInput for one that cannot be varied or a value that does not fit.
+    """
+    choices = dict(_leaves(scenario.vary))
+    for key, values in choices.items():
+        if key.split(".")[0] in _FIXED or key in ("motion.test", "motion.behaviours"):
+            raise BadInput(f"vary: {key} cannot be varied.", "Lists of methods, inputs and clips say it themselves.")
+        if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
+            raise BadInput(f"vary: {key} = {values!r} is no list of different values.", "For example: [0.0, 0.05].")
+    found = []
+    for combination in itertools.product(*choices.values()):
+        varied = dict(zip(choices, combination, strict=True))
+        made = replace(scenario, vary={})
+        try:
+            for key, value in varied.items():
+                content: Any = value
+                for name in reversed(key.split(".")):
+                    content = {name: content}
+                made = changed(made, content, "scenario")
+        except (TypeError, ValueError) as error:
+            raise BadInput(f"vary: {error}.", "Values are those that the scenario's own key may have.") from error
+        found.append((varied, made))
+    return found
+
+
+def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys, whether TOML read them as one text or as tables inside tables."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
 
 
 def find_scenario(path: Path | str) -> Path:
@@ -136,6 +179,11 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
             "one for all of them, or one for each",
             "Give motion.behaviours one word.",
         )
+    for varied, made in variants(scenario) if scenario.vary else ():
+        try:
+            check_scenario(path, made)
+        except BadFile as error:
+            refuse(f"{error.found} with {varied_text(varied)}", error.expected, error.advice)
     for what, repeated in (
         ("motion.test", scenario.motion.test),
         ("methods", scenario.methods),

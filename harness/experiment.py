@@ -1,30 +1,32 @@
 """The whole loop: mocap -> body -> simulate -> calibrate -> reconstruct -> score -> report, cell by cell.
 
-A job is one test clip: simulated once, then shown to every method with every choice of inputs. Each pair is a cell,
-written whole or not at all, so that a run can be stopped at any moment and goes on where it was.
+A job is one test clip: simulated once for every combination of varied values, then shown to every method with every
+choice of inputs. Each of these is a cell, written whole or not at all, so that a run can be stopped at any moment
+and goes on where it was.
 """
 
 import time
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from harness.body.mounts import place
-from harness.config import Motion, Scenario
+from harness.config import Motion, Scenario, variants
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.protocol import Part
-from harness.core.seeds import generator
 from harness.core.workers import call_each
 from harness.errors import BadInput, HarnessError, Outcome, was_interrupted
 from harness.mocap.sources import MotionSource, open_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.score import manifest, results
+from harness.score.cell import varied_text
 from harness.score.score import score
 from harness.setting import Setting, mounts_of, noise_of
 from harness.simulate.simulate import Simulation
@@ -33,6 +35,26 @@ from harness.stream.reader import WireFormat
 
 Progress = Callable[[str, int, int], None]
 """Called with what was done last, how many cells are finished and how many were planned."""
+
+
+Varied = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One cell to come."""
+
+    scenario: Scenario
+    """With the varied values put in."""
+    varied: Varied
+    part: Part
+    method: str
+    inputs: str
+
+    def __str__(self) -> str:
+        """What the cell is called."""
+        besides = [text for text in (self.inputs, varied_text(self.varied)) if text not in ("", "pos+ori")]
+        return f"{self.method} on {self.part}" + (f" ({', '.join(besides)})" if besides else "")
 
 
 @dataclass(frozen=True)
@@ -47,12 +69,13 @@ class Job:
     command: str
     """The command that reproduces the run."""
 
-    def cells(self) -> list[tuple[str, str, str]]:
-        """What each cell is called, its method and its inputs."""
+    def cells(self) -> list[Planned]:
+        """One for each combination of varied values, inputs and methods."""
         return [
-            (f"{method} on {self.part}" + ("" if inputs == "pos+ori" else f" ({inputs})"), method, inputs)
-            for inputs in self.scenario.inputs
-            for method in self.scenario.methods
+            Planned(scenario, varied, self.part, method, inputs)
+            for varied, scenario in variants(self.scenario)
+            for inputs in scenario.inputs
+            for method in scenario.methods
         ]
 
 
@@ -87,10 +110,11 @@ def run(
     parts = [Part.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
     todo = [Job(scenario, part, b, folder, command) for part, b in zip(parts, behaviours, strict=True)]
-    source = source_of(scenario.motion, folder, scenario.seed)
-    check_names(scenario, source, parts)
+    for _, made in reversed(variants(scenario)):
+        source = source_of(made.motion, folder, made.seed)
+        check_names(made, source, parts)
     results.open_run(out, manifest.of_run(asdict(scenario), motion_source=source.title, command=command))
-    planned = [cell for job in todo for cell, _, _ in job.cells()]
+    planned = _in_order(todo)
     ended: dict[str, Ended] = {}
     try:
         for cell in _cells(todo, out, jobs):
@@ -129,6 +153,13 @@ def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> 
     noise_of(scenario)
 
 
+def _in_order(todo: list[Job]) -> list[str]:
+    """Every cell as tables list them: the varied values change slowest, then the clips."""
+    cells = [cell for job in todo for cell in job.cells()]
+    places = {varied_text(varied): place for place, (varied, _) in enumerate(variants(todo[0].scenario))}
+    return [str(cell) for cell in sorted(cells, key=lambda cell: places[varied_text(cell.varied)])]
+
+
 def _cells(todo: list[Job], out: Path, jobs: int) -> Iterator[Ended]:
     if min(jobs, len(todo)) <= 1:
         for job in todo:
@@ -138,7 +169,7 @@ def _cells(todo: list[Job], out: Path, jobs: int) -> Iterator[Ended]:
         try:
             yield from done.result()
         except BrokenExecutor:
-            yield from (Ended(cell, failure="a worker process died") for cell, _, _ in todo[which].cells())
+            yield from (Ended(str(cell), failure="a worker process died") for cell in todo[which].cells())
 
 
 def _run_whole_job(job: Job, out: Path) -> list[Ended]:
@@ -148,33 +179,32 @@ def _run_whole_job(job: Job, out: Path) -> list[Ended]:
 def run_job(job: Job, out: Path) -> Iterator[Ended]:
     """Every cell of one clip, in order; a failure is reported in its place."""
     setting: Setting | None = None
-    for cell, name, inputs in job.cells():
+    for cell in job.cells():
         try:
-            if setting is None:
-                source = source_of(job.scenario.motion, job.folder, job.scenario.seed)
-                setting = Setting(job.scenario, source, job.part, job.behaviour)
-            method = registry.resolve(name)
-            key = setting.key(method, name, inputs)
+            if setting is None or setting.scenario != cell.scenario:
+                setting = (setting and setting.under(cell.scenario)) or _setting(job, cell.scenario)
+            method = registry.resolve(cell.method)
+            key = setting.key(method, cell.method, cell.inputs, cell.varied)
             if not results.has_cell(out, key):
-                results.write_cell(out, judge(setting, method, name, inputs, key, job.command))
-            yield Ended(cell, key)
+                results.write_cell(out, judge(setting, method, cell, key, job.command))
+            yield Ended(str(cell), key)
         except HarnessError as error:
-            yield Ended(cell, failure=str(error), refused=True)
+            yield Ended(str(cell), failure=str(error), refused=True)
         except (Exception, SystemExit) as error:  # a method may raise anything: its cell fails, the run goes on
             if was_interrupted(error):
                 raise KeyboardInterrupt from error
-            yield Ended(cell, failure=traceback.format_exc())
+            yield Ended(str(cell), failure=traceback.format_exc())
 
 
-def judge(setting: Setting, method: Method, name: str, inputs: str, key: str, command: str) -> results.Cell:
+def _setting(job: Job, scenario: Scenario) -> Setting:
+    return Setting(scenario, source_of(scenario.motion, job.folder, scenario.seed), job.part, job.behaviour)
+
+
+def judge(setting: Setting, method: Method, planned: Planned, key: str, command: str) -> results.Cell:
     """Fit, run causally over the stream, score."""
     scenario, simulation = setting.scenario, setting.simulation
-    seen = combination(inputs, simulation.stations)
-    examples = setting.examples if method.needs_examples else []
-    reconstructor = method.fit(
-        setting.body, examples, generator(scenario.seed, "method", registry.without_options(name))
-    )
-    qpos, status, step_ms = reconstruct(reconstructor, simulation, seen)
+    seen = combination(planned.inputs, simulation.stations)
+    qpos, status, step_ms = reconstruct(setting.fitted(method, planned.method), simulation, seen)
     scores = score(
         setting.body.skeleton,
         scenario.tracker.rate_hz,
@@ -187,19 +217,21 @@ def judge(setting: Setting, method: Method, name: str, inputs: str, key: str, co
     frames = simulation.frames
     return results.Cell(
         key=key,
-        method=name,
+        method=planned.method,
         behaviour=setting.behaviour,
         clip=str(setting.part),
         motion_source=setting.source.title,
         stations=simulation.stations,
         mount=scenario.mount,
         rate_hz=scenario.tracker.rate_hz,
-        inputs=inputs,
+        inputs=planned.inputs,
         protocol=scenario.motion.protocol if method.needs_examples else "none",
         calibration=simulation.calibration.kind,
         noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,
-        defined_by=setting.inputs_of(method, inputs),
+        performer=setting.performer,
+        varied=planned.varied,
+        defined_by=setting.inputs_of(method, planned.inputs),
         scores=scores,
         health=simulation.health,
         bone_m=setting.body.skeleton.bone_m,

@@ -1,5 +1,7 @@
 """What the cells of one clip share: the body, the true motion on it, its simulation, and what may be learnt from."""
 
+import copy
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
 
@@ -12,10 +14,11 @@ from harness.core.fields import changed
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip, Take
 from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
+from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
-from harness.reconstruct.contract import Method
+from harness.reconstruct.contract import Method, Reconstructor
 from harness.score import manifest, results
 from harness.score.metrics import VERSIONS
 from harness.score.score import WARM_UP_S
@@ -56,6 +59,24 @@ class Setting:
         self.clip = source.load(part.clip)
         self._retargeted: dict[str, retarget.RetargetReport] = {}
         """What each clip that is not on its own body lost on the way."""
+        self._fitted: dict[str, Reconstructor] = {}
+
+    def under(self, scenario: Scenario) -> "Setting | None":
+        """The same under other errors of the tracker, sharing motion and what was learnt; None if more differs."""
+        same = replace(self.scenario, noise=scenario.noise, profile=scenario.profile, components=scenario.components)
+        if same != scenario:
+            return None
+        other = copy.copy(self)
+        other.scenario = scenario
+        other.__dict__.pop("simulation", None)
+        return other
+
+    def fitted(self, method: Method, name: str) -> Reconstructor:
+        """The method of that name, trained once on what the protocol lets it see."""
+        if name not in self._fitted:
+            rng = generator(self.scenario.seed, "method", registry.without_options(name))
+            self._fitted[name] = method.fit(self.body, self.examples if method.needs_examples else [], rng)
+        return self._fitted[name]
 
     @cached_property
     def body(self) -> humanoid.Body:
@@ -93,14 +114,27 @@ class Setting:
         return (self.part, *map(Part.parse, self.scenario.motion.withheld))
 
     @cached_property
-    def example_clips(self) -> list[Clip]:
+    def example_names(self) -> list[str]:
+        """The clips that the protocol and the scenario let a method learn from, wholly or in part."""
         motion, test = self.scenario.motion, self.part
         subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
         names = examples_of(test, motion.examples, motion.protocol, subjects)
-        names = [name for name in names if Part(name) not in self.closed]
         if motion.database == "behaviour":
             names = [name for name in names if self.source.behaviour(name) == self.behaviour]
-        clips, judged = [self.source.load(name) for name in names], _motion_digest(self.clip)
+        return [name for name in names if Part(name) not in self.closed]
+
+    @cached_property
+    def performer(self) -> str:
+        """`known` if other motion of whoever is judged is among the examples, `new` if not, "" without examples."""
+        if not self.example_names:
+            return ""
+        judged = self.source.subject(self.part.clip)
+        return "known" if judged in {self.source.subject(name) for name in self.example_names} else "new"
+
+    @cached_property
+    def example_clips(self) -> list[Clip]:
+        test = self.part
+        clips, judged = [self.source.load(name) for name in self.example_names], _motion_digest(self.clip)
         for clip in clips:
             if clip.name != test.clip and _motion_digest(clip) == judged:
                 raise BadInput(f"{clip.name} is {test.clip} under another name.", "Remove it from motion.examples.")
@@ -125,7 +159,7 @@ class Setting:
         """
         scenario, body = self.scenario, self.body
         content = asdict(scenario)
-        for many in ("methods", "inputs", "name", "components"):
+        for many in ("methods", "inputs", "name", "components", "vary"):
             del content[many]
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
         del content["motion"]["withheld"]
@@ -162,9 +196,11 @@ class Setting:
         soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
         return (*self.clip.notes, note + soles)
 
-    def key(self, method: Method, name: str, inputs: str) -> str:
+    def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
+        """Of a cell; the varied values count even where they change nothing for the method."""
         described = {"name": name, "options": repr(method), "source": registry.source_hash(method)}
-        return results.cell_key(self.inputs_of(method, inputs), described, manifest.source_hash())
+        content = {**self.inputs_of(method, inputs), "varied": varied}
+        return results.cell_key(content, described, manifest.source_hash())
 
     def _on_body(self, clip: Clip) -> Take:
         kind = self.scenario.motion.body

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.config import load_scenario, shipped_scenarios
+from harness.config import Station, load_scenario, shipped_scenarios, variants
 from harness.core.fields import changed
 from harness.core.protocol import Part
 from harness.errors import BadFile, HarnessError, UnknownName
@@ -120,3 +120,57 @@ def test_noise_components_are_changed_added_and_listed() -> None:
     assert changed(level("clean"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
     lost = [{"station": "head", "from_s": 1.0, "to_s": 2.0}]
     assert changed(level("clean"), {"lost": lost}, "components").lost == (LostStation("head", 1.0, 2.0),)
+
+
+VARIED = """
+[vary]
+noise = ["clean", "default"]
+components.echo.share = [0.0, 0.05]
+"stations.head.along" = [0.5]
+"""
+
+
+def test_every_combination_of_varied_values_is_a_scenario(tmp_path: Path) -> None:
+    scenario = load_scenario(written(tmp_path, MINIMAL + "[components.echo]\nsize_m = [0.1, 0.2]\n" + VARIED))
+    found = variants(scenario)
+    assert [list(varied.values()) for varied, _ in found] == [
+        ["clean", 0.0, 0.5], ["clean", 0.05, 0.5], ["default", 0.0, 0.5], ["default", 0.05, 0.5],
+    ]  # fmt: skip
+    assert list(found[0][0]) == ["noise", "components.echo.share", "stations.head.along"]
+    last = found[-1][1]
+    assert (last.noise, last.stations["head"]) == ("default", Station("head", along=0.5))
+    assert last.components == {"echo": {"size_m": [0.1, 0.2], "share": 0.05}}
+    assert last.vary == {}
+    assert variants(last) == [({}, last)]
+
+
+def test_a_component_can_be_varied_away(tmp_path: Path) -> None:
+    scenario = load_scenario(written(tmp_path, MINIMAL + '[vary]\n"components.echo" = ["none", { share = 0.1 }]\n'))
+    without, with_it = (changed(level("default"), made.components, "components") for _, made in variants(scenario))
+    assert without.echo is None
+    assert with_it.echo == Echo(share=0.1)
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("seed = 3", "no list"),
+        ("seed = []", "no list"),
+        ("seed = [1, 1]", "no list"),
+        ("seed = [1, 1.5]", "expected int"),
+        ("sed = [1, 2]", "Did you mean 'seed'"),
+        ("tracker.rate = [1.0, 2.0]", "Did you mean 'rate_hz'"),
+        ("tracker.rate_hz = [40.0, 4000.0]", "with tracker.rate_hz=4000"),
+        ("motion.test = [['a']]", "cannot be varied"),
+        ("methods = [['ik'], ['mean_pose']]", "cannot be varied"),
+        ("noise = ['clean', 'loud']", "loud"),
+    ],
+)
+def test_what_cannot_be_varied_is_refused(tmp_path: Path, line: str, message: str) -> None:
+    with pytest.raises(HarnessError, match=message):
+        load_scenario(written(tmp_path, MINIMAL + f"[vary]\n{line}\n"))
+
+
+def test_alternatives_of_a_method_are_methods(tmp_path: Path) -> None:
+    scenario = load_scenario(written(tmp_path, MINIMAL.replace('"ik"', '"ik[limits=true|false]", "ik"')))
+    assert scenario.methods == ("ik[limits=true]", "ik[limits=false]", "ik")

@@ -33,7 +33,7 @@ SMALL = Scenario(
         "builtin", ("walking_p1_01", "boxing_p2_01"), ("walking", "boxing"), ("walking_p1_02",), longest_s=2.5
     ),
     stations=load_scenario("demo").stations,
-    methods=("ik", "mean_pose"),
+    methods=("ik:previous", "mean_pose"),
 )
 
 
@@ -52,7 +52,7 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     assert set(found) == {(m, c) for m in SMALL.methods for c in SMALL.motion.test}
     for (method, _), row in found.items():
         assert row["motion_source"] == "built-in performer"
-        assert row["protocol"] == ("none" if method == "ik" else "sequence")
+        assert row["protocol"] == ("none" if method == "ik:previous" else "sequence")
         assert row["frames_matched"] == row["frames_expected"]
         assert 0.5 < row["joint_angle_mean_deg"] < 30.0
     header = (out / "summary.csv").read_text().splitlines()[0]
@@ -147,6 +147,66 @@ class Struck(Broken):
 def test_ctrl_c_behind_another_error_is_still_ctrl_c(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
         experiment.run(replace(SMALL, methods=("tests.test_experiment:Struck",)), tmp_path / "run")
+
+
+VARIED = replace(
+    SMALL,
+    motion=replace(SMALL.motion, test=("walking_p1_01", "walking_p2_01"), behaviours=("walking",)),
+    methods=("mean_pose",),
+    vary={"noise": ["clean", "noise"], "motion": {"longest_s": [2.0, 2.5]}},
+)
+
+
+def test_every_clip_runs_with_every_combination_of_varied_values(tmp_path: Path) -> None:
+    """In every table: noise in its column, the values in theirs, and no row pools over them."""
+    experiment.run(VARIED, tmp_path / "one")
+    experiment.run(VARIED, tmp_path / "two", jobs=2)
+    found = rows(tmp_path / "one")
+    assert [row["key"] for row in found] == [row["key"] for row in rows(tmp_path / "two")]
+    assert [(row["varied"]["noise"], row["varied"]["motion.longest_s"], row["clip"]) for row in found] == [
+        (noise, longest_s, clip)
+        for noise in ("clean", "noise")
+        for longest_s in (2.0, 2.5)
+        for clip in VARIED.motion.test
+    ]
+    assert all(row["noise"] == row["varied"]["noise"] for row in found)
+    assert {row["frames_expected"] for row in found if row["varied"]["motion.longest_s"] == 2.0} <= {40, 41}
+    summary = read_summary(tmp_path / "one")
+    assert len(summary["methods"]) == 8  # performer p1 is known, p2 is new
+    assert all(row["sequences"] == 1 for row in summary["methods"])
+    text = (tmp_path / "one" / "summary.csv").read_text()
+    assert ",known,noise=clean motion.longest_s=2," in text
+    shown = table(summary)
+    assert "noise=clean motion.longest_s=2.5" in shown
+    assert "noise clean, noise" in shown
+    assert shown.count("known") == 4
+
+
+def test_what_is_varied_shares_motion_and_learning_with_the_same_result_as_alone(tmp_path: Path) -> None:
+    varied = replace(VARIED, vary={"components.echo.share": [0.0, 0.2]})
+    experiment.run(varied, tmp_path / "varied")
+    experiment.run(replace(VARIED, vary={}, components={"echo": {"share": 0.2}}), tmp_path / "alone")
+    alone = {cell.clip: cell for cell in read_cells(tmp_path / "alone")}
+    both = list(read_cells(tmp_path / "varied"))
+    for cell in both[2:]:
+        np.testing.assert_array_equal(cell.estimate_qpos, alone[cell.clip].estimate_qpos)
+        assert cell.defined_by == alone[cell.clip].defined_by
+        assert not np.array_equal(cell.estimate_qpos, both[0].estimate_qpos)
+    made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "varied" / "cells").iterdir()}
+    experiment.run(varied, tmp_path / "varied")
+    assert made == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "varied" / "cells").iterdir()}
+
+
+def test_a_value_that_changes_nothing_for_a_method_has_a_row_of_its_own(tmp_path: Path) -> None:
+    vary = {"motion.examples": [["walking_p1_02"], ["walking_p2_02"]]}
+    one = replace(VARIED.motion, test=("walking_p1_01",))
+    experiment.run(replace(VARIED, motion=one, methods=("ik:previous", "mean_pose"), vary=vary), tmp_path / "run")
+    found = [(row["method"], row["performer"], row["varied"]["motion.examples"]) for row in rows(tmp_path / "run")]
+    assert found == [
+        (method, performer, [example])
+        for performer, example in (("known", "walking_p1_02"), ("new", "walking_p2_02"))
+        for method in ("ik:previous", "mean_pose")
+    ]
 
 
 def test_what_is_all_warm_up_is_refused(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import types
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from harness.errors import HarnessError, UnknownName
@@ -48,11 +48,28 @@ def changed(instance: T, content: Mapping[str, Any], where: str, infinite: bool 
         now = getattr(instance, key)
         if dataclasses.is_dataclass(now) and not isinstance(now, type) and isinstance(value, Mapping):
             values[key] = changed(now, value, f"{where}.{key}", infinite)
+        elif isinstance(now, Mapping) and isinstance(value, Mapping):
+            values[key] = {**now, **dict(_entries(now, value, hints[key], f"{where}.{key}", infinite))}
         elif infinite and hints[key] is float and isinstance(value, float) and math.isinf(value):
             values[key] = value
         else:
             values[key] = convert(hints[key], value, f"{where}.{key}")
     return dataclasses.replace(instance, **values)
+
+
+def _entries(
+    now: Mapping[str, Any], content: Mapping[str, Any], hint: Any, where: str, infinite: bool
+) -> Iterator[tuple[str, Any]]:
+    """Those of a table that `content` changes or adds: records and tables inside it keep what is not named."""
+    kind = (get_args(hint) or (Any, Any))[1]
+    for key, value in content.items():
+        old = now.get(key)
+        if isinstance(value, Mapping) and dataclasses.is_dataclass(old) and not isinstance(old, type):
+            yield key, changed(old, value, f"{where}.{key}", infinite)
+        elif isinstance(value, Mapping) and isinstance(old, Mapping):
+            yield key, {**old, **dict(_entries(old, value, Any, f"{where}.{key}", infinite))}
+        else:
+            yield key, convert(kind, value, f"{where}.{key}")
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:

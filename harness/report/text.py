@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from harness.score.cell import varied_text
+
 COLUMNS = (
     ("joint angle [deg]", "joint_angle_mean_deg", 2),
     ("rotation [deg]", "mpjre_deg", 2),
@@ -23,7 +25,7 @@ def table(summary: Mapping[str, Any]) -> str:
         return "\n".join(["nothing was measured", finished, *failed])
     lines = [["behaviour", "method", *_varying(cells), "clips", "matched", *(title for title, *_ in COLUMNS)]]
     for row in sorted(summary["behaviours"], key=lambda row: str(row["behaviour"])):
-        varying = [str(row[name]) for name in _varying(cells)]
+        varying = [_text(row[name]) for name in _varying(cells)]
         matched = f"{row['frames_matched']}/{row['frames_expected']}"
         figures = [_figure(row["metrics"][name], decimals) for _, name, decimals in COLUMNS]
         lines.append([row["behaviour"], row["method"], *varying, str(row["sequences"]), matched, *figures])
@@ -42,11 +44,11 @@ def table(summary: Mapping[str, Any]) -> str:
 
 def _setting(cells: Sequence[Mapping[str, Any]]) -> str:
     """What all cells share, in two lines."""
-    one = cells[0]
+    one, noise = cells[0], ", ".join(dict.fromkeys(str(cell["noise"]) for cell in cells))
     return (
         f"motion: {one['motion_source']}; {len(one['stations'])} stations ({', '.join(one['stations'])}), "
         f"ankles on the {one['mount']}\n"
-        f"{one['rate_hz']:g} Hz, noise {one['noise']}, calibration {one['calibration']}, seed {one['seed']}; "
+        f"{one['rate_hz']:g} Hz, noise {noise}, calibration {one['calibration']}, seed {one['seed']}; "
         "mean over sequences ± standard deviation, nothing aligned"
     )
 
@@ -60,8 +62,13 @@ def _line(cells: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _varying(cells: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Protocol always (examples decide much); inputs where there is a choice."""
-    return ["protocol", *(["inputs"] if len({cell["inputs"] for cell in cells}) > 1 else [])]
+    """Protocol always (examples decide much); inputs, performer and varied values where there is a choice."""
+    choices = {name: {_text(cell[name]) for cell in cells} for name in ("inputs", "performer", "varied")}
+    return ["protocol", *(name for name, texts in choices.items() if len(texts) > 1)]
+
+
+def _text(value: Any) -> str:
+    return varied_text(value) if isinstance(value, Mapping) else str(value)
 
 
 def _figure(statistics: Mapping[str, Any], decimals: int) -> str:

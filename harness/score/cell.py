@@ -5,11 +5,12 @@ a folder that is there is finished.
 """
 
 import io
+import json
 import os
 import shutil
 import zipfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -35,8 +36,10 @@ IDENTITY = (
     "noise",
     "seed",
 )
-"""What a row of the summary says about its cell, in this order."""
-_TEXTS = (*IDENTITY, "key", "defined_by", "health", "bone_m", "source_hash", "reproduce", "notes")
+"""What a row of the summary says about its cell first, in this order."""
+FURTHER = ("performer", "varied")
+"""What it says besides."""
+_TEXTS = (*IDENTITY, *FURTHER, "key", "defined_by", "health", "bone_m", "source_hash", "reproduce", "notes")
 _FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "quality")
 _INTS = ("frame_index", "status")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
@@ -93,6 +96,11 @@ class Cell:
     """(F, S)."""
     suspect: Bools
     """(F, S)."""
+    performer: str = ""
+    """"known" if another take of the performer, or the rest of this one, is among the examples, "new" if none is, ""
+    when there are no examples at all."""
+    varied: Mapping[str, Any] = field(default_factory=dict)
+    """Scenario key -> value, of the keys that the scenario varies."""
 
     def __post_init__(self) -> None:
         frames, stations = len(self.time_s), len(self.stations)
@@ -100,8 +108,8 @@ class Cell:
         freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
         freeze(self, np.int64, frame_index=(frames,), status=(frames,))
         freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))
-        for field in ("stations", "notes"):
-            object.__setattr__(self, field, tuple(getattr(self, field)))
+        for name in ("stations", "notes"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
 
     @property
     def metrics(self) -> Mapping[str, float | None]:
@@ -179,5 +187,17 @@ def read_cell(folder: Path) -> Cell:
 
 def as_row(cell: Cell) -> dict[str, Any]:
     """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
-    row = {name: plain(getattr(cell, name)) for name in IDENTITY}
-    return {**row, **cell.metrics, "key": cell.key, "source_hash": cell.source_hash, "health": plain(cell.health)}
+    row, further = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, FURTHER))
+    rest = {"key": cell.key, "source_hash": cell.source_hash, "health": plain(cell.health)}
+    return {**row, **cell.metrics, **further, **rest}
+
+
+def varied_text(varied: Mapping[str, Any]) -> str:
+    """As tables have it: "components.echo.share=0.02 noise=clean"; empty when nothing is varied."""
+    return " ".join(f"{key}={_short(value)}" for key, value in varied.items())
+
+
+def _short(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:g}"
+    return value if isinstance(value, str) else json.dumps(plain(value), separators=(",", ":"))

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.score.cell import IDENTITY, Cell, as_row
+from harness.score.cell import FURTHER, IDENTITY, Cell, as_row, varied_text
+from harness.score.files import plain
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import pooled
 from harness.score.timing import step_times_ms
@@ -30,10 +31,10 @@ FIRST_METRICS = (
     "step_p99_ms",
     "fps",
 )
-COLUMNS = (*IDENTITY, *FIRST_METRICS, *(name for name in DEFINITIONS if name not in FIRST_METRICS), "key")
+COLUMNS = (*IDENTITY, *FIRST_METRICS, *(name for name in DEFINITIONS if name not in FIRST_METRICS), *FURTHER, "key")
 """Of summary.csv."""
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
-GROUP = ("method", "inputs", "protocol")
+GROUP = ("method", "inputs", "protocol", "performer", "varied")
 """Cells that differ in these are never pooled."""
 
 
@@ -54,12 +55,12 @@ class Tally:
         self._groups: dict[tuple[str, ...], _Group] = {}
 
     def add(self, cell: Cell) -> None:
-        name = tuple(str(getattr(cell, field)) for field in self.by)
+        name = tuple(_text(plain(getattr(cell, field))) for field in self.by)
         self._groups.setdefault(name, _Group()).add(cell)
 
     def rows(self) -> list[dict[str, Any]]:
         """One for each group: what it is, how many sequences, frames and the statistics of every metric."""
-        return [{**dict(zip(self.by, name, strict=True)), **group.row()} for name, group in self._groups.items()]
+        return [{**group.named(self.by), **group.row()} for group in self._groups.values()]
 
 
 class _Group:
@@ -75,6 +76,10 @@ class _Group:
         for name, values in cell.scores.per_frame.items():
             self.frames[name].append(values[cell.scores.scored].astype(np.float32))
         self.step_ms.append(cell.step_ms[cell.scores.scored & (np.arange(len(cell)) > 0)])
+
+    def named(self, fields: Iterable[str]) -> dict[str, Any]:
+        """What all its cells share."""
+        return {field: self.sequences[0][field] for field in fields}
 
     def row(self) -> dict[str, Any]:
         counts = {name: sum(row[name] for row in self.sequences) for name in _COUNTS}
@@ -111,4 +116,6 @@ def _text(value: Any) -> str:
         return ""
     if isinstance(value, list):
         return " ".join(map(str, value))
+    if isinstance(value, Mapping):
+        return varied_text(value)
     return f"{value:.9g}" if isinstance(value, float) else str(value)

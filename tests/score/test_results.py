@@ -277,3 +277,20 @@ def test_a_manifest_survives_its_file_and_names_the_machine(run_folder: Path) ->
     (run_folder / "manifest.json").write_text("{}")
     with pytest.raises(BadFile, match="inputs"):
         manifests.Manifest.read(run_folder / "manifest.json")
+
+
+def test_known_and_new_performers_and_varied_values_are_never_pooled(run_folder: Path, make_cell: MakeCell) -> None:
+    shares = [0.0, 0.02, 0.02]
+    cells = [
+        make_cell(0.01, clip=f"c{n}", performer=who, varied={"components.echo.share": share, "noise": "clean"})
+        for n, (who, share) in enumerate(zip(("known", "known", "new"), shares, strict=True))
+    ]
+    for cell in cells:
+        results.write_cell(run_folder, cell)
+    content = results.write_summary(run_folder, keys=[c.key for c in cells], planned=3)
+    assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
+    assert [row["varied"]["components.echo.share"] for row in content["behaviours"]] == shares
+    assert [row["performer"] for row in content["cells"]] == ["known", "known", "new"]
+    first, *table = csv.DictReader((run_folder / "summary.csv").read_text().splitlines())
+    assert (first["performer"], first["varied"]) == ("known", "components.echo.share=0 noise=clean")
+    assert [row["varied"] for row in table] == ["components.echo.share=0.02 noise=clean"] * 2
