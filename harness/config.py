@@ -12,6 +12,7 @@ from harness.core.options import alternatives
 from harness.core.share import share_folder
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.score.cell import varied_text
+from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
 
 SCHEMA = 1
@@ -80,6 +81,8 @@ class Scenario:
     """What tables call the noise when components are changed; "default*" and so on without a name."""
     components: dict[str, Any] = field(default_factory=dict)
     """Changes to the noise level (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    """A fault that ends; vary "disturbance.kind" to see how methods get over it (see `harness.score.recovery`)."""
     vary: dict[str, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
     or with each combination of them when there are several keys."""

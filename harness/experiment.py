@@ -150,7 +150,7 @@ def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> 
     WireFormat(tuple(scenario.stations), scenario.tracker.rate_hz, scenario.tracker.items)
     for mount in mounts_of(scenario):
         place(standard_skeleton(), mount)
-    noise_of(scenario)
+    scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
 
 
 def _in_order(todo: list[Job]) -> list[str]:

@@ -63,8 +63,8 @@ class Setting:
 
     def under(self, scenario: Scenario) -> "Setting | None":
         """The same under other errors of the tracker, sharing motion and what was learnt; None if more differs."""
-        same = replace(self.scenario, noise=scenario.noise, profile=scenario.profile, components=scenario.components)
-        if same != scenario:
+        errors = {name: getattr(scenario, name) for name in ("noise", "profile", "components", "disturbance")}
+        if replace(self.scenario, **errors) != scenario:
             return None
         other = copy.copy(self)
         other.scenario = scenario
@@ -101,7 +101,8 @@ class Setting:
     @cached_property
     def simulation(self) -> Simulation:
         scenario = self.scenario
-        tracker, noise = tracker_of(scenario), noise_of(scenario)
+        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
+        tracker = tracker_of(scenario)
         seen = simulate(self.body, self.take, mounts_of(scenario), tracker, noise, seed=scenario.seed)
         if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
             found = f"{self.part} is judged for {len(seen.truth_s) / tracker.rate_hz:.2f} s"
@@ -169,6 +170,7 @@ class Setting:
             **content,
             "tracker": asdict(tracker_of(scenario)),
             "components": asdict(noise_of(scenario)),
+            "disturbance": scenario.disturbance.as_dict(),
             "clip": str(self.part),
             "motion_digest": _motion_digest(self.clip),
             "body_digest": results.digest(body.skeleton.bone_m, body.skeleton.axes, body.limits_rad),

@@ -4,11 +4,12 @@ Two runs that differ in nothing but their disturbance share every other draw (`c
 the other's error would have been; `score.recovery` compares them.
 """
 
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from harness.errors import UnknownName
 from harness.simulate.components.displaced import Displaced
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.turned import Turned
@@ -49,8 +50,14 @@ class Disturbance:
         """The first moment after it [s]."""
         return self.begins_s + self.lasts_s
 
+    def as_dict(self) -> dict[str, Any]:
+        """With the time of its beginning and end, so that a reader need not know how they are found."""
+        return {**asdict(self), "begins_s": self.begins_s, "ends_s": self.ends_s}
+
     def added(self, noise: Noise, stations: tuple[str, ...]) -> Noise:
-        """The noise and this on top of it."""
+        """The noise and this on top of it; UnknownName when nobody wears the one station."""
+        if self.station and self.station not in stations:
+            raise UnknownName("station", self.station, stations)
         within = {"from_s": self.begins_s, "to_s": self.ends_s}
         one = (self.station or stations[0],)
         match self.kind:
