@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
+from harness.bench.index import bench_index
 from harness.bench.load import bench_load
 from harness.bench.rows import Row
 from harness.bench.startup import bench_startup
@@ -23,6 +24,7 @@ BENCHMARKS: dict[str, Callable[[int], list[Row]]] = {
     "load": bench_load,
     "stream": bench_stream,
     "ik": _ik,
+    "index": bench_index,
 }
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from harness.core.arrays import Floats, Ints, Singles
+from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.reconstruct.database.ground import POSTURE, ground_of, posture_of, seen_from
 
 if TYPE_CHECKING:
@@ -57,6 +57,15 @@ class Windows:
             out[:, at : at + POSTURE] = database.posture.take(newest - age, 0)
         if self.scale is not None:
             out *= self.scale
+        return out
+
+    @property
+    def follows(self) -> Bools:
+        """(W,) whether the next window is that of the next frame of the same take."""
+        out = np.zeros(len(self), bool)
+        out[:-1] = np.diff(self.frames) == 1
+        ends = np.searchsorted(self.frames, [run.stop for run in self.database.runs])
+        out[ends[ends > 0] - 1] = False
         return out
 
     def successors(self, rows: Ints | slice) -> Singles:
