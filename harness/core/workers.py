@@ -28,7 +28,7 @@ def call_each(
             with _ctrl_c_ignored():  # which processes inherit, so that they never see it, not even while they import
                 running = {pool.submit(function, *task): which for which, task in enumerate(tasks)}
             for future in as_completed(running):
-                yield running[future], future
+                yield running.pop(future), future  # kept no longer than the caller keeps it
             pool.shutdown()
         finally:
             ours.close()
