@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.report import tables
+from harness.report import tables, varied
 from harness.report.markup import Markup, folded, joined, scrolling, table, tag
 from harness.report.run import Run
 from harness.report.style import Chart
@@ -42,6 +42,7 @@ class Content:
 
     run: Run
     verdict: Verdict
+    varied: Sequence[Chart]
     over_time: Sequence[Chart]
     per_joint: Chart | None
     distribution: Chart | None
@@ -91,7 +92,9 @@ def _sections(content: Content) -> list[tuple[str, str, Markup]]:
     measured = bool(run.cells)
     nothing = Markup()
     return [
+        ("Varied", "varied", joined(*(_chart(chart, 3) for chart in content.varied), varied.tables(run))),
         ("Results", "results", tables.results(run) if measured else nothing),
+        ("Recovery", "recovery", recovery.section(run.summary)),
         ("Coverage", "coverage", tables.coverage(run)),
         ("Error over time", "time", joined(*(_chart(chart, 3) for chart in content.over_time))),
         ("Each joint", "joints", _chart(content.per_joint) if content.per_joint else nothing),

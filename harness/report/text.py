@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from harness.report import recovery
 from harness.score.cell import varied_text
 
 COLUMNS = (
@@ -36,6 +37,7 @@ def table(summary: Mapping[str, Any]) -> str:
             "",
             *_aligned(lines, text_columns=2 + len(_varying(cells))),
             "",
+            *recovery.text(summary),
             finished,
             *failed,
         ]
