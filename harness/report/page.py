@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.report import tables, varied
+from harness.report import recovery, tables, varied
 from harness.report.markup import Markup, folded, joined, scrolling, table, tag
 from harness.report.run import Run
 from harness.report.style import Chart
