@@ -14,7 +14,7 @@ from harness.core.motion import Clip
 from harness.core.protocol import Part
 from harness.errors import BadInput
 from harness.mocap.sources import open_source
-from harness.reconstruct.ik import Ik
+from harness.reconstruct.ik import PREVIOUS
 from harness.reconstruct.mean_pose import MeanPose
 from harness.setting import Setting
 from harness.simulate import noise
@@ -30,7 +30,7 @@ SCENARIO = Scenario(
 
 def inputs(scenario: Scenario = SCENARIO) -> dict[str, object]:
     source = open_source("builtin", None, seed=1, rate_hz=None)
-    return Setting(scenario, source, Part("walking_p1_01"), "walking").inputs_of(Ik(), "pos+ori")
+    return Setting(scenario, source, Part("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
 
 
 def test_what_retargeting_cost_is_told() -> None:
@@ -41,8 +41,8 @@ def test_what_retargeting_cost_is_told() -> None:
         for m in (SCENARIO.motion, motion)
     )
     assert len(own.take) == len(common.take)
-    assert own.notes(Ik()) == ()
-    assert "1 of 1 clips" in common.notes(Ik())[0]
+    assert own.notes(PREVIOUS) == ()
+    assert "1 of 1 clips" in common.notes(PREVIOUS)[0]
     assert len(common.examples) == 2
     assert "3 of 3 clips" in common.notes(MeanPose())[0]
 
@@ -77,7 +77,7 @@ def test_what_is_withheld_is_in_no_example() -> None:
     assert (len(after) - 1) / 40.0 == pytest.approx((len(clip) - block.stop - guard - 1) / clip.rate_hz, abs=1 / 40.0)
     np.testing.assert_array_equal(other.qpos, free.examples[1].qpos)
     assert closed.inputs_of(MeanPose(), "pos+ori")["withheld"] == ["walking_p1_02@0.40-0.60"]
-    assert closed.inputs_of(Ik(), "pos+ori") == free.inputs_of(Ik(), "pos+ori")
+    assert closed.inputs_of(PREVIOUS, "pos+ori") == free.inputs_of(PREVIOUS, "pos+ori")
 
 
 def _angles(clip: Clip) -> Floats:
