@@ -8,8 +8,8 @@ from harness.report.markup import table as page_table
 from harness.score.recovery import AFTER_S, AT_MOST, OVER_S, table
 
 _WHAT = (
-    f"joint angle error over the {OVER_S:g} s that begins {AFTER_S:g} s after the last bad frame, "
-    "divided by the undisturbed run's over the same frames"
+    "joint angle error divided by the undisturbed run's over the same frames: while the disturbance lasts, then over "
+    f"the {OVER_S:g} s that begins {AFTER_S:g} s after its last bad frame"
 )
 _HOW = f"mean over clips (worst clip); above {AT_MOST:g} is not recovered"
 
@@ -57,4 +57,4 @@ def _ratio(after: Mapping[str, Any] | None) -> str:
     if after is None:
         return "not measured"
     mark = "" if after["ratio"] <= AT_MOST else " FAIL"
-    return f"{after['ratio']:.2f} ({after['worst']:.2f}){mark}"
+    return f"{after['during']:.2f}, then {after['ratio']:.2f} ({after['worst']:.2f}){mark}"

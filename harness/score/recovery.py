@@ -48,6 +48,8 @@ class Recovery:
     disturbed_deg: float
     """Mean joint angle error of the frames that are judged."""
     undisturbed_deg: float
+    during: float
+    """Times the undisturbed error while it lasted, from the first bad frame to the last."""
     disturbed_mm: float
     """Mean distance of the joint centres in the same frames."""
     undisturbed_mm: float
@@ -128,6 +130,7 @@ def _compared(course: _Course, undisturbed: _Course) -> Recovery | None:
     if since_s[-1] < AFTER_S + OVER_S - 1e-9:
         return None
     disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
+    during = (common >= begin_s - 1e-9) & (since_s <= 0.0)
     within = (common >= begin_s - 1e-9) & (since_s <= AFTER_S + OVER_S)
     right = _right(course.time_s, course.reporting, course.status)
     return Recovery(
@@ -135,6 +138,7 @@ def _compared(course: _Course, undisturbed: _Course) -> Recovery | None:
         disturbance=str(course.disturbance["kind"]),
         disturbed_deg=float(np.mean(disturbed_deg[judged])),
         undisturbed_deg=float(np.mean(undisturbed_deg[judged])),
+        during=float(np.mean(disturbed_deg[during]) / np.mean(undisturbed_deg[during])),
         disturbed_mm=float(np.mean(course.error_mm[here][judged])),
         undisturbed_mm=float(np.mean(undisturbed.error_mm[there][judged])),
         back_after_s=_back_after_s(since_s, disturbed_deg, undisturbed_deg),
@@ -166,8 +170,9 @@ def _right(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
 def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Of `summary.json`'s rows: one for each method, inputs and protocol, clips pooled.
 
-    Each has `clips`, `undisturbed_deg`, `status_right` (the least) and disturbance -> `ratio` of the means over clips,
-    `worst` ratio of a single clip, `back_after_s` of the slowest clip (None: one never was) under `after`.
+    Each has `clips`, `undisturbed_deg`, `status_right` (the least) and, under `after`, disturbance -> `ratio` of the
+    means over clips, `worst` ratio of a single clip, how many times as large the error is `during` it (mean over
+    clips), `back_after_s` of the slowest clip (None: one never was).
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -181,6 +186,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             slowest = [row["back_after_s"] for row in those]
             after[kind] = {
                 "ratio": means[0] / means[1],
+                "during": _mean(those, "during"),
                 "worst": float(np.max([_number(row["ratio"]) for row in those])),
                 "back_after_s": None if None in slowest else max(slowest),
             }

@@ -53,6 +53,7 @@ def test_the_ratio_is_that_of_the_second_from_one_second_after_the_last_bad_fram
         (found,) = recoveries.pairs()
         assert (found.disturbance, found.disturbed_deg, found.undisturbed_deg) == ("one_off", 2.5, 2.0)
         assert found.ratio == 1.25
+        assert found.during == pytest.approx(30.0 / 9.0)
         assert found.back_after_s == pytest.approx(1.025)
         assert found.status_right == 1.0
 
@@ -110,4 +111,4 @@ def test_the_table_pools_clips_and_shows_the_worst(bent: Callable[..., Cell]) ->
     rows = json.loads(json.dumps(plain(recoveries.rows())))
     (row,) = table(rows)
     assert (row["method"], row["clips"], row["undisturbed_deg"]) == ("ik", 2, 1.5)
-    assert row["after"] == {"all_turned": {"ratio": 1.5, "worst": 2.5, "back_after_s": None}}
+    assert row["after"] == {"all_turned": {"ratio": 1.5, "during": 1.75, "worst": 2.5, "back_after_s": None}}
