@@ -40,10 +40,10 @@ def over_time(run: Run, behaviour: str) -> Chart:
         error.set_ylabel(UNITS[ANGLE])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
-        figure.legend(*error.get_legend_handles_labels(), **_legend([trace.series for trace in shown]))
+        figure.legend(*error.get_legend_handles_labels(), **legend([trace.series for trace in shown]))
         _quality(quality, max(shown, key=lambda trace: len(trace.time_s)))
 
-    return _chart(
+    return drawn(
         f"error_{file_name(behaviour)}",
         behaviour.replace("_", " "),
         f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).",
@@ -82,9 +82,9 @@ def per_joint(run: Run, series: str) -> Chart:
             axes.set_title(title)
             axes.grid(False, axis="y")
         if others:
-            figure.legend(*left.get_legend_handles_labels(), **_legend(others))
+            figure.legend(*left.get_legend_handles_labels(), **legend(others))
 
-    return _chart(
+    return drawn(
         "per_joint",
         f"Each joint, {series}",
         f"{series}: box from quartile to quartile, line at the median, whiskers at the 5th and 95th percentile of all "
@@ -113,9 +113,9 @@ def distribution(run: Run) -> Chart:
             axes.set_ylim(0.0, 100.0)
         first = figure.axes[0]
         first.set_ylabel("frames below [%]")
-        figure.legend(*first.get_legend_handles_labels(), **_legend(run.series))
+        figure.legend(*first.get_legend_handles_labels(), **legend(run.series))
 
-    return _chart(
+    return drawn(
         "error_cdf",
         "How often an error stays below",
         "All scored frames of all clips; the axis of the error is logarithmic. Further left is better.",
@@ -125,7 +125,8 @@ def distribution(run: Run) -> Chart:
     )
 
 
-def _chart(name: str, title: str, caption: str, alt: str, draw: Callable[["Figure"], None], height_in: float) -> Chart:
+def drawn(name: str, title: str, caption: str, alt: str, draw: Callable[["Figure"], None], height_in: float) -> Chart:
+    """What `draw` puts on a figure as wide as the page."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -168,7 +169,7 @@ def _boxes(axes: "Axes", values: Floats, colour: str) -> None:
     axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
 
 
-def _legend(names: Sequence[str]) -> dict[str, Any]:
+def legend(names: Sequence[str]) -> dict[str, Any]:
     """Above the chart, in one row if the names are short enough."""
     return {"loc": "outside upper left", "ncols": len(names) if sum(len(name) + 6 for name in names) < 95 else 3}
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Ints
 from harness.core.humanoid24 import standard_skeleton
-from harness.report import figures
+from harness.report import figures, varied
 from harness.report.apart import Job, Progress, Rendering
 from harness.report.markup import Markup
 from harness.report.page import Content, Strip, page
@@ -51,6 +51,7 @@ def write_report(
     rendering = Rendering([_strip_job(reader(s.windows[0].key), run, s) for s in strips] if rendered else [])
     try:
         measured = [name for name in run.behaviours if any(t.scored.any() for t in run.traces if t.behaviour == name)]
+        curves = varied.charts(run)
         over_time = [figures.over_time(run, behaviour) for behaviour in measured]
         per_joint = figures.per_joint(run, found.best) if found.best else None
         distribution = figures.distribution(run) if measured else None
@@ -68,9 +69,9 @@ def write_report(
     movies, no_movies = _movies(run, reader, progress) if movie else ([], "")
     if no_movies:
         missing.append(f"Movies: {no_movies}")
-    for chart in (*over_time, *(chart for chart in (per_joint, distribution) if chart)):
+    for chart in (*curves, *over_time, *(chart for chart in (per_joint, distribution) if chart)):
         chart.write(plots)
-    content = Content(run, found, over_time, per_joint, distribution, windows, strips, view, movies, missing)
+    content = Content(run, found, curves, over_time, per_joint, distribution, windows, strips, view, movies, missing)
     path = out / "report.html"
     write_text(path, page(content))
     return path

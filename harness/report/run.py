@@ -1,7 +1,7 @@
 """What the page needs of a run: its summary, and of every cell the numbers that are drawn, without the poses."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,13 +11,15 @@ import numpy as np
 from harness.core.arrays import Bools, Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.score.angles import local_errors_deg
-from harness.score.cell import Cell, cell_folder
+from harness.score.cell import Cell, cell_folder, varied_text
 from harness.score.manifest import Manifest
 from harness.score.pair import Pair, posed
 from harness.score.positions import joint_errors_mm
-from harness.score.results import read_cell, read_cells, read_summary
+from harness.score.results import read_cell, read_summary
+from harness.score.summary import GROUP
 
 Row = Mapping[str, Any]
+_GROUPS = ("methods", "behaviours")
 WORST_METRICS = (
     "joint_angle_mean_deg",
     "mpjre_deg",
@@ -64,6 +66,8 @@ class Run:
     manifest: Manifest
     summary: Row
     traces: tuple[Trace, ...]
+    whole: Row
+    """The summary with every combination of varied values; `summary` has the last one alone."""
 
     @property
     def name(self) -> str:
@@ -75,9 +79,14 @@ class Run:
         rows: Sequence[Row] = self.summary["cells"]
         return rows
 
+    @property
+    def varied(self) -> str:
+        """The varied values that are shown, as text; empty when the scenario varies none."""
+        return varied_text(self.cells[0]["varied"]) if self.cells else ""
+
     @cached_property
     def series(self) -> tuple[str, ...]:
-        """Names of the groups that are compared: methods, told apart by inputs and protocol where these vary."""
+        """Names of the groups that are compared: methods, told apart by inputs, protocol, performer where they vary."""
         return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
 
     @cached_property
@@ -89,12 +98,14 @@ class Run:
 
     def series_of(self, row: Row) -> str:
         """Name of the group of a row of the summary."""
-        rows = self.summary["methods"]
+        rows = self.whole["methods"]
         parts = []
         if len({r["inputs"] for r in rows}) > 1:
             parts.append(str(row["inputs"]))
         if len({r["protocol"] for r in rows if r["method"] == row["method"]}) > 1:
             parts.append(f"protocol {row['protocol']}")
+        if len({r["performer"] for r in rows}) > 1:
+            parts.append(f"{row['performer'] or 'no'} performer")
         return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
 
     def cell(self, key: str) -> Cell:
@@ -103,17 +114,26 @@ class Run:
 
 def read_run(out: Path) -> Run:
     """Read it, one cell at a time; BadFile when the folder holds no run or a damaged one."""
-    manifest = Manifest.read(out / "manifest.json")
-    run = Run(out, manifest, read_summary(out), ())
-    return Run(out, manifest, run.summary, tuple(_trace(run, cell) for cell in read_cells(out)))
+    manifest, whole = Manifest.read(out / "manifest.json"), read_summary(out)
+    run = Run(out, manifest, _last_varied(whole), (), whole)
+    keys = [str(row["key"]) for row in run.cells]
+    return replace(run, traces=tuple(_trace(run, run.cell(key)) for key in keys))
+
+
+def _last_varied(summary: Row) -> Row:
+    """The summary of the cells with the last combination of varied values."""
+    if not summary["cells"]:
+        return summary
+    last = summary["cells"][-1]["varied"]
+    parts = {name: [row for row in summary[name] if row["varied"] == last] for name in ("cells", *_GROUPS)}
+    return {**summary, **parts}
 
 
 def _trace(run: Run, cell: Cell) -> Trace:
     pair = pair_of(cell)
-    identity = {"method": cell.method, "inputs": cell.inputs, "protocol": cell.protocol}
     return Trace(
         key=cell.key,
-        series=run.series_of(identity),
+        series=run.series_of({name: getattr(cell, name) for name in GROUP}),
         behaviour=cell.behaviour,
         clip=cell.clip,
         stations=cell.stations,

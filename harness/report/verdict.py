@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.report.run import Run
+from harness.score.cell import varied_text
 from harness.score.metrics import DEFINITIONS
 
 HEADLINE, SECOND = "joint_angle_mean_deg", "mpjpe_mm"
@@ -30,6 +31,7 @@ def verdict(run: Run) -> Verdict:
         "Motion": _motion(run),
         "Tracker": _tracker(run),
         "Learning": _learning(run),
+        "Varied": _varied(run),
         "Coverage": _coverage(run),
         "Line": _line(run),
         "Not measured": _unmeasured(run),
@@ -38,18 +40,35 @@ def verdict(run: Run) -> Verdict:
     measured = {name: values for name in run.series if (values := _by_sequence(run, name, HEADLINE))}
     if not measured:
         return Verdict(f"Nothing was measured: {_finished(run)}.", None, facts)
+    kinds: dict[str, dict[str, dict[Take, float]]] = {}
+    for name, values in measured.items():
+        kinds.setdefault(_performer(run, name), {})[name] = values
+    said = [_ranked(run, kind, found) for kind, found in kinds.items()]
+    return Verdict(" ".join(sentence for sentence, _ in said), said[0][1], facts)
+
+
+def _ranked(run: Run, kind: str, measured: Mapping[str, Mapping[Take, float]]) -> tuple[str, str | None]:
+    """The sentence about methods that saw the same kind of performer, and which of them leads."""
     shared = sorted(set.intersection(*(set(values) for values in measured.values())))
     if not shared:
-        return Verdict(f"{', '.join(measured)} share no measured sequence: none is best.", None, facts)
+        return f"{', '.join(measured)} share no measured sequence: none is best.", None
     means = {name: float(np.mean([values[k] for k in shared])) for name, values in measured.items()}
     order = sorted(means, key=lambda name: means[name])
     sequences = _many(len(shared), "sequence")
     if len(shared) < max(map(len, measured.values())):
         sequences = f"the {sequences} that all methods were measured on"
     best = f"{order[0]} is best" if len(order) > 1 else order[0]
-    start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences} of {_source(run)}"
+    several = len({_performer(run, name) for name in run.series}) > 1
+    whose = f" of {kind} performers" if several and kind else ""
+    start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences}{whose} of {_source(run)}"
     lead = _lead(measured, order[0], order[1], shared) if len(order) > 1 else "; no other method was measured"
-    return Verdict(f"{start}{lead}.{_positions(run, order, shared)}", order[0], facts)
+    at = f", with {run.varied}" if run.varied else ""
+    return f"{start}{lead}{at}.{_positions(run, order, shared)}", order[0]
+
+
+def _performer(run: Run, series: str) -> str:
+    """Whether the examples know the performers of a series, see `Cell.performer`."""
+    return next(str(row["performer"]) for row in run.summary["methods"] if run.series_of(row) == series)
 
 
 def _positions(run: Run, order: Sequence[str], shared: Sequence[Take]) -> str:
@@ -117,6 +136,12 @@ def _learning(run: Run) -> str:
     without = learners.pop("none", [])
     parts = [f"{', '.join(names)} from other motion (protocol {protocol})" for protocol, names in learners.items()]
     return "; ".join([*parts, *([f"{', '.join(without)} from none"] if without else [])])
+
+
+def _varied(run: Run) -> str:
+    """The combinations that were run, and which of them is shown."""
+    texts = list(dict.fromkeys(varied_text(row["varied"]) for row in run.whole["cells"]))
+    return f"{'; '.join(texts)}. Everything below the table of them is about {run.varied}" if run.varied else ""
 
 
 def _finished(run: Run) -> str:

@@ -1,8 +1,10 @@
 """A run folder made up from the built-in performer and from errors of known kind, through the real results API."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
@@ -37,6 +39,10 @@ class Plan:
     """Share of the frames that find an estimate."""
     silent: tuple[str, ...] = ()
     """Methods that never answer."""
+    performers: tuple[str, ...] = ("known",)
+    """Of the takes, in turn."""
+    varied: tuple[Mapping[str, Any], ...] = ({},)
+    """The n-th has errors n times as large."""
 
 
 def fabricate(out: Path, plan: Plan | None = None) -> Path:
@@ -47,23 +53,26 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
     command = "harness run fabricated.toml --out results/fabricated"
     results.open_run(out, manifest.of_run(scenario, motion_source=SOURCE, command=command))
     keys, failures, planned = [], {}, 0
-    for behaviour in plan.behaviours:
-        for take in range(1, plan.takes + 1):
-            for inputs in plan.inputs:
-                for method, error_deg in methods.items():
-                    planned += 1
-                    if method in plan.failing:
-                        text = "Traceback (most recent call last):\n  somewhere\nValueError: <b>no</b> pose & no plan"
-                        failures[f"{method} on {behaviour}_{take}"] = text
-                        continue
-                    cell = make_cell(behaviour, take, method, error_deg, inputs, plan)
-                    results.write_cell(out, cell)
-                    keys.append(cell.key)
+    takes = range(1, plan.takes + 1)
+    for times, behaviour, take, inputs in itertools.product(
+        range(len(plan.varied)), plan.behaviours, takes, plan.inputs
+    ):
+        for method, error_deg in methods.items():
+            planned += 1
+            if method in plan.failing:
+                text = "Traceback (most recent call last):\n  somewhere\nValueError: <b>no</b> pose & no plan"
+                failures[f"{method} on {behaviour}_{take}"] = text
+                continue
+            cell = make_cell(behaviour, take, method, (times + 1) * error_deg, inputs, plan, plan.varied[times])
+            results.write_cell(out, cell)
+            keys.append(cell.key)
     results.write_summary(out, keys=keys, planned=planned, failures=failures)
     return out
 
 
-def make_cell(behaviour: str, take: int, method: str, error_deg: float, inputs: str, plan: Plan) -> results.Cell:
+def make_cell(
+    behaviour: str, take: int, method: str, error_deg: float, inputs: str, plan: Plan, varied: Mapping[str, Any]
+) -> results.Cell:
     """One method on one take of the performer."""
     made = generate(behaviour, "p1", take, seed=1, duration_s=plan.duration_s, rate_hz=RATE_HZ)
     skeleton, dofs = made.skeleton.subset(BONES)
@@ -74,7 +83,7 @@ def make_cell(behaviour: str, take: int, method: str, error_deg: float, inputs: 
     seen = np.flatnonzero(rng.random(len(truth)) < (0.0 if method in plan.silent else plan.covered))
     estimate = _wrong(truth, error_deg, valid, rng)[seen]
     status, step_ms = np.where(valid.all(axis=1), 0, 1)[seen], rng.gamma(4.0, 0.15, len(seen))
-    defined_by = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ}
+    defined_by = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ, "varied": varied}
     return results.Cell(
         key=results.cell_key(defined_by, {"name": method}, "made up"),
         method=method,
@@ -106,6 +115,8 @@ def make_cell(behaviour: str, take: int, method: str, error_deg: float, inputs: 
         position_valid=valid[seen],
         orientation_valid=valid[seen],
         suspect=np.zeros_like(valid)[seen],
+        performer=plan.performers[(take - 1) % len(plan.performers)],
+        varied=varied,
     )
 
 

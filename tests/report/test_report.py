@@ -153,6 +153,44 @@ def test_inputs_and_several_takes_are_told_apart(tmp_path: Path) -> None:
     assert " ± " in said
 
 
+def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
+    """All values are in the table; everything else is about the last one."""
+    varied = tuple({"components.echo.share": share} for share in (0.0, 0.02, 0.1))
+    plan = Plan(behaviours=("boxing",), methods={"ik": 1.0, "mean_pose": 9.0}, duration_s=3.0, varied=varied)
+    out = fabricate(tmp_path / "run", plan)
+    page = write_report(out, rendered=False)
+    said = text_of(page)
+    curve = (out / "plots" / "varied_components_echo_share_boxing.svg").read_text()
+    assert "components.echo.share" in curve
+    assert "boxing: error against components.echo.share" in said
+    rows = json.loads((out / "summary.json").read_text())["behaviours"]
+    assert len(rows) == 6
+    for row in rows:
+        assert f" {row['metrics']['joint_angle_mean_deg']['mean']:.2f} " in said
+    last = next(r["metrics"]["joint_angle_mean_deg"]["mean"] for r in rows[4:] if r["method"] == "ik")
+    assert f"ik is best: {last:.2f}° mean joint-angle error on 1 sequence" in said
+    assert "the next, with components.echo.share=0.1." in said
+    assert {trace.key for trace in read_run(out).traces} == {row["key"] for row in read_run(out).whole["cells"][-2:]}
+
+
+def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
+    varied = ({"noise": "clean"}, {"noise": "default"})
+    out = fabricate(tmp_path / "run", Plan(behaviours=("boxing",), methods={"ik": 1.0}, duration_s=3.0, varied=varied))
+    said = text_of(write_report(out, rendered=False))
+    assert "method noise=clean noise=default ik " in said
+    assert not list((out / "plots").glob("varied*"))
+
+
+def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
+    plan = Plan(behaviours=("walking",), methods={"ik": 1.0, "mean_pose": 9.0}, duration_s=3.0, takes=2)
+    said = text_of(
+        write_report(fabricate(tmp_path / "run", replace(plan, performers=("known", "new"))), rendered=False)
+    )
+    for kind in ("known", "new"):
+        assert f"ik ({kind} performer) is best: " in said
+        assert f"on 1 sequence of {kind} performers of the built-in performer" in said
+
+
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="manifest"):
         write_report(tmp_path)
