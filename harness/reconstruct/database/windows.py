@@ -10,13 +10,15 @@ Two conventions meet here. A method that wants the poses themselves (local PCA) 
 `successors(rows)` are its targets: the frames after, seen from the ground of the window's newest pose.
 """
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, Singles
-from harness.reconstruct.database.ground import POSTURE, ground_of, posture_of, seen_from
+from harness.core.compiled import compiled
+from harness.reconstruct.database.ground import POSTURE
 
 if TYPE_CHECKING:
     from harness.reconstruct.database.database import MotionDatabase
@@ -46,15 +48,7 @@ class Windows:
         """Vectors (K, D) of some windows."""
         newest, database = self.frames[rows], self.database
         out = np.empty((len(newest), self.size), np.float32)
-        database.posture.take(newest, 0, out[:, :POSTURE])
-        seen = np.zeros((len(newest), 3))
-        for age in range(1, self.length):
-            at = (POSTURE + 3) * age
-            # the frame before, from k-age+1: the step backwards; then on to where that one is seen from k
-            before = _backwards(database.step.take(newest - (age - 1), 0).astype(float))
-            seen = before if age == 1 else _onwards(seen, before)
-            out[:, at - 3 : at] = seen
-            out[:, at : at + POSTURE] = database.posture.take(newest - age, 0)
+        _gather(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest, out)
         if self.scale is not None:
             out *= self.scale
         return out
@@ -78,27 +72,49 @@ class Windows:
 
     def query(self, qpos: Floats) -> Singles:
         """The vector (D,) of m configurations (m, 55), newest first, hinges in the database's representation."""
-        ground, posture = ground_of(qpos), posture_of(qpos)
-        out = np.empty((self.length, POSTURE + 3), np.float32)
-        out[:, 3:] = posture
-        out[1:, :3] = seen_from(ground[0], ground[1:])
-        vector: Singles = out.reshape(-1)[3:]
-        return vector if self.scale is None else vector * self.scale
+        out = np.empty(self.size, np.float32)
+        _query(np.ascontiguousarray(qpos[: self.length]), out)
+        return out if self.scale is None else out * self.scale
 
     def scaled(self, scale: Floats) -> "Windows":
         """The same windows with every vector multiplied by `scale` (D,)."""
         return Windows(self.database, self.length, self.frames, np.asarray(scale, np.float32).reshape(self.size))
 
 
-def _backwards(step: Floats) -> Floats:
-    """(K, 3) where a step's start is seen from its end."""
-    forward, left, turn = step[:, 0], step[:, 1], step[:, 2]
-    cosine, sine = np.cos(turn), np.sin(turn)
-    return np.stack([-cosine * forward - sine * left, sine * forward - cosine * left, -turn], axis=-1)
+@compiled
+def _gather(posture: Singles, step: Singles, newest: Ints, out: Singles) -> None:
+    """Fill vectors (K, D) of windows that end with frames (K,)."""
+    for k in range(len(newest)):
+        frame = newest[k]
+        out[k, :POSTURE] = posture[frame]
+        x, y, yaw = 0.0, 0.0, 0.0  # of the older frame's ground, seen from the newest's
+        for age in range(1, (out.shape[1] + 3) // (POSTURE + 3)):
+            forward, left, turn = step[frame - age + 1]
+            yaw -= np.float64(turn)
+            cosine, sine = math.cos(yaw), math.sin(yaw)
+            x -= cosine * forward - sine * left
+            y -= sine * forward + cosine * left
+            at = (POSTURE + 3) * age
+            out[k, at - 3], out[k, at - 2], out[k, at - 1] = x, y, yaw
+            out[k, at : at + POSTURE] = posture[frame - age]
 
 
-def _onwards(seen: Floats, step: Floats) -> Floats:
-    """(K, 3) a step that starts where `seen` says."""
-    cosine, sine = np.cos(seen[:, 2]), np.sin(seen[:, 2])
-    forward, left = cosine * step[:, 0] - sine * step[:, 1], sine * step[:, 0] + cosine * step[:, 1]
-    return seen + np.stack([forward, left, step[:, 2]], axis=-1)
+@compiled
+def _query(qpos: Floats, out: Singles) -> None:
+    """Fill the vector (D,) of configurations (m, 55): `posture_of`, and `seen_from` of their `ground_of`."""
+    newest = 2.0 * math.atan2(qpos[0, 6], qpos[0, 3])
+    cosine, sine = math.cos(newest), math.sin(newest)
+    for age in range((len(out) + 3) // (POSTURE + 3)):
+        at = (POSTURE + 3) * age
+        w, x, y, z = qpos[age, 3], qpos[age, 4], qpos[age, 5], qpos[age, 6]
+        if age:
+            turn = 2.0 * math.atan2(z, w) - newest
+            east, north = qpos[age, 0] - qpos[0, 0], qpos[age, 1] - qpos[0, 1]
+            out[at - 3] = cosine * east + sine * north
+            out[at - 2] = cosine * north - sine * east
+            out[at - 1] = turn - 2.0 * math.pi * round(turn / (2.0 * math.pi))
+        level, lean = math.hypot(w, z), math.hypot(x, y)
+        along = 2.0 * math.atan2(lean, level) / max(level * lean, 1e-30)
+        out[at] = qpos[age, 2]
+        out[at + 1], out[at + 2], out[at + 3] = along * (x * w + y * z), along * (y * w - x * z), 0.0
+        out[at + 4 : at + POSTURE] = qpos[age, 7:]

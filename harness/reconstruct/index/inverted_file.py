@@ -17,11 +17,11 @@ from harness.core.seeds import generator
 from harness.reconstruct.index.principal import Principal, chunks
 from harness.reconstruct.index.protocol import CHUNK, Vectors
 
-PROBES = 12
+PROBES = 10
 """Cells looked into: a recall of 0.97 and more at 66,000 and at 1,000,000 frames (`harness bench index`)."""
 KEPT = 0.9995
 """Share of the variance that the axes keep."""
-_PER_CELL, _ROUNDS = 48, 8
+_PER_CELL, _ROUNDS = 39, 6
 """Of the clustering: vectors that each centroid is found from, and rounds."""
 
 
