@@ -20,7 +20,7 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     assert len(code) == 1
-    assert len(code[0].splitlines()) < 45
+    assert len(code[0].splitlines()) < 40
     (tmp_path / "upright.py").write_text(code[0])
     command = next(c for c in re.findall(r"`harness (run demo --methods [^`]*)`", README))
     monkeypatch.chdir(tmp_path)
@@ -30,6 +30,7 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     assert set(methods) == {"ik", "upright:Upright", "upright:Upright+ik"}
     errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
     assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
+    assert main(shlex.split(next(c for c in re.findall(r"`harness (check [^`]*)`", README)))) == 0
 
 
 def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path) -> None:
