@@ -16,8 +16,9 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.motion import Take
 from harness.reconstruct.coverage import LOST_AFTER_S
+from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.gate import JUMP_M
-from harness.reconstruct.mean_pose import mean_posture
+from harness.reconstruct.mean_pose import mean_posture, spread_rad
 from harness.reconstruct.pursuit import Leaning, Manner, Pursuit
 from harness.reconstruct.residuals import Loss
 from harness.reconstruct.solver import Stopping
@@ -51,16 +52,21 @@ class Ik:
 
     def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedIk":
         """BadInput when the prior needs examples and there are none."""
-        spread_rad = np.full(len(body.limits_rad), self.prior_sigma_rad)
+        return self._fitted(body, examples)
+
+    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedIk":
+        """From a database that may lie on disk."""
+        return self._fitted(body, database)
+
+    def _fitted(self, body: Body, examples: Sequence[Take] | MotionDatabase) -> "FittedIk":
+        sigma_rad = np.full(48, self.prior_sigma_rad)
         if not self.needs_examples:
-            return FittedIk(self, body, None, spread_rad)
+            return FittedIk(self, body, None, sigma_rad)
         mean_qpos = mean_posture(body, examples)
         if self.spread:
-            angles = np.concatenate([take.qpos[:, 7:] for take in examples])
-            away = np.remainder(angles - mean_qpos[7:] + np.pi, 2.0 * np.pi) - np.pi
-            own = np.maximum(np.sqrt(np.mean(away**2, axis=0)), _LEAST_SPREAD_RAD)
-            spread_rad = spread_rad * own / np.sqrt(np.mean(own**2))
-        return FittedIk(self, body, mean_qpos, spread_rad)
+            own = np.maximum(spread_rad(body, examples, mean_qpos), _LEAST_SPREAD_RAD)
+            sigma_rad *= own / np.sqrt(np.mean(own**2))
+        return FittedIk(self, body, mean_qpos, sigma_rad)
 
 
 PREVIOUS = Ik(
@@ -88,10 +94,10 @@ class FittedIk:
     body: Body
     mean_qpos: Floats | None
     """(55,) T-pose root, mean hinges; None when there is nothing to learn it from."""
-    spread_rad: Floats
+    sigma_rad: Floats
     """(48,) the prior's standard deviations."""
 
     def begin(self, calibration: Calibration) -> Pursuit:
         options = self.options
         manner = Manner(options.loss, options.limits, options.jump_m, options.lost_after_s, options.stopping)
-        return Pursuit(self.body, calibration, manner, Leaning(self.mean_qpos, self.spread_rad, options.towards_mean))
+        return Pursuit(self.body, calibration, manner, Leaning(self.mean_qpos, self.sigma_rad, options.towards_mean))

@@ -1,6 +1,6 @@
 """The mean posture of the examples, stood where the trackers are: what any method that learns has to beat."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,19 +12,48 @@ from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import Coverage
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.ground import HINGES
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 
-def mean_posture(body: Body, examples: Sequence[Take]) -> Floats:
-    """(55,) the mean of the examples' hinge angles, rooted like the T-pose; BadInput without examples."""
-    if not examples:
+def mean_posture(body: Body, examples: Sequence[Take] | MotionDatabase) -> Floats:
+    """(55,) the mean of the examples' hinge angles, rooted like the T-pose; BadInput without examples.
+
+    The mean of directions, in principal form and within the limits.
+    """
+    limits, total, count = HingeLimits(body), np.zeros((2, 48)), 0
+    for angles in _angles(limits, examples):
+        total += [np.sum(np.sin(angles), axis=0), np.sum(np.cos(angles), axis=0)]
+        count += len(angles)
+    if not count:
         raise BadInput("The mean posture is learnt from examples, and there are none.", "Name some in the scenario.")
     out = np.array(tpose(body.skeleton))
-    out[7:] = HingeLimits(body).mean(np.concatenate([take.qpos[:, 7:] for take in examples]))
+    out[7:] = limits.clipped(limits.principal(np.arctan2(*total)))
     return out
+
+
+def spread_rad(body: Body, examples: Sequence[Take] | MotionDatabase, about: Floats) -> Floats:
+    """(48,) root mean square of the examples' hinge angles about those of a configuration (55,)."""
+    limits, total, count = HingeLimits(body), np.zeros(48), 0
+    for angles in _angles(limits, examples):
+        away = np.remainder(angles - about[7:] + np.pi, 2.0 * np.pi) - np.pi
+        total += np.sum(away**2, axis=0)
+        count += len(angles)
+    return np.sqrt(total / count)
+
+
+def _angles(limits: HingeLimits, examples: Sequence[Take] | MotionDatabase) -> Iterator[Floats]:
+    """Principal hinge angles (T, 48), some at a time, for a database may be larger than memory."""
+    if isinstance(examples, MotionDatabase):
+        for run in examples.runs:
+            yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
+    else:
+        for take in examples:
+            yield limits.principal(take.qpos[:, 7:])
 
 
 @dataclass(frozen=True)
