@@ -45,8 +45,7 @@ class InvertedFile:
             self._file.train(np.concatenate([self._principal.seen(vectors.gather(rows)) for rows in chunks(sample)]))
             for start in range(0, count, CHUNK):
                 self._file.add(self._principal.seen(vectors.gather(slice(start, start + CHUNK))))
-            self._file.nprobe = self._probes = min(probes, cells)
-            self._all = faiss.SearchParametersIVF(nprobe=cells)
+            self._file.nprobe = min(probes, cells)
 
     def __len__(self) -> int:
         return int(self._file.ntotal)
@@ -57,7 +56,9 @@ class InvertedFile:
         asked = self._principal.seen(np.asarray(query, np.float32)[None])
         squared, rows = self._file.search(asked, count)
         if rows[0, -1] < 0:  # the cells looked into hold fewer: look into all
-            squared, rows = self._file.search(asked, count, params=self._all)
+            with _one_thread() as faiss:
+                every = faiss.SearchParametersIVF(nprobe=self._file.nlist)
+            squared, rows = self._file.search(asked, count, params=every)
         order: Ints = np.lexsort((rows[0], squared[0]))
         return rows[0, order], squared[0, order]
 

@@ -1,5 +1,6 @@
 """Every index finds what looking at every vector finds, the approximate ones nearly always."""
 
+import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
 from harness.errors import UnknownName
-from harness.reconstruct.index import Flat, Index, InvertedFile, KDTree, Table, Vectors, choose, nearest_known
+from harness.reconstruct.index import Flat, Graph, Index, InvertedFile, KDTree, Table, Vectors, choose, nearest_known
 
 EXACT: dict[str, Callable[[Vectors], Index]] = {"flat": Flat, "kd_tree": KDTree}
 ALL = EXACT | {"inverted_file": InvertedFile}
@@ -80,6 +81,16 @@ def test_the_same_vectors_give_the_same_answers(name: str) -> None:
             np.testing.assert_array_equal(mine, theirs)
 
 
+@pytest.mark.parametrize("name", ALL)
+def test_an_index_travels_to_another_process(name: str) -> None:
+    values = paths(1000, 16)
+    index = ALL[name](Table(values))
+    other = pickle.loads(pickle.dumps(index))  # noqa: S301
+    for query in values[::250] + np.float32(0.01):
+        for mine, theirs in zip(index.nearest(query, 300), other.nearest(query, 300), strict=True):
+            np.testing.assert_array_equal(mine, theirs)
+
+
 def test_nothing_is_far_away_in_a_set_that_never_varies() -> None:
     values = np.full((500, 9), 3.0, np.float32)
     rows, _ = Flat(Table(values)).nearest(values[0], 4)
@@ -117,3 +128,23 @@ def test_the_index_is_chosen_by_size_or_by_name() -> None:
     assert isinstance(choose("flat", Table(paths(4000, 107))), Flat)
     with pytest.raises(UnknownName, match="Did you mean 'kd_tree'"):
         choose("kdtree", Table(paths(10, 3)))
+
+
+def test_a_graph_follows_and_asks_for_everything_when_it_must() -> None:
+    values = paths(3000, 12)
+    follows = np.append(np.ones(2999, bool), False)
+    follows[[999, 1999]] = False
+    graph = Graph(Table(values), follows, Flat(Table(values)))
+    assert graph.links.min() >= 0
+    assert graph.links.max() < 3000
+    session, found = graph.follow(), []
+    for row in range(1200, 1300):
+        rows, squared = session.nearest(values[row] + np.float32(0.01), 20)
+        assert np.all(np.diff(squared) >= 0.0)
+        found.append(len(set(rows.tolist()) & set(truth(values, values[row], 20)[0].tolist())) / 20)
+    assert np.mean(found) > 0.8
+    rows, _ = graph.follow().nearest(values[2500], 20)  # a new session knows nothing of the last one
+    assert rows[0] == 2500
+    fresh, again = graph.follow(), graph.follow()
+    for row in (5, 6, 7):
+        np.testing.assert_array_equal(fresh.nearest(values[row], 9)[0], again.nearest(values[row], 9)[0])
