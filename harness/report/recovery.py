@@ -14,6 +14,9 @@ _WHAT = (
 _HOW = f"mean over clips (worst clip); above {AT_MOST:g} is not recovered"
 
 
+_UNKNOWN = "not measured: too short"
+
+
 def lines(summary: Mapping[str, Any]) -> list[list[str]]:
     """The table's cells, head first; empty without recoveries."""
     rows = table(summary.get("recovery", []))
@@ -25,7 +28,9 @@ def lines(summary: Mapping[str, Any]) -> list[list[str]]:
     for row in rows:
         ratios = [_ratio(row["after"].get(kind)) for kind in kinds]
         names = [row["method"], *(row[name] for name in inputs), row["protocol"], str(row["clips"])]
-        found.append([*names, f"{row['undisturbed_deg']:.2f}", *ratios, f"{100.0 * row['status_right']:.1f} %"])
+        found.append(
+            [*names, _known(row["undisturbed_deg"], 1.0, ""), *ratios, _known(row["status_right"], 100.0, " %")]
+        )
     return found
 
 
@@ -55,6 +60,10 @@ def section(summary: Mapping[str, Any]) -> Markup:
 
 def _ratio(after: Mapping[str, Any] | None) -> str:
     if after is None:
-        return "not measured"
+        return _UNKNOWN
     mark = "" if after["ratio"] <= AT_MOST else " FAIL"
     return f"{after['during']:.2f}, then {after['ratio']:.2f} ({after['worst']:.2f}){mark}"
+
+
+def _known(value: float | None, times: float, unit: str) -> str:
+    return _UNKNOWN if value is None else f"{times * value:.2f}{unit}"

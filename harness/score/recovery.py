@@ -45,6 +45,8 @@ class Recovery:
     behaviour: str
     clip: str
     disturbance: str
+    judged: int
+    """Frames of the second that is judged; 0 when the take ends before it does, and then nothing below is known."""
     disturbed_deg: float
     """Mean joint angle error of the frames that are judged."""
     undisturbed_deg: float
@@ -61,7 +63,7 @@ class Recovery:
 
     @property
     def ratio(self) -> float:
-        return self.disturbed_deg / self.undisturbed_deg
+        return times(self.disturbed_deg, self.undisturbed_deg)
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,12 +108,11 @@ class Recoveries:
         )
 
     def pairs(self) -> list[Recovery]:
-        """Every disturbed cell whose undisturbed twin is there and whose frames reach far enough."""
+        """Every disturbed cell whose undisturbed twin is there; `judged` is 0 for takes that end too soon."""
         found = []
         for courses in self._courses.values():
             if (plain_course := courses.get("none")) is not None:
-                compared = (_compared(course, plain_course) for kind, course in courses.items() if kind != "none")
-                found += [recovery for recovery in compared if recovery is not None]
+                found += [_compared(course, plain_course) for kind, course in courses.items() if kind != "none"]
         return found
 
     def rows(self) -> list[dict[str, Any]]:
@@ -119,41 +120,48 @@ class Recoveries:
         return [{**asdict(recovery), "ratio": recovery.ratio} for recovery in self.pairs()]
 
 
-def _compared(course: _Course, undisturbed: _Course) -> Recovery | None:
+def _compared(course: _Course, undisturbed: _Course) -> Recovery:
     begin_s, end_s = float(course.disturbance["begins_s"]), float(course.disturbance["ends_s"])
     common, here, there = np.intersect1d(course.time_s, undisturbed.time_s, return_indices=True)
     bad = common[common < end_s - 1e-9]
-    if not len(bad):
-        return None
-    since_s = common - bad[-1]
-    judged = (since_s > AFTER_S) & (since_s <= AFTER_S + OVER_S + 1e-9)
-    if since_s[-1] < AFTER_S + OVER_S - 1e-9:
-        return None
+    since_s = common - (bad[-1] if len(bad) else np.inf)
+    long_enough = len(since_s) > 0 and since_s[-1] > AFTER_S + OVER_S - 1e-9
+    until = (since_s <= AFTER_S + OVER_S + 1e-9) & long_enough
+    judged, during = until & (since_s > AFTER_S), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
     disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
-    during = (common >= begin_s - 1e-9) & (since_s <= 0.0)
-    within = (common >= begin_s - 1e-9) & (since_s <= AFTER_S + OVER_S)
     right = _right(course.time_s, course.reporting, course.status)
     return Recovery(
         **course.cell,
         disturbance=str(course.disturbance["kind"]),
-        disturbed_deg=float(np.mean(disturbed_deg[judged])),
-        undisturbed_deg=float(np.mean(undisturbed_deg[judged])),
-        during=float(np.mean(disturbed_deg[during]) / np.mean(undisturbed_deg[during])),
-        disturbed_mm=float(np.mean(course.error_mm[here][judged])),
-        undisturbed_mm=float(np.mean(undisturbed.error_mm[there][judged])),
-        back_after_s=_back_after_s(since_s, disturbed_deg, undisturbed_deg),
-        status_right=float(np.mean(right[here][within])),
+        judged=int(np.count_nonzero(judged)),
+        disturbed_deg=_over(disturbed_deg, judged),
+        undisturbed_deg=_over(undisturbed_deg, judged),
+        during=times(_over(disturbed_deg, during), _over(undisturbed_deg, during)),
+        disturbed_mm=_over(course.error_mm[here], judged),
+        undisturbed_mm=_over(undisturbed.error_mm[there], judged),
+        back_after_s=_back_after_s(since_s, until & (since_s > 0.0), disturbed_deg, undisturbed_deg),
+        status_right=_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
     )
 
 
-def _back_after_s(since_s: Floats, disturbed_deg: Floats, undisturbed_deg: Floats) -> float | None:
-    after = np.flatnonzero((since_s > 0.0) & (since_s <= AFTER_S + OVER_S + 1e-9))
-    width = max(round(_SMOOTHED_S / float(np.median(np.diff(since_s)))), 1)
-    starts = after[: len(after) - width + 1]
-    means = np.array([[x[i : i + width].mean() for i in starts] for x in (disturbed_deg, undisturbed_deg)])
-    worse = np.flatnonzero(means[0] > AT_MOST * means[1])
-    first = int(worse[-1]) + 1 if len(worse) else 0
-    return float(since_s[starts[first]]) if first < len(starts) else None
+def times(error: float, undisturbed: float) -> float:
+    """How many times as large: 1 where both are zero, NaN where one is not finite."""
+    if undisturbed == 0.0:
+        return 1.0 if error == 0.0 else float("nan") if np.isnan(error) else float("inf")
+    return error / undisturbed
+
+
+def _over(values: Floats, rows: Bools) -> float:
+    return float(np.mean(values[rows])) if rows.any() else float("nan")
+
+
+def _back_after_s(since_s: Floats, after: Bools, disturbed_deg: Floats, undisturbed_deg: Floats) -> float | None:
+    rows = np.flatnonzero(after)
+    width = max(round(_SMOOTHED_S / float(np.median(np.diff(since_s[rows])))), 1) if len(rows) > 1 else 1
+    starts = rows[: max(len(rows) - width + 1, 0)]
+    good = [np.mean(disturbed_deg[i : i + width]) <= AT_MOST * np.mean(undisturbed_deg[i : i + width]) for i in starts]
+    first = len(good) - next((n for n, fine in enumerate(reversed(good)) if not fine), len(good))
+    return float(since_s[starts[first]]) if first < len(good) else None
 
 
 def _right(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
@@ -172,20 +180,22 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
     Each has `clips`, `undisturbed_deg`, `status_right` (the least) and, under `after`, disturbance -> `ratio` of the
     means over clips, `worst` ratio of a single clip, how many times as large the error is `during` it (mean over
-    clips), `back_after_s` of the slowest clip (None: one never was).
+    clips), `back_after_s` of the slowest clip (None: one never was). Clips that end too soon are left out, and a
+    disturbance is None where all do.
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
         groups.setdefault((row["method"], row["inputs"], row["protocol"]), []).append(row)
     found = []
     for (method, inputs, protocol), group in groups.items():
-        after = {}
-        for kind in dict.fromkeys(row["disturbance"] for row in group):
-            those = [row for row in group if row["disturbance"] == kind]
+        after: dict[str, Any] = dict.fromkeys(row["disturbance"] for row in group)
+        known = [row for row in group if row["judged"]]
+        for kind in dict.fromkeys(row["disturbance"] for row in known):
+            those = [row for row in known if row["disturbance"] == kind]
             means = [_mean(those, name) for name in ("disturbed_deg", "undisturbed_deg")]
             slowest = [row["back_after_s"] for row in those]
             after[kind] = {
-                "ratio": means[0] / means[1],
+                "ratio": times(*means),
                 "during": _mean(those, "during"),
                 "worst": float(np.max([_number(row["ratio"]) for row in those])),
                 "back_after_s": None if None in slowest else max(slowest),
@@ -195,9 +205,9 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 "method": method,
                 "inputs": inputs,
                 "protocol": protocol,
-                "clips": len({row["clip"] for row in group}),
-                "undisturbed_deg": _mean(group, "undisturbed_deg"),
-                "status_right": min(row["status_right"] for row in group),
+                "clips": len({row["clip"] for row in known}),
+                "undisturbed_deg": _mean(known, "undisturbed_deg") if known else None,
+                "status_right": min((row["status_right"] for row in known), default=None),
                 "after": after,
             }
         )

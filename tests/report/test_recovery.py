@@ -7,6 +7,7 @@ ROW = {
     "inputs": "pos+ori",
     "protocol": "none",
     "clip": "a",
+    "judged": 40,
     "disturbed_deg": 3.0,
     "undisturbed_deg": 2.0,
     "ratio": 1.5,
@@ -22,11 +23,13 @@ def test_ratios_that_are_too_large_or_unknown_are_marked() -> None:
         ROW | {"disturbance": "all_lost", "disturbed_deg": 3.1, "ratio": 1.55},
         ROW | {"disturbance": "one_off", "disturbed_deg": None, "ratio": None, "back_after_s": None},
     ]
+    rows.append(ROW | {"disturbance": "start_off", "judged": 0, "ratio": None, "status_right": None})
     found = text({"recovery": rows})
     head, line = found[3], found[4]
     for word in ("method", "protocol", "clips", "undisturbed [deg]", "one_lost", "all_lost", "one_off", "status right"):
         assert word in head
-    assert "4.00, then 1.50 (1.50)  4.00, then 1.55 (1.55) FAIL  4.00, then nan (nan) FAIL  99.5 %" in line
+    assert "4.00, then 1.50 (1.50)  4.00, then 1.55 (1.55) FAIL  4.00, then nan (nan) FAIL  not measured" in line
+    assert line.endswith("99.50 %")
     page = section({"recovery": rows})
     assert "1.55 (1.55) FAIL" in page
     assert '<th scope="col">all_lost</th>' in page

@@ -99,7 +99,9 @@ def test_a_take_that_ends_too_soon_tells_nothing(bent: Callable[..., Cell]) -> N
     recoveries = Recoveries()
     for kind in ("none", "one_lost"):
         recoveries.add(bent(kind, 2.0, defined_by={"clip": "walk_01", "disturbance": {"kind": kind, **late}}))
-    assert recoveries.pairs() == []
+    assert [found.judged for found in recoveries.pairs()] == [0]
+    (row,) = table(json.loads(json.dumps(plain(recoveries.rows()))))
+    assert (row["clips"], row["after"]) == (0, {"one_lost": None})
 
 
 def test_the_table_pools_clips_and_shows_the_worst(bent: Callable[..., Cell]) -> None:
