@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,7 @@ def run(
     NOT_COMPARABLE when every cell came below the floor of coverage, so that nothing was measured.
     Names that do not exist are refused before anything is written.
     """
+    _opened.cache_clear()  # files may have changed since the last run
     parts = [Part.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
     todo = [Job(scenario, part, b, folder, command) for part, b in zip(parts, behaviours, strict=True)]
@@ -135,7 +137,13 @@ def run(
 
 def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:
     """The motion that a scenario names; BadInput when it needs a library and none is named."""
-    return open_source(motion.source, folder, seed=seed, rate_hz=motion.rate_hz or None)
+    return _opened(motion.source, folder, seed, motion.rate_hz or None)
+
+
+@lru_cache(maxsize=2)
+def _opened(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
+    """One for all the clips of a run: they share examples."""
+    return open_source(kind, folder, seed=seed, rate_hz=rate_hz)
 
 
 def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> None:

@@ -3,7 +3,7 @@
 import copy
 from collections.abc import Mapping
 from dataclasses import asdict, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -60,6 +60,7 @@ class Setting:
         self._retargeted: dict[str, retarget.RetargetReport] = {}
         """What each clip that is not on its own body lost on the way."""
         self._fitted: dict[str, Reconstructor] = {}
+        self._sources: dict[str, str] = {}
 
     def under(self, scenario: Scenario) -> "Setting | None":
         """The same under other errors of the tracker, sharing motion and what was learnt; None if more differs."""
@@ -200,7 +201,9 @@ class Setting:
 
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
         """Of a cell; the varied values count even where they change nothing for the method."""
-        described = {"name": name, "options": repr(method), "source": registry.source_hash(method)}
+        if name not in self._sources:
+            self._sources[name] = registry.source_hash(method)
+        described = {"name": name, "options": repr(method), "source": self._sources[name]}
         content = {**self.inputs_of(method, inputs), "varied": varied}
         return results.cell_key(content, described, manifest.source_hash())
 
@@ -208,11 +211,22 @@ class Setting:
         kind = self.scenario.motion.body
         if clip.name == self.clip.name and kind == "own":
             return retarget.to_own_body(clip)[1]
-        onto = retarget.with_angles_kept if kind == "common" else retarget.to_common_body
-        take, self._retargeted[clip.name] = onto(clip, self.body.skeleton)
+        if kind == "own":
+            take, report = retarget.to_common_body(clip, self.body.skeleton)
+        else:
+            take, report = _onto_standard(clip, kind)
+        self._retargeted[clip.name] = report
         return take
 
 
+@lru_cache(maxsize=256)
+def _onto_standard(clip: Clip, kind: str) -> tuple[Take, retarget.RetargetReport]:
+    """The same for every test clip: once in a process."""
+    onto = retarget.with_angles_kept if kind == "common" else retarget.to_common_body
+    return onto(clip, standard_skeleton())
+
+
+@lru_cache(maxsize=256)
 def _motion_digest(clip: Clip) -> str:
     skeleton = clip.skeleton
     where = np.array([clip.rate_hz]), skeleton.bone_m, skeleton.axes

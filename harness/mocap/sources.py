@@ -30,7 +30,9 @@ class MotionSource(Protocol):
         """What the clip shows, "" where nobody knows."""
         ...
 
-    def load(self, name: str) -> Clip: ...
+    def load(self, name: str) -> Clip:
+        """The same object each time."""
+        ...
 
 
 def open_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | None) -> MotionSource:
@@ -49,6 +51,7 @@ class BuiltIn:
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
+        self._made: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
         return tuple(name for behaviour in performer.BEHAVIOURS for name in performer.take_names(behaviour))
@@ -64,8 +67,10 @@ class BuiltIn:
         return _parts(name)[0]
 
     def load(self, name: str) -> Clip:
-        behaviour, who, take = _parts(name)
-        return performer.generate(behaviour, who, take, seed=self._seed)
+        if name not in self._made:
+            behaviour, who, take = _parts(name)
+            self._made[name] = performer.generate(behaviour, who, take, seed=self._seed)
+        return self._made[name]
 
 
 def _parts(name: str) -> tuple[str, str, int]:
@@ -81,6 +86,7 @@ class MotionFiles:
 
     def __init__(self, library: MotionLibrary) -> None:
         self._library = library
+        self._read: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
         return self._library.names()
@@ -95,7 +101,9 @@ class MotionFiles:
         return self._library.entry(name).behaviour
 
     def load(self, name: str) -> Clip:
-        return self._library.load(name)
+        if name not in self._read:
+            self._read[name] = self._library.load(name)
+        return self._read[name]
 
 
 def library_folder(folder: Path | None) -> Path:
