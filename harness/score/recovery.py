@@ -127,7 +127,7 @@ def _compared(course: _Course, undisturbed: _Course) -> Recovery:
     since_s = common - (bad[-1] if len(bad) else np.inf)
     long_enough = len(since_s) > 0 and since_s[-1] > AFTER_S + OVER_S - 1e-9
     until = (since_s <= AFTER_S + OVER_S + 1e-9) & long_enough
-    judged, during = until & (since_s > AFTER_S), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
+    judged, during = until & (since_s > AFTER_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
     disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
     right = _right(course.time_s, course.reporting, course.status)
     return Recovery(
