@@ -1,6 +1,6 @@
 """Everything that can be named on the command line or in a scenario, with a line about each."""
 
-from harness.config import load_scenario, shipped_scenarios
+from harness.config import Scenario, load_scenario, shipped_scenarios, variants
 from harness.mocap import performer
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
@@ -10,7 +10,7 @@ from harness.stream.inputs import COMBINATIONS
 def catalogue() -> dict[str, dict[str, str]]:
     """Title -> name -> one line."""
     return {
-        "methods": {name: registry.summary(name) for name in registry.methods()},
+        "methods": {name: _method(name) for name in registry.methods()},
         "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
         f"motion of the {performer.SOURCE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
         "inputs": dict(COMBINATIONS),
@@ -23,13 +23,27 @@ def catalogue() -> dict[str, dict[str, str]]:
     }
 
 
+def _method(name: str) -> str:
+    """What it does, what it needs, and where it comes from."""
+    method = registry.resolve(name)
+    examples = "examples" if method.needs_examples else "no examples"
+    said = [method.summary, f"needs {examples}, takes any inputs", registry.origin(name)]
+    return "; ".join(part for part in said if part)
+
+
 def _line(name: str) -> str:
     scenario = load_scenario(name)
     motion = scenario.motion
     return (
         f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
-        f"{len(scenario.stations)} stations, noise {scenario.noise}; {', '.join(scenario.methods)}"
+        f"{len(scenario.stations)} stations, {_errors(scenario)}; {len(scenario.methods)} methods"
     )
+
+
+def _errors(scenario: Scenario) -> str:
+    """What is varied; without that the noise."""
+    varied = dict.fromkeys(key for combination, _ in variants(scenario) for key in combination)
+    return f"varies {', '.join(varied)}" if varied else f"noise {scenario.noise}"
 
 
 def _range(names: tuple[str, ...]) -> str:

@@ -28,7 +28,10 @@ class Reconstructor(Protocol):
 
 
 class Method(Protocol):
-    """A configured algorithm; its `repr` tells its options, as that of a dataclass does."""
+    """A configured algorithm; its `repr` tells its options, as that of a dataclass does.
+
+    It may also have `source`, where it comes from, which `harness list` prints.
+    """
 
     @property
     def name(self) -> str:

@@ -51,6 +51,22 @@ def methods() -> dict[str, Callable[[], Method]]:
     }
 
 
+_ORIGINS = {
+    "ik": "docs/methods.md C1",
+    "best_match": "Slyper & Hodgins 2008, who play the nearest example",
+    "kernel_ridge": "kernel ridge regression, Saunders et al. 1998",
+    "local_pca": "Chai & Hodgins 2005, as Liu et al. 2011 compare with it",
+    "dynamic_map": "Liu et al. 2011, eq. 2 to 14",
+    "weighted_blend": "Kim et al. 2012, what they compare with",
+    "kernel_cca": "Kim et al. 2012, eq. 2 to 6",
+}
+
+
+def origin(name: str) -> str:
+    """Where a method comes from: its field `source`, which is optional; of presets that of the method they preset."""
+    return str(getattr(resolve(name), "source", "") or _ORIGINS.get(name.partition(":")[0], ""))
+
+
 def resolve(name: str) -> Method:
     """The method of that name, with options as in `best_match[matching=tree]+ik`; UnknownName, BadInput."""
     base, *suffixes = split(name, "+")
