@@ -62,6 +62,8 @@ def part_of(limits: HingeLimits, take: Take | Callable[[], Take]) -> Part:
     """One take in the database's form."""
     if not isinstance(take, Take):
         take = take()
+    if not len(take):
+        raise BadInput(f"{take.name} has no frames.", "Leave it out of the examples.")
     qpos = np.array(take.qpos)
     qpos[:, 7:] = limits.course(qpos[:, 7:])
     ground = ground_of(qpos)

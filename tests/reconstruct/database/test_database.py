@@ -204,6 +204,8 @@ def test_takes_are_read_one_at_a_time_into_a_folder(
 def test_nothing_to_learn_from_and_unequal_rates_are_refused(takes: list[Take], tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="there are none"):
         MotionDatabase.build(BODY, [])
+    with pytest.raises(BadInput, match="nothing has no frames"):
+        MotionDatabase.build(BODY, [takes[0], changed(takes[0], takes[0].qpos[:0], "nothing")])
     slow = Take("slow", "p1", "", "", 30.0, takes[0].qpos)
     with pytest.raises(BadInput, match="slow has 30 frames a second, and walking_p2_01 40"):
         MotionDatabase.build(BODY, [takes[0], slow], folder=tmp_path / "database")
