@@ -2,8 +2,8 @@
 
 The plainest method that learns from examples: no blending, no memory, no kinematics after it. Distances are those of
 Kim et al. 2012, eq. 2, over positions, velocities and orientations of the stations, after the turn about the
-vertical and the horizontal shift that serve each example best; so neither place nor heading matters, and a station
-that is lost is simply left out.
+vertical and the horizontal shift that serve each example best; so neither place nor heading matters. A station
+counts by its quality; one that is lost is simply left out.
 """
 
 from collections.abc import Sequence
@@ -108,12 +108,14 @@ class BestMatchSession:
         Turning an example by y takes Re(e^-iy pull) off its squared distance, so the best y is the angle of `pull`.
         """
         options, count = self._options, len(self._residuals.bones)
-        here, facing = self._residuals.measured[:count], self._residuals.measured[count:]
+        here, facing = self._residuals.trust[:count], self._residuals.trust[count:]
         target_m = self._residuals.target_m
-        middle_m = np.array([*target_m[here, :2].mean(axis=0), 0.0]) if here.any() else np.zeros(3)
+        middle_m = np.zeros(3)
+        if total := float(here.sum()):
+            middle_m[:2] = here @ target_m[:, :2] / total
         far, pull = self._position.against(target_m - middle_m, here, centred=True)
         distance, pull = options.position_weight * far, options.position_weight * pull
-        far, velocity_pull = self._velocity.against(velocity_m_s, moving, centred=False)
+        far, velocity_pull = self._velocity.against(velocity_m_s, moving * here, centred=False)
         distance += options.velocity_weight * far
         pull += options.velocity_weight * velocity_pull
         far, orientation_pull = self._orientation(facing)
@@ -122,27 +124,27 @@ class BestMatchSession:
         best = int(np.argmin(distance - np.abs(pull)))
         return self._stood(best, float(np.angle(pull[best])), middle_m, here)
 
-    def _orientation(self, facing: Bools) -> tuple[Floats, Complexes]:
+    def _orientation(self, facing: Floats) -> tuple[Floats, Complexes]:
         """Squared distance (N,) of orientations but for the turn, and its pull.
 
         sin^2 of half the angle between them: min |q -+ p|^2 of eq. 2 to first order, and of period pi in the turn.
         """
-        target = np.where(facing[:, None], self._residuals.world_from_target, 0.0)
+        target = np.sqrt(facing)[:, None] * self._residuals.world_from_target
         half_round = rotations.multiply(rotations.about_z(-np.pi), target)
         plain, turned = np.matmul(np.stack([target, half_round], axis=1), self._turned).swapaxes(0, 1)
         plain_plain, turned_turned, plain_turned = (
             np.einsum("sn,sn->n", one, other) for one, other in ((plain, plain), (turned, turned), (plain, turned))
         )
-        far: Floats = np.count_nonzero(facing) - 0.5 * (plain_plain + turned_turned)
+        far: Floats = facing.sum() - 0.5 * (plain_plain + turned_turned)
         pull: Complexes = 0.5 * (plain_plain - turned_turned) + 1j * plain_turned
         return far, pull
 
-    def _stood(self, best: int, yaw_rad: float, target_middle_m: Floats, here: Bools) -> Floats:
+    def _stood(self, best: int, yaw_rad: float, target_middle_m: Floats, here: Floats) -> Floats:
         out: Floats = self._qpos[best].copy()
         turn = rotations.about_z(yaw_rad)
         out[3:7] = rotations.multiply(turn, out[3:7])
         if here.any():
-            middle = np.mean(self._position.flat[best, here])
+            middle = self._position.flat[best] @ here / here.sum()
             middle_m = np.array([middle.real, middle.imag, 0.0])
             out[:3] = rotations.rotate(turn, out[:3] - middle_m) + target_middle_m
         else:  # orientations alone do not say where: stay
@@ -158,17 +160,16 @@ class _Vectors:
         self._up = np.ascontiguousarray(vectors[..., 2])
         self._squares: Floats = np.sum(vectors**2, axis=2)
 
-    def against(self, reading: Floats, known: Bools, centred: bool) -> tuple[Floats, Complexes]:
-        """Squared distance (N,) summed over the known ones but for the turn, and its pull.
+    def against(self, reading: Floats, trust: Floats, centred: bool) -> tuple[Floats, Complexes]:
+        """Squared distance (N,) summed over stations as they are trusted (S,), but for the turn, and its pull.
 
-        `centred` readings have their horizontal mean taken out, and so have the examples, where that is known.
+        `centred` readings have their horizontal mean taken out, and so have the examples, by the same weights.
         """
-        used, count = known.astype(float), np.count_nonzero(known)
-        seen = np.where(known[:, None], reading, 0.0)
-        far = self._squares @ used + float(np.sum(seen**2)) - 2.0 * (self._up @ seen[:, 2])
-        if centred and count:
-            middle = self.flat @ (used / count)
-            far -= count * (middle.real**2 + middle.imag**2)
+        seen, total = trust[:, None] * reading, float(trust.sum())
+        far = self._squares @ trust + float(np.vdot(seen, reading)) - 2.0 * (self._up @ seen[:, 2])
+        if centred and total:
+            middle = self.flat @ (trust / total)
+            far -= total * (middle.real**2 + middle.imag**2)
         pull: Complexes = (self.flat @ (2.0 * seen[:, 0] - 2.0j * seen[:, 1])).conj()
         return far, pull
 

@@ -1,5 +1,7 @@
 """The mean posture and the best match: what they are for is to be beaten, but rightly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -60,3 +62,15 @@ def test_takes_the_nearer_of_two_examples(walk: Scene, boxing: Scene) -> None:
     session = BestMatch().fit(walk.body, [other, walk.take], np.random.default_rng(0)).begin(walk.calibration)
     found = np.array([session.step(f).qpos[7:] for f in walk.frames])
     assert np.max(np.abs(found[2:] - walk.take.qpos[2:, 7:])) < 1e-6
+
+
+def test_the_best_match_heeds_a_station_the_less_the_poorer_its_quality(boxing: Scene) -> None:
+    """A hand 40 cm off leads to other examples; at a hundredth of the quality to the right ones again."""
+    shift = np.zeros((6, 3))
+    shift[0] = [0.25, 0.25, 0.25]
+    said = np.ones(6)
+    said[0] = 0.01
+    wrong = [replace(frame, position_m=frame.position_m + shift) for frame in boxing.frames[:1]]
+    doubted = [replace(frame, quality=said) for frame in wrong]
+    off_m = [boxing.off_m(boxing.run(BestMatch(), frames), boxing.take.qpos[:1])[0] for frames in (wrong, doubted)]
+    assert off_m[1] < 2e-3 < 0.02 < off_m[0]
