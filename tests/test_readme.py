@@ -2,14 +2,18 @@
 
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import harness
+from harness.catalogue import catalogue
 from harness.cli import build_parser, main
 from harness.config import load_scenario
+from harness.core.options import alternatives
+from harness.reconstruct import registry
 from harness.report.text import table
 from harness.score.results import read_summary
 
@@ -31,6 +35,34 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
     assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
     assert main(shlex.split(next(c for c in re.findall(r"`harness (check [^`]*)`", README)))) == 0
+
+
+def test_the_entry_point_of_the_readme_gives_the_method_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As an installer writes it: the package's folder beside its dist-info."""
+    (tmp_path / "upright.py").write_text(re.findall(r"```python\n(.*?)```", README, re.DOTALL)[0])
+    (project,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    points = tomllib.loads(project)["project"]["entry-points"]
+    info = tmp_path / "upright-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: upright\nVersion: 1.0\n")
+    lines = [f"[{group}]\n" + "".join(f"{k} = {v}\n" for k, v in names.items()) for group, names in points.items()]
+    (info / "entry_points.txt").write_text("\n".join(lines))
+    assert "upright" not in registry.methods()
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert registry.resolve("upright+ik").name == "upright+ik"
+    assert "upright" in catalogue()["methods"]
+    out = tmp_path / "run"
+    assert main(["run", "demo", "--methods", "upright", "--no-report", "--out", str(out)]) == 0
+    assert {row["method"] for row in read_summary(out)["methods"]} == {"upright"}
+
+
+def test_options_of_the_readme_are_those_of_the_method() -> None:
+    (named,) = re.findall(r"`--methods '([^']*)'`", README)
+    assert registry.resolve(named).name == named
+    for text in re.findall(r"\(`(\w+\[[^`]*\|[^`]*\])`\)", README):
+        assert [registry.resolve(name).name for name in alternatives(text)] == alternatives(text)
 
 
 def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path) -> None:
