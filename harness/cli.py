@@ -270,7 +270,8 @@ def report_run(args: argparse.Namespace) -> Outcome:
 
 def add_bench(verbs: Verbs) -> None:
     verb = add_verb(verbs, "bench", "measure speed: ratios and medians of one run on this machine", run_bench, "seed")
-    verb.add_argument("what", nargs="*", help="ik, stream, load, startup (default: all)")
+    verb.add_argument("what", nargs="*", help="methods, ik, index, stream, load, startup (default: all)")
+    verb.add_argument("--large", action="store_true", help="methods: also learn from a million frames (minutes)")
 
 
 def run_bench(args: argparse.Namespace) -> Outcome:
@@ -278,7 +279,8 @@ def run_bench(args: argparse.Namespace) -> Outcome:
     from harness.bench.rows import as_text
 
     with ProgressBar("benchmarks") as progress:
-        rows, left_out = bench(tuple(args.what), seed=args.seed if args.seed is not None else 1, progress=progress)
+        seed = args.seed if args.seed is not None else 1
+        rows, left_out = bench(tuple(args.what), seed=seed, large=args.large, progress=progress)
     outcome = Outcome.INCOMPLETE if left_out else Outcome.PASS
     if args.json:
         found = {"rows": [row.as_dict() for row in rows], "left_out": left_out, "outcome": outcome.word}

@@ -11,25 +11,42 @@ from harness.bench.stream import bench_stream
 from harness.errors import MissingExtra, UnknownName
 
 
-def _ik(seed: int) -> list[Row]:
-    if find_spec("mink") is None:
-        raise MissingExtra("The reference of inverse kinematics", "mink", "bench")
+def _ik(seed: int, large: bool) -> list[Row]:
+    _require_mink()
     from harness.bench.ik import bench_ik
 
     return bench_ik(seed)
 
 
-BENCHMARKS: dict[str, Callable[[int], list[Row]]] = {
-    "startup": lambda seed: bench_startup(),
-    "load": bench_load,
-    "stream": bench_stream,
+def _methods(seed: int, large: bool) -> list[Row]:
+    _require_mink()
+    from harness.bench.methods import bench_methods
+
+    return bench_methods(seed, large=large)
+
+
+def _require_mink() -> None:
+    if find_spec("mink") is None:
+        raise MissingExtra("The reference of inverse kinematics", "mink", "bench")
+
+
+BENCHMARKS: dict[str, Callable[[int, bool], list[Row]]] = {
+    "startup": lambda seed, large: bench_startup(),
+    "load": lambda seed, large: bench_load(seed),
+    "stream": lambda seed, large: bench_stream(seed),
     "ik": _ik,
-    "index": bench_index,
+    "index": lambda seed, large: bench_index(seed),
+    "methods": _methods,
 }
 
 
-def bench(what: Sequence[str], *, seed: int, progress: Callable[[str, int, int], None]) -> tuple[list[Row], list[str]]:
-    """The rows of the named benchmarks, or of all, and why some of all could not be run; UnknownName, MissingExtra."""
+def bench(
+    what: Sequence[str], *, seed: int, large: bool = False, progress: Callable[[str, int, int], None]
+) -> tuple[list[Row], list[str]]:
+    """The rows of the named benchmarks, or of all, and why some of all could not be run; UnknownName, MissingExtra.
+
+    `large` has `methods` learn from a million frames as well, which takes minutes.
+    """
     for name in what:
         if name not in BENCHMARKS:
             raise UnknownName("benchmark", name, BENCHMARKS)
@@ -39,7 +56,7 @@ def bench(what: Sequence[str], *, seed: int, progress: Callable[[str, int, int],
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
         try:
-            rows += BENCHMARKS[name](seed)
+            rows += BENCHMARKS[name](seed, large)
         except MissingExtra as missing:
             if what:
                 raise

@@ -48,14 +48,15 @@ Follower = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What all contenders are given."""
+    """What all contenders are given. The tracker's frame is the world's."""
 
     body: humanoid.Body
+    """With the stations as sites."""
     calibration: Calibration
     frames: list[TrackerFrame]
     starts: Floats
     """(T, 55) for each frame the true pose of the one before."""
-    example: Take
+    examples: tuple[Take, ...]
     """Another walk of the same performer."""
 
 
@@ -105,7 +106,7 @@ def make_setting(seed: int, frames: int) -> Setting:
     readings = [_reading(kinematics, calibration, q, t / RATE_HZ, rng) for t, q in enumerate(qpos)]
     other = performer.generate("walking", who, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
     example = to_own_body(other)[1]
-    return Setting(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), example)
+    return Setting(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), (example,))
 
 
 def _reading(
@@ -129,7 +130,7 @@ def _reading(
 
 def used(setting: Setting) -> Follower:
     """The registered method: cold start, then always from its own last pose."""
-    session = Ik().fit(setting.body, [setting.example], np.random.default_rng(0)).begin(setting.calibration)
+    session = Ik().fit(setting.body, setting.examples, np.random.default_rng(0)).begin(setting.calibration)
 
     def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         begin = time.perf_counter()
@@ -159,7 +160,7 @@ def with_mink(setting: Setting) -> Follower:
     model.jnt_limited[1:] = np.isfinite(limits.high_rad)
     configuration = mink.Configuration(model)
     weights = {"position_cost": 1.0 / SQUARES.position_sigma_m, "orientation_cost": 1.0 / SQUARES.orientation_sigma_rad}
-    tasks = [mink.FrameTask(station, "site", **weights) for station in STATIONS]
+    tasks = [mink.FrameTask(station, "site", **weights) for station in setting.calibration.stations]
     kept = [mink.ConfigurationLimit(model, gain=1.0)]
     judge = Residuals(setting.body, setting.calibration, SQUARES)
 

@@ -1,7 +1,7 @@
 """One line of `harness bench`: what was measured, beside what it is held to."""
 
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,11 @@ class Row:
     """What it was measured against in the same run, or "" when it stands alone."""
     target: str
     """What it is held to, such as ">= 1500"; "" when it is for information."""
+    more: Mapping[str, str | float] = field(default_factory=dict)
+    """What else there is to say, for programs: further entries of `as_dict`."""
 
     def as_dict(self) -> dict[str, str | float]:
-        return asdict(self)
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "more"} | dict(self.more)
 
 
 def as_text(rows: Sequence[Row]) -> str:

@@ -1,0 +1,220 @@
+"""How fast the methods are, how far off with these very options, and how much memory they take.
+
+All learn from one database of built-in takes and follow held-out ones, in the setting of the accuracy tables
+(`trials`). They take turns, a second of motion each, beside `ik` and mink, so that whatever else the machine does meets
+all alike. What memory and a larger database cost is measured in processes of their own (`alone`).
+"""
+
+import hashlib
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from harness.bench import trials
+from harness.bench.alone import NOTHING, Alone, run_alone
+from harness.bench.rows import Row
+from harness.bench.trials import Progress, Trial
+from harness.body import humanoid
+from harness.config import load_scenario
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.seeds import generator
+from harness.progress import ProgressBar
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Method, Session
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.ground import POSTURE
+from harness.setting import mounts_of
+from harness.stream.frame import TrackerFrame
+
+HELD_TO = {"dynamic_map": 1000, "local_pca": 1000, "kernel_cca": 2000, "weighted_blend": 2000}
+"""Frames a second on one core, final inverse kinematics included where the method ends with it."""
+BESIDE = ("kernel_ridge", "ik")
+FRAMES, LARGE = 66_000, 1_000_000
+SECONDS, TURN = 9.0, 40
+"""Of every held-out take; frames of one contender in a row."""
+REFERENCE, MINK = "ik", "mink"
+WORKERS = 2
+RATIO_P99, RATIO_MEMORY, RATIO_LARGE = 3.0, 1.3, 1.5
+
+
+@dataclass
+class Tally:
+    """One contender's turns."""
+
+    turn_s: list[float] = field(default_factory=list)
+    step_ms: list[float] = field(default_factory=list)
+    error_deg: list[float] = field(default_factory=list)
+
+    @property
+    def fps(self) -> float:
+        """The median turn's."""
+        return TURN / float(np.median(self.turn_s))
+
+
+def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
+    """Rows of each method; with `large`, also beside a database of a million frames."""
+    many: dict[str, Alone] = {}
+    frames_many = 0
+    with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
+        small, vast = Path(folder) / "small", Path(folder) / "large"
+        with ProgressBar("takes") as bar:
+            learnt = trials.database(small, FRAMES, seed, WORKERS, bar)
+        with ProgressBar("turns") as bar:
+            tallies = contest(learnt, seed, bar)
+        with ProgressBar("methods") as bar:
+            nothing, alone = run_alone(NOTHING, small, seed), _each_alone(small, seed, bar)
+        if large:
+            with ProgressBar("takes") as bar:
+                frames_many = len(trials.database(vast, LARGE, seed, WORKERS, bar))
+            with ProgressBar("methods") as bar:
+                many = _each_alone(vast, seed, bar)
+        rows = []
+        for name in (*HELD_TO, *BESIDE):
+            memory: list[Row] = []
+            if name in alone:
+                memory.append(memory_row(name, nothing, alone[name], len(learnt)))
+            if name in many:
+                memory.append(slower_row(name, alone[name], many[name], len(learnt), frames_many))
+                memory.append(memory_row(name, nothing, many[name], frames_many))
+            rows += [*rows_of(name, tallies, memory), *memory]
+    return rows
+
+
+def _each_alone(folder: Path, seed: int, progress: Progress) -> dict[str, Alone]:
+    found = {}
+    for done, name in enumerate(HELD_TO):
+        progress(name, done, len(HELD_TO))
+        found[name] = run_alone(name, folder, seed)
+    return found
+
+
+def rows_of(name: str, tallies: dict[str, Tally], others: Sequence[Row]) -> list[Row]:
+    """Speed and error of one method, beside the references of the same run; programs are told of the others as well."""
+    tally, to = tallies[name], {other: _ratio(tallies[other], tallies[name]) for other in (REFERENCE, MINK)}
+    p50_ms, p99_ms = np.percentile(tally.step_ms, [50, 99]).tolist()
+    error_deg, options = float(np.mean(tally.error_deg)), config_hash(registry.resolve(name))
+    held = HELD_TO.get(name)
+    more = {
+        "method": name,
+        "fps": tally.fps,
+        "p50_ms": p50_ms,
+        "p99_ms": p99_ms,
+        "error_deg": error_deg,
+        "config_hash": options,
+        "ratio_to_ik": to[REFERENCE],
+        "ratio_to_mink": to[MINK],
+    }
+    for other, key in zip(others, ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio"), strict=False):
+        more[key] = other.value
+    beside = f"error {error_deg:.2f} deg, options {options}; ik x {to[REFERENCE]:.2f}, mink x {to[MINK]:.1f}"
+    rows = [Row(name, tally.fps, "frames/s", beside, f">= {held}" if held else "", more)]
+    if held:
+        text = f"p50 {p50_ms:.3f} ms, p99 {p99_ms:.3f} ms"
+        rows.append(Row(f"{name}, p99 / p50", p99_ms / p50_ms, "x", text, f"<= {RATIO_P99:g}"))
+    return rows
+
+
+def memory_row(name: str, nothing: Alone, found: Alone, frames: int) -> Row:
+    """Above an empty process, over one float32 copy of poses and query vectors."""
+    needed = 4 * frames * (POSTURE + 3 + query_numbers(registry.resolve(name)))
+    took = found.peak_bytes - nothing.peak_bytes
+    text = f"{took / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
+    return Row(f"{name}, peak memory, {frames:,} frames", took / needed, "x", text, f"<= {RATIO_MEMORY:g}")
+
+
+def slower_row(name: str, small: Alone, large: Alone, frames: int, frames_many: int) -> Row:
+    """What a larger database costs."""
+    text = f"{large.step_ms:.3f} against {small.step_ms:.3f} ms a step, {frames_many:,} against {frames:,} frames"
+    return Row(f"{name}, larger / smaller database", large.step_ms / small.step_ms, "x", text, f"<= {RATIO_LARGE:g}")
+
+
+def query_numbers(method: Method) -> int:
+    """Numbers in the vector by which a method finds examples: m poses, or what the stations read (eq. 2)."""
+    poses = getattr(method, "poses", None)
+    if poses is not None:
+        return (POSTURE + 3) * int(poses) - 3
+    return 10 * len(load_scenario(trials.SETTING).stations)
+
+
+def config_hash(method: Method) -> str:
+    """A short digest of a method's options, as `repr` tells them."""
+    return hashlib.blake2b(repr(method).encode(), digest_size=6).hexdigest()
+
+
+def _ratio(other: Tally, own: Tally) -> float:
+    """How many times faster than the other, turn by turn."""
+    return float(np.median(np.array(other.turn_s) / np.array(own.turn_s)))
+
+
+Follower = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
+"""Takes a frame and the true pose of the one before to a configuration (55,) and the seconds that it took."""
+
+
+def contest(learnt: MotionDatabase, seed: int, progress: Progress) -> dict[str, Tally]:
+    """All contenders on all held-out takes, in turns; the first second of a take is not counted."""
+    shown, body = trials.trials(seed, SECONDS), trials.body()
+    fitted = {
+        name: trials.fitted(registry.resolve(name), body, learnt, generator(seed, "method", name))
+        for name in (*HELD_TO, *BESIDE)
+    }
+    tallies = {name: Tally() for name in (*fitted, MINK)}
+    planned = sum(len(trial.simulation.frames) // TURN for trial in shown)
+    done = 0
+    for trial in shown:
+        worn = trial.simulation.calibration
+        followers = {name: _following(learner.begin(worn)) for name, learner in fitted.items()}
+        followers[MINK] = _mink(trial)
+        count = len(trial.simulation.frames)
+        for start in range(0, count - TURN + 1, TURN):
+            progress(trial.take, done, planned)
+            done += 1
+            for name, follow in followers.items():
+                turn = [
+                    follow(trial.simulation.frames[t], trial.truth[max(t - 1, 0)]) for t in range(start, start + TURN)
+                ]
+                if start >= trials.WARM_UP:
+                    found, seconds = np.array([qpos for qpos, _ in turn]), [spent for _, spent in turn]
+                    tallies[name].turn_s.append(sum(seconds))
+                    tallies[name].step_ms += [1e3 * spent for spent in seconds]
+                    tallies[name].error_deg.append(trials.error_deg(found, trial.truth[start : start + TURN]))
+    return tallies
+
+
+def _following(session: Session) -> Follower:
+    step = session.step
+
+    def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
+        begin = time.perf_counter()
+        qpos = step(frame).qpos
+        return qpos, time.perf_counter() - begin
+
+    return follow
+
+
+def _mink(trial: Trial) -> Follower:
+    """mink from the true pose of the frame before, on readings brought to the world's frame off its clock."""
+    from harness.bench.ik import Setting, with_mink
+
+    worn = trial.simulation.calibration
+    body = humanoid.build(trackers=mounts_of(load_scenario(trials.SETTING)))
+    at_home = replace(worn, world_from_tracker=rotations.IDENTITY, tracker_origin_m=np.zeros(3))
+    solve = with_mink(Setting(body, at_home, [], np.zeros((0, 55)), ()))
+
+    def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
+        return solve(_in_world(frame, worn), before)
+
+    return follow
+
+
+def _in_world(frame: TrackerFrame, worn: Calibration) -> TrackerFrame:
+    return replace(
+        frame,
+        position_m=rotations.rotate(worn.world_from_tracker, frame.position_m) + worn.tracker_origin_m,
+        tracker_from_station=rotations.multiply(worn.world_from_tracker, frame.tracker_from_station),
+    )

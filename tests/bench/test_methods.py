@@ -1,0 +1,79 @@
+"""The bench of methods: it says what was measured, on a database small enough for a test."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mink", reason="the bench compares with mink, an extra")
+
+from harness.bench import alone, methods, trials
+from harness.bench.alone import NOTHING, Alone
+from harness.core.seeds import generator
+from harness.reconstruct import registry
+from harness.reconstruct.database import MotionDatabase
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two takes of each behaviour, one of them of the performer who is followed."""
+    where = tmp_path_factory.mktemp("bench") / "database"
+    trials.database(where, 8_000, 1, 1)
+    return where
+
+
+def test_a_database_of_takes_with_distinct_seeds(folder: Path) -> None:
+    learnt = MotionDatabase.open(folder)
+    assert len(learnt) >= 8_000
+    assert len({run.take for run in learnt.runs}) == len(learnt.runs)
+    assert len({run.behaviour for run in learnt.runs}) == 5
+    assert not {run.take for run in learnt.runs} & {trial.take for trial in trials.trials(1, 2.0)}
+
+
+def test_takes_of_a_database_are_its_motion(folder: Path) -> None:
+    learnt = MotionDatabase.open(folder)
+    again = MotionDatabase.build(trials.body(), trials.takes(learnt)[:2])
+    np.testing.assert_allclose(again.posture, learnt.posture[: len(again)], atol=1e-5)
+    np.testing.assert_allclose(again.step, learnt.step[: len(again)], atol=1e-4)
+
+
+def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(methods, "HELD_TO", {"weighted_blend": 2000})
+    monkeypatch.setattr(methods, "BESIDE", ("ik",))
+    monkeypatch.setattr(methods, "SECONDS", 2.0)
+    tallies = methods.contest(MotionDatabase.open(folder), 1, lambda *_: None)
+    assert set(tallies) == {"weighted_blend", "ik", "mink"}
+    assert {len(tally.turn_s) for tally in tallies.values()} == {5}
+    memory = methods.memory_row("weighted_blend", Alone(0.0, 1.0, 0), Alone(0.0, 1.0, 1_000_000), 1_000)
+    assert memory.value == pytest.approx(1e6 / (4 * 1_000 * (55 + 60)))
+    row, tail = methods.rows_of("weighted_blend", tallies, [memory])
+    said = row.as_dict()
+    assert said["method"] == "weighted_blend"
+    assert said["fps"] == row.value > 0.0
+    assert 0.0 < float(said["p50_ms"]) <= float(said["p99_ms"]) == pytest.approx(tail.value * float(said["p50_ms"]))
+    assert 0.1 < float(said["error_deg"]) < 10.0
+    assert said["peak_memory_ratio"] == memory.value
+    assert float(said["ratio_to_mink"]) > float(said["ratio_to_ik"]) > 0.0
+
+
+def test_options_change_the_hash() -> None:
+    plain, other = (registry.resolve(name) for name in ("ik", "ik[prior_sigma_rad=0.4]"))
+    assert methods.config_hash(plain) == methods.config_hash(registry.resolve("ik")) != methods.config_hash(other)
+
+
+def test_memory_is_that_of_the_process_alone(folder: Path) -> None:
+    held = np.ones(30_000_000)  # 240 MB that a child must not count
+    nothing = alone.run_alone(NOTHING, folder, 1)
+    assert held[-1] == 1.0
+    assert nothing.peak_bytes > 50e6
+    if sys.platform == "linux":
+        assert nothing.peak_bytes < alone.peak_bytes()
+
+
+def test_a_method_takes_what_it_is_given(folder: Path) -> None:
+    learner = trials.fitted(registry.resolve("ik"), trials.body(), MotionDatabase.open(folder), generator(1, "test"))
+    trial = trials.trials(1, 1.0)[0]
+    session = learner.begin(trial.simulation.calibration)
+    found = np.array([session.step(frame).qpos for frame in trial.simulation.frames])
+    assert trials.error_deg(found, trial.truth) < 8.0
