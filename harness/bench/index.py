@@ -83,7 +83,7 @@ def _poses(database: MotionDatabase, held_out: Sequence[Take]) -> Search:
 
 def _readings(body: humanoid.Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
     worn = _worn(body)
-    examples, queries = LocalExamples(body, database, worn, Weights()), []
+    examples, queries = LocalExamples(body, database, worn, Weights(), "flat"), []
     for take in held_out:
         at_m, turned = station_poses(body, take, worn)
         velocity, asked = np.diff(at_m, axis=0, prepend=at_m[:1]) * RATE_HZ, []
