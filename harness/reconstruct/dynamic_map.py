@@ -7,6 +7,7 @@ on them, and the pose is solved that is likely both as what follows and by what 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
@@ -17,23 +18,23 @@ from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import LOST_AFTER_S
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.database.ground import HEIGHT, HINGES, POSTURE, ground_of, moved, standing
+from harness.reconstruct.database.ground import HEIGHT, HINGES, POSTURE, TILT, ground_of, moved, standing
 from harness.reconstruct.gate import JUMP_M
-from harness.reconstruct.index import Flat, Index
+from harness.reconstruct.index import Index, choose
 from harness.reconstruct.local_model import closeness, forecast
 from harness.reconstruct.mean_pose import mean_posture
-from harness.reconstruct.pursuit import Leaning, Manner, Pursuit
+from harness.reconstruct.pursuit import LEANING_RAD, Leaning, Manner
+from harness.reconstruct.remembering import Remembering
 from harness.reconstruct.residuals import Loss
 from harness.reconstruct.solver import Prior, Solution, Stopping
-from harness.stream.frame import TrackerFrame
 
-_LEANING_RAD = math.radians(30.0)
-"""Of hinges about the examples' mean posture, while there is no past to go by [rad]."""
+_NEAREST = 1e-6
+"""Smallest variance of the examples' weights; a performer who repeats an example exactly has distances of 0."""
 
 
 @dataclass(frozen=True)
 class DynamicMap:
-    """A `Method`."""
+    """A `Method`; defaults were chosen on validation clips, see scenarios/tune_dynamic_map.toml."""
 
     name: str = "dynamic_map"
     summary: str = "the pose that is likely both after the last ones, by a local model of examples, and by the readings"
@@ -42,10 +43,18 @@ class DynamicMap:
     """m, answers that the next is predicted from."""
     neighbours: int = 100
     """K, examples of the local model."""
-    kept: float = 0.5
-    """Share of the windows' variance that the regression uses."""
-    ridge: float = 1e-5
+    width: float = 1.0
+    """Variance of the weights in squared distances of the K/2-th neighbour; 0 for eq. 6 as printed, D_w = 1."""
+    kept: float = 1.0
+    """Share of the windows' variance that the regression uses: eq. 5 cuts off the rest, 1 leaves it to the ridge."""
+    ridge: float = 0.1
     """Added to that variance's eigenvalues, as a share of it."""
+    spread: float = 8.0
+    """Times the examples' standard deviations about the regression: how much worse it may be for another performer.
+
+    Their ratios say which hinges to believe; at 1 the prior is a wall that pulls the body off exact trackers."""
+    novelty: float = 0.0
+    """Times the root mean square distance of the nearest example per number of its window, added to every sigma."""
     least_sigma_rad: float = math.radians(3.0)
     """Floor of every hinge's standard deviation [rad]."""
     tilt_sigma_rad: float = math.radians(5.0)
@@ -53,9 +62,13 @@ class DynamicMap:
     height_sigma_m: float = 0.05
     """Of the root's height [m]."""
     step_sigma_m: float = 0.3
-    """Of the root's step over the ground [m]."""
+    """Of the root's step over the ground from the estimated frame before [m]: loose, or one slip is for ever."""
     turn_sigma_rad: float = math.radians(10.0)
     """Of its turn about the vertical [rad]."""
+    start: Literal["prediction", "closest"] = "prediction"
+    """Of the solver; the other one, and the closest example is the paper's, takes its place when it costs less."""
+    index: str = "auto"
+    """How neighbours are searched (`index.choose`)."""
     loss: Loss = field(default_factory=Loss)
     jump_m: float = JUMP_M
     """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
@@ -64,11 +77,35 @@ class DynamicMap:
 
     def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedDynamicMap":
         """BadInput without examples that are long enough."""
-        windows = MotionDatabase.build(body, examples).windows(self.poses, followed=True)
-        if not len(windows):
-            found = f"No example has more than {self.poses} frames."
-            raise BadInput(found, "Give longer examples, or fewer poses.")
-        return FittedDynamicMap(self, body, windows, Flat(windows), mean_posture(body, examples))
+        if not any(len(take) > self.poses for take in examples):
+            found = f"A dynamic map is learnt from examples of more than {self.poses} frames, and there are none."
+            raise BadInput(found, "Name some in the scenario.")
+        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
+
+    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
+        """From a database that may lie on disk."""
+        windows = database.windows(self.poses, followed=True)
+        return FittedDynamicMap(self, body, windows, choose(self.index, windows), mean_posture(body, database))
+
+
+LITERAL = DynamicMap(
+    "dynamic_map:literal",
+    "Liu et al. 2011 to the letter: 99 % of the variance, weights as printed, one sigma, start at the closest example",
+    neighbours=40,
+    width=0.0,
+    kept=0.99,
+    ridge=0.0,
+    spread=1.0,
+    least_sigma_rad=math.radians(0.01),
+    tilt_sigma_rad=math.radians(0.01),
+    height_sigma_m=1e-4,
+    step_sigma_m=1e-4,
+    turn_sigma_rad=math.radians(0.01),
+    start="closest",
+    loss=Loss(position_scale_m=0.003, orientation_scale_rad=math.radians(0.5), quality=False, suspect_weight=1.0),
+    jump_m=math.inf,
+)
+"""The floors only keep a standard deviation of 0 from dividing; sigma of eq. 12 is that of the trackers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,65 +123,64 @@ class FittedDynamicMap:
         return DynamicMapSession(self, calibration)
 
 
-class DynamicMapSession(Pursuit):
-    """Remembers its last m answers."""
+class DynamicMapSession(Remembering):
+    """Makes a model for every frame and throws it away."""
 
     def __init__(self, fitted: FittedDynamicMap, calibration: Calibration) -> None:
-        options = fitted.options
+        options, windows = fitted.options, fitted.windows
         manner = Manner(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
-        leaning = Leaning(fitted.mean_qpos, np.full(48, _LEANING_RAD))
-        super().__init__(fitted.body, calibration, manner, leaning)
-        self._options, self._windows, self._index = options, fitted.windows, fitted.index
-        self._past = np.zeros((options.poses, 55))
-        """The last answers, newest first."""
-        self._known = 0
-        self._now_s = -math.inf
+        leaning = Leaning(fitted.mean_qpos, np.full(48, LEANING_RAD))
+        super().__init__(fitted.body, calibration, manner, leaning, options.poses, windows.database.rate_hz)
+        self._options, self._windows, self._index = options, windows, fitted.index
         sigma = np.zeros(POSTURE + 3)
-        sigma[HINGES] = options.least_sigma_rad
-        sigma[1:4], sigma[HEIGHT] = options.tilt_sigma_rad, options.height_sigma_m
-        sigma[POSTURE : POSTURE + 2], sigma[-1] = options.step_sigma_m, options.turn_sigma_rad
-        self._least_variance = sigma**2
-
-    def followed(self, frame: TrackerFrame) -> Solution:
-        if self._known < self._options.poses:
-            return super().followed(frame)
-        periods = round((frame.received_s - self._now_s) * self._windows.database.rate_hz)
-        if not 1 <= periods <= 4:
-            self._known = 0
-            return super().followed(frame)
-        for _ in range(periods - 1):
-            self._remember(self._predicted().qpos)
-        prior = self._predicted()
-        return self.solver.solve(prior.qpos, prior)
-
-    def noted(self, frame: TrackerFrame, anew: bool) -> None:
-        self._known = 0 if anew else self._known
-        self._remember(self.qpos)
-        self._now_s = frame.received_s
-
-    def _remember(self, qpos: Floats) -> None:
-        self._past[1:] = self._past[:-1]
-        self._past[0] = qpos
-        self._known += 1
-
-    def _predicted(self) -> Prior:
-        """Eq. 8, on the ground."""
-        options, windows = self._options, self._windows
-        query = windows.query(self._past)
-        rows, squared = self._index.nearest(query, options.neighbours)
-        weight = closeness(squared.astype(float), max(float(squared[len(squared) // 2]), 1e-9))
-        after = forecast(
-            (windows.gather(rows) - query).astype(float),
-            windows.successors(rows).astype(float),
-            weight,
-            options.kept,
-            options.ridge,
+        sigma[HINGES], sigma[TILT], sigma[HEIGHT] = (
+            options.least_sigma_rad,
+            options.tilt_sigma_rad,
+            options.height_sigma_m,
         )
-        mean = standing(after.mean[:POSTURE], moved(ground_of(self._past[0]), after.mean[POSTURE:]))
+        sigma[POSTURE:] = options.step_sigma_m, options.step_sigma_m, options.turn_sigma_rad
+        self._least_variance = sigma**2
+        self._closest: Floats = self.qpos
+
+    def continued(self) -> Solution:
+        """Eq. 9 and 10: the most likely pose of the frame, by the readings and by what went before."""
+        prior = self.predicted()
+        first, other = prior.qpos, self._closest
+        if self._options.start == "closest":
+            first, other = other, first
+        found = self.solver.solve(first, prior)
+        if found.converged and self.contradiction() == 0.0:
+            return found
+        again = self.solver.solve(other, prior)
+        best = again if again.cost < found.cost else found
+        self.residuals.place(best.qpos)
+        return best
+
+    def bridged(self) -> Floats:
+        return self.predicted().qpos
+
+    def predicted(self) -> Prior:
+        """Eq. 8 for what follows `past`, on the ground and in the solver's tangent space."""
+        options, windows = self._options, self._windows
+        query = windows.query(self.past)
+        rows, squared = self._index.nearest(query, options.neighbours)
+        variance = 1.0 if options.width == 0.0 else options.width * float(squared[len(squared) // 2])
+        weight = closeness(squared.astype(float), max(variance, _NEAREST))
+        away, after = windows.gather(rows), windows.successors(rows)
+        away -= query
+        next_mean, left = forecast(away, after, weight, options.kept, options.ridge)
+        ground = ground_of(self.past[0])
+        mean, self._closest = standing(
+            np.stack([next_mean[:POSTURE], after[0, :POSTURE]]),
+            moved(ground, np.stack([next_mean[POSTURE:], after[0, POSTURE:]])),
+        )
         mean[7:] = self.limits.clipped(mean[7:])
-        variance = after.variance + self._least_variance
-        precision = np.empty(54)
-        precision[:2] = 1.0 / max(variance[POSTURE], variance[POSTURE + 1])
-        precision[2], precision[3:5], precision[5] = 1.0 / variance[HEIGHT], 1.0 / variance[1:3], 1.0 / variance[-1]
-        precision[6:] = 1.0 / variance[HINGES]
+        variance_of = options.spread**2 * left + self._least_variance
+        variance_of += options.novelty**2 * float(squared[0]) / len(query)
+        precision = 1.0 / variance_of[_TANGENT]
+        precision[:2] = precision[:2].min()  # forward and left are not the world's x and y
         return Prior(mean, precision)
+
+
+_TANGENT = np.array([POSTURE, POSTURE + 1, HEIGHT, 1, 2, POSTURE + 2, *range(HINGES.start, HINGES.stop)])
+"""(54,) which number of posture and step each direction of the solver is; tilts are small, so turns are the root's."""

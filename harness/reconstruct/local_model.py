@@ -2,14 +2,18 @@
 
 Liu et al. 2011, eq. 2 to 8 (docs/methods.md A4): K windows x_k with their successors y_k, weighted by closeness to the
 query. Everything is solved in the K x K space of the examples: with X the weighted, centred windows and
-X X^T = V L V^T, the principal directions of X^T X are U = X^T V L^-1/2, of the same eigenvalues.
+X X^T = V L V^T, the principal directions of X^T X are U = X^T V L^-1/2, of the same eigenvalues L.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
+from scipy.linalg import lapack
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Singles
+
+Real = TypeVar("Real", Floats, Singles)
+"""Either precision; the numbers that come out have that of those that went in."""
 
 
 class Forecast(NamedTuple):
@@ -26,30 +30,51 @@ def closeness(squared: Floats, variance: float) -> Floats:
 
     The smallest distance is taken out, which changes no ratio and keeps the weights above 0.
     """
-    weight = np.exp(-0.5 / variance * (squared - squared[0]))
+    weight = np.exp((squared[0] - squared) * (0.5 / variance))
     out: Floats = weight / weight.sum()
     return out
 
 
-def forecast(away: Floats, after: Floats, weight: Floats, kept: float, ridge: float) -> Forecast:
+def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float) -> Forecast:
     """What follows the query, from windows minus query (K, N), successors (K, D) and weights (K,) of sum 1.
 
-    Regresses in as many principal directions as hold the share `kept` of the weighted variance, and with a `ridge`
-    (in the same shares) on their eigenvalues.
+    Regresses in as many principal directions as hold the share `kept` of the weighted variance, in all of them for
+    1, with a `ridge` (a share of that variance, too) added to their eigenvalues.
     """
-    root = np.sqrt(weight)[:, None]
-    middle, after_middle = weight @ away, weight @ after
-    x, y = (away - middle) * root, (after - after_middle) * root  # means taken out, eq. 2; W of eq. 7
-    eigenvalue, vector = np.linalg.eigh(x @ x.T)
+    share: Real = weight.astype(away.dtype)
+    root: Real = np.sqrt(share)[:, None]
+    middle, after_middle = share @ away, share @ after
+    x: Real = (away - middle) * root  # means taken out, eq. 2; W of eq. 7
+    y: Real = (after - after_middle) * root
+    inner: Real = x @ x.T
+    whole = float(inner.trace())
+    asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
+    solve = _ridged if kept >= 1.0 else _truncated
+    shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
+    variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
+    return Forecast((after_middle - shift).astype(float), variance.astype(float))
+
+
+def _truncated(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float) -> tuple[Real, Real]:
+    """Eq. 5 and 7: (D,) what to take off the mean, and (K, D) residuals."""
+    eigenvalue, vector = np.linalg.eigh(inner)
     eigenvalue, vector = eigenvalue[::-1], vector[:, ::-1]
-    whole = float(eigenvalue.sum())
     count = int(np.searchsorted(np.cumsum(eigenvalue), kept * whole)) + 1
-    eigenvalue, vector = np.maximum(eigenvalue[:count], 1e-12 * whole + 1e-300), vector[:, :count]
-    damped = eigenvalue + ridge * whole
+    eigenvalue, vector = np.maximum(eigenvalue[:count], 1e-12 * whole + 1e-30), vector[:, :count]
+    damped = eigenvalue + ridge
     along = vector.T @ y
-    # beta_w^T (Q - mean x), eq. 7: the query itself is the origin of `away`
-    mean = after_middle - ((vector.T @ (x @ middle)) / damped) @ along
     left = y - vector @ ((eigenvalue / damped)[:, None] * along)
-    effective = 1.0 / float(weight @ weight)  # number of examples that the weights leave
-    spent = min(float(count + 1), effective - 1.0)
-    return Forecast(mean, np.vecdot(left.T, left.T) * effective / (effective - spent))
+    return ((vector.T @ asked) / damped) @ along, left
+
+
+def _ridged(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float) -> tuple[Real, Real]:
+    """The same with all directions: Lambda^-1 becomes (Lambda + ridge)^-1, and no eigenvectors are needed."""
+    single = inner.dtype == np.float32
+    factorise, invert = (lapack.spotrf, lapack.strtri) if single else (lapack.dpotrf, lapack.dtrtri)
+    inner = inner.copy()
+    inner.reshape(-1)[:: len(inner) + 1] += max(ridge, (1e-6 if single else 1e-13) * whole) + 1e-30
+    factor, _ = factorise(inner, lower=1, clean=1, overwrite_a=1)
+    inverse, _ = invert(factor, lower=1, overwrite_c=1)  # of L in X X^T + ridge = L L^T
+    turned = inverse @ y
+    shift = (inverse @ asked) @ turned
+    return shift, ridge * (inverse.T @ turned)

@@ -21,6 +21,8 @@ from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.solver import Prior, Solution, Solver, Stopping
 from harness.stream.frame import TrackerFrame
 
+LEANING_RAD = float(np.deg2rad(30.0))
+"""Of hinges about the examples' mean posture, while there is no past to go by [rad]."""
 _FAR = 2.0
 """A reading contradicts the pose when it is off by more than so many times the Lorentzian's scale: 6 cm, 16 deg."""
 _MANY = 0.25
@@ -91,6 +93,11 @@ class Pursuit:
         """Inverse kinematics with the weak prior alone."""
         return self.solver.solve(start, self._leaning.prior(self.limits, previous))
 
+    def contradiction(self) -> float:
+        """The share of readings that lie far from the pose."""
+        far = (self.residuals.distance > _FAR * self.residuals.scale) & self.residuals.measured
+        return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
+
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
         if any_seen:
@@ -109,7 +116,7 @@ class Pursuit:
 
     def _checked(self, warm: Solution, now_s: float) -> tuple[Solution, bool]:
         """The pose as it was followed, or one sought anew when the readings contradict it; and whether so."""
-        contradicted = self._contradiction()
+        contradicted = self.contradiction()
         if contradicted == 0.0 and not self._gate.left_out:
             self._contradicted_since_s = None
             return warm, False
@@ -133,11 +140,6 @@ class Pursuit:
                     qpos = solution.qpos
                 found.append(solution)
         return min(found, key=lambda solution: solution.cost)
-
-    def _contradiction(self) -> float:
-        """The share of readings that lie far from the pose."""
-        far = (self.residuals.distance > _FAR * self.residuals.scale) & self.residuals.measured
-        return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
 
     def _tidy(self, qpos: Floats) -> Floats:
         """The same pose in lawful angles: past a gimbal's pole the limits hold for the twin."""

@@ -19,13 +19,13 @@ from typing import Any, cast
 from harness.core.fields import changed
 from harness.core.options import named, split
 from harness.errors import BadInput, HarnessError, UnknownName
-from harness.reconstruct import ik
+from harness.reconstruct import dynamic_map, ik
 from harness.reconstruct.best_match import BestMatch
 from harness.reconstruct.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.contract import Method
-from harness.reconstruct.dynamic_map import DynamicMap
 from harness.reconstruct.kernel_cca import KernelCca
 from harness.reconstruct.kernel_ridge import KernelRidge
+from harness.reconstruct.local_pca import LocalPca
 from harness.reconstruct.mean_pose import MeanPose
 from harness.reconstruct.weighted_blend import WeightedBlend
 
@@ -45,7 +45,9 @@ def methods() -> dict[str, Callable[[], Method]]:
         "mean_pose": MeanPose,
         "kernel_ridge": KernelRidge,
         "best_match": BestMatch,
-        "dynamic_map": DynamicMap,
+        "local_pca": LocalPca,
+        "dynamic_map": dynamic_map.DynamicMap,
+        "dynamic_map:literal": lambda: dynamic_map.LITERAL,
         "weighted_blend": WeightedBlend,
         "kernel_cca": KernelCca,
     }

@@ -1,0 +1,154 @@
+"""Poses within a local linear model: Chai and Hodgins 2005, the baseline of Liu et al. 2011 (docs/methods.md C2).
+
+At every frame the examples are found that read like the trackers and follow poses like the last two answers. Their
+mean and a few principal directions span the poses that are possible: q = p + U w. The ground frame is free, for the
+examples know neither place nor heading. No dynamics beyond a pull to constant velocity.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from harness.body.humanoid import Body
+from harness.core.arrays import Floats, Ints, Singles
+from harness.core.calibration import Calibration
+from harness.core.motion import Take
+from harness.errors import BadInput
+from harness.reconstruct.controls import Controls
+from harness.reconstruct.coverage import LOST_AFTER_S
+from harness.reconstruct.database import MotionDatabase, Windows
+from harness.reconstruct.database.ground import POSTURE, ground_of, moved, posture_of
+from harness.reconstruct.gate import JUMP_M
+from harness.reconstruct.index import choose, nearest_known
+from harness.reconstruct.mean_pose import mean_posture
+from harness.reconstruct.pursuit import LEANING_RAD, Leaning, Manner
+from harness.reconstruct.remembering import Remembering
+from harness.reconstruct.residuals import Loss
+from harness.reconstruct.solver import Solution, Stopping
+from harness.reconstruct.subspace import Subspace, solve
+
+_PAST = 2
+"""Poses of the query, C2."""
+
+
+@dataclass(frozen=True)
+class LocalPca:
+    """A `Method`; defaults were chosen on validation clips, see scenarios/tune_local_pca.toml."""
+
+    name: str = "local_pca"
+    summary: str = "the pose within a few principal directions of similar examples that fits the readings best"
+    needs_examples: bool = True
+    neighbours: int = 300
+    """K, examples of the local model."""
+    components: int = 40
+    """Directions in which a pose may leave their mean."""
+    prior_weight: float = 0.8
+    """alpha, of the distance from the mean in the examples' own standard deviations."""
+    smooth_weight: float = 0.0
+    """beta, of a change of velocity, in units of `smooth_sigma_rad`."""
+    smooth_sigma_rad: float = 0.1
+    """What a hinge's velocity changes by from frame to frame [rad; m for the height]."""
+    control_weight: float = 1.0
+    """Of the readings in the query, squared distances in m^2 against rad^2 of the poses."""
+    lever_m: float = 0.3
+    """In the query, an orientation that is off by an angle counts like a position off by the angle times this [m]."""
+    index: str = "auto"
+    """How neighbours are searched (`index.choose`)."""
+    loss: Loss = field(default_factory=Loss)
+    jump_m: float = JUMP_M
+    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
+    lost_after_s: float = LOST_AFTER_S
+    stopping: Stopping = field(default_factory=Stopping)
+
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedLocalPca":
+        """BadInput without examples that are long enough."""
+        if not any(len(take) > _PAST for take in examples):
+            found = f"Local PCA is learnt from examples of more than {_PAST} frames, and there are none."
+            raise BadInput(found, "Name some in the scenario.")
+        return self.fit_database(body, MotionDatabase.build(body, examples), rng)
+
+    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalPca":
+        """From a database that may lie on disk."""
+        return FittedLocalPca(self, body, database.windows(_PAST, followed=True), mean_posture(body, database))
+
+
+@dataclass(frozen=True, eq=False)
+class FittedLocalPca:
+    """The examples; what trackers would have read in them depends on where they are worn."""
+
+    options: LocalPca
+    body: Body
+    windows: Windows
+    mean_qpos: Floats
+    """(55,) for starts without a past."""
+
+    def begin(self, calibration: Calibration) -> "LocalPcaSession":
+        return LocalPcaSession(self, calibration)
+
+
+class LocalPcaSession(Remembering):
+    """Makes a model for every frame and throws it away."""
+
+    def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
+        options, windows = fitted.options, fitted.windows
+        manner = Manner(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        leaning = Leaning(fitted.mean_qpos, np.full(48, LEANING_RAD))
+        super().__init__(fitted.body, calibration, manner, leaning, _PAST, windows.database.rate_hz)
+        self._options, self._windows = options, windows
+        self._controls = Controls(fitted.body, windows, calibration, options.lever_m)
+        self._examples = _Examples(windows, self._controls.values, np.sqrt(options.control_weight))
+        self._index = choose(options.index, self._examples)
+
+    def continued(self) -> Solution:
+        options = self._options
+        ground, postures = ground_of(self.past[0]), posture_of(self.past)
+        rows = self._nearest(ground)
+        poses = self._windows.successors(rows).astype(float)
+        space = Subspace.of(poses[:, :POSTURE], options.components, options.prior_weight)
+        space = space.smoothed(2.0 * postures[0] - postures[1], options.smooth_weight / options.smooth_sigma_rad**2)
+        here = moved(ground, poses[0, POSTURE:])
+        return solve(self.residuals, self.limits, space, here, space.nearest(poses[0, :POSTURE]), options.stopping)
+
+    def bridged(self) -> Floats:
+        """Nothing was read, and there are no dynamics: as it was."""
+        held: Floats = self.past[0]
+        return held
+
+    def _nearest(self, ground: Floats) -> Ints:
+        """Rows (K,) of the examples nearest to the readings and the past; what was not read follows the past."""
+        residuals, controls, options = self.residuals, self._controls, self._options
+        scale = np.float32(np.sqrt(options.control_weight))
+        position_m, turned = residuals.target_m, residuals.world_from_target
+        past = self._windows.query(self.past)
+        if residuals.measured.all():
+            query = np.concatenate([past, scale * controls.query(position_m, turned, ground)])
+            rows, _ = self._index.nearest(query, options.neighbours)
+            return rows
+        count = len(position_m)
+        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
+        at_m, at_turned = controls.worn_at(residuals.kinematics, self.past[0])
+        control = controls.query(np.where(here, position_m, at_m), np.where(facing, turned, at_turned), ground)
+        weight = np.concatenate([np.ones(len(past)), controls.columns(residuals.measured)])
+        query = np.concatenate([past, scale * control])
+        rows, _ = nearest_known(self._index, self._examples, query, weight, options.neighbours)
+        return rows
+
+
+@dataclass(frozen=True, eq=False)
+class _Examples:
+    """`Vectors`: two poses, and what trackers would have read in the frame after them."""
+
+    windows: Windows
+    controls: Singles
+    scale: float
+
+    def __len__(self) -> int:
+        return len(self.windows)
+
+    @property
+    def size(self) -> int:
+        return self.windows.size + int(self.controls.shape[1])
+
+    def gather(self, rows: Ints | slice) -> Singles:
+        return np.concatenate([self.windows.gather(rows), np.float32(self.scale) * self.controls[rows]], axis=1)
