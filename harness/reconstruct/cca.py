@@ -5,7 +5,8 @@ those m. The answer is linear in the outputs, so what comes out is one weight fo
 
 With full rank eq. 3 is 1 in every direction. So Gram matrices are centred, and regularised as docs/methods.md E says:
 (H + kH I)^-1 F (F + kF I)^-1 H x = rho^2 x, with kH = kappa times H's mean eigenvalue. Centring is done by an
-orthonormal basis of what sums to 0, which leaves m - 1 dimensions and nothing singular.
+orthonormal basis of what sums to 0, which leaves m - 1 dimensions and nothing singular. Eq. 4 may be held
+back by the same ridge, x^T H (H + kH I) x in place of x^T H^2 x: as it is written, the last bases follow noise.
 """
 
 from functools import lru_cache
@@ -35,16 +36,16 @@ def squared_distances(points: Floats) -> Floats:
     return out
 
 
-def weights(inputs: Floats, outputs: Floats, query: Floats, *, bases: int, kappa: float) -> Floats:
+def weights(inputs: Floats, outputs: Floats, query: Floats, *, bases: int, kappa: float, held: bool) -> Floats:
     """(m,) what each of m >= 2 outputs counts, from Gram matrices (m, m) of both sides and the query's kernel (m,).
 
-    ArithmeticError when all inputs or all outputs are the same.
+    With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
     """
     basis = _contrasts(len(query))
     h = basis.T @ inputs
     new: Floats = basis.T @ query - h.mean(axis=1)
     solution = _Solution(h @ basis, basis.T @ outputs @ basis, bases, kappa)
-    out: Floats = basis @ solution.coefficients(new)
+    out: Floats = basis @ solution.coefficients(new, held)
     out += 1.0 / len(query)
     return out
 
@@ -66,31 +67,35 @@ class _Solution:
 
     def __init__(self, inputs: Floats, outputs: Floats, bases: int, kappa: float) -> None:
         identity = np.eye(len(inputs))
-        self._inverse, kept_x = _regularised(inputs, kappa, identity)
-        _, kept_y = _regularised(outputs, kappa, identity)
+        inverse, kept_x, ridge = _regularised(inputs, kappa, identity)
+        _, kept_y, _ = _regularised(outputs, kappa, identity)
         lower, _ = dpotrf(kept_y + _TINY * identity, lower=1, clean=1)
         squared, vectors, _ = dsyevd(lower.T @ kept_x @ lower, lower=1)
         kept = min(bases, len(squared))
         self.squared_correlation: Floats = squared[-kept:]
         self._y = lower @ vectors[:, -kept:]  # F y: the reduced outputs of the examples
         self._x = kept_x @ self._y  # H x: their reduced inputs
+        self._bases = inverse @ self._y  # x itself
+        self._ridge = ridge
 
-    def coefficients(self, new: Floats) -> Floats:
+    def coefficients(self, new: Floats, held: bool) -> Floats:
         """(n,) of the centred outputs, for a centred kernel vector (n,)."""
-        x, y = self._x, self._y
-        reduced_x = y.T @ (self._inverse @ new)
-        reduced_y = (y.T @ x) @ _lu(x.T @ x, reduced_x)  # eq. 4
+        x, y, bases = self._x, self._y, self._bases
+        square = x.T @ x
+        if held:
+            square += self._ridge * (bases.T @ x)
+        reduced_y = (y.T @ x) @ _lu(square, bases.T @ new)  # eq. 4
         out: Floats = y @ _lu(y.T @ y, reduced_y)  # eq. 5
         return out
 
 
-def _regularised(gram: Floats, kappa: float, identity: Floats) -> tuple[Floats, Floats]:
-    """(G + k I)^-1 and G (G + k I)^-1."""
+def _regularised(gram: Floats, kappa: float, identity: Floats) -> tuple[Floats, Floats, float]:
+    """(G + k I)^-1, G (G + k I)^-1 and k."""
     ridge = kappa * float(gram.trace()) / len(gram)
     _, inverse, failed = dposv(gram + ridge * identity, identity, lower=1)
     if failed:
         raise ArithmeticError("a Gram matrix is not positive definite: are all examples the same?")
-    return inverse, identity - ridge * inverse
+    return inverse, identity - ridge * inverse, ridge
 
 
 def _lu(matrix: Floats, right: Floats) -> Floats:

@@ -15,10 +15,13 @@ class KernelCca(LocalRegression):
 
     name: str = "kernel_cca"
     summary: str = "kernel canonical correlation regression on the nearest examples, smoothed, then fitted"
-    bases: int = 6
+    neighbours: int = 12
+    bases: int = 12
     """l of eq. 4, and at most m - 1."""
-    kappa: float = 0.01
+    kappa: float = 0.3
     """How strongly eq. 3 is regularised."""
+    held: bool = True
+    """Whether eq. 4 is, too."""
     width: float = 1.0
     """sigma of the kernels, in root mean square distances of two examples."""
 
@@ -31,4 +34,4 @@ class KernelCca(LocalRegression):
         if sharpness == 0.0 or sharpness_y == 0.0:  # all of them are the same
             return np.full(len(x), 1.0 / len(x))
         near = np.exp(-sharpness * np.vecdot(away, away))
-        return cca.weights(kernel_x, kernel_y, near, bases=self.bases, kappa=self.kappa)
+        return cca.weights(kernel_x, kernel_y, near, bases=self.bases, kappa=self.kappa, held=self.held)

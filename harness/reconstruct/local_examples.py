@@ -12,12 +12,12 @@ import numpy as np
 from harness.body import kinematics
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.arrays import Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import seen_from
-from harness.reconstruct.index import Flat, Index
-from harness.reconstruct.index.protocol import Table
+from harness.reconstruct.index import choose
+from harness.reconstruct.index.masked import nearest_known
 from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
 
 _CHUNK = 2048
@@ -36,7 +36,7 @@ class Weights:
 class LocalExamples:
     """N frames of examples with S stations worn as a calibration says."""
 
-    def __init__(self, body: Body, database: MotionDatabase, worn: Calibration, weights: Weights) -> None:
+    def __init__(self, body: Body, database: MotionDatabase, worn: Calibration, weights: Weights, index: str) -> None:
         self.count, self.anchor = len(worn.stations), anchor_of(worn.bones)
         self.scale: Floats = np.sqrt(
             np.repeat([weights.position, weights.orientation, weights.velocity], np.multiply([3, 4, 3], self.count))
@@ -47,7 +47,6 @@ class LocalExamples:
         """(N, 3) the root's ground frame as seen from the anchor: forward, left [m], turn [rad]."""
         self._body, self._database, self._worn = body, database, worn
         self._bones = [body.skeleton.index(bone) for bone in worn.bones]
-        self._indexes: dict[bytes, Index] = {}
         for run in database.runs:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
@@ -57,6 +56,7 @@ class LocalExamples:
         for start in range(0, len(database), _CHUNK):
             near = self._quaternions(slice(start, start + _CHUNK))
             near *= np.copysign(1.0, np.vecdot(near, first))[..., None]
+        self._index = choose(index, self)
 
     def query(self, position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View) -> Floats:
         """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3) in the world."""
@@ -70,12 +70,33 @@ class LocalExamples:
         out *= self.scale
         return out
 
-    def nearest(self, query: Floats, known: Bools, count: int) -> Ints:
-        """Rows of the frames nearest to a query (10 S,) in the `known` columns."""
-        key = known.tobytes()
-        if key not in self._indexes:
-            self._indexes[key] = Flat(Table(np.ascontiguousarray(self.features[:, known])))
-        return self._indexes[key].nearest(query[known].astype(np.float32), count)[0]
+    def nearest(self, query: Floats, trust: Floats, count: int) -> Ints:
+        """Rows of the frames nearest to a query (10 S,) whose columns count as much as `trust` (10 S,), 0 to 1."""
+        asked = query.astype(np.float32)
+        if trust.min() == 1.0:
+            return self._index.nearest(asked, count)[0]
+        return nearest_known(self._index, self, asked, trust.astype(np.float32), count)[0]
+
+    def __len__(self) -> int:
+        return len(self.features)
+
+    @property
+    def size(self) -> int:
+        """Columns, 10 S."""
+        return 10 * self.count
+
+    def gather(self, rows: Ints | slice) -> Singles:
+        """(K, 10 S) of some rows."""
+        return self.features[rows]
+
+    def inputs(self, rows: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats]:
+        """What is learnt from: positions and orientations of some rows (m, n) and of the query (n,), n <= 7 S."""
+        used = slice(0, 7 * self.count)
+        values, asked = self.features[rows, used].astype(float), query[used]
+        if trust[used].min() < 1.0:
+            root = np.sqrt(trust[used])
+            return values * root, asked * root
+        return values, asked
 
     def poses(self, rows: Ints) -> Floats:
         """(K, 55) what is learnt: posture (52), and the root's ground frame seen from the anchor (3)."""

@@ -8,12 +8,12 @@ before; one weight for each of them, which is where the methods differ; the weig
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core import rotations
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import Take
@@ -22,14 +22,19 @@ from harness.reconstruct.coverage import Coverage
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.gate import Gate
 from harness.reconstruct.hinges import HingeLimits
+from harness.reconstruct.limbs import Limbs
 from harness.reconstruct.local_examples import LocalExamples, Weights
+from harness.reconstruct.mean_pose import mean_posture, spread_rad
+from harness.reconstruct.outlook import Outlook
 from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.smoothing import shares
 from harness.reconstruct.solver import Prior, Solver, Stopping
-from harness.reconstruct.viewpoint import View, on_trunk
+from harness.reconstruct.viewpoint import View
 from harness.stream.frame import TrackerFrame
 
+_LEAST_SPREAD_RAD = math.radians(1.0)
+"""A hinge that rests in all examples may still give way a little."""
 _JUMP_M = 0.3
 """As for the best match: a learnt pose is never as near as a fitted one."""
 
@@ -44,18 +49,26 @@ class LocalRegression:
     neighbours: int = 8
     """k of eq. 2, for this frame; those of the frame before are kept as well."""
     weights: Weights = field(default_factory=Weights)
+    """Of eq. 2."""
+    index: str = "auto"
+    """What neighbours are sought in (`index.choose`)."""
     longest_gap_s: float = 0.2
-    """A velocity is taken between readings no farther apart [s]."""
+    """A velocity is taken between readings, or examples, no farther apart [s]."""
     alpha: float = 0.3
     beta: float = 0.4
     """Of eq. 6; beta = 0 blends nothing."""
     final_ik: bool = True
+    """Off, the pose is only stood where the trackers are."""
+    solve: Literal["body", "limbs"] = "body"
+    """Final inverse kinematics: a few steps on the whole body, from and towards what was regressed; or in closed form."""
     root_sigma_m: float = 0.1
     root_sigma_rad: float = math.radians(10.0)
-    hinge_sigma_rad: float = math.radians(15.0)
-    """How far inverse kinematics lets the pose be from what was regressed [m, rad]."""
+    hinge_sigma_rad: float = math.radians(30.0)
+    """How freely inverse kinematics may leave what was regressed [m, rad]; of the hinges it is the root mean square."""
+    spread: bool = True
+    """Whether each hinge's own follows its spread over the examples, as for `ik`; else all have the same."""
     most_steps: int = 4
-    """Of inverse kinematics."""
+    """Of that on the whole body."""
 
     def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedLocal":
         """BadInput without examples."""
@@ -65,10 +78,14 @@ class LocalRegression:
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocal":
         """From a database that may lie on disk."""
-        return FittedLocal(self, body, database)
+        sigma_rad = np.full(48, self.hinge_sigma_rad)
+        if self.spread:
+            own = np.maximum(spread_rad(body, database, mean_posture(body, database)), _LEAST_SPREAD_RAD)
+            sigma_rad *= own / np.sqrt(np.mean(own**2))
+        return FittedLocal(self, body, database, sigma_rad)
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        """(m,) weights, of sum 1, of m >= 2 outputs (m, 55), for inputs (m, 7 S) and a query (7 S,)."""
+        """(m,) weights, of sum 1, of m >= 2 outputs (m, 55), for inputs (m, n) and a query (n,)."""
         raise NotImplementedError
 
 
@@ -79,6 +96,8 @@ class FittedLocal:
     options: LocalRegression
     body: Body
     database: MotionDatabase
+    hinge_sigma_rad: Floats
+    """(48,)"""
 
     def begin(self, calibration: Calibration) -> "LocalSession":
         return LocalSession(self, calibration)
@@ -91,17 +110,16 @@ class LocalSession:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
         self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), _JUMP_M)
+        self._examples = LocalExamples(fitted.body, fitted.database, calibration, options.weights, options.index)
+        self._outlook = Outlook(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
         self._solver = Solver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
-        self._precision = np.repeat(
-            [options.root_sigma_m**-2, options.root_sigma_rad**-2, options.hinge_sigma_rad**-2], [3, 3, 48]
-        )
-        self._examples = LocalExamples(fitted.body, fitted.database, calibration, options.weights)
-        self._on_trunk = on_trunk(calibration.bones[self._examples.anchor])
+        self._limbs = Limbs(fitted.body, calibration.bones, self._residuals, self._limits)
+        self._precision = np.repeat([options.root_sigma_m**-2, options.root_sigma_rad**-2], 3)
+        self._precision = np.concatenate([self._precision, fitted.hinge_sigma_rad**-2])
         self._answer = fitted.database.qpos(np.array([0]), np.zeros(3))[0]
         self._rows_before: list[int] = []
         self._poses_before: list[Floats] = []
-        self._positions_before: tuple[Floats, Floats, Bools] | None = None
 
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
@@ -109,96 +127,58 @@ class LocalSession:
             self._rows_before, self._poses_before = [], []
             return Estimate(self._answer, status)
         self._gate.read(frame, self._residuals)
-        view, query, known = self._looked_at(frame)
-        pose = self._regressed(query, known)
-        pose = self._smoothed(pose)
-        qpos = _stood(pose, view)
-        if not self._residuals.measured[: self._examples.count].any():
-            qpos[:2] = self._answer[:2]  # orientations alone do not say where: stay
-        if self._options.final_ik:
-            qpos[7:] = self._limits.clipped(qpos[7:])
-            qpos = self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
-        else:
-            qpos = nearest_placed(self._residuals, qpos)
-        self._answer = qpos
-        self._gate.answered(frame, self._residuals, qpos)
-        return Estimate(qpos, status)
+        if not self._residuals.measured.any():
+            return Estimate(self._answer, status)
+        view, query, trust = self._outlook.seen(frame, self._answer)
+        pose = self._smoothed(self._regressed(query, trust))
+        self._answer = self._fitted_to_trackers(stood(pose, view))
+        self._gate.answered(frame, self._residuals, self._answer)
+        return Estimate(self._answer, status)
 
-    def _looked_at(self, frame: TrackerFrame) -> tuple[View, Floats, Bools]:
-        residuals, count, anchor = self._residuals, self._examples.count, self._examples.anchor
-        velocity_m_s, moving = self._velocities(frame)
-        position_m, turned = residuals.target_m, residuals.world_from_target
-        if not residuals.measured.all():
-            position_m, turned = self._filled()
-        w, _, _, z = turned[anchor].tolist()
-        x_m, y_m, _ = position_m[anchor].tolist()
-        view = View(x_m, y_m, 2.0 * math.atan2(z, w))
-        known = np.repeat(np.concatenate([residuals.measured, moving]), np.repeat([3, 4, 3], count))
-        return view, self._examples.query(position_m, turned, velocity_m_s, view), known
-
-    def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
-        """(S, 3) since the last frame [m/s], and where it is known."""
-        here = self._residuals.measured[: self._examples.count]
-        now = self._residuals.target_m.copy(), frame.measured_s, here
-        before, self._positions_before = self._positions_before, now
-        if before is None:
-            return np.zeros_like(now[0]), np.zeros_like(now[2])
-        gap_s = now[1] - before[1]
-        known = now[2] & before[2] & (gap_s > 0.0) & (gap_s <= self._options.longest_gap_s)
-        gone_m = np.where(known[:, None], now[0] - before[0], 0.0)
-        velocity_m_s: Floats = gone_m / np.where(known, gap_s, 1.0)[:, None]
-        return velocity_m_s, known
-
-    def _filled(self) -> tuple[Floats, Floats]:
-        residuals, count = self._residuals, self._examples.count
-        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(nearest_placed(residuals, self._answer))
-        identity = np.tile(rotations.IDENTITY, (count, 1))
-        at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, identity)
-        return np.where(here, residuals.target_m, at_m), np.where(facing, residuals.world_from_target, turned)
-
-    def _regressed(self, query: Floats, known: Bools) -> Floats:
-        rows = self._examples.nearest(query, known, self._options.neighbours).tolist()
-        training = list(dict.fromkeys([*rows, *self._rows_before]))
+    def _regressed(self, query: Floats, trust: Floats) -> Floats:
+        """(55,) what is learnt (`LocalExamples.poses`), from the neighbours of this frame and the last."""
+        rows = self._examples.nearest(query, trust, self._options.neighbours).tolist()
+        training = np.array(list(dict.fromkeys([*rows, *self._rows_before])))
         self._rows_before = rows
-        outputs = self._examples.poses(np.array(training))
+        outputs = self._examples.poses(training)
         if len(training) == 1:
             return outputs.reshape(-1)
-        used = known.copy()
-        used[7 * self._examples.count :] = False
-        inputs = self._examples.features[training][:, used].astype(float)
-        weights = self._options.weigh(inputs, query[used], outputs)
-        pose: Floats = np.matmul(weights, outputs)
+        inputs, asked = self._examples.inputs(training, query, trust)
+        pose: Floats = np.matmul(self._options.weigh(inputs, asked, outputs), outputs)
         return pose
 
     def _smoothed(self, pose: Floats) -> Floats:
+        """Eq. 6, on hinge angles and on the root as seen from the anchor, so that walking itself is not delayed."""
         if len(self._poses_before) == 2:
             now, last, earlier = shares(self._options.alpha, self._options.beta)
             pose = now * pose + last * self._poses_before[1] + earlier * self._poses_before[0]
         self._poses_before = [*self._poses_before[-1:], pose]
         return pose
 
+    def _fitted_to_trackers(self, qpos: Floats) -> Floats:
+        qpos[7:] = self._limits.clipped(qpos[7:])
+        if not self._residuals.measured[: self._examples.count].any():
+            qpos[:2] = self._answer[:2]  # orientations alone do not say where: stay
+        if self._options.final_ik and self._options.solve == "limbs":
+            return self._limbs.reach(qpos)
+        if self._options.final_ik:
+            return self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
+        return nearest_placed(self._residuals, qpos)
 
-def _stood(pose: Floats, view: View) -> Floats:
-    """The configuration (55,) of what was learnt (55,)."""
+
+def stood(pose: Floats, view: View) -> Floats:
+    """The configuration (55,) of a posture and the root's ground frame as seen from a view (55,)."""
     cosine, sine = math.cos(view.yaw_rad), math.sin(view.yaw_rad)
-    height, roll, pitch, _ = pose[:4].tolist()
-    forward, left, turn = pose[52:].tolist()
-    half = 0.5 * (view.yaw_rad + turn)
-    c, s = math.cos(half), math.sin(half)
+    height_m, roll, pitch, _ = pose[:4].tolist()
+    forward_m, left_m, turn_rad = pose[52:].tolist()
+    c, s = math.cos(0.5 * (view.yaw_rad + turn_rad)), math.sin(0.5 * (view.yaw_rad + turn_rad))
     lean = math.hypot(roll, pitch)
-    w = math.cos(0.5 * lean)
-    by = math.sin(0.5 * lean) / lean if lean > 0.0 else 0.5
+    w, by = math.cos(0.5 * lean), math.sin(0.5 * lean) / lean if lean > 0.0 else 0.5
     x, y = by * roll, by * pitch
     out = np.empty(55)
-    out[:7] = (
-        view.x_m + cosine * forward - sine * left,
-        view.y_m + sine * forward + cosine * left,
-        height,
-        c * w,
-        c * x - s * y,
-        c * y + s * x,
-        s * w,
-    )
+    out[0] = view.x_m + cosine * forward_m - sine * left_m
+    out[1] = view.y_m + sine * forward_m + cosine * left_m
+    out[2] = height_m
+    out[3:7] = c * w, c * x - s * y, c * y + s * x, s * w  # about_z(yaw) tilt
     out[7:] = pose[4:52]
     return out

@@ -14,7 +14,8 @@ class WeightedBlend(LocalRegression):
 
     name: str = "weighted_blend"
     summary: str = "the nearest examples blended by their closeness, smoothed, then fitted to the trackers"
-    power: float = 1.0
+    neighbours: int = 16
+    power: float = 4.0
     """Weights fall with this power of the distance."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:

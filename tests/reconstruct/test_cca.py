@@ -23,7 +23,7 @@ def grams(x: Floats, y: Floats, new: Floats) -> tuple[Floats, Floats, Floats]:
     return kernel_x, kernel_y, np.exp(-sharpness * np.sum((x - new) ** 2, axis=1))
 
 
-def as_written(h: Floats, f: Floats, k: Floats, y: Floats, bases: int) -> tuple[Floats, Floats]:
+def as_written(h: Floats, f: Floats, k: Floats, y: Floats, bases: int, held: bool) -> tuple[Floats, Floats]:
     """Correlations (l,) and the answer by eq. 3 to 5, as one generalised symmetric eigenproblem on both blocks."""
     within = scipy.linalg.null_space(np.ones((1, PAIRS)))
     n = PAIRS - 1
@@ -36,33 +36,35 @@ def as_written(h: Floats, f: Floats, k: Floats, y: Floats, bases: int) -> tuple[
     )
     best = vectors[:, ::-1][:, :bases]
     reduced_x, reduced_y = within @ centred_h @ best[:n], within @ centred_f @ best[n:]
-    first = np.linalg.lstsq(reduced_x, reduced_y)[0]  # eq. 4
+    square = best[:n].T @ centred_h @ (centred_h + held * ridge_h) @ best[:n]
+    first = np.linalg.solve(square, reduced_x.T @ reduced_y)  # eq. 4
     second = np.linalg.lstsq(reduced_y, y - y.mean(axis=0))[0]  # eq. 5
     new = (k - h.mean(axis=1)) @ within @ best[:n]
     return values[::-1][:bases], y.mean(axis=0) + new @ first @ second
 
 
-def test_correlations_and_answer_are_those_of_the_problem_as_written(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("held", [False, True])
+def test_correlations_and_answer_are_those_of_the_problem_as_written(rng: np.random.Generator, held: bool) -> None:
     x, y, new = planted(rng)
     h, f, k = grams(x, y, new)
-    correlations, answer = as_written(h, f, k, y, bases=6)
+    correlations, answer = as_written(h, f, k, y, 6, held)
     np.testing.assert_allclose(cca.correlations(h, f, bases=6, kappa=KAPPA), correlations, atol=1e-9)
-    np.testing.assert_allclose(cca.weights(h, f, k, bases=6, kappa=KAPPA) @ y, answer, atol=1e-9)
+    np.testing.assert_allclose(cca.weights(h, f, k, bases=6, kappa=KAPPA, held=held) @ y, answer, atol=1e-9)
 
 
 def test_a_planted_linear_system_comes_back(rng: np.random.Generator) -> None:
     x, new = rng.normal(size=(PAIRS, 4)), rng.normal(size=4)
     linear, offset = rng.normal(size=(4, 6)), rng.normal(size=6)
     y = x @ linear + offset
-    weights = cca.weights(x @ x.T, y @ y.T, x @ new, bases=4, kappa=KAPPA)
+    weights = cca.weights(x @ x.T, y @ y.T, x @ new, bases=4, kappa=KAPPA, held=False)
     np.testing.assert_allclose(weights @ y, new @ linear + offset, atol=1e-9)
 
 
 def test_weights_sum_to_one_and_unite_at_an_example_when_nothing_is_held_back(rng: np.random.Generator) -> None:
     x, y, _ = planted(rng)
     h, f, k = grams(x, y, x[3])
-    np.testing.assert_allclose(cca.weights(h, f, k, bases=3, kappa=KAPPA).sum(), 1.0, atol=1e-12)
-    np.testing.assert_allclose(cca.weights(h, f, k, bases=PAIRS, kappa=1e-13), np.eye(PAIRS)[3], atol=1e-9)
+    np.testing.assert_allclose(cca.weights(h, f, k, bases=3, kappa=KAPPA, held=True).sum(), 1.0, atol=1e-12)
+    np.testing.assert_allclose(cca.weights(h, f, k, bases=PAIRS, kappa=1e-13, held=True), np.eye(PAIRS)[3], atol=1e-9)
 
 
 def test_without_regularisation_every_direction_correlates_fully(rng: np.random.Generator) -> None:
@@ -74,13 +76,13 @@ def test_without_regularisation_every_direction_correlates_fully(rng: np.random.
 
 def test_two_pairs_are_enough() -> None:
     gram = np.array([[1.0, 0.2], [0.2, 1.0]])
-    weights = cca.weights(gram, gram, np.array([1.0, 0.2]), bases=6, kappa=1e-13)
+    weights = cca.weights(gram, gram, np.array([1.0, 0.2]), bases=6, kappa=1e-13, held=True)
     np.testing.assert_allclose(weights, [1.0, 0.0], atol=1e-9)
 
 
 def test_pairs_that_are_the_same_are_refused() -> None:
     with pytest.raises(ArithmeticError, match="same"):
-        cca.weights(np.ones((3, 3)), np.eye(3), np.ones(3), bases=2, kappa=KAPPA)
+        cca.weights(np.ones((3, 3)), np.eye(3), np.ones(3), bases=2, kappa=KAPPA, held=True)
 
 
 def test_distances_are_pairwise(rng: np.random.Generator) -> None:
