@@ -264,12 +264,13 @@ class Model(NamedTuple):
     slope: Floats
     toward: Floats
     there: Floats
+    gone: Floats
     bend: Floats
 
 
 def unsolved(directions: int) -> Model:
     """Arrays for one solver."""
-    gradient, step, away, slope, toward, there, bend = np.zeros((7, directions))
+    gradient, step, away, slope, toward, there, gone, bend = np.zeros((8, directions))
     hessian, bent, factor = np.zeros((3, directions, directions))
     return Model(
         hessian,
@@ -285,6 +286,7 @@ def unsolved(directions: int) -> Model:
         slope,
         toward,
         there,
+        gone,
         bend,
     )
 
@@ -403,7 +405,10 @@ def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
 
     False unless H is positive definite on the directions that the bounds leave free.
     """
-    x, slope, toward, there, bend = model.step, model.slope, model.toward, model.there, model.bend
+    x, slope, toward, there, gone, bend = (
+        *(model.step, model.slope, model.toward),
+        *(model.there, model.gone, model.bend),
+    )
     x[:] = 0.0
     slope[:] = model.gradient
     whole = False
@@ -421,20 +426,26 @@ def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
         _solve(before, model.factor, toward)
         if not _dot(slope, toward) < -_NOTHING:
             return True
-        share = 1.0
+        share, bound = 1.0, 0
         while True:
-            whole = share == 1.0
+            whole, bound, promised = share == 1.0, 0, 0.0
             for i in range(len(x)):
                 free = x[i] + share * toward[i]
                 there[i] = min(max(free, model.low[i]), model.high[i])
                 whole = whole and there[i] == free
-            _product(before, hessian, there - x, bend)
-            promised = _dot(slope, there - x)
-            if whole or promised + 0.5 * _dot(there - x, bend) <= 0.1 * promised or share < 1e-9:
+                bound += model.clamped[i]
+                gone[i] = there[i] - x[i]
+                promised += slope[i] * gone[i]
+            if whole and bound == 0:
+                x[:] = there
+                return True
+            _product(before, hessian, gone, bend)
+            if whole or promised + 0.5 * _dot(gone, bend) <= 0.1 * promised or share < 1e-9:
                 break
             share *= 0.5
-        x[:] = there
-        slope += bend
+        for i in range(len(x)):
+            x[i] = there[i]
+            slope[i] += bend[i]
     return True
 
 
