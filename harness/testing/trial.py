@@ -25,7 +25,7 @@ from harness.testing.frames import exact_frames, swaying, without, worn
 
 RATE_HZ, FRAMES = 40.0, 60
 SECOND = round(RATE_HZ)
-LONG, BAD = 5 * SECOND, range(SECOND, 3 * SECOND)
+LONG, BAD = 7 * SECOND // 2, range(SECOND, 2 * SECOND)
 """Frames of a long take, and those of it that are disturbed."""
 Frames = Sequence[TrackerFrame]
 
@@ -139,13 +139,13 @@ DISTURBANCES: dict[str, tuple[range, Callable[[TrackerFrame], TrackerFrame]]] = 
     "all lost": (BAD, lambda frame: without(frame, range(len(frame.quality)))),
     "one 0.3 m off": (BAD, _one_off),
     "all turned by 30 deg": (BAD, lambda frame: turned(frame, np.pi / 6.0)),
-    "a start 1 m off": (range(2 * SECOND), lambda frame: moved(frame, np.array([1.0, 0.0, 0.0]))),
+    "a start 1 m off": (range(SECOND), lambda frame: moved(frame, np.array([1.0, 0.0, 0.0]))),
 }
-"""What goes wrong in which frames, and how; 2 s each, as `simulate.disturbance` has them."""
+"""What goes wrong in which frames, and how: what `simulate.disturbance` does, for 1 s each."""
 
 
 def disturbed(frames: Frames, what: str) -> tuple[list[TrackerFrame], slice]:
-    """The frames with something gone wrong, and those by which recovery is judged: the second from 1 s after it."""
+    """Frames with something gone wrong, and which of them recovery is judged by: half a second from 1 s after it."""
     when, spoil = DISTURBANCES[what]
-    judged = slice(when.stop + SECOND, when.stop + 2 * SECOND)
-    return [spoil(frame) if index in when else frame for index, frame in enumerate(frames)], judged
+    judged = slice(when.stop + SECOND, when.stop + 3 * SECOND // 2)
+    return [spoil(frame) if index in when else frame for index, frame in enumerate(frames[: judged.stop])], judged
