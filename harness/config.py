@@ -34,6 +34,8 @@ class Motion:
     withheld: tuple[str, ...] = ()
     """Clips and parts of clips that nothing is learnt from under any protocol, nor within 1 s of them: the test clips,
     while constants are chosen on others."""
+    thin_to: int = 0
+    """Keep so many frames of all examples together, evenly spaced: a sparse database (Kim et al. 2012); 0 keeps all."""
     database: Literal["all", "behaviour"] = "all"
     """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
     protocol: Literal["block", "sequence", "subject"] = "sequence"

@@ -1,7 +1,7 @@
 """What the cells of one clip share: the body, the true motion on it, its simulation, and what may be learnt from."""
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cached_property, lru_cache
 
@@ -151,7 +151,7 @@ class Setting:
             refuse_leak(self.closed, clip.name, runs, len(clip), clip.rate_hz)
             whole = self._on_body(clip)
             takes += [_at_rate(self.body, _cut(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
-        return takes
+        return thinned(takes, self.scenario.motion.thin_to)
 
     def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
         """Everything that defines a cell; two results with other inputs are not comparable.
@@ -235,6 +235,27 @@ def _motion_digest(clip: Clip) -> str:
 
 def _cut(take: Take, frames: range, name: str) -> Take:
     return Take(name, take.subject, take.source, take.behaviour, take.rate_hz, take.qpos[frames.start : frames.stop])
+
+
+def thinned(takes: Sequence[Take], count: int) -> list[Take]:
+    """So many frames of takes at one rate, evenly spaced over all of them, at the lower rate that they then have.
+
+    0 keeps all; BadInput when there are not as many.
+    """
+    total = sum(map(len, takes))
+    if not count:
+        return list(takes)
+    if not 0 < count <= total:
+        raise BadInput(f"{count} frames are wanted of examples that have {total}.", "Change motion.thin_to.")
+    every = total // count
+    kept, out, passed = every // 2 + every * np.arange(count), [], 0
+    for take in takes:
+        rows = kept[(kept >= passed) & (kept < passed + len(take))] - passed
+        passed += len(take)
+        if len(rows):
+            rate_hz = take.rate_hz / every
+            out.append(Take(take.name, take.subject, take.source, take.behaviour, rate_hz, take.qpos[rows]))
+    return out
 
 
 def _at_rate(body: humanoid.Body, take: Take, rate_hz: float) -> Take:

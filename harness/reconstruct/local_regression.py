@@ -7,7 +7,7 @@ before; one weight for each of them, which is where the methods differ; the weig
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -60,7 +60,7 @@ class LocalRegression:
     final_ik: bool = True
     """Off, the pose is only stood where the trackers are."""
     solve: Literal["body", "limbs"] = "body"
-    """Final inverse kinematics: a few steps on the whole body, from and towards what was regressed; or in closed form."""
+    """Inverse kinematics: a few steps on the whole body, from and towards what was regressed, or in closed form."""
     root_sigma_m: float = 0.1
     root_sigma_rad: float = math.radians(10.0)
     hinge_sigma_rad: float = math.radians(30.0)
@@ -110,7 +110,10 @@ class LocalSession:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
         self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), _JUMP_M)
-        self._examples = LocalExamples(fitted.body, fitted.database, calibration, options.weights, options.index)
+        weights = options.weights
+        if fitted.database.rate_hz * options.longest_gap_s < 1.0:
+            weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
+        self._examples = LocalExamples(fitted.body, fitted.database, calibration, weights, options.index)
         self._outlook = Outlook(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
         self._solver = Solver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
