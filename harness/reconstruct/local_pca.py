@@ -43,9 +43,9 @@ class LocalPca:
     """K, examples of the local model."""
     components: int = 40
     """Directions in which a pose may leave their mean."""
-    prior_weight: float = 0.8
+    prior_weight: float = 0.3
     """alpha, of the distance from the mean in the examples' own standard deviations."""
-    smooth_weight: float = 0.0
+    smooth_weight: float = 0.2
     """beta, of a change of velocity, in units of `smooth_sigma_rad`."""
     smooth_sigma_rad: float = 0.1
     """What a hinge's velocity changes by from frame to frame [rad; m for the height]."""

@@ -15,6 +15,8 @@ from harness.reconstruct.residuals import Residuals
 from harness.reconstruct.solver import Solution, Stopping
 
 _DAMPING, _RAISE, _LOWER = 1e-3, 10.0, 3.0
+_LEAST = 1e-6
+"""Keeps a step of 0 where nothing was read about the ground frame."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +72,7 @@ def solve(
         gradient[3:] += space.pull - space.curvature @ z[3:]
         normal = slope.T @ hessian @ slope + own
         while True:
-            damped = normal + damping * np.diag(normal.diagonal())
+            damped = normal + np.diag(damping * normal.diagonal() + _LEAST)
             step = np.linalg.solve(damped, gradient)
             longest = float(np.abs(step).max())
             moved = posed(space, z + step)

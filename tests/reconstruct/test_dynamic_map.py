@@ -1,0 +1,127 @@
+"""The dynamic map on motion whose truth is known, in its database and out of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.core.arrays import Floats
+from harness.core.estimate import Estimate, Status
+from harness.core.motion import Take
+from harness.errors import BadInput
+from harness.reconstruct.contract import Method
+from harness.reconstruct.dynamic_map import LITERAL, DynamicMap
+from harness.reconstruct.local_pca import LocalPca
+from harness.stream.frame import TrackerFrame
+from harness.testing.frames import exact_frames, without
+from harness.testing.method_checks import check_method
+
+from .conftest import Scene, moved
+
+BOTH = [DynamicMap(), LocalPca()]
+FEW = [DynamicMap(neighbours=30), LocalPca(neighbours=60)]
+"""For one take of three seconds."""
+
+
+def angles_deg(scene: Scene, estimates: list[Estimate], truth: Floats) -> Floats:
+    """(T,) mean over the hinges of wrapped differences [deg]."""
+    away = np.array([e.qpos[7:] for e in estimates]) - truth[:, 7:]
+    out: Floats = np.rad2deg(np.abs((away + np.pi) % (2 * np.pi) - np.pi).mean(axis=1))
+    return out
+
+
+def shifted(frame: TrackerFrame, station: int, by_m: float) -> TrackerFrame:
+    position_m = np.array(frame.position_m)
+    position_m[station, 1] += by_m
+    return replace(frame, position_m=position_m)
+
+
+@pytest.mark.parametrize("method", FEW)
+@pytest.mark.parametrize("motion", ["walk", "boxing"])
+def test_a_take_of_the_database_comes_back(motion: str, method: Method, request: pytest.FixtureRequest) -> None:
+    scene: Scene = request.getfixturevalue(motion)
+    estimates = scene.run(method)
+    assert angles_deg(scene, estimates, scene.take.qpos)[20:].mean() < 0.5
+    assert scene.off_m(estimates, scene.take.qpos)[20:].max() < 0.005
+
+
+@pytest.mark.parametrize("method", BOTH)
+def test_the_room_does_not_matter(walk: Scene, method: Method) -> None:
+    qpos = moved(walk.take.qpos, np.deg2rad(130.0), (4.0, -3.0, 0.0))
+    here = angles_deg(walk, walk.run(method), walk.take.qpos)
+    there = angles_deg(walk, walk.run(method, exact_frames(walk.body, walk.calibration, qpos)), qpos)
+    np.testing.assert_allclose(there[5:], here[5:], atol=2e-3)
+
+
+@pytest.mark.parametrize("method", [*BOTH, LITERAL])
+def test_the_same_frames_give_the_same_bytes(walk: Scene, method: Method) -> None:
+    fitted = method.fit(walk.body, [walk.take], np.random.default_rng(0))
+    one, two = fitted.begin(walk.calibration), fitted.begin(walk.calibration)
+    for frame in walk.frames[:30]:
+        assert one.step(frame).qpos.tobytes() == two.step(frame).qpos.tobytes()
+
+
+@pytest.mark.parametrize("method", BOTH)
+def test_the_contract(method: Method) -> None:
+    check_method(method)
+
+
+@pytest.mark.parametrize("method", BOTH)
+def test_examples_of_some_length_are_needed(walk: Scene, method: Method) -> None:
+    short = Take("a", "b", "c", "walking", 40.0, walk.take.qpos[:2])
+    for examples in ([], [short]):
+        with pytest.raises(BadInput, match="examples of more than 2 frames"):
+            method.fit(walk.body, examples, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("method", BOTH)
+@pytest.mark.parametrize("lost", [[0], [4], [0, 1, 2, 3, 4, 5]])
+def test_back_after_stations_were_lost(walk: Scene, method: Method, lost: list[int]) -> None:
+    frames = [without(f, lost) if 30 <= i < 60 else f for i, f in enumerate(walk.frames)]
+    estimates = walk.run(method, frames)
+    plain = walk.off_m(walk.run(method), walk.take.qpos)
+    off_m = walk.off_m(estimates, walk.take.qpos)
+    assert (estimates[58].status is Status.LOST) == (len(lost) == 6)
+    assert off_m[80:].mean() < 1.5 * plain[80:].mean() + 1e-4
+
+
+@pytest.mark.parametrize("method", BOTH)
+def test_a_station_that_is_off_for_a_while_moves_the_pose_little(walk: Scene, method: Method) -> None:
+    frames = [shifted(f, 0, 0.3) if 40 <= i < 48 else f for i, f in enumerate(walk.frames)]
+    off_m = walk.off_m(walk.run(method, frames), walk.take.qpos)
+    assert off_m[40:48].max() < 0.04
+    assert off_m[70:].max() < 0.01
+
+
+@pytest.mark.parametrize("method", BOTH)
+def test_frames_that_are_missing_or_early(walk: Scene, method: Method) -> None:
+    """The past keeps the examples' rate: a short gap is bridged, a long one begins anew, an early frame replaces."""
+    dropped = {40, 41, 60, *range(70, 90)}
+    kept = [i for i in range(len(walk.frames)) if i not in dropped]
+    frames = [walk.frames[i] for i in kept]
+    off_m = walk.off_m(walk.run(method, frames), walk.take.qpos[kept])
+    assert off_m[20:].max() < 0.03
+    doubled = [f for frame in walk.frames for f in (frame, replace(frame, received_s=frame.received_s + 0.005))]
+    off_m = walk.off_m(walk.run(method, doubled)[::2], walk.take.qpos)
+    assert off_m[20:].mean() < 0.005
+
+
+def test_the_literal_preset_is_literal() -> None:
+    assert (LITERAL.kept, LITERAL.ridge, LITERAL.width, LITERAL.spread) == (0.99, 0.0, 0.0, 1.0)
+    assert LITERAL.loss.position_scale_m == LITERAL.loss.position_sigma_m
+    assert LITERAL.start == "closest"
+
+
+def test_what_is_far_from_all_examples_is_believed_less(walk: Scene) -> None:
+    """Novelty widens every sigma by the distance of the nearest example."""
+    spreads = []
+    for novelty in (0.0, 2.0):
+        fitted = DynamicMap(novelty=novelty).fit(walk.body, [walk.take], np.random.default_rng(0))
+        session = fitted.begin(walk.calibration)
+        for frame in walk.frames[:5]:
+            session.step(frame)
+        session.past[:, 7:] += 0.3
+        precision = session.predicted().precision
+        assert precision is not None
+        spreads.append(precision)
+    assert (spreads[1] < spreads[0]).all()
