@@ -159,14 +159,13 @@ class Setting:
         Device and noise stand as numbers, motion, body and mounts as digests of theirs: names and defaults mean
         what the code of their day made of them.
         """
-        scenario, body = self.scenario, self.body
+        scenario = self.scenario
         content = asdict(scenario)
         for many in ("methods", "inputs", "name", "components", "vary"):
             del content[many]
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
         del content["motion"]["withheld"]
         learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}
-        worn = [array for mount in mounts_of(scenario) for array in place(body.skeleton, mount)]
         return {
             **content,
             "tracker": asdict(tracker_of(scenario)),
@@ -174,13 +173,20 @@ class Setting:
             "disturbance": scenario.disturbance.as_dict(),
             "clip": str(self.part),
             "motion_digest": _motion_digest(self.clip),
-            "body_digest": results.digest(body.skeleton.bone_m, body.skeleton.axes, body.limits_rad),
-            "mounts_digest": results.digest(*worn),
+            **self._worn,
             "examples": learnt,
             "withheld": sorted(str(part) for part in self.closed[1:] if part.clip in learnt),
             "inputs": inputs,
             "metric_versions": VERSIONS,
         }
+
+    @cached_property
+    def _worn(self) -> dict[str, str]:
+        """Digests of the body and of where the stations sit on it."""
+        skeleton = self.body.skeleton
+        worn = [array for mount in mounts_of(self.scenario) for array in place(skeleton, mount)]
+        body = results.digest(skeleton.bone_m, skeleton.axes, self.body.limits_rad)
+        return {"body_digest": body, "mounts_digest": results.digest(*worn)}
 
     def notes(self, method: Method) -> tuple[str, ...]:
         """What a reader should know of the motion: notes of the clip, and what retargeting to another body cost."""
