@@ -1,5 +1,7 @@
 """Sparse databases: so many frames of all examples, evenly spaced."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -11,10 +13,7 @@ from harness.setting import thinned
 def takes(*lengths: int) -> list[Take]:
     """Each frame is numbered in its first coordinate, on from take to take."""
     starts = np.cumsum([0, *lengths])
-    numbered = [
-        np.repeat(np.arange(a, b, dtype=float)[:, None], 55, axis=1)
-        for a, b in zip(starts[:-1], starts[1:], strict=True)
-    ]
+    numbered = [np.repeat(np.arange(a, b, dtype=float)[:, None], 55, axis=1) for a, b in pairwise(starts)]
     return [Take(f"take_{k}", "nobody", "numbers", "", 40.0, qpos) for k, qpos in enumerate(numbered)]
 
 

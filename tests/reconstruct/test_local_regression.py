@@ -1,0 +1,133 @@
+"""The second paper's methods: what they must do alike, and what each does by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from harness.core import rotations
+from harness.core.estimate import Status
+from harness.core.humanoid24 import unpack
+from harness.errors import BadInput
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.kernel_cca import KernelCca
+from harness.reconstruct.local_examples import LocalExamples, Weights
+from harness.reconstruct.local_regression import LocalRegression, stood
+from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
+from harness.reconstruct.weighted_blend import WeightedBlend
+from harness.testing.frames import exact_frames, without
+
+from .conftest import Scene, moved
+
+METHODS = [KernelCca(), WeightedBlend()]
+IDS = [method.name for method in METHODS]
+
+
+def angle_error_deg(scene: Scene, qpos: np.ndarray) -> np.ndarray:
+    """(T,) mean over the hinges."""
+    off = unpack(qpos)[2] - unpack(scene.take.qpos)[2]
+    return np.asarray(np.rad2deg(np.abs((off + np.pi) % (2.0 * np.pi) - np.pi)).mean(axis=1))
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+def test_examples_are_needed(walk: Scene, method: LocalRegression) -> None:
+    with pytest.raises(BadInput, match="examples"):
+        method.fit(walk.body, [], np.random.default_rng(0))
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+@pytest.mark.parametrize("yaw_deg", [0.0, 135.0])
+def test_a_take_that_was_learnt_comes_back_wherever_it_is_performed(
+    walk: Scene, method: LocalRegression, yaw_deg: float
+) -> None:
+    qpos = moved(walk.take.qpos, np.deg2rad(yaw_deg), (3.0, -2.0, 0.0))
+    exact = replace(method, beta=0.0)
+    estimates = walk.run(exact, exact_frames(walk.body, walk.calibration, qpos))
+    assert angle_error_deg(walk, np.array([e.qpos for e in estimates])).mean() < 0.2
+    assert walk.off_m(estimates, qpos).mean() < 0.002
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+def test_the_room_makes_no_difference(walk: Scene, method: LocalRegression) -> None:
+    here = walk.run(method)
+    qpos = moved(walk.take.qpos, 2.0, (3.0, -2.0, 0.0))
+    there = walk.run(method, exact_frames(walk.body, walk.calibration, qpos))
+    expected = moved(np.array([e.qpos for e in here]), 2.0, (3.0, -2.0, 0.0))
+    assert walk.off_m(there, expected).max() < 1e-3
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+@pytest.mark.parametrize("inputs", ["pos", "mixed"])
+def test_a_long_walk_on_part_of_the_readings_does_not_run_away(
+    walk: Scene, method: LocalRegression, inputs: str
+) -> None:
+    off_m = walk.off_m(walk.run(method, walk.only(inputs)), walk.take.qpos)
+    assert off_m[-20:].mean() < 0.05
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+def test_a_lost_station_degrades_and_its_return_mends(walk: Scene, method: LocalRegression) -> None:
+    anchor = walk.calibration.stations.index("torso")
+    frames = [without(f, [anchor]) if 30 <= k < 70 else f for k, f in enumerate(walk.frames)]
+    estimates = walk.run(method, frames)
+    off_m, plain_m = walk.off_m(estimates, walk.take.qpos), walk.off_m(walk.run(method), walk.take.qpos)
+    assert all(e.status is Status.SOLVED for e in estimates)
+    assert off_m.max() < 0.1
+    assert off_m[75:].mean() < 1.5 * plain_m[75:].mean() + 1e-3
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+def test_when_all_are_lost_it_says_so_and_goes_on_by_itself(walk: Scene, method: LocalRegression) -> None:
+    everyone = range(len(walk.calibration.stations))
+    frames = [without(f, list(everyone)) if 30 <= k < 70 else f for k, f in enumerate(walk.frames)]
+    estimates = walk.run(method, frames)
+    assert estimates[35].status is Status.HELD
+    assert estimates[60].status is Status.LOST
+    assert estimates[70].status is Status.SOLVED
+    assert walk.off_m(estimates, walk.take.qpos)[72:].max() < 0.02
+
+
+@pytest.mark.parametrize("method", METHODS, ids=IDS)
+def test_the_closed_form_meets_every_limb_tracker(walk: Scene, method: LocalRegression) -> None:
+    estimates = walk.run(replace(method, solve="limbs"))
+    position_m, _ = walk.residuals(estimates, walk.frames)
+    assert position_m[:, :5].max() < 0.01  # the head's is sixth, and not met
+
+
+def test_features_tell_what_trackers_read(walk: Scene) -> None:
+    database = MotionDatabase.build(walk.body, [walk.take])
+    examples = LocalExamples(walk.body, database, walk.calibration, Weights(), "flat")
+    row, rate_hz = 20, 40.0
+    first, second = (f.position_m for f in walk.frames[row - 1 : row + 1])
+    world = walk.calibration.world_from_tracker
+    position_m = rotations.rotate(world, second) + walk.calibration.tracker_origin_m
+    velocity = rotations.rotate(world, second - first) * rate_hz
+    station_from_bone = rotations.inverse(walk.calibration.bone_from_station)
+    turned = rotations.multiply(world, walk.frames[row].tracker_from_station)
+    turned = rotations.multiply(turned, station_from_bone)
+    anchor = examples.anchor
+    view = View(float(position_m[anchor, 0]), float(position_m[anchor, 1]), float(twist_rad(turned[anchor])))
+    query = examples.query(position_m, turned, velocity, view)
+    np.testing.assert_allclose(query, examples.features[row], atol=2e-5)
+    assert examples.nearest(query, np.ones(examples.size), 1).tolist() == [row]
+    pose = examples.poses(np.array([row]))[0]
+    np.testing.assert_allclose(stood(pose, view)[:3], walk.take.qpos[row, :3], atol=1e-5)
+
+
+def test_the_pelvis_is_the_first_choice_of_anchor() -> None:
+    assert anchor_of(["head", "thorax", "lhand", "lhipjoint"]) == 3
+    assert anchor_of(["lhand", "head", "thorax"]) == 2
+    assert anchor_of(["lhand", "rtibia"]) == 0
+
+
+def test_a_blend_weighs_by_closeness() -> None:
+    inputs = np.array([[1.0, 0.0], [0.0, 2.0]])
+    np.testing.assert_allclose(WeightedBlend(power=1.0).weigh(inputs, np.zeros(2), inputs), [2 / 3, 1 / 3])
+    np.testing.assert_allclose(WeightedBlend(power=2.0).weigh(inputs, np.zeros(2), inputs), [0.8, 0.2])
+    np.testing.assert_allclose(WeightedBlend().weigh(inputs, inputs[1], inputs), [0.0, 1.0], atol=1e-9)
+
+
+def test_neighbours_that_are_all_the_same_count_the_same(rng: np.random.Generator) -> None:
+    same = np.tile(rng.normal(size=4), (5, 1))
+    np.testing.assert_allclose(KernelCca().weigh(same, same[0], rng.normal(size=(5, 55))), 0.2)
+    np.testing.assert_allclose(KernelCca().weigh(rng.normal(size=(5, 4)), same[0], np.tile(same[:1], (5, 1))), 0.2)
