@@ -18,7 +18,8 @@ from harness.errors import BadInput
 from harness.reconstruct.controls import Controls
 from harness.reconstruct.coverage import LOST_AFTER_S
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.database.ground import POSTURE, ground_of, moved, posture_of
+from harness.reconstruct.database.ground import POSTURE
+from harness.reconstruct.footing import stepped, window
 from harness.reconstruct.gate import JUMP_M
 from harness.reconstruct.index import choose, nearest_known
 from harness.reconstruct.mean_pose import mean_posture
@@ -102,12 +103,15 @@ class LocalPcaSession(Remembering):
 
     def continued(self) -> Solution:
         options = self._options
-        ground, postures = ground_of(self.past[0]), posture_of(self.past)
-        rows = self._nearest(ground)
+        before = window(self.past)
+        rows = self._nearest(before)
         poses = self._windows.successors(rows).astype(float)
         space = Subspace.of(poses[:, :POSTURE], options.components, options.prior_weight)
-        space = space.smoothed(2.0 * postures[0] - postures[1], options.smooth_weight / options.smooth_sigma_rad**2)
-        here = moved(ground, poses[0, POSTURE:])
+        space = space.smoothed(
+            2.0 * before[:POSTURE].astype(float) - before[-POSTURE:],
+            options.smooth_weight / options.smooth_sigma_rad**2,
+        )
+        here = stepped(self.past[0], poses[0, POSTURE:])
         return solve(self.residuals, self.limits, space, here, space.nearest(poses[0, :POSTURE]), options.stopping)
 
     def bridged(self) -> Floats:
@@ -115,12 +119,12 @@ class LocalPcaSession(Remembering):
         held: Floats = self.past[0]
         return held
 
-    def _nearest(self, ground: Floats) -> Ints:
+    def _nearest(self, past: Singles) -> Ints:
         """Rows (K,) of the examples nearest to the readings and the past; what was not read follows the past."""
         residuals, controls, options = self.residuals, self._controls, self._options
         scale = np.float32(np.sqrt(options.control_weight))
         position_m, turned = residuals.target_m, residuals.world_from_target
-        past = self._windows.query(self.past)
+        ground = stepped(self.past[0], np.zeros(3))
         if residuals.measured.all():
             query = np.concatenate([past, scale * controls.query(position_m, turned, ground)])
             rows, _ = self._index.nearest(query, options.neighbours)

@@ -4,12 +4,16 @@ Unknown are the ground frame (x, y, yaw) and the weights w of q = p + U w, a pos
 alpha/2 (q - p)^T Lambda^-1 (q - p) plus beta/2 |q - 2 q' + q''|^2 (docs/methods.md C2), both quadratic in w.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import lapack
 
 from harness.core.arrays import Floats
-from harness.reconstruct.database.ground import HEIGHT, HINGES, TILT, standing
+from harness.reconstruct import descent
+from harness.reconstruct.database.ground import HEIGHT, HINGES, TILT
+from harness.reconstruct.footing import stood
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Residuals
 from harness.reconstruct.solver import Solution, Stopping
@@ -61,20 +65,24 @@ def solve(
 ) -> Solution:
     """Downhill from a ground frame (3,) and weights (B,). What leaves the hinges' limits is clipped at the end."""
     z = np.concatenate([ground, w])
-    hessian, own = np.empty((54, 54)), np.zeros((len(z), len(z)))
+    hessian, descending, own = np.zeros((54, 54)), np.empty(54), np.zeros((len(z), len(z)))
     own[3:, 3:] = space.curvature
-    qpos = posed(space, z)
-    cost, damping, converged, steps = residuals.place(qpos) + space.cost(z[3:]), _DAMPING, False, 0
+    qpos, slope = posed(space, z), empty_tangent(space)
+    cost, damping, converged, steps = residuals.place(qpos) + space.cost(w), _DAMPING, False, 0
     while not converged and steps < stopping.most_steps:
         steps += 1
-        slope = tangent(space, z)
-        gradient = residuals.normal_equations(hessian) @ slope
+        fill_tangent(space, z, slope)
+        descent.normal_equations(residuals.chain, residuals.placed, hessian, descending)  # the lower triangle
+        hessian.reshape(-1)[::55] *= 0.5
+        normal = slope.T @ (hessian @ slope)
+        normal += normal.T + own
+        gradient = descending @ slope
         gradient[3:] += space.pull - space.curvature @ z[3:]
-        normal = slope.T @ hessian @ slope + own
+        diagonal = normal.diagonal().copy()
         while True:
-            damped = normal + np.diag(damping * normal.diagonal() + _LEAST)
-            step = np.linalg.solve(damped, gradient)
-            longest = float(np.abs(step).max())
+            normal.reshape(-1)[:: len(z) + 1] = diagonal * (1.0 + damping) + _LEAST
+            _, step, _ = lapack.dposv(normal, gradient, lower=1)
+            longest = max(float(step.max()), -float(step.min()))
             moved = posed(space, z + step)
             new_cost = residuals.place(moved) + space.cost((z + step)[3:])
             if new_cost <= cost or longest < stopping.step:
@@ -90,28 +98,42 @@ def solve(
 
 def posed(space: Subspace, z: Floats) -> Floats:
     """The configuration (55,) of a ground frame and weights (3 + B,)."""
-    return standing(space.mean + space.axes @ z[3:], z[:3])
+    out: Floats = stood(space.mean + space.axes @ z[3:], z[:3])
+    return out
+
+
+def empty_tangent(space: Subspace) -> Floats:
+    """(54, 3 + B) what of `tangent` is the same everywhere."""
+    out = np.zeros((54, 3 + len(space.pull)))
+    out[0, 0] = out[1, 1] = 1.0
+    out[2, 3:], out[6:, 3:] = space.axes[HEIGHT], space.axes[HINGES]
+    return out
 
 
 def tangent(space: Subspace, z: Floats) -> Floats:
-    """(54, 3 + B) how the solver's directions follow the unknowns: J U but for the kinematics.
+    """(54, 3 + B) how the solver's directions follow the unknowns: J U but for the kinematics."""
+    out = empty_tangent(space)
+    fill_tangent(space, z, out)
+    return out
+
+
+def fill_tangent(space: Subspace, z: Floats, out: Floats) -> None:
+    """The rest of it.
 
     The root's turn is about_z(yaw) exp(tilt): in the root's own axes yaw turns about exp(-tilt) z, and tilt by its
     right Jacobian.
     """
-    out = np.zeros((54, len(z)))
-    out[0, 0] = out[1, 1] = 1.0
-    out[2, 3:], out[6:, 3:] = space.axes[HEIGHT], space.axes[HINGES]
     tilt = space.mean[TILT] + space.axes[TILT] @ z[3:]
-    angle_squared = float(tilt @ tilt)
-    angle = np.sqrt(angle_squared)
-    cross = np.array([[0.0, -tilt[2], tilt[1]], [tilt[2], 0.0, -tilt[0]], [-tilt[1], tilt[0], 0.0]])
-    twice = cross @ cross
+    x, y, up = tilt.tolist()
+    cross = np.array([[0.0, -up, y], [up, 0.0, -x], [-y, x, 0.0]])
+    twice, squared = cross @ cross, x * x + y * y + up * up
+    angle = math.sqrt(squared)
+    half, sine, rest = 0.5, 1.0, 1.0 / 6.0
     if angle > 1e-4:
-        half = (1.0 - np.cos(angle)) / angle_squared
-        sine, rest = np.sin(angle) / angle, (angle - np.sin(angle)) / (angle_squared * angle)
-    else:
-        half, sine, rest = 0.5, 1.0, 1.0 / 6.0
-    out[3:6, 2] = (np.eye(3) - sine * cross + half * twice)[:, 2]
-    out[3:6, 3:] = (np.eye(3) - half * cross + rest * twice) @ space.axes[TILT]
-    return out
+        half = (1.0 - math.cos(angle)) / squared
+        sine, rest = math.sin(angle) / angle, (angle - math.sin(angle)) / (squared * angle)
+    out[3:6, 2] = _UP - sine * cross[:, 2] + half * twice[:, 2]
+    out[3:6, 3:] = (_SAME - half * cross + rest * twice) @ space.axes[TILT]
+
+
+_UP, _SAME = np.array([0.0, 0.0, 1.0]), np.eye(3)

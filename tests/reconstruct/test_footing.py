@@ -1,0 +1,28 @@
+"""The compiled forms against those for many poses at once."""
+
+import numpy as np
+import pytest
+
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.ground import ground_of, moved, posture_of, standing
+from harness.reconstruct.footing import stepped, stood, window
+
+from .conftest import Scene
+from .conftest import moved as elsewhere
+
+
+@pytest.mark.parametrize("poses", [1, 2, 4])
+@pytest.mark.parametrize("yaw_rad", [0.0, 3.0, -2.0])
+def test_windows_are_those_of_the_database(boxing: Scene, poses: int, yaw_rad: float) -> None:
+    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(poses)
+    past = elsewhere(boxing.take.qpos, yaw_rad, (3.0, 1.0, 0.0))[20 + poses : 20 : -1].copy()
+    np.testing.assert_allclose(window(past), windows.query(past), atol=1e-6)
+
+
+@pytest.mark.parametrize("yaw_rad", [0.0, 3.0, -2.0])
+def test_standing_and_stepping(boxing: Scene, yaw_rad: float) -> None:
+    qpos = elsewhere(boxing.take.qpos, yaw_rad, (3.0, 1.0, 0.0))[30]
+    step = np.array([0.1, -0.2, 0.3])
+    np.testing.assert_allclose(stepped(qpos, step), moved(ground_of(qpos), step), atol=1e-12)
+    posture, ground = posture_of(qpos), ground_of(qpos)
+    np.testing.assert_allclose(stood(posture, ground), standing(posture, ground), atol=1e-12)
