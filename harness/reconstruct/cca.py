@@ -12,28 +12,12 @@ back by the same ridge, x^T H (H + kH I) x in place of x^T H^2 x: as it is writt
 from functools import lru_cache
 
 import numpy as np
-from scipy.linalg.lapack import dgesv, dposv, dpotrf, dsyevd
 
 from harness.core.arrays import Floats
+from harness.core.compiled import compiled
 
 _TINY = 1e-12
 """Added to eigenvalues from 0 to 1, so that outputs may lie in fewer dimensions."""
-
-
-def gaussian(squared: Floats, width: float) -> tuple[Floats, float]:
-    """The kernel exp(-d^2 / 2 s^2) of squared distances (m, m), and 1 / 2 s^2; s is `width` RMS distances of two."""
-    count = len(squared)
-    mean = float(squared.sum()) / max(count * (count - 1), 1)
-    sharpness = 0.5 / (width * width * mean) if mean > 0.0 else 0.0
-    return np.exp(squared * -sharpness), sharpness
-
-
-def squared_distances(points: Floats) -> Floats:
-    """(m, m) between points (m, n), given near their own middle."""
-    gram = points @ points.T
-    square = gram.diagonal()
-    out: Floats = np.maximum(square + square[:, None] - 2.0 * gram, 0.0)
-    return out
 
 
 def weights(inputs: Floats, outputs: Floats, query: Floats, *, bases: int, kappa: float, held: bool) -> Floats:
@@ -41,74 +25,114 @@ def weights(inputs: Floats, outputs: Floats, query: Floats, *, bases: int, kappa
 
     With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
     """
-    basis = _contrasts(len(query))
-    h = basis.T @ inputs
-    new: Floats = basis.T @ query - h.mean(axis=1)
-    solution = _Solution(h @ basis, basis.T @ outputs @ basis, bases, kappa)
-    out: Floats = basis @ solution.coefficients(new, held)
-    out += 1.0 / len(query)
-    return out
+    return _weights(inputs, outputs, query, contrasts(len(query)), bases, kappa, held)
 
 
 def correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
     """The largest canonical correlations (l,) of two Gram matrices (m, m), falling."""
-    basis = _contrasts(len(inputs))
-    squared = _Solution(basis.T @ inputs @ basis, basis.T @ outputs @ basis, bases, kappa).squared_correlation
+    basis = contrasts(len(inputs))
+    squared, _, _, _ = _solution(_centred(inputs, basis), _centred(outputs, basis), bases, kappa)
     out: Floats = np.sqrt(np.maximum(squared[::-1], 0.0))
     return out
 
 
-class _Solution:
+@compiled
+def regressed(
+    inputs: Floats, query: Floats, outputs: Floats, basis: Floats, width: float, bases: int, kappa: float, held: bool
+) -> Floats:
+    """`weights` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d); `basis` of `contrasts`.
+
+    Kernels are `width` root mean square distances of two examples wide. When inputs or outputs are all the same, they
+    count the same.
+    """
+    between, across = squared_distances(inputs), squared_distances(outputs)
+    count = len(query)
+    if between.sum() <= 0.0 or across.sum() <= 0.0:
+        return np.full(len(inputs), 1.0 / len(inputs))
+    sharpness = _sharpness(between, width)
+    near = np.empty(len(inputs))
+    for i in range(len(inputs)):
+        far = 0.0
+        for k in range(count):
+            far += (inputs[i, k] - query[k]) ** 2
+        near[i] = np.exp(-sharpness * far)
+    kernel_x, kernel_y = np.exp(between * -sharpness), np.exp(across * -_sharpness(across, width))
+    return _weights(kernel_x, kernel_y, near, basis, bases, kappa, held)
+
+
+@compiled
+def squared_distances(points: Floats) -> Floats:
+    """(m, m) between points (m, n)."""
+    count, size = points.shape
+    out = np.zeros((count, count))
+    for i in range(count):
+        for j in range(i):
+            far = 0.0
+            for k in range(size):
+                far += (points[i, k] - points[j, k]) ** 2
+            out[i, j] = out[j, i] = far
+    return out
+
+
+@compiled
+def _sharpness(squared: Floats, width: float) -> float:
+    """1 / 2 s^2 of a Gaussian exp(-d^2 / 2 s^2) that is `width` RMS distances wide, from squared distances (m, m)."""
+    count = len(squared)
+    return float(0.5 * count * (count - 1) / (width * width * squared.sum()))
+
+
+@compiled
+def _weights(
+    inputs: Floats, outputs: Floats, query: Floats, basis: Floats, bases: int, kappa: float, held: bool
+) -> Floats:
+    _, x, y, duals = _solution(_centred(inputs, basis), _centred(outputs, basis), bases, kappa)
+    across = np.ascontiguousarray(basis.T)
+    new = across @ (query - inputs.sum(axis=1) / len(query))
+    x_across, y_across = np.ascontiguousarray(x.T), np.ascontiguousarray(y.T)
+    square = x_across @ x
+    if held:
+        square += _ridge(_centred(inputs, basis), kappa) * (np.ascontiguousarray(duals.T) @ x)
+    reduced = np.linalg.solve(square, np.ascontiguousarray(duals.T) @ new)
+    reduced = (y_across @ x) @ reduced  # eq. 4
+    reduced = np.linalg.solve(y_across @ y, reduced)  # eq. 5
+    return basis @ (y @ reduced) + 1.0 / len(query)
+
+
+@compiled
+def _solution(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tuple[Floats, Floats, Floats, Floats]:
     """The l best pairs of bases of centred Gram matrices of n = m - 1 dimensions.
 
     With R = H (H + kH I)^-1 and the Cholesky factor L of F (F + kF I)^-1, the matrix L^T R L is symmetric, and its
-    eigenvectors w give  F y = L w  and, up to length,  x = (H + kH I)^-1 L w.
+    eigenvectors w give  F y = L w  and, up to length,  x = (H + kH I)^-1 L w. Returned are squared correlations (l,),
+    rising, then H x, F y and x (n, l): the examples' reduced inputs and outputs, and the bases of the inputs.
     """
-
-    def __init__(self, inputs: Floats, outputs: Floats, bases: int, kappa: float) -> None:
-        identity = np.eye(len(inputs))
-        inverse, kept_x, ridge = _regularised(inputs, kappa, identity)
-        _, kept_y, _ = _regularised(outputs, kappa, identity)
-        lower, _ = dpotrf(kept_y + _TINY * identity, lower=1, clean=1)
-        squared, vectors, _ = dsyevd(lower.T @ kept_x @ lower, lower=1)
-        kept = min(bases, len(squared))
-        self.squared_correlation: Floats = squared[-kept:]
-        self._y = lower @ vectors[:, -kept:]  # F y: the reduced outputs of the examples
-        self._x = kept_x @ self._y  # H x: their reduced inputs
-        self._bases = inverse @ self._y  # x itself
-        self._ridge = ridge
-
-    def coefficients(self, new: Floats, held: bool) -> Floats:
-        """(n,) of the centred outputs, for a centred kernel vector (n,)."""
-        x, y, bases = self._x, self._y, self._bases
-        square = x.T @ x
-        if held:
-            square += self._ridge * (bases.T @ x)
-        reduced_y = (y.T @ x) @ _lu(square, bases.T @ new)  # eq. 4
-        out: Floats = y @ _lu(y.T @ y, reduced_y)  # eq. 5
-        return out
-
-
-def _regularised(gram: Floats, kappa: float, identity: Floats) -> tuple[Floats, Floats, float]:
-    """(G + k I)^-1, G (G + k I)^-1 and k."""
-    ridge = kappa * float(gram.trace()) / len(gram)
-    _, inverse, failed = dposv(gram + ridge * identity, identity, lower=1)
-    if failed:
+    identity = np.eye(len(inputs))
+    ridge_x, ridge_y = _ridge(inputs, kappa), _ridge(outputs, kappa)
+    if ridge_x <= 0.0 or ridge_y <= 0.0:
         raise ArithmeticError("a Gram matrix is not positive definite: are all examples the same?")
-    return inverse, identity - ridge * inverse, ridge
+    inverse = np.linalg.inv(inputs + ridge_x * identity)
+    kept_x = identity - ridge_x * inverse
+    kept_y = identity - ridge_y * np.linalg.inv(outputs + ridge_y * identity)
+    lower = np.linalg.cholesky(0.5 * (kept_y + kept_y.T) + _TINY * identity)
+    squared, vectors = np.linalg.eigh(np.ascontiguousarray(lower.T) @ (kept_x @ lower))
+    first = max(len(squared) - bases, 0)
+    y = lower @ np.ascontiguousarray(vectors[:, first:])
+    return squared[first:], kept_x @ y, y, inverse @ y
 
 
-def _lu(matrix: Floats, right: Floats) -> Floats:
-    """The solution (l,) of a system (l, l)."""
-    _, _, out, failed = dgesv(matrix, right)
-    if failed:
-        raise ArithmeticError("fewer independent examples than bases")
-    solution: Floats = out
-    return solution
+@compiled
+def _ridge(gram: Floats, kappa: float) -> float:
+    return float(kappa * np.trace(gram) / len(gram))
+
+
+@compiled
+def _centred(gram: Floats, basis: Floats) -> Floats:
+    """(n, n) Gram matrix (m, m) about the mean of its m vectors."""
+    return np.ascontiguousarray(basis.T) @ (gram @ basis)
 
 
 @lru_cache(maxsize=64)
-def _contrasts(count: int) -> Floats:
+def contrasts(count: int) -> Floats:
     """(m, m - 1) orthonormal columns that sum to 0 (Helmert's)."""
     rank = np.arange(1, count)
     upper = np.triu(np.ones((count, count - 1)))

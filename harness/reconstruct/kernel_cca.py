@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from harness.core.arrays import Floats
 from harness.reconstruct import cca
 from harness.reconstruct.local_regression import LocalRegression
@@ -26,12 +24,5 @@ class KernelCca(LocalRegression):
     """sigma of the kernels, in root mean square distances of two examples."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        middle = inputs.mean(axis=0)
-        x = inputs - middle
-        away = x - (query - middle)
-        kernel_x, sharpness = cca.gaussian(cca.squared_distances(x), self.width)
-        kernel_y, sharpness_y = cca.gaussian(cca.squared_distances(outputs - outputs.mean(axis=0)), self.width)
-        if sharpness == 0.0 or sharpness_y == 0.0:  # all of them are the same
-            return np.full(len(x), 1.0 / len(x))
-        near = np.exp(-sharpness * np.vecdot(away, away))
-        return cca.weights(kernel_x, kernel_y, near, bases=self.bases, kappa=self.kappa, held=self.held)
+        basis = cca.contrasts(len(inputs))
+        return cca.regressed(inputs, query, outputs, basis, self.width, self.bases, self.kappa, self.held)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.linalg
+import scipy.spatial
 
 from harness.core.arrays import Floats
 from harness.reconstruct import cca
@@ -17,10 +18,12 @@ def planted(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
     return x, y, 0.5 * rng.normal(size=7)
 
 
-def grams(x: Floats, y: Floats, new: Floats) -> tuple[Floats, Floats, Floats]:
-    kernel_x, sharpness = cca.gaussian(cca.squared_distances(x), 0.7)
-    kernel_y, _ = cca.gaussian(cca.squared_distances(y), 0.7)
-    return kernel_x, kernel_y, np.exp(-sharpness * np.sum((x - new) ** 2, axis=1))
+def grams(x: Floats, y: Floats, new: Floats, width: float = 0.7) -> tuple[Floats, Floats, Floats]:
+    """Gaussian kernels of both sides, as docs/methods.md E says, and the query's."""
+    sharpness = [0.5 / (width**2 * scipy.spatial.distance.pdist(side, "sqeuclidean").mean()) for side in (x, y)]
+    far = [np.sum((side[:, None] - side) ** 2, axis=2) for side in (x, y)]
+    kernels = [np.exp(-sharp * squared) for sharp, squared in zip(sharpness, far, strict=True)]
+    return kernels[0], kernels[1], np.exp(-sharpness[0] * np.sum((x - new) ** 2, axis=1))
 
 
 def as_written(h: Floats, f: Floats, k: Floats, y: Floats, bases: int, held: bool) -> tuple[Floats, Floats]:
@@ -89,3 +92,11 @@ def test_distances_are_pairwise(rng: np.random.Generator) -> None:
     x = rng.normal(size=(5, 3))
     expected = np.sum((x[:, None] - x) ** 2, axis=2)
     np.testing.assert_allclose(cca.squared_distances(x), expected, atol=1e-12)
+
+
+def test_the_whole_regression_is_that_of_its_kernels(rng: np.random.Generator) -> None:
+    x, y, new = planted(rng)
+    h, f, k = grams(x, y, new)
+    expected = cca.weights(h, f, k, bases=6, kappa=KAPPA, held=True)
+    found = cca.regressed(x, new, y, cca.contrasts(PAIRS), 0.7, 6, KAPPA, True)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
