@@ -5,13 +5,13 @@ Columns: for each of S stations its place (3) [m], then two axes of its bone tim
 
 import numpy as np
 
-from harness.body import kinematics
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import Windows
+from harness.reconstruct.examples import Worn
 
 _CHUNK = 2048
 """Frames whose kinematics are worked out at a time."""
@@ -26,13 +26,11 @@ class Controls:
         self._no_turn = np.tile(rotations.IDENTITY, (len(self._bones), 1))
         self.values: Singles = np.empty((len(followed), 9 * len(self._bones)), np.float32)
         """(W, 9 S)"""
-        database = followed.database
+        database, trackers = followed.database, Worn(body, worn)
         for start in range(0, len(followed), _CHUNK):
             after = followed.frames[start : start + _CHUNK] + 1
             qpos = database.qpos(after, database.step[after].astype(float))
-            start_m, turned = kinematics.bone_poses(body.skeleton, qpos)
-            turned = turned[:, self._bones]
-            at_m = start_m[:, self._bones] + rotations.rotate(turned, worn.mount_m)
+            at_m, turned = trackers.at(qpos)
             axes = lever_m * rotations.to_matrix(turned)[..., :2]
             columns = np.concatenate([at_m, axes.reshape(*at_m.shape[:2], 6)], axis=2)
             self.values[start : start + _CHUNK] = columns.reshape(len(after), -1)

@@ -114,8 +114,8 @@ def unplaced(chain: Chain) -> Placed:
 
 
 @compiled
-def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> float:
-    """Forward kinematics of a configuration, errors and weights; the data cost."""
+def stand(chain: Chain, placed: Placed, qpos: Floats) -> None:
+    """Forward kinematics of a configuration (V + 1,)."""
     at_m, turned, axis = placed.at_m, placed.turned, placed.axis
     at_m[0] = qpos[:3]
     length = np.sqrt(qpos[3] ** 2 + qpos[4] ** 2 + qpos[5] ** 2 + qpos[6] ** 2)
@@ -135,14 +135,30 @@ def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> flo
             axis[hinge] = _rotated(turned[body], own[0], own[1], own[2])
             sine = np.sin(half)
             turned[body] = _times(turned[body], np.cos(half), sine * own[0], sine * own[1], sine * own[2])
-
-    count, cost = len(chain.station_body), 0.0
-    for s in range(count):
+    for s in range(len(chain.station_body)):
         body, mount = chain.station_body[s], chain.mount_m[s]
         x, y, z = _rotated(turned[body], mount[0], mount[1], mount[2])
         placed.station_m[s] = at_m[body, 0] + x, at_m[body, 1] + y, at_m[body, 2] + z
+
+
+@compiled
+def stand_each(chain: Chain, placed: Placed, qpos: Floats, station_m: Floats, turned: Floats) -> None:
+    """The same of many (T, V + 1): their stations (T, S, 3) and the orientations of the bones under them (T, S, 4)."""
+    for t in range(len(qpos)):
+        stand(chain, placed, qpos[t])
+        station_m[t] = placed.station_m
+        for s in range(len(chain.station_body)):
+            turned[t, s] = placed.turned[chain.station_body[s]]
+
+
+@compiled
+def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> float:
+    """Stands the body, then errors and weights; the data cost."""
+    stand(chain, placed, qpos)
+    count, cost = len(chain.station_body), 0.0
+    for s in range(count):
         placed.error[s] = readings.target_m[s] - placed.station_m[s]
-        q = turned[body]
+        q = placed.turned[chain.station_body[s]]
         placed.error[count + s] = _rotation_vector(*_times(readings.world_from_target[s], q[0], -q[1], -q[2], -q[3]))
     for row in range(2 * count):
         error, precision, scale = placed.error[row], readings.precision[row], readings.twice_scale_squared[row]

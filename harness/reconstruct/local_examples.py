@@ -9,13 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body import kinematics
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import seen_from
+from harness.reconstruct.examples import Worn
 from harness.reconstruct.index import choose
 from harness.reconstruct.index.masked import nearest_known
 from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
@@ -45,8 +45,7 @@ class LocalExamples:
         self.features: Singles = np.empty((len(database), 10 * self.count), np.float32)
         self.root: Singles = np.empty((len(database), 3), np.float32)
         """(N, 3) the root's ground frame as seen from the anchor: forward, left [m], turn [rad]."""
-        self._body, self._database, self._worn = body, database, worn
-        self._bones = [body.skeleton.index(bone) for bone in worn.bones]
+        self._database, self._trackers = database, Worn(body, worn)
         for run in database.runs:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
@@ -112,9 +111,7 @@ class LocalExamples:
         """Rows from start to stop; `first` is the frame before, or start where a run begins."""
         count, rows = self.count, slice(first, stop)
         begins = first == start
-        start_m, turned = kinematics.bone_poses(self._body.skeleton, self._database.qpos(rows, np.zeros(3)))
-        turned = turned[:, self._bones]
-        at_m = start_m[:, self._bones] + rotations.rotate(turned, self._worn.mount_m)
+        at_m, turned = self._trackers.at(self._database.qpos(rows, np.zeros(3)))
         # where the stations were a frame before, seen from the ground frame of this one
         back = seen_from(self._database.step[rows].astype(float)[1:], np.zeros(3))[:, None]
         before = rotations.rotate(rotations.about_z(back[..., 2]), at_m[:-1])
