@@ -131,7 +131,9 @@ def turned(frame: TrackerFrame, angle_rad: float) -> TrackerFrame:
 
 
 def _one_off(frame: TrackerFrame) -> TrackerFrame:
-    return moved(frame, 0.3 * np.eye(len(frame.quality), 3))
+    offset_m = np.zeros((len(frame.quality), 3))
+    offset_m[0, 0] = 0.3
+    return moved(frame, offset_m)
 
 
 DISTURBANCES: dict[str, tuple[range, Callable[[TrackerFrame], TrackerFrame]]] = {
