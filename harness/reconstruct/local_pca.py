@@ -21,7 +21,7 @@ from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.footing import stepped, window
 from harness.reconstruct.gate import JUMP_M
-from harness.reconstruct.index import choose, nearest_known
+from harness.reconstruct.index import Index, Vectors, choose, nearest_known
 from harness.reconstruct.mean_pose import mean_posture
 from harness.reconstruct.pursuit import LEANING_RAD, Leaning, Manner
 from harness.reconstruct.remembering import Remembering
@@ -84,8 +84,22 @@ class FittedLocalPca:
     mean_qpos: Floats
     """(55,) for starts without a past."""
 
+    worn: "dict[bytes, tuple[Controls, Vectors, Index]]" = field(default_factory=dict, repr=False)
+    """What the last calibration has the trackers read, and the search in it: sessions of one performer share it."""
+
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
         return LocalPcaSession(self, calibration)
+
+    def seen_through(self, calibration: Calibration) -> "tuple[Controls, Vectors, Index]":
+        """What trackers worn so would have read after every window; both together, and an index of them."""
+        key = repr(calibration.bones).encode() + calibration.mount_m.tobytes()
+        if key not in self.worn:
+            options = self.options
+            controls = Controls(self.body, self.windows, calibration, options.lever_m)
+            examples = _Examples(self.windows, controls.values, np.sqrt(options.control_weight))
+            self.worn.clear()
+            self.worn[key] = controls, examples, choose(options.index, examples)
+        return self.worn[key]
 
 
 class LocalPcaSession(Remembering):
@@ -97,9 +111,7 @@ class LocalPcaSession(Remembering):
         leaning = Leaning(fitted.mean_qpos, np.full(48, LEANING_RAD))
         super().__init__(fitted.body, calibration, manner, leaning, _PAST, windows.database.rate_hz)
         self._options, self._windows = options, windows
-        self._controls = Controls(fitted.body, windows, calibration, options.lever_m)
-        self._examples = _Examples(windows, self._controls.values, np.sqrt(options.control_weight))
-        self._index = choose(options.index, self._examples)
+        self._controls, self._examples, self._index = fitted.seen_through(calibration)
 
     def continued(self) -> Solution:
         options = self._options

@@ -20,7 +20,7 @@ from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import Coverage
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.gate import Gate
+from harness.reconstruct.gate import JUMP_M, Gate
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.limbs import Limbs
 from harness.reconstruct.local_examples import LocalExamples, Weights
@@ -35,8 +35,8 @@ from harness.stream.frame import TrackerFrame
 
 _LEAST_SPREAD_RAD = math.radians(1.0)
 """A hinge that rests in all examples may still give way a little."""
-_JUMP_M = 0.3
-"""As for the best match: a learnt pose is never as near as a fitted one."""
+_BARE_JUMP_M = 0.3
+"""The gate without inverse kinematics, as for the best match: a learnt pose is never as near as a fitted one."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ class LocalRegression:
     """What neighbours are sought in (`index.choose`)."""
     longest_gap_s: float = 0.2
     """A velocity is taken between readings, or examples, no farther apart [s]."""
+    jump_m: float = JUMP_M
+    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
     alpha: float = 0.3
     beta: float = 0.4
     """Of eq. 6; beta = 0 blends nothing."""
@@ -98,9 +100,22 @@ class FittedLocal:
     database: MotionDatabase
     hinge_sigma_rad: Floats
     """(48,)"""
+    worn: dict[bytes, LocalExamples] = field(default_factory=dict, repr=False)
+    """The examples as the last calibration has the trackers worn: sessions of one performer share them."""
 
     def begin(self, calibration: Calibration) -> "LocalSession":
         return LocalSession(self, calibration)
+
+    def seen_through(self, calibration: Calibration) -> LocalExamples:
+        """What trackers worn so would have read in the examples."""
+        key = repr(calibration.bones).encode() + calibration.mount_m.tobytes()
+        if key not in self.worn:
+            options, weights = self.options, self.options.weights
+            if self.database.rate_hz * options.longest_gap_s < 1.0:
+                weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
+            self.worn.clear()
+            self.worn[key] = LocalExamples(self.body, self.database, calibration, weights, options.index)
+        return self.worn[key]
 
 
 class LocalSession:
@@ -109,11 +124,9 @@ class LocalSession:
     def __init__(self, fitted: FittedLocal, calibration: Calibration) -> None:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), _JUMP_M)
-        weights = options.weights
-        if fitted.database.rate_hz * options.longest_gap_s < 1.0:
-            weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
-        self._examples = LocalExamples(fitted.body, fitted.database, calibration, weights, options.index)
+        jump_m = options.jump_m if options.final_ik else max(options.jump_m, _BARE_JUMP_M)
+        self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), jump_m)
+        self._examples = fitted.seen_through(calibration)
         self._outlook = Outlook(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
         self._solver = Solver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
