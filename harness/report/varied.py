@@ -70,8 +70,10 @@ def _table(run: Run, behaviour: str, metric: str) -> Markup:
     for name in run.series:
         if name in found:
             each = [found[name].get(column) for column in columns]
-            rows.append([name, *(statistics(row and row["metrics"][metric], unit) for row in each)])
-    caption = joined(tag("b", f"{behaviour.replace('_', ' ')}, {metric} [{unit}]"), ": mean ± sd over clips.")
+            n = max(row["metrics"][metric]["sequences"] for row in each if row)
+            title = joined(name, tag("span", f" n {n}", class_="spread"))
+            rows.append([title, *(statistics(row and row["metrics"][metric], unit, n=n) for row in each)])
+    caption = joined(tag("b", f"{behaviour.replace('_', ' ')}, {metric} [{unit}]"), ": mean ± sd over n clips.")
     return table(caption, ["method", *columns], rows, label=f"{metric} against the varied values")
 
 

@@ -177,7 +177,7 @@ def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
     varied = ({"noise": "clean"}, {"noise": "default"})
     out = fabricate(tmp_path / "run", Plan(behaviours=("boxing",), methods={"ik": 1.0}, duration_s=3.0, varied=varied))
     said = text_of(write_report(out, rendered=False))
-    assert "method noise=clean noise=default ik " in said
+    assert "method noise=clean noise=default ik n 1 " in said
     assert not list((out / "plots").glob("varied*"))
 
 
