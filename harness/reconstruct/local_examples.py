@@ -17,6 +17,7 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import seen_from
 from harness.reconstruct.examples import Worn
 from harness.reconstruct.index import choose
+from harness.reconstruct.index.choose import AUTO, FEW
 from harness.reconstruct.index.masked import nearest_known
 from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
 
@@ -55,7 +56,7 @@ class LocalExamples:
         for start in range(0, len(database), _CHUNK):
             near = self._quaternions(slice(start, start + _CHUNK))
             near *= np.copysign(1.0, np.vecdot(near, first))[..., None]
-        self._index = choose(index, self)
+        self._index = choose(_quickest(len(database)) if index == AUTO else index, self)
 
     def query(self, position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View) -> Floats:
         """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3) in the world."""
@@ -130,3 +131,8 @@ class LocalExamples:
         out[:, 7 * count :] = rotations.rotate(level, velocity).reshape(len(out), -1)
         out *= self.scale
         self.root[start:stop] = seen_from(anchor, np.zeros(3))
+
+
+def _quickest(count: int) -> str:
+    """Never the kd-tree of the paper, which in 10 S dimensions looks at most vectors when none is near."""
+    return "flat" if count <= FEW else "inverted_file"
