@@ -34,6 +34,7 @@ class Controls:
             axes = lever_m * rotations.to_matrix(turned)[..., :2]
             columns = np.concatenate([at_m, axes.reshape(*at_m.shape[:2], 6)], axis=2)
             self.values[start : start + _CHUNK] = columns.reshape(len(after), -1)
+        database.let_go()
 
     def query(self, position_m: Floats, turned: Floats, ground: Floats) -> Singles:
         """(9 S,) of positions (S, 3) and bone orientations (S, 4) in the world, from a ground frame (3,)."""

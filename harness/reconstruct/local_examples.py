@@ -56,6 +56,7 @@ class LocalExamples:
         for start in range(0, len(database), _CHUNK):
             near = self._quaternions(slice(start, start + _CHUNK))
             near *= np.copysign(1.0, np.vecdot(near, first))[..., None]
+        database.let_go()
         self._index = choose(_quickest(len(database)) if index == AUTO else index, self)
 
     def query(self, position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View) -> Floats:

@@ -51,6 +51,7 @@ def _angles(limits: HingeLimits, examples: Sequence[Take] | MotionDatabase) -> I
     if isinstance(examples, MotionDatabase):
         for run in examples.runs:
             yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
+        examples.let_go()
     else:
         for take in examples:
             yield limits.principal(take.qpos[:, 7:])

@@ -6,6 +6,7 @@ Hinge angles run on through each take, in the representation that most of its fr
 (`HingeLimits.course`); so takes agree with each other and with what a solver within those limits answers.
 """
 
+import mmap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -120,6 +121,13 @@ class MotionDatabase:
         """Where a frame comes from."""
         starts: Sequence[int] = [run.start for run in self.runs]
         return self.runs[int(np.searchsorted(starts, row, side="right")) - 1]
+
+    def let_go(self) -> None:
+        """Give back the memory into which a map was read so far; what is asked for again is read again."""
+        for array in (self.posture, self.step):
+            mapped = getattr(array, "_mmap", None)
+            if mapped is not None and hasattr(mmap, "MADV_DONTNEED"):
+                mapped.madvise(mmap.MADV_DONTNEED)
 
     def save(self, folder: Path) -> None:
         """Write it to a folder that does not exist yet; BadFile when it does. Whole or not at all."""

@@ -118,3 +118,11 @@ def test_arrays_of_other_kinds_are_refused(saved: Path) -> None:
     np.save(saved / "step.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
     with pytest.raises(BadFile, match="damaged"):
         MotionDatabase.open(saved)
+
+
+def test_what_was_let_go_is_read_again(saved: Path) -> None:
+    mapped = MotionDatabase.open(saved)
+    before = np.array(mapped.posture), np.array(mapped.step)
+    mapped.let_go()
+    np.testing.assert_array_equal(mapped.posture, before[0])
+    np.testing.assert_array_equal(mapped.step, before[1])
