@@ -29,6 +29,8 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Session
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import POSTURE
+from harness.reconstruct.dynamic_map import DynamicMap
+from harness.reconstruct.local_pca import LocalPca
 from harness.setting import mounts_of
 from harness.stream.frame import TrackerFrame
 
@@ -135,11 +137,13 @@ def slower_row(name: str, small: Alone, large: Alone, frames: int, frames_many: 
 
 
 def query_numbers(method: Method) -> int:
-    """Numbers in the vector by which a method finds examples: m poses, or what the stations read (eq. 2)."""
-    poses = getattr(method, "poses", None)
-    if poses is not None:
-        return (POSTURE + 3) * int(poses) - 3
-    return 10 * len(load_scenario(trials.SETTING).stations)
+    """Numbers in the vector by which a method finds examples: poses, what the stations read, or both."""
+    stations = len(load_scenario(trials.SETTING).stations)
+    if isinstance(method, LocalPca):
+        return (POSTURE + 3) * 2 - 3 + 9 * stations
+    if isinstance(method, DynamicMap):
+        return (POSTURE + 3) * method.poses - 3
+    return 10 * stations  # eq. 2 of Kim et al. 2012
 
 
 def config_hash(method: Method) -> str:
