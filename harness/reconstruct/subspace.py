@@ -42,7 +42,7 @@ class Subspace:
         mean = postures.mean(axis=0)
         away = postures - mean
         values, axes = np.linalg.eigh(away.T @ away / len(away))
-        values, axes = values[::-1][:components], axes[:, ::-1][:, :components]
+        values, axes = values[-components:], np.ascontiguousarray(axes[:, -components:])
         curvature = np.diag(weight / np.maximum(values, 1e-9))
         return cls(mean, axes, curvature, np.zeros(len(values)))
 
