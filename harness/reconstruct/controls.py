@@ -12,6 +12,7 @@ from harness.core.arrays import Bools, Floats, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import Windows
 from harness.reconstruct.examples import Worn
+from harness.reconstruct.footing import readings
 
 _CHUNK = 2048
 """Frames whose kinematics are worked out at a time."""
@@ -38,12 +39,8 @@ class Controls:
 
     def query(self, position_m: Floats, turned: Floats, ground: Floats) -> Singles:
         """(9 S,) of positions (S, 3) and bone orientations (S, 4) in the world, from a ground frame (3,)."""
-        cosine, sine = np.cos(ground[2]), np.sin(ground[2])
-        view = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-        out = np.empty((len(position_m), 9), np.float32)
-        out[:, :3] = (position_m - [ground[0], ground[1], 0.0]) @ view.T
-        out[:, 3:] = (self._lever_m * view @ rotations.to_matrix(turned)[..., :2]).reshape(-1, 6)
-        return out.reshape(-1)
+        out: Singles = readings(position_m, turned, ground, self._lever_m)
+        return out
 
     def columns(self, measured: Bools) -> Singles:
         """(9 S,) 1 where rows (2S,) of a frame were measured, else 0."""

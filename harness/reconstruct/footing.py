@@ -62,3 +62,27 @@ def stepped(qpos: Floats, step: Floats) -> Floats:
             yaw + step[2],
         ]
     )
+
+
+@compiled
+def readings(position_m: Floats, turned: Floats, ground: Floats, lever_m: float) -> Singles:
+    """(9 S,) the columns of `controls` for positions (S, 3) and orientations (S, 4), from a ground frame (3,)."""
+    cosine, sine = np.cos(ground[2]), np.sin(ground[2])
+    out = np.empty((len(position_m), 9), np.float32)
+    for k in range(len(position_m)):
+        x, y = position_m[k, 0] - ground[0], position_m[k, 1] - ground[1]
+        out[k, 0], out[k, 1] = cosine * x + sine * y, cosine * y - sine * x
+        out[k, 2] = position_m[k, 2]
+        a, b, c, d = turned[k, 0], turned[k, 1], turned[k, 2], turned[k, 3]
+        forward = 1.0 - 2.0 * (c * c + d * d), 2.0 * (b * c + a * d), 2.0 * (b * d - a * c)
+        left = 2.0 * (b * c - a * d), 1.0 - 2.0 * (b * b + d * d), 2.0 * (c * d + a * b)
+        out[k, 3], out[k, 4] = (
+            lever_m * (cosine * forward[0] + sine * forward[1]),
+            lever_m * (cosine * left[0] + sine * left[1]),
+        )
+        out[k, 5], out[k, 6] = (
+            lever_m * (cosine * forward[1] - sine * forward[0]),
+            lever_m * (cosine * left[1] - sine * left[0]),
+        )
+        out[k, 7], out[k, 8] = lever_m * forward[2], lever_m * left[2]
+    return out.reshape(-1)

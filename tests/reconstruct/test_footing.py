@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from harness.body.kinematics import Kinematics
+from harness.reconstruct.controls import Controls
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import ground_of, moved, posture_of, standing
 from harness.reconstruct.footing import stepped, stood, window
@@ -26,3 +28,14 @@ def test_standing_and_stepping(boxing: Scene, yaw_rad: float) -> None:
     np.testing.assert_allclose(stepped(qpos, step), moved(ground_of(qpos), step), atol=1e-12)
     posture, ground = posture_of(qpos), ground_of(qpos)
     np.testing.assert_allclose(stood(posture, ground), standing(posture, ground), atol=1e-12)
+
+
+def test_readings_of_an_example_are_its_controls(boxing: Scene) -> None:
+    """What exact trackers read after a window is what the database says that they would have read."""
+    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, followed=True)
+    controls = Controls(boxing.body, windows, boxing.calibration, 0.3)
+    qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))
+    for row in (0, 40):
+        before = int(windows.frames[row])
+        placed = controls.worn_at(Kinematics(boxing.body), qpos[before + 1])
+        np.testing.assert_allclose(controls.query(*placed, ground_of(qpos[before])), controls.values[row], atol=1e-5)
