@@ -57,7 +57,7 @@ def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[Row]:
     for size in sizes:
         takes = (built_in(which, seed) for which in range(-(-size // round(TAKE_S * RATE_HZ))))
         database = MotionDatabase.build(body, takes)
-        for search in (_poses(database, held_out), _readings(body, database, held_out)):
+        for search in (poses(database, held_out), readings(body, database, held_out)):
             rows += _compared(search)
     return rows
 
@@ -72,7 +72,8 @@ def built_in(which: int, seed: int) -> Take:
     return Take(f"{clip.name}_{seed + again}", clip.subject, clip.source, clip.behaviour, RATE_HZ, qpos)
 
 
-def _poses(database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+def poses(database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+    """The last answers, as windows."""
     windows = database.windows(POSES, followed=True)
     queries = [
         np.array([windows.query(take.qpos[k : k - POSES : -1]) for k in range(POSES, POSES + TURN * TURNS)])
@@ -81,7 +82,8 @@ def _poses(database: MotionDatabase, held_out: Sequence[Take]) -> Search:
     return Search(f"{POSES} poses", windows, queries, EXAMPLES, windows.follows)
 
 
-def _readings(body: humanoid.Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+def readings(body: humanoid.Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+    """What six stations read."""
     worn = _worn(body)
     examples, queries = LocalExamples(body, database, worn, Weights(), "flat"), []
     for take in held_out:

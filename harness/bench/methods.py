@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.bench import trials
+from harness.bench import index, trials
 from harness.bench.alone import NOTHING, Alone, run_alone
 from harness.bench.rows import Row
 from harness.bench.trials import Progress, Trial
@@ -24,12 +24,15 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.seeds import generator
+from harness.mocap import performer
 from harness.progress import ProgressBar
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Session
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.dynamic_map import DynamicMap
+from harness.reconstruct.index import Flat, choose
+from harness.reconstruct.index.choose import AUTO
 from harness.reconstruct.local_pca import LocalPca
 from harness.setting import mounts_of
 from harness.stream.frame import TrackerFrame
@@ -62,7 +65,7 @@ class Tally:
 def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
     """Rows of each method; with `large`, also beside a database of a million frames."""
     many: dict[str, Alone] = {}
-    frames_many = 0
+    frames_many, recalls = 0, list[Row]()
     with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
         small, vast = Path(folder) / "small", Path(folder) / "large"
         with ProgressBar("takes") as bar:
@@ -76,6 +79,7 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
                 frames_many = len(trials.database(vast, LARGE, seed, WORKERS, bar))
             with ProgressBar("methods") as bar:
                 many = _each_alone(vast, seed, bar)
+            recalls = recall_rows(MotionDatabase.open(vast), seed)
         rows = []
         for name in (*HELD_TO, *BESIDE):
             memory: list[Row] = []
@@ -85,7 +89,7 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
                 memory.append(slower_row(name, alone[name], many[name], len(learnt), frames_many))
                 memory.append(memory_row(name, nothing, many[name], frames_many))
             rows += [*rows_of(name, tallies, memory), *memory]
-    return rows
+    return [*rows, *recalls]
 
 
 def _each_alone(folder: Path, seed: int, progress: Progress) -> dict[str, Alone]:
@@ -134,6 +138,20 @@ def slower_row(name: str, small: Alone, large: Alone, frames: int, frames_many: 
     """What a larger database costs."""
     text = f"{large.step_ms:.3f} against {small.step_ms:.3f} ms a step, {frames_many:,} against {frames:,} frames"
     return Row(f"{name}, larger / smaller database", large.step_ms / small.step_ms, "x", text, f"<= {RATIO_LARGE:g}")
+
+
+def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
+    """The share of the true neighbours that the index finds which methods choose, for every so manyth query."""
+    held_out = [index.built_in(which, seed + trials.HELD_OUT) for which in range(len(performer.BEHAVIOURS))]
+    rows = []
+    for search in (index.poses(learnt, held_out), index.readings(trials.body(), learnt, held_out)):
+        judge, used, shares = Flat(search.vectors), choose(AUTO, search.vectors), []
+        for query in np.concatenate(search.queries)[::every]:
+            true, found = (set(one.nearest(query, search.count)[0].tolist()) for one in (judge, used))
+            shares.append(len(true & found) / search.count)
+        what = f"recall@{search.count}, {search.name}, {len(search.vectors):,} frames"
+        rows.append(Row(what, float(np.mean(shares)), "", "exact search", ">= 0.95"))
+    return rows
 
 
 def query_numbers(method: Method) -> int:

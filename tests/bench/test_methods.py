@@ -77,3 +77,9 @@ def test_a_method_takes_what_it_is_given(folder: Path) -> None:
     session = learner.begin(trial.simulation.calibration)
     found = np.array([session.step(frame).qpos for frame in trial.simulation.frames])
     assert trials.error_deg(found, trial.truth) < 8.0
+
+
+def test_recall_is_judged_by_exact_search(folder: Path) -> None:
+    rows = methods.recall_rows(MotionDatabase.open(folder), 1, every=40)
+    assert [row.target for row in rows] == [">= 0.95"] * 2
+    assert all(0.9 < row.value <= 1.0 for row in rows)
