@@ -62,15 +62,13 @@ def regressed(
 
 @compiled
 def squared_distances(points: Floats) -> Floats:
-    """(m, m) between points (m, n)."""
-    count, size = points.shape
-    out = np.zeros((count, count))
-    for i in range(count):
+    """(m, m) between points (m, n), exactly 0 between equal ones when all are."""
+    away = points - points[0]
+    gram = away @ np.ascontiguousarray(away.T)
+    out: Floats = np.zeros_like(gram)
+    for i in range(len(gram)):
         for j in range(i):
-            far = 0.0
-            for k in range(size):
-                far += (points[i, k] - points[j, k]) ** 2
-            out[i, j] = out[j, i] = far
+            out[i, j] = out[j, i] = max(gram[i, i] + gram[j, j] - 2.0 * gram[i, j], 0.0)
     return out
 
 
@@ -85,13 +83,14 @@ def _sharpness(squared: Floats, width: float) -> float:
 def _weights(
     inputs: Floats, outputs: Floats, query: Floats, basis: Floats, bases: int, kappa: float, held: bool
 ) -> Floats:
-    _, x, y, duals = _solution(_centred(inputs, basis), _centred(outputs, basis), bases, kappa)
+    middled = _centred(inputs, basis)
+    _, x, y, duals = _solution(middled, _centred(outputs, basis), bases, kappa)
     across = np.ascontiguousarray(basis.T)
     new = across @ (query - inputs.sum(axis=1) / len(query))
     x_across, y_across = np.ascontiguousarray(x.T), np.ascontiguousarray(y.T)
     square = x_across @ x
     if held:
-        square += _ridge(_centred(inputs, basis), kappa) * (np.ascontiguousarray(duals.T) @ x)
+        square += _ridge(middled, kappa) * (np.ascontiguousarray(duals.T) @ x)
     reduced = np.linalg.solve(square, np.ascontiguousarray(duals.T) @ new)
     reduced = (y_across @ x) @ reduced  # eq. 4
     reduced = np.linalg.solve(y_across @ y, reduced)  # eq. 5

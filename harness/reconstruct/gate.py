@@ -8,6 +8,7 @@ last velocity. When many jump at once the person moved, and after `patience_s` t
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
+from harness.core.compiled import compiled
 from harness.reconstruct.residuals import Residuals
 from harness.stream.frame import TrackerFrame
 
@@ -51,8 +52,9 @@ class Gate:
         if not (self._moving and 0.0 < period_s <= _LONGEST_PERIOD_S):
             self._believed_at_s[:] = now_s
             return none
-        away_m = target_m - self._station_m - period_s * self._velocity_m_s
-        far = measured & (np.vecdot(away_m, away_m) > self._jump_m**2)
+        far = np.zeros(len(measured), bool)
+        _strays(target_m, self._station_m, self._velocity_m_s, period_s, self._jump_m, far)
+        far &= measured
         self._believed_at_s[~far] = now_s
         if far.any() and 2 * np.count_nonzero(far) >= np.count_nonzero(measured):
             self.all_moved = True
@@ -67,3 +69,15 @@ class Gate:
         if self._moving:
             self._velocity_m_s = (station_m - self._station_m) / period_s
         self._station_m, self._known_at_s = station_m.copy(), now_s
+
+
+@compiled
+def _strays(
+    target_m: Floats, station_m: Floats, velocity_m_s: Floats, period_s: float, jump_m: float, far: Bools
+) -> None:
+    """Which targets (S, 3) are farther than a jump from where stations (S, 3) are after so long at their velocity."""
+    for s in range(len(far)):
+        squared = 0.0
+        for i in range(3):
+            squared += (target_m[s, i] - station_m[s, i] - period_s * velocity_m_s[s, i]) ** 2
+        far[s] = squared > jump_m**2

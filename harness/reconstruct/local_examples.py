@@ -47,6 +47,7 @@ class LocalExamples:
         self.root: Singles = np.empty((len(database), 3), np.float32)
         """(N, 3) the root's ground frame as seen from the anchor: forward, left [m], turn [rad]."""
         self._database, self._trackers = database, Worn(body, worn)
+        self._posture: Singles = np.asarray(database.posture)
         for run in database.runs:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
@@ -102,7 +103,7 @@ class LocalExamples:
     def poses(self, rows: Ints) -> Floats:
         """(K, 55) what is learnt: posture (52), and the root's ground frame seen from the anchor (3)."""
         out = np.empty((len(rows), 55))
-        out[:, :52] = self._database.posture[rows]
+        out[:, :52] = self._posture.take(rows, 0)
         out[:, 52:] = self.root[rows]
         return out
 
