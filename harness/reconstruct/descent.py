@@ -54,6 +54,17 @@ class Readings(NamedTuple):
     """(2S,) of the Lorentzian; inf for plain squares."""
 
 
+class Tracker(NamedTuple):
+    """How readings become targets."""
+
+    turn: Floats
+    """(3, 3) `world_from_tracker`."""
+    origin_m: Floats
+    """(3,)"""
+    to_bone: Floats
+    """(S, 4, 4) from a station's quaternion to that of its bone in the world."""
+
+
 class Placed(NamedTuple):
     """Where a configuration puts the body."""
 
@@ -111,6 +122,38 @@ def unplaced(chain: Chain) -> Placed:
         weight=np.zeros(2 * stations),
         slope=np.zeros((directions, 6)),
     )
+
+
+@compiled
+def read(
+    tracker: Tracker,
+    readings: Readings,
+    position_m: Floats,
+    turned: Floats,
+    position_valid: Bools,
+    orientation_valid: Bools,
+    measured: Bools,
+) -> None:
+    """Brings a frame's readings (S, 3), (S, 4) into the world and onto the bones, and says which are `measured` (2S,).
+
+    Zero and identity stand where nothing was measured.
+    """
+    count = len(position_m)
+    for s in range(count):
+        measured[s], measured[count + s] = position_valid[s], orientation_valid[s]
+        readings.target_m[s] = 0.0
+        readings.world_from_target[s] = 0.0
+        readings.world_from_target[s, 0] = 1.0
+        if position_valid[s]:
+            readings.target_m[s] = tracker.origin_m
+            for i in range(3):
+                for j in range(3):
+                    readings.target_m[s, i] += tracker.turn[i, j] * position_m[s, j]
+        if orientation_valid[s]:
+            readings.world_from_target[s] = 0.0
+            for i in range(4):
+                for j in range(4):
+                    readings.world_from_target[s, i] += tracker.to_bone[s, i, j] * turned[s, j]
 
 
 @compiled

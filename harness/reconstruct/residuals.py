@@ -69,11 +69,13 @@ class Residuals:
         """(S, 3) modelled station positions in the world [m]."""
 
         self._qpos = np.zeros(body.model.nq)
-        self._world_from_tracker = rotations.to_matrix(calibration.world_from_tracker)
-        self._origin_m = calibration.tracker_origin_m
-        station_from_bone = rotations.inverse(calibration.bone_from_station)
-        self._to_bone = _left(calibration.world_from_tracker) @ _right(station_from_bone)
-        self._robust, self._by_quality, self._suspect_weight = loss.robust, loss.quality, loss.suspect_weight
+        self._tracker = descent.Tracker(
+            rotations.to_matrix(calibration.world_from_tracker),
+            np.array(calibration.tracker_origin_m),
+            _left(calibration.world_from_tracker) @ _right(rotations.inverse(calibration.bone_from_station)),
+        )
+        self._by_quality, self._suspect_weight = loss.quality, loss.suspect_weight
+        self._twice_scale_squared = 2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf)
         self._said_trust = np.ones((2, count))
         self._own_precision = np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count)
 
@@ -85,14 +87,11 @@ class Residuals:
 
     def read(self, frame: TrackerFrame) -> None:
         """Take up the valid readings of a frame."""
-        count = len(self.bones)
-        self.measured = np.concatenate([frame.position_valid, frame.orientation_valid])
-        np.matmul(frame.position_m, self._world_from_tracker.T, out=self.target_m)
-        self.target_m += self._origin_m
-        np.matmul(self._to_bone, frame.tracker_from_station[:, :, None], out=self.world_from_target[:, :, None])
-        if not self.measured.all():
-            self.target_m[~self.measured[:count]] = 0.0
-            self.world_from_target[~self.measured[count:]] = rotations.IDENTITY
+        self.measured = np.empty(2 * len(self.bones), bool)
+        descent.read(
+            *(self._tracker, self.readings, frame.position_m, frame.tracker_from_station),
+            *(frame.position_valid, frame.orientation_valid, self.measured),
+        )
         self._said_trust[:] = frame.quality if self._by_quality else 1.0
         if frame.suspect.any():
             self._said_trust[:, frame.suspect] *= self._suspect_weight
@@ -110,8 +109,7 @@ class Residuals:
 
     def widen(self, factor: float) -> None:
         """Let the Lorentzian reach `factor` times farther, until the next frame: for solving from far away."""
-        reach = factor * self.scale if self._robust else np.inf
-        self.readings.twice_scale_squared[:] = 2.0 * reach**2
+        np.multiply(self._twice_scale_squared, factor * factor, out=self.readings.twice_scale_squared)
 
     def place(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""
