@@ -1,7 +1,7 @@
 """Weighted regression of what follows on what went before, in the principal subspace of a few examples.
 
 Liu et al. 2011, eq. 2 to 8 (docs/methods.md A4): K windows x_k with their successors y_k, weighted by closeness to the
-query. Everything is solved in the K x K space of the examples: with X the weighted, centred windows and
+query. With few examples everything is solved in their K x K space: with X the weighted, centred windows and
 X X^T = V L V^T, the principal directions of X^T X are U = X^T V L^-1/2, of the same eigenvalues L.
 """
 
@@ -46,12 +46,15 @@ def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float)
     middle, after_middle = share @ away, share @ after
     x: Real = (away - middle) * root  # means taken out, eq. 2; W of eq. 7
     y: Real = (after - after_middle) * root
-    inner: Real = x @ x.T
-    whole = float(inner.trace())
-    asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
-    solve = _ridged if kept >= 1.0 else _truncated
-    shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
-    variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
+    if kept >= 1.0 and x.shape[0] > x.shape[1]:
+        shift, variance = _primal(x, middle, y, ridge)
+    else:
+        inner: Real = x @ x.T
+        whole = float(inner.trace())
+        asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
+        solve = _ridged if kept >= 1.0 else _truncated
+        shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
+        variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
     return Forecast((after_middle - shift).astype(float), variance.astype(float))
 
 
@@ -78,3 +81,21 @@ def _ridged(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole:
     turned = inverse @ y
     shift = (inverse @ asked) @ turned
     return shift, ridge * (inverse.T @ turned)
+
+
+def _primal(x: Real, middle: Real, y: Real, ridge: float) -> tuple[Real, Floats]:
+    """Eq. 4 with a ridge, in the N x N space of the windows' numbers: (D,) as above, and (D,) squares of residuals.
+
+    Cheaper when examples outnumber numbers; residuals are not worked out one by one.
+    """
+    single = x.dtype == np.float32
+    factorise, solve = (lapack.spotrf, lapack.spotrs) if single else (lapack.dpotrf, lapack.dpotrs)
+    outer, mixed = x.T @ x, x.T @ y
+    least = max(ridge, 1e-6 if single else 1e-9) * float(outer.trace()) + 1e-30
+    damped = outer.copy()
+    damped.reshape(-1)[:: len(outer) + 1] += least
+    factor, _ = factorise(damped, lower=1, clean=0, overwrite_a=1)
+    slope, _ = solve(factor, mixed, lower=1)
+    explained = np.einsum("nd,nd->d", slope, mixed + least * slope)  # |y|^2 - |y - x slope|^2
+    left: Floats = np.einsum("kd,kd->d", y, y) - explained
+    return middle @ slope, np.maximum(left, 0.0)

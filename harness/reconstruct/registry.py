@@ -47,6 +47,7 @@ def methods() -> dict[str, Callable[[], Method]]:
         "best_match": BestMatch,
         "local_pca": LocalPca,
         "dynamic_map": dynamic_map.DynamicMap,
+        "dynamic_map:window": lambda: dynamic_map.WINDOW,
         "dynamic_map:literal": lambda: dynamic_map.LITERAL,
         "weighted_blend": WeightedBlend,
         "kernel_cca": KernelCca,

@@ -15,8 +15,10 @@ def examples(rng: np.random.Generator, count: int, rank: int, size: int = 20) ->
     return away, closeness(np.sort(rng.uniform(0.0, 2.0, count)), 0.7)
 
 
-@pytest.mark.parametrize(("kept", "off"), [(1.0 - 1e-13, 1e-9), (1.0, 1e-7)])
-@pytest.mark.parametrize(("count", "rank"), [(60, 5), (60, 20), (15, 4)])
+@pytest.mark.parametrize(
+    ("kept", "off", "count", "rank"),
+    [(1.0 - 1e-13, 1e-9, 60, 5), (1.0 - 1e-13, 1e-9, 60, 20), (1.0 - 1e-13, 1e-9, 15, 4), (1.0, 1e-7, 15, 4)],
+)
 def test_a_planted_linear_system_is_recovered(
     rng: np.random.Generator, kept: float, off: float, count: int, rank: int
 ) -> None:
@@ -26,6 +28,27 @@ def test_a_planted_linear_system_is_recovered(
     found = forecast(away, away @ slope + level, weight, kept, 0.0)
     np.testing.assert_allclose(found.mean, level + _unreachable(away, weight) @ slope, atol=off)
     assert np.max(found.variance) < off**2
+
+
+def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.Generator) -> None:
+    """More examples than numbers: the normal equations, with a trace of a ridge."""
+    away = rng.normal(size=(400, 12))
+    weight = closeness(np.sort(rng.uniform(0.0, 2.0, 400)), 0.7)
+    slope, level = rng.normal(size=(12, 7)), rng.normal(size=7)
+    found = forecast(away, away @ slope + level, weight, 1.0, 0.0)
+    np.testing.assert_allclose(found.mean, level, atol=1e-8)
+    assert np.max(found.variance) < 1e-7
+
+
+@pytest.mark.parametrize("ridge", [1e-6, 1e-3, 0.1])
+def test_many_examples_and_few_are_solved_alike(rng: np.random.Generator, ridge: float) -> None:
+    """The normal equations give what the K x K space gives: zeros beside the numbers change nothing but the way."""
+    away, after = rng.normal(size=(100, 12)), rng.normal(size=(100, 6))
+    weight = closeness(np.sort(rng.uniform(0.0, 2.0, 100)), 0.7)
+    primal = forecast(away, after, weight, 1.0, ridge)
+    dual = forecast(np.concatenate([away, np.zeros((100, 90))], axis=1), after, weight, 1.0, ridge)
+    np.testing.assert_allclose(primal.mean, dual.mean, atol=1e-9)
+    np.testing.assert_allclose(primal.variance, dual.variance, rtol=1e-6)
 
 
 def _unreachable(away: Floats, weight: Floats) -> Floats:

@@ -4,27 +4,33 @@ from collections.abc import Callable
 
 from harness.errors import UnknownName
 from harness.reconstruct.index.flat import Flat
-from harness.reconstruct.index.inverted_file import InvertedFile
+from harness.reconstruct.index.inverted_file import InvertedFile, probes_for
 from harness.reconstruct.index.kd_tree import KDTree
 from harness.reconstruct.index.protocol import Index, Vectors
 
-INDEXES: dict[str, Callable[[Vectors], Index]] = {"flat": Flat, "kd_tree": KDTree, "inverted_file": InvertedFile}
+INDEXES: dict[str, Callable[[Vectors, int], Index]] = {
+    "flat": lambda vectors, wanted: Flat(vectors),
+    "kd_tree": lambda vectors, wanted: KDTree(vectors),
+    "inverted_file": lambda vectors, wanted: InvertedFile(vectors, probes_for(wanted, len(vectors))),
+}
 AUTO = "auto"
-FEW, MANY, LOW = 3000, 30_000, 64
-"""Up to so many vectors all are looked at; up to so many of up to so many numbers go into a kd-tree."""
+SMALL, LOW, FEW = 3000, 20, 16
+"""Up to so many vectors all are looked at; those of up to so many numbers go into a kd-tree when no more than so many
+neighbours are wanted: in more dimensions, and asked for hundreds, a tree looks at nearly all."""
 
 
-def choose(kind: str, vectors: Vectors) -> Index:
-    """The named index of these vectors; "auto" is the quickest that misses next to nothing. UnknownName."""
+def choose(kind: str, vectors: Vectors, wanted: int = FEW) -> Index:
+    """The named index of these vectors, for queries of so many neighbours; "auto" is the quickest that misses next to
+    nothing. UnknownName."""
     if kind == AUTO:
-        return choose(best_for(len(vectors), vectors.size), vectors)
+        return choose(best_for(len(vectors), vectors.size, wanted), vectors, wanted)
     if kind not in INDEXES:
         raise UnknownName("index", kind, (AUTO, *INDEXES))
-    return INDEXES[kind](vectors)
+    return INDEXES[kind](vectors, wanted)
 
 
-def best_for(count: int, size: int) -> str:
+def best_for(count: int, size: int, wanted: int) -> str:
     """The kind for so many vectors of so many numbers."""
-    if count <= FEW:
+    if count <= SMALL:
         return "flat"
-    return "kd_tree" if size <= LOW and count <= MANY else "inverted_file"
+    return "kd_tree" if size <= LOW and wanted <= FEW else "inverted_file"

@@ -123,8 +123,9 @@ def test_weighing_every_column_alike_is_plain_search() -> None:
 
 def test_the_index_is_chosen_by_size_or_by_name() -> None:
     assert isinstance(choose("auto", Table(paths(500, 107))), Flat)
-    assert isinstance(choose("auto", Table(paths(4000, 60))), KDTree)
+    assert isinstance(choose("auto", Table(paths(4000, 12))), KDTree)
     assert isinstance(choose("auto", Table(paths(4000, 107))), InvertedFile)
+    assert isinstance(choose("auto", Table(paths(4000, 60)), 800), InvertedFile)
     assert isinstance(choose("flat", Table(paths(4000, 107))), Flat)
     with pytest.raises(UnknownName, match="Did you mean 'kd_tree'"):
         choose("kdtree", Table(paths(10, 3)))

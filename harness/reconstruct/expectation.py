@@ -1,0 +1,157 @@
+"""What posture to expect: one linear map of everything that is known, and in its terms a search and a local model.
+
+Known at a frame are the window of the last m answers (Liu et al. 2011, eq. 6 and 8) and the readings of the trackers
+(docs/methods.md G3). A ridge regression over the whole database turns both into the posture that goes with them; its
+leading directions are the coordinates z in which neighbours are sought and from which local models regress. So eq. 6's
+D_w is learnt rather than the identity: what says nothing about the posture does not count, and 40 numbers do.
+
+Readings are seen from above the station on the trunk, along its heading. What was not read is replaced by what the
+rest of the evidence leads to expect of it, which for a linear map is the same as learning it without.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve
+
+from harness.body.humanoid import Body
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.calibration import Calibration
+from harness.reconstruct.database import Windows
+from harness.reconstruct.database.ground import POSTURE
+from harness.reconstruct.examples import Worn
+from harness.reconstruct.index import Index, choose
+from harness.reconstruct.index.protocol import Table
+from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
+
+_CHUNK = 2048
+"""Windows worked on at a time."""
+_HERE: Floats = np.zeros(3)
+"""A ground frame to stand on."""
+_MAPS = 64
+"""Combinations of silent stations whose maps are kept."""
+_LEARNT_FROM = 20_000
+"""Windows, evenly spread, that the map is learnt from."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """In which terms postures are expected."""
+
+    window_weight: float = 0.3
+    """What a window's numbers are multiplied by, beside readings in metres."""
+    lever_m: float = 0.3
+    """A turn by one radian counts like so many metres."""
+    directions: int = 40
+    """Coordinates that are kept."""
+    ridge: float = 1e-5
+    """Of the map, as a share of the evidence's variance."""
+
+
+class Evidence:
+    """What is known before each frame of a database, for stations worn as a calibration says.
+
+    A row is the window before the frame (D), then places (3 S) and two axes (6 S) of each station's bone.
+    """
+
+    def __init__(self, body: Body, windows: Windows, worn: Calibration, terms: Terms) -> None:
+        self.terms, self.count, self.anchor = terms, len(worn.stations), anchor_of(worn.bones)
+        self._windows, self._trackers = windows, Worn(body, worn)
+        self.size = windows.size + 9 * self.count
+        self._expectations: dict[bytes, Expectation] = {}
+        every = np.arange(len(windows))
+        rows = every if len(every) <= _LEARNT_FROM else np.linspace(0, len(every) - 1, _LEARNT_FROM).astype(np.int64)
+        self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE)
+        for known, after in self.parts(rows):
+            self.mean += known.sum(axis=0) / len(rows)
+            self._mean_after += after.sum(axis=0) / len(rows)
+        self.scatter: Floats = np.zeros((self.size, self.size))
+        """(D + 9 S, D + 9 S) covariance of the evidence."""
+        self._shared = np.zeros((self.size, POSTURE))
+        for known, after in self.parts(rows):
+            away = known - self.mean
+            self.scatter += away.T @ away / len(rows)
+            self._shared += away.T @ (after - self._mean_after) / len(rows)
+        self.least = terms.ridge * float(np.trace(self.scatter))
+
+    def __len__(self) -> int:
+        """N, windows."""
+        return len(self._windows)
+
+    def expectation(self, usual: Bools, index: str, wanted: int) -> "Expectation":
+        """The search for sessions that know the `usual` columns; made once."""
+        key = usual.tobytes()
+        if key not in self._expectations:
+            self._expectations[key] = Expectation(self, usual, index, wanted)
+        return self._expectations[key]
+
+    def parts(self, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
+        """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
+        for start in range(0, len(rows), _CHUNK):
+            some = rows[start : start + _CHUNK]
+            after = self._windows.successors(some)[:, :POSTURE].astype(float)
+            qpos = self._windows.database.qpos(self._windows.frames[some] + 1, _HERE)
+            at_m, turned = self._trackers.at(qpos)
+            level = rotations.about_z(-twist_rad(turned[:, self.anchor]))[:, None]
+            place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
+            axes = self.terms.lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
+            window = self.terms.window_weight * self._windows.gather(some)
+            yield np.concatenate([window, place.reshape(len(some), -1), axes.reshape(len(some), -1)], axis=1), after
+
+    def known(self, window: Singles, position_m: Floats, turned: Floats, view: View) -> Floats:
+        """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""
+        turn = view.turn()
+        place = (position_m - [view.x_m, view.y_m, 0.0]) @ turn
+        axes = self.terms.lever_m * (turn.T @ rotations.to_matrix(turned))[..., :2]
+        return np.concatenate([self.terms.window_weight * window, place.reshape(-1), axes.reshape(-1)])
+
+    def columns(self, measured: Bools) -> Bools:
+        """(D + 9 S,) which columns are known when these rows (2 S,) of positions, then orientations, are."""
+        window = np.ones(self._windows.size, bool)
+        return np.concatenate([window, np.repeat(measured, np.repeat([3, 6], self.count))])
+
+    def directions(self, columns: Bools) -> Floats:
+        """(C, 40) from the known columns C to the leading directions of the posture that they lead to expect."""
+        scatter = self.scatter[np.ix_(columns, columns)]
+        damped = scatter + self.least * np.eye(len(scatter))
+        to_posture = solve(damped, self._shared[columns], assume_a="pos")
+        _, vector = np.linalg.eigh(to_posture.T @ scatter @ to_posture)
+        out: Floats = to_posture @ vector[:, ::-1][:, : self.terms.directions]
+        return out
+
+    def filled(self, columns: Bools, wanted: Bools) -> Floats:
+        """(C, W) from known columns to the wanted ones: themselves, or what the known ones lead to expect."""
+        damped = self.scatter[np.ix_(columns, columns)] + self.least * np.eye(int(columns.sum()))
+        out: Floats = solve(damped, self.scatter[np.ix_(columns, wanted)], assume_a="pos")
+        out[:, columns[wanted]] = np.eye(len(out))[:, wanted[columns]]
+        return out
+
+
+class Expectation:
+    """The search among N windows, in terms of the postures that certain readings lead to expect."""
+
+    def __init__(self, evidence: Evidence, usual: Bools, index: str, wanted: int) -> None:
+        """For sessions that know the `usual` columns (D + 9 S,) as a rule and ask for so many neighbours."""
+        self._evidence, self._usual = evidence, usual
+        self._directions = evidence.directions(usual)
+        self._maps: dict[bytes, Floats] = {}
+        self.table: Singles = np.empty((len(evidence), self._directions.shape[1]), np.float32)
+        """(N, 40) z of every window."""
+        start = 0
+        for known, _ in evidence.parts(np.arange(len(evidence))):
+            away = (known - evidence.mean)[:, usual]
+            self.table[start : start + len(known)] = away @ self._directions
+            start += len(known)
+        self.index: Index = choose(index, Table(self.table), wanted)
+
+    def query(self, known: Floats, columns: Bools) -> Singles:
+        """z (40,) of evidence (D + 9 S,) of which only some columns (D + 9 S,) mean something."""
+        key = columns.tobytes()
+        if key not in self._maps:
+            if len(self._maps) >= _MAPS:
+                self._maps.clear()
+            self._maps[key] = self._evidence.filled(columns, self._usual) @ self._directions
+        out: Singles = ((known - self._evidence.mean)[columns] @ self._maps[key]).astype(np.float32)
+        return out

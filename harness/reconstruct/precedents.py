@@ -1,0 +1,94 @@
+"""Which frames of the database are like this one: by the last answers alone, or by the readings as well.
+
+Both answer a `DynamicMapSession`: which windows, how far (squared), and the windows minus the query, from which the
+local model regresses.
+"""
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.reconstruct.database import Windows
+from harness.reconstruct.expectation import Evidence, Expectation
+from harness.reconstruct.index import Index
+from harness.reconstruct.residuals import Residuals
+from harness.reconstruct.viewpoint import View, twist_rad
+
+
+class Found(NamedTuple):
+    """K windows, nearest first."""
+
+    rows: Ints
+    """(K,)"""
+    squared: Floats
+    """(K,) distances from the query."""
+    away: Singles
+    """(K, N) windows minus query."""
+
+
+class Precedents(Protocol):
+    """A session's search."""
+
+    def nearest(self, past: Floats, count: int) -> Found:
+        """For the last answers (m, 55), newest first, and the readings at hand."""
+        ...
+
+    def read(self) -> None:
+        """A frame was answered; its readings are still at hand."""
+        ...
+
+
+class ByWindow:
+    """Liu et al. 2011: the windows nearest to the last m answers, D_w = 1."""
+
+    def __init__(self, windows: Windows, index: Index) -> None:
+        self._windows, self._index = windows, index
+
+    def nearest(self, past: Floats, count: int) -> Found:
+        query = self._windows.query(past)
+        rows, squared = self._index.nearest(query, count)
+        away = self._windows.gather(rows)
+        away -= query
+        return Found(rows, squared.astype(float), away)
+
+    def read(self) -> None:
+        pass
+
+
+class ByEvidence:
+    """The windows and readings that lead to expect a posture like this one (`expectation`)."""
+
+    def __init__(self, windows: Windows, evidence: Evidence, residuals: Residuals, index: str) -> None:
+        self._windows, self._evidence, self._residuals, self._kind = windows, evidence, residuals, index
+        self._ever: Bools = np.zeros(2 * evidence.count, bool)
+        """Rows of readings that this session has had; a station that comes later only takes part in the solving."""
+        self._expectation: Expectation | None = None
+        self._no_turn = np.tile(rotations.IDENTITY, (evidence.count, 1))
+
+    def nearest(self, past: Floats, count: int) -> Found:
+        evidence, residuals = self._evidence, self._residuals
+        columns = evidence.columns(residuals.measured)
+        if self._expectation is None:
+            usual = evidence.columns(self._ever | residuals.measured)
+            self._expectation = evidence.expectation(usual, self._kind, count)
+        window = self._windows.query(past)
+        known = evidence.known(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
+        query = self._expectation.query(known, columns)
+        rows, squared = self._expectation.index.nearest(query, count)
+        return Found(rows, squared.astype(float), self._expectation.table[rows] - query)
+
+    def read(self) -> None:
+        self._ever |= self._residuals.measured
+
+    def _view(self, last: Floats) -> View:
+        """From above the anchor, along its heading; the last answer (55,) lends what was not read of it."""
+        residuals, anchor = self._residuals, self._evidence.anchor
+        here, facing = residuals.measured[anchor], residuals.measured[self._evidence.count + anchor]
+        at_m, turned = residuals.target_m[anchor], residuals.world_from_target[anchor]
+        if not (here and facing):
+            residuals.kinematics.set(last)
+            lent_m, lent = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
+            at_m, turned = (at_m if here else lent_m[anchor]), (turned if facing else lent[anchor])
+        return View(float(at_m[0]), float(at_m[1]), float(twist_rad(turned)))
