@@ -1,4 +1,4 @@
-"""Tests run with one thread for matrix products, as the command line does: on many, small ones take six times longer."""
+"""Tests run with one thread for matrix products, as the command line does: small ones are six times slower on many."""
 
 import os
 
