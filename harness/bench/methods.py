@@ -159,6 +159,8 @@ def query_numbers(method: Method) -> int:
     stations = len(load_scenario(trials.SETTING).stations)
     if isinstance(method, LocalPca):
         return (POSTURE + 3) * 2 - 3 + 9 * stations
+    if isinstance(method, DynamicMap) and method.like == "evidence":
+        return method.terms.directions
     if isinstance(method, DynamicMap):
         return (POSTURE + 3) * method.poses - 3
     return 10 * stations  # eq. 2 of Kim et al. 2012
