@@ -112,7 +112,7 @@ def _worn(body: humanoid.Body) -> Calibration:
 
 def _compared(search: Search) -> list[Row]:
     """Exact search is the judge, and the reference for speed."""
-    indexes = {name: kind(search.vectors) for name, kind in INDEXES.items()}
+    indexes = {name: kind(search.vectors, search.count) for name, kind in INDEXES.items()}
     begin: dict[str, Callable[[], Index]] = {name: partial(_same, index) for name, index in indexes.items()}
     if search.follows is not None:
         begin["graph"] = Graph(search.vectors, search.follows, indexes["inverted_file"]).follow
@@ -129,7 +129,7 @@ def _compared(search: Search) -> list[Row]:
                     rows, _ = session.nearest(query, search.count)
                     seconds[name].append(time.perf_counter() - start_s)
                     hits[name].append(len(wanted.intersection(rows.tolist())) / search.count)
-    best, out = best_for(len(search.vectors), search.vectors.size), []
+    best, out = best_for(len(search.vectors), search.vectors.size, search.count), []
     judge_us = 1e6 * float(np.median(seconds[JUDGE]))
     for name in begin:
         what = f"{name}, {search.name}, {len(search.vectors):,} frames"

@@ -145,7 +145,7 @@ def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
     held_out = [index.built_in(which, seed + trials.HELD_OUT) for which in range(len(performer.BEHAVIOURS))]
     rows = []
     for search in (index.poses(learnt, held_out), index.readings(trials.body(), learnt, held_out)):
-        judge, used, shares = Flat(search.vectors), choose(AUTO, search.vectors), []
+        judge, used, shares = Flat(search.vectors), choose(AUTO, search.vectors, search.count), []
         for query in np.concatenate(search.queries)[::every]:
             true, found = (set(one.nearest(query, search.count)[0].tolist()) for one in (judge, used))
             shares.append(len(true & found) / search.count)
