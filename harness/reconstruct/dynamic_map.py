@@ -21,8 +21,9 @@ from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import LOST_AFTER_S
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.database.ground import HEIGHT, HINGES, POSTURE, TILT, ground_of, moved, standing
+from harness.reconstruct.database.ground import HEIGHT, HINGES, POSTURE, TILT
 from harness.reconstruct.expectation import Evidence, Terms
+from harness.reconstruct.footing import stepped, stood
 from harness.reconstruct.gate import JUMP_M
 from harness.reconstruct.index import Index, choose
 from harness.reconstruct.local_model import closeness, forecast
@@ -183,21 +184,24 @@ class DynamicMapSession(Remembering):
         )
         sigma[POSTURE:] = options.step_sigma_m, options.step_sigma_m, options.turn_sigma_rad
         self._least_variance = sigma**2
-        self._closest: Floats = self.qpos
+        self._closest: Floats = np.zeros(POSTURE + 3)
 
     def continued(self) -> Solution:
         """Eq. 9 and 10: the most likely pose of the frame, by the readings and by what went before."""
         prior = self.predicted()
-        first, other = prior.qpos, self._closest
-        if self._options.start == "closest":
-            first, other = other, first
-        found = self.solver.solve(first, prior)
+        forward = self._options.start == "prediction"
+        found = self.solver.solve(prior.qpos if forward else self._stood(self._closest), prior)
         if found.converged and self.contradiction() == 0.0:
             return found
-        again = self.solver.solve(other, prior)
+        again = self.solver.solve(self._stood(self._closest) if forward else prior.qpos, prior)
         best = again if again.cost < found.cost else found
         self.residuals.place(best.qpos)
         return best
+
+    def _stood(self, following: Floats) -> Floats:
+        """The configuration (55,) of a posture and of the step to it (55,)."""
+        out: Floats = stood(following[:POSTURE], stepped(self.past[0], following[POSTURE:]))
+        return out
 
     def noted(self, frame: TrackerFrame, anew: bool) -> None:
         super().noted(frame, anew)
@@ -214,11 +218,8 @@ class DynamicMapSession(Remembering):
         weight = closeness(squared, max(variance, _NEAREST))
         after = windows.successors(rows)
         next_mean, left = forecast(away, after, weight, options.kept, options.ridge)
-        ground = ground_of(self.past[0])
-        mean, self._closest = standing(
-            np.stack([next_mean[:POSTURE], after[0, :POSTURE]]),
-            moved(ground, np.stack([next_mean[POSTURE:], after[0, POSTURE:]])),
-        )
+        self._closest = after[0].astype(float)
+        mean = self._stood(next_mean)
         mean[7:] = self.limits.clipped(mean[7:])
         variance_of = options.spread**2 * left + self._least_variance
         variance_of += options.novelty**2 * float(squared[0]) / away.shape[1]

@@ -22,6 +22,7 @@ from harness.core.calibration import Calibration
 from harness.reconstruct.database import Windows
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.examples import Worn
+from harness.reconstruct.footing import readings
 from harness.reconstruct.index import Index, choose
 from harness.reconstruct.index.protocol import Table
 from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
@@ -53,7 +54,7 @@ class Terms:
 class Evidence:
     """What is known before each frame of a database, for stations worn as a calibration says.
 
-    A row is the window before the frame (D), then places (3 S) and two axes (6 S) of each station's bone.
+    A row is the window before the frame (D), then each station's place (3) and two axes of its bone (6).
     """
 
     def __init__(self, body: Body, windows: Windows, worn: Calibration, terms: Terms) -> None:
@@ -98,19 +99,19 @@ class Evidence:
             place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
             axes = self.terms.lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
             window = self.terms.window_weight * self._windows.gather(some)
-            yield np.concatenate([window, place.reshape(len(some), -1), axes.reshape(len(some), -1)], axis=1), after
+            read = np.concatenate([place, axes.reshape(*place.shape[:2], 6)], axis=2)
+            yield np.concatenate([window, read.reshape(len(some), -1)], axis=1), after
 
     def known(self, window: Singles, position_m: Floats, turned: Floats, view: View) -> Floats:
         """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""
-        turn = view.turn()
-        place = (position_m - [view.x_m, view.y_m, 0.0]) @ turn
-        axes = self.terms.lever_m * (turn.T @ rotations.to_matrix(turned))[..., :2]
-        return np.concatenate([self.terms.window_weight * window, place.reshape(-1), axes.reshape(-1)])
+        read = readings(position_m, turned, np.array(view), self.terms.lever_m)
+        return np.concatenate([self.terms.window_weight * window, read])
 
     def columns(self, measured: Bools) -> Bools:
         """(D + 9 S,) which columns are known when these rows (2 S,) of positions, then orientations, are."""
         window = np.ones(self._windows.size, bool)
-        return np.concatenate([window, np.repeat(measured, np.repeat([3, 6], self.count))])
+        places, turns = measured[: self.count], measured[self.count :]
+        return np.concatenate([window, np.repeat(np.stack([places, turns], axis=1), [3, 6], axis=1).reshape(-1)])
 
     def directions(self, columns: Bools) -> Floats:
         """(C, 40) from the known columns C to the leading directions of the posture that they lead to expect."""

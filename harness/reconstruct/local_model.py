@@ -41,20 +41,19 @@ def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float)
     Regresses in as many principal directions as hold the share `kept` of the weighted variance, in all of them for
     1, with a `ridge` (a share of that variance, too) added to their eigenvalues.
     """
+    if kept >= 1.0 and away.shape[0] > away.shape[1]:
+        return _of_many(away, after, weight.astype(away.dtype), ridge)
     share: Real = weight.astype(away.dtype)
     root: Real = np.sqrt(share)[:, None]
     middle, after_middle = share @ away, share @ after
     x: Real = (away - middle) * root  # means taken out, eq. 2; W of eq. 7
     y: Real = (after - after_middle) * root
-    if kept >= 1.0 and x.shape[0] > x.shape[1]:
-        shift, variance = _primal(x, middle, y, ridge)
-    else:
-        inner: Real = x @ x.T
-        whole = float(inner.trace())
-        asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
-        solve = _ridged if kept >= 1.0 else _truncated
-        shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
-        variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
+    inner: Real = x @ x.T
+    whole = float(inner.trace())
+    asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
+    solve = _ridged if kept >= 1.0 else _truncated
+    shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
+    variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
     return Forecast((after_middle - shift).astype(float), variance.astype(float))
 
 
@@ -83,19 +82,24 @@ def _ridged(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole:
     return shift, ridge * (inverse.T @ turned)
 
 
-def _primal(x: Real, middle: Real, y: Real, ridge: float) -> tuple[Real, Floats]:
-    """Eq. 4 with a ridge, in the N x N space of the windows' numbers: (D,) as above, and (D,) squares of residuals.
+def _of_many(away: Real, after: Real, share: Real, ridge: float) -> Forecast:
+    """Eq. 4 with a ridge, in the space of the N numbers: cheaper when examples outnumber them.
 
-    Cheaper when examples outnumber numbers; residuals are not worked out one by one.
+    One product of all that is known with itself holds X^T X, X^T y and y^T y; residuals need not be worked out.
     """
-    single = x.dtype == np.float32
-    factorise, solve = (lapack.spotrf, lapack.spotrs) if single else (lapack.dpotrf, lapack.dpotrs)
-    outer, mixed = x.T @ x, x.T @ y
-    least = max(ridge, 1e-6 if single else 1e-9) * float(outer.trace()) + 1e-30
-    damped = outer.copy()
-    damped.reshape(-1)[:: len(outer) + 1] += least
-    factor, _ = factorise(damped, lower=1, clean=0, overwrite_a=1)
-    slope, _ = solve(factor, mixed, lower=1)
+    count = away.shape[1]
+    middle, after_middle = share @ away, share @ after
+    known = np.empty((len(share), count + after.shape[1]), away.dtype)
+    np.subtract(away, middle, out=known[:, :count])  # means taken out, eq. 2
+    np.subtract(after, after_middle, out=known[:, count:])
+    known *= np.sqrt(share)[:, None]  # W of eq. 7
+    product = known.T @ known
+    outer, mixed = product[:count, :count], product[:count, count:]
+    least = max(ridge, 1e-6 if product.dtype == np.float32 else 1e-9) * float(outer.trace()) + 1e-30
+    damped = outer.astype(float)
+    damped.reshape(-1)[:: count + 1] += least
+    factor, _ = lapack.dpotrf(damped, lower=1, clean=0, overwrite_a=1)
+    slope, _ = lapack.dpotrs(factor, mixed, lower=1)
     explained = np.einsum("nd,nd->d", slope, mixed + least * slope)  # |y|^2 - |y - x slope|^2
-    left: Floats = np.einsum("kd,kd->d", y, y) - explained
-    return middle @ slope, np.maximum(left, 0.0)
+    variance = np.maximum(product.diagonal()[count:] - explained, 0.0)  # sigma_d^2 of eq. 8
+    return Forecast(after_middle - middle @ slope, variance)

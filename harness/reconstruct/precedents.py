@@ -77,7 +77,7 @@ class ByEvidence:
         known = evidence.known(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
         query = self._expectation.query(known, columns)
         rows, squared = self._expectation.index.nearest(query, count)
-        return Found(rows, squared.astype(float), self._expectation.table[rows] - query)
+        return Found(rows, squared.astype(float), self._expectation.table.take(rows, 0) - query)
 
     def read(self) -> None:
         self._ever |= self._residuals.measured
