@@ -75,6 +75,7 @@ class Evidence:
             away = known - self.mean
             self.scatter += away.T @ away / len(rows)
             self._shared += away.T @ (after - self._mean_after) / len(rows)
+        self.let_go()
         self.least = terms.ridge * float(np.trace(self.scatter))
 
     def __len__(self) -> int:
@@ -87,6 +88,10 @@ class Evidence:
         if key not in self._expectations:
             self._expectations[key] = Expectation(self, usual, index, wanted)
         return self._expectations[key]
+
+    def let_go(self) -> None:
+        """Give back the memory of a database on disk that was gone through."""
+        self._windows.database.let_go()
 
     def parts(self, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
         """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
@@ -145,6 +150,7 @@ class Expectation:
             away = (known - evidence.mean)[:, usual]
             self.table[start : start + len(known)] = away @ self._directions
             start += len(known)
+        evidence.let_go()
         self.index: Index = choose(index, Table(self.table), wanted)
 
     def query(self, known: Floats, columns: Bools) -> Singles:
