@@ -84,15 +84,12 @@ def _weights(
     inputs: Floats, outputs: Floats, query: Floats, basis: Floats, bases: int, kappa: float, held: bool
 ) -> Floats:
     middled = _centred(inputs, basis)
-    _, x, y, duals = _solution(middled, _centred(outputs, basis), bases, kappa)
-    across = np.ascontiguousarray(basis.T)
-    new = across @ (query - inputs.sum(axis=1) / len(query))
-    x_across, y_across = np.ascontiguousarray(x.T), np.ascontiguousarray(y.T)
-    square = x_across @ x
-    if held:
-        square += _ridge(middled, kappa) * (np.ascontiguousarray(duals.T) @ x)
-    reduced = np.linalg.solve(square, np.ascontiguousarray(duals.T) @ new)
-    reduced = (y_across @ x) @ reduced  # eq. 4
+    squared, x, y, inverse = _solution(middled, _centred(outputs, basis), bases, kappa)
+    new = np.ascontiguousarray(basis.T) @ (query - inputs.sum(axis=1) / len(query))
+    y_across = np.ascontiguousarray(y.T)
+    reduced = y_across @ (inverse @ new)  # eq. 4, held: H (H + kH I) and F y make the same diagonal of squares
+    if not held:
+        reduced = squared * np.linalg.solve(np.ascontiguousarray(x.T) @ x, reduced)
     reduced = np.linalg.solve(y_across @ y, reduced)  # eq. 5
     return basis @ (y @ reduced) + 1.0 / len(query)
 
@@ -103,20 +100,34 @@ def _solution(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tupl
 
     With R = H (H + kH I)^-1 and the Cholesky factor L of F (F + kF I)^-1, the matrix L^T R L is symmetric, and its
     eigenvectors w give  F y = L w  and, up to length,  x = (H + kH I)^-1 L w. Returned are squared correlations (l,),
-    rising, then H x, F y and x (n, l): the examples' reduced inputs and outputs, and the bases of the inputs.
+    rising, then H x and F y (n, l), the examples' reduced inputs and outputs, and (H + kH I)^-1 (n, n).
     """
     identity = np.eye(len(inputs))
     ridge_x, ridge_y = _ridge(inputs, kappa), _ridge(outputs, kappa)
     if ridge_x <= 0.0 or ridge_y <= 0.0:
         raise ArithmeticError("a Gram matrix is not positive definite: are all examples the same?")
-    inverse = np.linalg.inv(inputs + ridge_x * identity)
+    inverse = _inverse(inputs + ridge_x * identity)
     kept_x = identity - ridge_x * inverse
-    kept_y = identity - ridge_y * np.linalg.inv(outputs + ridge_y * identity)
+    kept_y = identity - ridge_y * _inverse(outputs + ridge_y * identity)
     lower = np.linalg.cholesky(0.5 * (kept_y + kept_y.T) + _TINY * identity)
     squared, vectors = np.linalg.eigh(np.ascontiguousarray(lower.T) @ (kept_x @ lower))
     first = max(len(squared) - bases, 0)
     y = lower @ np.ascontiguousarray(vectors[:, first:])
-    return squared[first:], kept_x @ y, y, inverse @ y
+    return squared[first:], kept_x @ y, y, inverse
+
+
+@compiled
+def _inverse(gram: Floats) -> Floats:
+    """Of a positive definite matrix (n, n), by that of its Cholesky factor."""
+    lower = np.linalg.cholesky(0.5 * (gram + gram.T))
+    out = np.zeros_like(lower)
+    for i in range(len(lower)):
+        out[i, i] = 1.0 / lower[i, i]
+        for j in range(i):
+            for k in range(j, i):
+                out[i, j] -= lower[i, k] * out[k, j]
+            out[i, j] /= lower[i, i]
+    return np.ascontiguousarray(out.T) @ out
 
 
 @compiled

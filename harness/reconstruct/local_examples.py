@@ -13,6 +13,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, Singles
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import seen_from
 from harness.reconstruct.examples import Worn
@@ -62,15 +63,7 @@ class LocalExamples:
 
     def query(self, position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View) -> Floats:
         """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3) in the world."""
-        count, turn = self.count, view.turn()
-        out = np.empty(10 * count)
-        np.matmul(position_m - [view.x_m, view.y_m, 0.0], turn, out=out[: 3 * count].reshape(count, 3))
-        np.matmul(velocity_m_s, turn, out=out[7 * count :].reshape(count, 3))
-        seen = turned @ view.unturn_quaternions()
-        seen *= np.copysign(1.0, np.vecdot(seen, self._hemisphere))[:, None]
-        out[3 * count : 7 * count] = seen.reshape(-1)
-        out *= self.scale
-        return out
+        return _features(position_m, turned, velocity_m_s, view, self._hemisphere, self.scale)
 
     def nearest(self, query: Floats, trust: Floats, count: int) -> Ints:
         """Rows of the frames nearest to a query (10 S,) whose columns count as much as `trust` (10 S,), 0 to 1."""
@@ -93,19 +86,12 @@ class LocalExamples:
 
     def inputs(self, rows: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats]:
         """What is learnt from: positions and orientations of some rows (m, n) and of the query (n,), n <= 7 S."""
-        used = slice(0, 7 * self.count)
-        values, asked = self.features[rows, used].astype(float), query[used]
-        if trust[used].min() < 1.0:
-            root = np.sqrt(trust[used])
-            return values * root, asked * root
-        return values, asked
+        count = 7 * self.count
+        return _trusted(self.features, rows, query[:count], trust[:count])
 
     def poses(self, rows: Ints) -> Floats:
         """(K, 55) what is learnt: posture (52), and the root's ground frame seen from the anchor (3)."""
-        out = np.empty((len(rows), 55))
-        out[:, :52] = self._posture.take(rows, 0)
-        out[:, 52:] = self.root[rows]
-        return out
+        return _side_by_side(self._posture, self.root, rows)
 
     def _quaternions(self, rows: slice) -> Singles:
         return self.features[rows, 3 * self.count : 7 * self.count].reshape(-1, self.count, 4)
@@ -138,3 +124,52 @@ class LocalExamples:
 def _quickest(count: int) -> str:
     """Never the kd-tree of the paper, which in 10 S dimensions looks at most vectors when none is near."""
     return "flat" if count <= FEW else "inverted_file"
+
+
+@compiled
+def _features(
+    position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View, hemisphere: Floats, scale: Floats
+) -> Floats:
+    """`LocalExamples.query`."""
+    count = len(position_m)
+    out = np.empty(10 * count)
+    cosine, sine = np.cos(view.yaw_rad), np.sin(view.yaw_rad)
+    c, s = np.cos(0.5 * view.yaw_rad), np.sin(0.5 * view.yaw_rad)
+    for k in range(count):
+        at, turn, gone = out[3 * k : 3 * k + 3], out[3 * count + 4 * k :], out[7 * count + 3 * k :]
+        x, y = position_m[k, 0] - view.x_m, position_m[k, 1] - view.y_m
+        at[0], at[1], at[2] = cosine * x + sine * y, cosine * y - sine * x, position_m[k, 2]
+        x, y = velocity_m_s[k, 0], velocity_m_s[k, 1]
+        gone[0], gone[1], gone[2] = cosine * x + sine * y, cosine * y - sine * x, velocity_m_s[k, 2]
+        q, like = turned[k], 0.0
+        turn[0], turn[1] = c * q[0] + s * q[3], c * q[1] + s * q[2]  # about_z(-yaw) q
+        turn[2], turn[3] = c * q[2] - s * q[1], c * q[3] - s * q[0]
+        for i in range(4):
+            like += turn[i] * hemisphere[k, i]
+        for i in range(4):
+            turn[i] = np.copysign(1.0, like) * turn[i]
+    return out * scale
+
+
+@compiled
+def _trusted(features: Singles, rows: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats]:
+    """The first n columns of some rows (m, n) and of the query (n,), each times the root of its trust (n,)."""
+    root = np.sqrt(trust)
+    values = np.empty((len(rows), len(query)))
+    for i in range(len(rows)):
+        for k in range(len(query)):
+            values[i, k] = features[rows[i], k] * root[k]
+    return values, query * root
+
+
+@compiled
+def _side_by_side(first: Singles, second: Singles, rows: Ints) -> Floats:
+    """Some rows of two tables (N, a), (N, b), as one (K, a + b)."""
+    width = first.shape[1]
+    out = np.empty((len(rows), width + second.shape[1]))
+    for i in range(len(rows)):
+        for k in range(width):
+            out[i, k] = first[rows[i], k]
+        for k in range(second.shape[1]):
+            out[i, width + k] = second[rows[i], k]
+    return out

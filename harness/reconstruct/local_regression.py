@@ -15,6 +15,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.errors import BadInput
@@ -28,7 +29,7 @@ from harness.reconstruct.mean_pose import mean_posture, spread_rad
 from harness.reconstruct.outlook import Outlook
 from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Loss, Residuals
-from harness.reconstruct.smoothing import shares
+from harness.reconstruct.smoothing import smoothed
 from harness.reconstruct.solver import Prior, Solver, Stopping
 from harness.reconstruct.viewpoint import View
 from harness.stream.frame import TrackerFrame
@@ -166,8 +167,8 @@ class LocalSession:
     def _smoothed(self, pose: Floats) -> Floats:
         """Eq. 6, on hinge angles and on the root as seen from the anchor, so that walking itself is not delayed."""
         if len(self._poses_before) == 2:
-            now, last, earlier = shares(self._options.alpha, self._options.beta)
-            pose = now * pose + last * self._poses_before[1] + earlier * self._poses_before[0]
+            earlier, before = self._poses_before
+            pose = smoothed(pose, before, earlier, self._options.alpha, self._options.beta)
         self._poses_before = [*self._poses_before[-1:], pose]
         return pose
 
@@ -182,11 +183,12 @@ class LocalSession:
         return nearest_placed(self._residuals, qpos)
 
 
+@compiled
 def stood(pose: Floats, view: View) -> Floats:
     """The configuration (55,) of a posture and the root's ground frame as seen from a view (55,)."""
     cosine, sine = math.cos(view.yaw_rad), math.sin(view.yaw_rad)
-    height_m, roll, pitch, _ = pose[:4].tolist()
-    forward_m, left_m, turn_rad = pose[52:].tolist()
+    height_m, roll, pitch = pose[0], pose[1], pose[2]
+    forward_m, left_m, turn_rad = pose[52], pose[53], pose[54]
     c, s = math.cos(0.5 * (view.yaw_rad + turn_rad)), math.sin(0.5 * (view.yaw_rad + turn_rad))
     lean = math.hypot(roll, pitch)
     w, by = math.cos(0.5 * lean), math.sin(0.5 * lean) / lean if lean > 0.0 else 0.5
@@ -195,6 +197,6 @@ def stood(pose: Floats, view: View) -> Floats:
     out[0] = view.x_m + cosine * forward_m - sine * left_m
     out[1] = view.y_m + sine * forward_m + cosine * left_m
     out[2] = height_m
-    out[3:7] = c * w, c * x - s * y, c * y + s * x, s * w  # about_z(yaw) tilt
+    out[3], out[4], out[5], out[6] = c * w, c * x - s * y, c * y + s * x, s * w  # about_z(yaw) tilt
     out[7:] = pose[4:52]
     return out

@@ -11,6 +11,7 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
+from harness.core.compiled import compiled
 from harness.reconstruct.local_examples import LocalExamples
 from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Residuals
@@ -36,7 +37,10 @@ class Outlook:
         `answer` (55,) is the last one.
         """
         residuals, anchor, count = self._residuals, self._examples.anchor, self._examples.count
-        velocity_m_s, moving = self._velocities(frame)
+        before = self._before_m, self._before_s, self._before_valid
+        velocity_m_s, moving = _velocities(
+            residuals.target_m, frame.measured_s, residuals.measured, *before, self._longest_gap_s
+        )
         position_m, turned = residuals.target_m, residuals.world_from_target
         whole = bool(residuals.measured.all())
         facing = turned[anchor]
@@ -54,19 +58,6 @@ class Outlook:
             trust[7 * count :] = np.repeat(positions * moving, 3)
         return view, self._examples.query(position_m, turned, velocity_m_s, view), trust
 
-    def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
-        """(S, 3) since the last frame [m/s], and where it is known."""
-        target_m, here = self._residuals.target_m, self._residuals.measured[: self._examples.count]
-        gap_s = frame.measured_s - self._before_s
-        known: Bools = here & self._before_valid & (gap_s > 0.0) & (gap_s <= self._longest_gap_s)
-        gone_m = target_m - self._before_m
-        if known.all():
-            velocity_m_s: Floats = gone_m / gap_s[:, None]
-        else:
-            velocity_m_s = np.where(known[:, None], gone_m, 0.0) / np.where(known, gap_s, 1.0)[:, None]
-        self._before_m, self._before_s, self._before_valid = target_m.copy(), frame.measured_s, here
-        return velocity_m_s, known
-
     def _filled(self, answer: Floats) -> tuple[Floats, Floats, Floats]:
         """Positions (S, 3), orientations (S, 4), and the anchor's (4,), from the last answer where nothing was read."""
         residuals, count = self._residuals, self._examples.count
@@ -75,3 +66,29 @@ class Outlook:
         at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
         turned = np.where(facing, residuals.world_from_target, turned)
         return np.where(here, residuals.target_m, at_m), turned, turned[self._examples.anchor]
+
+
+@compiled
+def _velocities(
+    target_m: Floats,
+    measured_s: Floats,
+    measured: Bools,
+    before_m: Floats,
+    before_s: Floats,
+    before_valid: Bools,
+    longest_gap_s: float,
+) -> tuple[Floats, Bools]:
+    """(S, 3) since the frame before [m/s], 0 where it is not known, and where it is (S,).
+
+    This frame then takes the place of the one before.
+    """
+    velocity_m_s, known = np.zeros_like(target_m), np.zeros(len(target_m), np.bool_)
+    for s in range(len(target_m)):
+        gap_s = measured_s[s] - before_s[s]
+        known[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= longest_gap_s
+        for i in range(3):
+            if known[s]:
+                velocity_m_s[s, i] = (target_m[s, i] - before_m[s, i]) / gap_s
+            before_m[s, i] = target_m[s, i]
+        before_s[s], before_valid[s] = measured_s[s], measured[s]
+    return velocity_m_s, known

@@ -7,6 +7,7 @@ about one axis add up, and the blend is a weighted sum: 0.60, 0.28 and 0.12 with
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.compiled import compiled
 
 
 def slerp(start: Floats, stop: Floats, share: float) -> Floats:
@@ -20,6 +21,18 @@ def smoothed_rotation(now: Floats, before: Floats, earlier: Floats, alpha: float
     return slerp(now, slerp(before, earlier, alpha), beta)
 
 
+def smoothed(now: Floats, before: Floats, earlier: Floats, alpha: float, beta: float) -> Floats:
+    """Eq. 6 of vectors (n,) at t, t-1 and t-2."""
+    return _sum(now, before, earlier, *shares(alpha, beta))
+
+
 def shares(alpha: float, beta: float) -> tuple[float, float, float]:
     """What t, t-1 and t-2 count in eq. 6 of a vector: angles of hinges, coordinates of a point."""
     return 1.0 - beta, beta * (1.0 - alpha), beta * alpha
+
+
+@compiled
+def _sum(
+    now: Floats, before: Floats, earlier: Floats, share: float, share_before: float, share_earlier: float
+) -> Floats:
+    return share * now + share_before * before + share_earlier * earlier

@@ -5,7 +5,6 @@ only the places at which it was captured. Here everything is seen from an anchor
 "world invariance"). A bone's heading is its twist about the vertical, as in `database.ground`.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -23,16 +22,6 @@ class View(NamedTuple):
     x_m: float
     y_m: float
     yaw_rad: float
-
-    def turn(self) -> Floats:
-        """(3, 3) `world_from_view`; row vectors times it go from the world into the view."""
-        cosine, sine = math.cos(self.yaw_rad), math.sin(self.yaw_rad)
-        return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
-
-    def unturn_quaternions(self) -> Floats:
-        """(4, 4) such that row quaternions times it go from the world into the view."""
-        c, s = math.cos(0.5 * self.yaw_rad), math.sin(0.5 * self.yaw_rad)
-        return np.array([[c, 0.0, 0.0, -s], [0.0, c, -s, 0.0], [0.0, s, c, 0.0], [s, 0.0, 0.0, c]])
 
 
 def anchor_of(bones: Sequence[str]) -> int:

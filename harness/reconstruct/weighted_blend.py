@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.compiled import compiled
 from harness.reconstruct.local_regression import LocalRegression
 
 
@@ -19,7 +20,17 @@ class WeightedBlend(LocalRegression):
     """Weights fall with this power of the distance."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        away = inputs - query
-        closeness = np.maximum(np.vecdot(away, away), 1e-12) ** (-0.5 * self.power)
-        out: Floats = closeness / closeness.sum()
-        return out
+        return _closeness(inputs, query, self.power)
+
+
+@compiled
+def _closeness(inputs: Floats, query: Floats, power: float) -> Floats:
+    """`WeightedBlend.weigh`."""
+    out: Floats = np.empty(len(inputs))
+    for i in range(len(inputs)):
+        squared = 0.0
+        for k in range(len(query)):
+            squared += (inputs[i, k] - query[k]) ** 2
+        out[i] = max(squared, 1e-12) ** (-0.5 * power)
+    out /= out.sum()
+    return out
