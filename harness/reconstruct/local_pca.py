@@ -125,7 +125,7 @@ class LocalPcaSession(Remembering):
             options.smooth_weight / options.smooth_sigma_rad**2,
         )
         here = stepped(self.past[0], poses[0, POSTURE:])
-        return solve(self.residuals, self.limits, space, here, space.nearest(poses[0, :POSTURE]), options.stopping)
+        return solve(self.residuals, self.limits, space, here, poses[0, :POSTURE], options.stopping)
 
     def bridged(self) -> Floats:
         """Nothing was read, and there are no dynamics: as it was."""

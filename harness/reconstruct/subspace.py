@@ -1,18 +1,18 @@
 """Levenberg and Marquardt's method among the poses of a local linear model.
 
-Unknown are the ground frame (x, y, yaw) and the weights w of q = p + U w, a posture. Minimised is the data cost plus
-alpha/2 (q - p)^T Lambda^-1 (q - p) plus beta/2 |q - 2 q' + q''|^2 (docs/methods.md C2), both quadratic in w.
+Unknown are the ground frame (x, y, yaw) and a posture q = p + U w. Minimised is the data cost plus
+alpha/2 (q - p)^T Lambda^-1 (q - p) plus beta/2 |q - q'|^2 (docs/methods.md C2), both quadratic in q. So many
+directions are kept that it is cheaper to name those that are not: q is sought among all postures, with a stiff spring
+across the space, and every step is projected onto it.
 """
 
-import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import lapack
 
 from harness.core.arrays import Floats
+from harness.core.compiled import compiled
 from harness.reconstruct import descent
-from harness.reconstruct.database.ground import HEIGHT, HINGES, TILT
 from harness.reconstruct.footing import stood
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Residuals
@@ -21,119 +21,199 @@ from harness.reconstruct.solver import Solution, Stopping
 _DAMPING, _RAISE, _LOWER = 1e-3, 10.0, 3.0
 _LEAST = 1e-6
 """Keeps a step of 0 where nothing was read about the ground frame."""
+_FLOOR = 1e-9
+"""Added to all variances [m^2, rad^2]."""
+_STIFF = 1e9
+"""Of the spring across the space, far above what trackers say of a pose [1/m^2, 1/rad^2]."""
+_FEW, _ROUNDS = 16, 4
+"""Up to so many directions left out are found by so many rounds of inverse iteration, in an eighth of the time."""
 
 
-@dataclass(frozen=True, eq=False)
-class Subspace:
-    """Postures p + U w with a quadratic cost 1/2 w^T A w - b^T w."""
+class Subspace(NamedTuple):
+    """Postures near p that differ from it by nothing along N, with a quadratic cost 1/2 a^T A a - b^T a, a = q - p."""
 
     mean: Floats
     """(52,) p."""
-    axes: Floats
-    """(52, B) U."""
+    across: Floats
+    """(52 - B, 52) N, orthonormal: what U leaves out."""
     curvature: Floats
-    """(B, B) A."""
+    """(52, 52) A, and the spring across the space."""
     pull: Floats
-    """(B,) b."""
+    """(52,) b."""
 
     @classmethod
     def of(cls, postures: Floats, components: int, weight: float) -> "Subspace":
-        """The leading directions of K postures (K, 52), and alpha = `weight` times w^T Lambda^-1 w."""
+        """The leading directions of K postures (K, 52), and alpha = `weight` times a^T Lambda^-1 a."""
         mean = postures.mean(axis=0)
         away = postures - mean
-        values, axes = np.linalg.eigh(away.T @ away / len(away))
-        values, axes = values[-components:], np.ascontiguousarray(axes[:, -components:])
-        curvature = np.diag(weight / np.maximum(values, 1e-9))
-        return cls(mean, axes, curvature, np.zeros(len(values)))
+        scatter = away.T @ away / len(away)
+        scatter.reshape(-1)[:: len(mean) + 1] += _FLOOR
+        inverse, left_out = inverted(scatter), max(len(mean) - components, 0)
+        if left_out <= _FEW:
+            across = least(inverse, left_out, _ROUNDS)
+        else:
+            across = np.ascontiguousarray(np.linalg.eigh(scatter)[1][:, :left_out].T)
+        return cls(mean, across, _confined(inverse, across, weight), np.zeros(len(mean)))
 
     def smoothed(self, expected: Floats, weight: float) -> "Subspace":
         """With beta = `weight` times the squared distance from a posture (52,) added."""
-        curvature = self.curvature + weight * np.eye(len(self.pull))
-        return replace(self, curvature=curvature, pull=self.pull + weight * (self.axes.T @ (expected - self.mean)))
+        curvature = np.array(self.curvature)
+        curvature.reshape(-1)[:: len(self.pull) + 1] += weight
+        return Subspace(self.mean, self.across, curvature, self.pull + weight * (expected - self.mean))
 
     def nearest(self, posture: Floats) -> Floats:
-        """w (B,) of the posture of the space that is nearest to one (52,)."""
-        out: Floats = self.axes.T @ (posture - self.mean)
+        """The posture (52,) of the space that is nearest to one."""
+        out: Floats = posture - (self.across @ (posture - self.mean)) @ self.across
         return out
 
-    def cost(self, w: Floats) -> float:
-        return float(0.5 * w @ self.curvature @ w - self.pull @ w)
+    def cost(self, posture: Floats) -> float:
+        away = posture - self.mean
+        return float(away @ (0.5 * (self.curvature @ away) - self.pull))
 
 
 def solve(
-    residuals: Residuals, limits: HingeLimits, space: Subspace, ground: Floats, w: Floats, stopping: Stopping
+    residuals: Residuals, limits: HingeLimits, space: Subspace, ground: Floats, posture: Floats, stopping: Stopping
 ) -> Solution:
-    """Downhill from a ground frame (3,) and weights (B,). What leaves the hinges' limits is clipped at the end."""
-    z = np.concatenate([ground, w])
-    hessian, descending, own = np.zeros((54, 54)), np.empty(54), np.zeros((len(z), len(z)))
-    own[3:, 3:] = space.curvature
-    qpos, slope = posed(space, z), empty_tangent(space)
-    cost, damping, converged, steps = residuals.place(qpos) + space.cost(w), _DAMPING, False, 0
+    """Downhill from a ground frame (3,) and a posture (52,). What leaves the hinges' limits is clipped at the end."""
+    z = np.concatenate([ground, space.nearest(posture)])
+    hessian, descending, gradient, normal = np.zeros((54, 54)), np.empty(54), np.empty(55), np.empty((55, 55))
+    qpos = stood(z[3:], z[:3])
+    cost, damping, converged, steps = residuals.place(qpos) + space.cost(z[3:]), _DAMPING, False, 0
     while not converged and steps < stopping.most_steps:
         steps += 1
-        fill_tangent(space, z, slope)
-        descent.normal_equations(residuals.chain, residuals.placed, hessian, descending)  # the lower triangle
-        hessian.reshape(-1)[::55] *= 0.5
-        normal = slope.T @ (hessian @ slope)
-        normal += normal.T + own
-        gradient = descending @ slope
-        gradient[3:] += space.pull - space.curvature @ z[3:]
-        diagonal = normal.diagonal().copy()
+        descent.normal_equations(residuals.chain, residuals.placed, hessian, descending)
+        refer(space, z, hessian, descending, normal, gradient)
         while True:
-            normal.reshape(-1)[:: len(z) + 1] = diagonal * (1.0 + damping) + _LEAST
-            _, step, _ = lapack.dposv(normal, gradient, lower=1)
+            step = damped(space, normal, gradient, damping)
             longest = max(float(step.max()), -float(step.min()))
-            moved = posed(space, z + step)
-            new_cost = residuals.place(moved) + space.cost((z + step)[3:])
+            if not longest < np.inf:
+                raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
+            there = z + step
+            moved = stood(there[3:], there[:3])
+            new_cost = residuals.place(moved) + space.cost(there[3:])
             if new_cost <= cost or longest < stopping.step:
                 break
             damping *= _RAISE
         converged = longest < stopping.step or cost - new_cost < stopping.decrease
         if new_cost <= cost:
-            z, qpos, cost, damping = z + step, moved, new_cost, damping / _LOWER
+            z, qpos, cost, damping = there, moved, new_cost, damping / _LOWER
     qpos = np.concatenate([qpos[:7], limits.clipped(qpos[7:])])
     residuals.place(qpos)
     return Solution(qpos, cost, steps, converged)
 
 
-def posed(space: Subspace, z: Floats) -> Floats:
-    """The configuration (55,) of a ground frame and weights (3 + B,)."""
-    out: Floats = stood(space.mean + space.axes @ z[3:], z[:3])
+@compiled
+def inverted(matrix: Floats) -> Floats:
+    """The inverse of a positive definite matrix (N, N), by Gauss and Jordan's elimination."""
+    out, count = matrix.copy(), len(matrix)
+    for k in range(count):
+        row = out[k] / out[k, k]
+        row[k] = 1.0 / out[k, k]
+        for i in range(count):
+            if i != k:
+                share = out[i, k]
+                out[i, k] = 0.0
+                for j in range(count):
+                    out[i, j] -= share * row[j]
+        out[k] = row
     return out
 
 
-def empty_tangent(space: Subspace) -> Floats:
-    """(54, 3 + B) what of `tangent` is the same everywhere."""
-    out = np.zeros((54, 3 + len(space.pull)))
-    out[0, 0] = out[1, 1] = 1.0
-    out[2, 3:], out[6:, 3:] = space.axes[HEIGHT], space.axes[HINGES]
-    return out
+@compiled
+def least(inverse: Floats, count: int, rounds: int) -> Floats:
+    """(D, N) orthonormal rows: the D = `count` directions of least variance, from the inverse (N, N) of the scatter.
 
-
-def tangent(space: Subspace, z: Floats) -> Floats:
-    """(54, 3 + B) how the solver's directions follow the unknowns: J U but for the kinematics."""
-    out = empty_tangent(space)
-    fill_tangent(space, z, out)
-    return out
-
-
-def fill_tangent(space: Subspace, z: Floats, out: Floats) -> None:
-    """The rest of it.
-
-    The root's turn is about_z(yaw) exp(tilt): in the root's own axes yaw turns about exp(-tilt) z, and tilt by its
-    right Jacobian.
+    Inverse iteration of all at once, from the coordinates that the others leave the least room. Two directions whose
+    variances are alike may come out mixed, which matters as little as which of them is left out.
     """
-    tilt = space.mean[TILT] + space.axes[TILT] @ z[3:]
-    x, y, up = tilt.tolist()
+    out = inverse[np.argsort(-np.diag(inverse))[:count]]
+    for turn in range(2 * rounds):
+        if turn % 2 == 1 and turn < 2 * rounds - 1:
+            out = np.dot(out, inverse)
+        for i in range(count):
+            out[i] /= np.sqrt(np.dot(out[i], out[i]))
+            for j in range(i + 1, count):
+                out[j] -= np.dot(out[j], out[i]) * out[i]
+    return out
+
+
+def _confined(inverse: Floats, across: Floats, weight: float) -> Floats:
+    """(N, N) `weight` times the inverse within the space, and the spring across it."""
+    share = weight * (across @ inverse)
+    within = share @ across.T
+    within.reshape(-1)[:: len(across) + 1] += _STIFF
+    half = across.T @ (share - 0.5 * within @ across)
+    out: Floats = weight * inverse - half - half.T
+    return out
+
+
+@compiled
+def root_slope(z: Floats) -> Floats:
+    """(6, 7) how the root moves and turns as the ground frame, height and tilt do.
+
+    Its turn is about_z(yaw) exp(tilt): in the root's own axes yaw turns about exp(-tilt) z, and tilt by its right
+    Jacobian.
+    """
+    x, y, up = z[4], z[5], z[6]
     cross = np.array([[0.0, -up, y], [up, 0.0, -x], [-y, x, 0.0]])
-    twice, squared = cross @ cross, x * x + y * y + up * up
-    angle = math.sqrt(squared)
+    squared = x * x + y * y + up * up
+    angle = np.sqrt(squared)
     half, sine, rest = 0.5, 1.0, 1.0 / 6.0
     if angle > 1e-4:
-        half = (1.0 - math.cos(angle)) / squared
-        sine, rest = math.sin(angle) / angle, (angle - math.sin(angle)) / (squared * angle)
-    out[3:6, 2] = _UP - sine * cross[:, 2] + half * twice[:, 2]
-    out[3:6, 3:] = (_SAME - half * cross + rest * twice) @ space.axes[TILT]
+        half = (1.0 - np.cos(angle)) / squared
+        sine, rest = np.sin(angle) / angle, (angle - np.sin(angle)) / (squared * angle)
+    twice = np.dot(cross, cross)
+    out = np.zeros((6, 7))
+    out[0, 0] = out[1, 1] = out[2, 3] = out[5, 2] = 1.0
+    out[3:, 2] += half * twice[:, 2] - sine * cross[:, 2]
+    out[3:, 4:] = np.eye(3) - half * cross + rest * twice
+    return out
 
 
-_UP, _SAME = np.array([0.0, 0.0, 1.0]), np.eye(3)
+@compiled
+def refer(space: Subspace, z: Floats, hessian: Floats, descent: Floats, normal: Floats, gradient: Floats) -> None:
+    """Makes normal equations (55, 55), in the upper triangle, and descent (55,) of z from those of the solver's
+    directions (54, 54), in the lower triangle, and (54,). Hinges are the same in both. The prior is added."""
+    slope = root_slope(z)
+    for r in range(48):
+        for c in range(r + 1):
+            normal[7 + c, 7 + r] = hessian[6 + r, 6 + c]
+    for a in range(7):
+        for r in range(48):
+            normal[a, 7 + r] = 0.0
+            for k in range(6):
+                normal[a, 7 + r] += slope[k, a] * hessian[6 + r, k]
+        for b in range(a, 7):
+            normal[a, b] = 0.0
+            for k in range(6):
+                for m in range(6):
+                    normal[a, b] += slope[k, a] * hessian[max(k, m), min(k, m)] * slope[m, b]
+        gradient[a] = 0.0
+        for k in range(6):
+            gradient[a] += slope[k, a] * descent[k]
+    gradient[7:] = descent[6:]
+    gradient[3:] += space.pull - np.dot(space.curvature, z[3:] - space.mean)
+    normal[3:, 3:] += space.curvature
+
+
+@compiled
+def damped(space: Subspace, normal: Floats, gradient: Floats, damping: float) -> Floats:
+    """Levenberg and Marquardt's step (55,) within the space; the matrix from its upper triangle, as L D L^T."""
+    factor, step, count = normal.copy(), gradient.copy(), len(gradient)
+    for k in range(count):
+        spring = _STIFF * np.sum(space.across[:, k - 3] ** 2) if k >= 3 else 0.0  # which is not damped
+        factor[k, k] += damping * (factor[k, k] - spring) + _LEAST
+    for k in range(count):
+        row = factor[k].copy()
+        for i in range(k + 1, count):
+            share = row[i] / row[k]
+            if share != 0.0:
+                for j in range(i, count):
+                    factor[i, j] -= share * row[j]
+                step[i] -= share * step[k]
+    for k in range(count - 1, -1, -1):
+        for i in range(k + 1, count):
+            step[k] -= factor[k, i] * step[i]
+        step[k] /= factor[k, k]
+    step[3:] -= np.dot(np.dot(space.across, step[3:]), space.across)
+    return step

@@ -6,11 +6,12 @@ import pytest
 from harness.core.arrays import Floats
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import ground_of, posture_of
+from harness.reconstruct.footing import stood
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.local_pca import LocalPca
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.solver import Stopping
-from harness.reconstruct.subspace import Subspace, posed, solve, tangent
+from harness.reconstruct.subspace import Subspace, damped, inverted, refer, solve
 
 from .conftest import Scene
 
@@ -21,33 +22,61 @@ def space_of(scene: Scene, components: int = 7) -> Subspace:
 
 
 @pytest.mark.parametrize("lean_rad", [0.0, 1e-6, 1.2])
-def test_tangent_against_differences(walk: Scene, rng: np.random.Generator, lean_rad: float) -> None:
-    space, residuals = space_of(walk), Residuals(walk.body, walk.calibration, Loss())
-    mean = np.array(space.mean)
-    mean[1:4] = [0.6 * lean_rad, 0.8 * lean_rad, 0.0]
-    space = Subspace(mean, space.axes, space.curvature, space.pull)
-    z = np.concatenate([[0.3, -0.2, 2.0], np.zeros(7)])
-    slopes, h = tangent(space, z), 1e-6
-    for k, step in enumerate(h * np.eye(10)):
-        away = residuals.kinematics.difference(posed(space, z - step), posed(space, z + step)) / (2.0 * h)
-        np.testing.assert_allclose(slopes[:, k], away, atol=2e-6)
-
-
-def test_gradient_against_central_differences(walk: Scene, rng: np.random.Generator) -> None:
-    space = space_of(walk).smoothed(posture_of(walk.take.qpos[33]), 20.0)
-    residuals = Residuals(walk.body, walk.calibration, Loss())
+def test_normal_equations_against_differences(walk: Scene, rng: np.random.Generator, lean_rad: float) -> None:
+    space = space_of(walk, 40).smoothed(posture_of(walk.take.qpos[33]), 20.0)
+    residuals = Residuals(walk.body, walk.calibration, Loss(robust=False))
     residuals.read(walk.frames[30])
-    z = np.concatenate([ground_of(walk.take.qpos[30]) + 0.05, 0.1 * rng.normal(size=7)])
+    z = np.concatenate([ground_of(walk.take.qpos[30]) + 0.05, space.mean + 0.1 * rng.normal(size=52)])
+    z[4:7] = [0.6 * lean_rad, 0.8 * lean_rad, 0.0]
 
-    def cost(z: Floats) -> float:
-        return residuals.place(posed(space, z)) + space.cost(z[3:])
+    def data_cost(z: Floats) -> float:
+        return residuals.place(stood(z[3:], z[:3]))
 
-    h = 1e-6
-    slopes = np.array([(cost(z + step) - cost(z - step)) / (2.0 * h) for step in h * np.eye(10)])
-    cost(z)
-    gradient = -residuals.normal_equations(np.zeros((54, 54))) @ tangent(space, z)
-    gradient[3:] += space.curvature @ z[3:] - space.pull
-    np.testing.assert_allclose(gradient, slopes, atol=1e-5 * np.abs(slopes).max())
+    h, hessian = 1e-6, np.zeros((54, 54))
+    steps = h * np.eye(55)
+    slopes = [
+        residuals.kinematics.difference(stood((z - step)[3:], (z - step)[:3]), stood((z + step)[3:], (z + step)[:3]))
+        for step in steps
+    ]
+    jacobian = np.array(slopes).T / (2.0 * h)
+    gradient = np.array([(data_cost(z + step) - data_cost(z - step)) / (2.0 * h) for step in steps])
+    gradient[3:] += space.curvature @ (z[3:] - space.mean) - space.pull
+    data_cost(z)
+    descent = residuals.normal_equations(hessian)
+    expected = jacobian.T @ hessian @ jacobian
+    expected[3:, 3:] += space.curvature
+    normal, found = np.empty((55, 55)), np.empty(55)
+    refer(space, z, hessian, descent, normal, found)
+    np.testing.assert_allclose(np.triu(normal), np.triu(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
+    np.testing.assert_allclose(-found, gradient, rtol=1e-6, atol=1e-5 * np.abs(descent).max())
+
+
+def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene, rng: np.random.Generator) -> None:
+    space = space_of(walk, 40)
+    basis = np.eye(55)
+    basis[3:, 3:] -= space.across.T @ space.across
+    half = rng.normal(size=(55, 55))
+    normal, gradient = half @ half.T + np.eye(55), rng.normal(size=55)
+    normal[3:, 3:] += space.curvature
+    within = np.linalg.svd(basis)[0][:, :43]
+    step = within @ np.linalg.solve(within.T @ normal @ within, within.T @ gradient)
+    np.testing.assert_allclose(damped(space, np.triu(normal), gradient, 0.0), step, atol=2e-3 * np.abs(step).max())
+
+
+def test_what_is_left_out_varies_least(walk: Scene) -> None:
+    """Found by inverse iteration: orthonormal, and next to no more variance than the smallest eigenvalues hold."""
+    postures = MotionDatabase.build(walk.body, [walk.take]).posture[20:80].astype(float)
+    space = Subspace.of(postures, 40, 0.8)
+    away = postures - postures.mean(axis=0)
+    scatter = away.T @ away / len(away)
+    np.testing.assert_allclose(space.across @ space.across.T, np.eye(12), atol=1e-10)
+    held = np.trace(space.across @ scatter @ space.across.T)
+    assert held <= 1.01 * np.sum(np.linalg.eigvalsh(scatter)[:12]) + 12 * 1e-9
+
+
+def test_inverse(rng: np.random.Generator) -> None:
+    half = rng.normal(size=(60, 52)) * np.geomspace(1.0, 1e-4, 52)
+    np.testing.assert_allclose(inverted(half.T @ half) @ (half.T @ half), np.eye(52), atol=1e-6)
 
 
 def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
@@ -58,27 +87,26 @@ def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
     away = postures - postures.mean(axis=0)
     scatter = away.T @ away / len(away)
 
-    def written_out(w: Floats) -> float:
-        q = space.mean + space.axes @ w
+    def written_out(q: Floats) -> float:
         within = q - space.mean
         return float(0.4 * within @ np.linalg.pinv(scatter, rcond=1e-9) @ within + 1.5 * np.sum((q - expected) ** 2))
 
-    for w in 0.2 * rng.normal(size=(5, 7)):
-        np.testing.assert_allclose(
-            space.cost(w) - space.cost(np.zeros(7)), written_out(w) - written_out(np.zeros(7)), rtol=1e-6
-        )
+    assert space.cost(space.mean) == 0.0
+    for direction in 0.2 * rng.normal(size=(5, 52)):
+        q = space.nearest(space.mean + direction)
+        np.testing.assert_allclose(space.cost(q), written_out(q) - written_out(space.mean), rtol=1e-6)
 
 
 def test_the_answer_lies_in_the_subspace_and_is_a_minimum(walk: Scene, rng: np.random.Generator) -> None:
     space, residuals = space_of(walk), Residuals(walk.body, walk.calibration, Loss())
     residuals.read(walk.frames[50])
     ground, limits = ground_of(walk.take.qpos[50]), HingeLimits(walk.body, keep=False)
-    found = solve(residuals, limits, space, ground + 0.05, np.zeros(7), Stopping(step=1e-7, decrease=0.0))
-    away = posture_of(found.qpos) - space.mean
-    np.testing.assert_allclose(space.axes @ (space.axes.T @ away), away, atol=1e-9)
-    z = np.concatenate([ground_of(found.qpos), space.nearest(posture_of(found.qpos))])
-    for step in 1e-3 * rng.normal(size=(20, 10)):
-        assert residuals.place(posed(space, z + step)) + space.cost((z + step)[3:]) > found.cost - 1e-9
+    found = solve(residuals, limits, space, ground + 0.05, space.mean, Stopping(step=1e-7, decrease=0.0))
+    posture, ground = posture_of(found.qpos), ground_of(found.qpos)
+    np.testing.assert_allclose(space.nearest(posture), posture, atol=1e-9)
+    for step in 1e-3 * rng.normal(size=(20, 55)):
+        there = space.nearest(posture + step[3:])
+        assert residuals.place(stood(there, ground + step[:3])) + space.cost(there) > found.cost - 1e-9
 
 
 def test_few_directions_follow_trackers_worse_than_many(walk: Scene, boxing: Scene) -> None:
