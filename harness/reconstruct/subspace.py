@@ -9,6 +9,7 @@ across the space, and every step is projected onto it.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg import lapack
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
@@ -40,26 +41,28 @@ class Subspace(NamedTuple):
     """(52, 52) A, and the spring across the space."""
     pull: Floats
     """(52,) b."""
+    spring: Floats
+    """(52,) what of the diagonal of A is the spring's."""
 
     @classmethod
     def of(cls, postures: Floats, components: int, weight: float) -> "Subspace":
         """The leading directions of K postures (K, 52), and alpha = `weight` times a^T Lambda^-1 a."""
-        mean = postures.mean(axis=0)
-        away = postures - mean
-        scatter = away.T @ away / len(away)
+        mean = np.full(len(postures), 1.0 / len(postures)) @ postures
+        scatter = postures.T @ postures / len(postures) - np.outer(mean, mean)
         scatter.reshape(-1)[:: len(mean) + 1] += _FLOOR
         inverse, left_out = inverted(scatter), max(len(mean) - components, 0)
         if left_out <= _FEW:
             across = least(inverse, left_out, _ROUNDS)
         else:
             across = np.ascontiguousarray(np.linalg.eigh(scatter)[1][:, :left_out].T)
-        return cls(mean, across, _confined(inverse, across, weight), np.zeros(len(mean)))
+        spring = _STIFF * (across * across).sum(axis=0)
+        return cls(mean, across, _confined(inverse, across, weight), np.zeros(len(mean)), spring)
 
     def smoothed(self, expected: Floats, weight: float) -> "Subspace":
         """With beta = `weight` times the squared distance from a posture (52,) added."""
         curvature = np.array(self.curvature)
         curvature.reshape(-1)[:: len(self.pull) + 1] += weight
-        return Subspace(self.mean, self.across, curvature, self.pull + weight * (expected - self.mean))
+        return self._replace(curvature=curvature, pull=self.pull + weight * (expected - self.mean))
 
     def nearest(self, posture: Floats) -> Floats:
         """The posture (52,) of the space that is nearest to one."""
@@ -86,8 +89,6 @@ def solve(
         while True:
             step = damped(space, normal, gradient, damping)
             longest = max(float(step.max()), -float(step.min()))
-            if not longest < np.inf:
-                raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
             there = z + step
             moved = stood(there[3:], there[:3])
             new_cost = residuals.place(moved) + space.cost(there[3:])
@@ -127,13 +128,15 @@ def least(inverse: Floats, count: int, rounds: int) -> Floats:
     variances are alike may come out mixed, which matters as little as which of them is left out.
     """
     out = inverse[np.argsort(-np.diag(inverse))[:count]]
-    for turn in range(2 * rounds):
-        if turn % 2 == 1 and turn < 2 * rounds - 1:
+    for turn in range(rounds + 1):
+        if 0 < turn < rounds:
             out = np.dot(out, inverse)
-        for i in range(count):
+        for i in range(count):  # Gram and Schmidt's method, at the end twice
             out[i] /= np.sqrt(np.dot(out[i], out[i]))
             for j in range(i + 1, count):
-                out[j] -= np.dot(out[j], out[i]) * out[i]
+                share = np.dot(out[j], out[i])
+                for k in range(out.shape[1]):
+                    out[j, k] -= share * out[i, k]
     return out
 
 
@@ -196,24 +199,16 @@ def refer(space: Subspace, z: Floats, hessian: Floats, descent: Floats, normal: 
     normal[3:, 3:] += space.curvature
 
 
-@compiled
 def damped(space: Subspace, normal: Floats, gradient: Floats, damping: float) -> Floats:
-    """Levenberg and Marquardt's step (55,) within the space; the matrix from its upper triangle, as L D L^T."""
-    factor, step, count = normal.copy(), gradient.copy(), len(gradient)
-    for k in range(count):
-        spring = _STIFF * np.sum(space.across[:, k - 3] ** 2) if k >= 3 else 0.0  # which is not damped
-        factor[k, k] += damping * (factor[k, k] - spring) + _LEAST
-    for k in range(count):
-        row = factor[k].copy()
-        for i in range(k + 1, count):
-            share = row[i] / row[k]
-            if share != 0.0:
-                for j in range(i, count):
-                    factor[i, j] -= share * row[j]
-                step[i] -= share * step[k]
-    for k in range(count - 1, -1, -1):
-        for i in range(k + 1, count):
-            step[k] -= factor[k, i] * step[i]
-        step[k] /= factor[k, k]
-    step[3:] -= np.dot(np.dot(space.across, step[3:]), space.across)
-    return step
+    """Levenberg and Marquardt's step (55,) within the space; the matrix from its upper triangle."""
+    matrix = normal.copy()
+    diagonal = matrix.reshape(-1)[:: len(matrix) + 1]
+    diagonal[3:] -= space.spring * (damping / (1.0 + damping))  # the spring is not damped
+    diagonal *= 1.0 + damping
+    diagonal += _LEAST
+    _, step, failed = lapack.dposv(matrix.T, gradient, lower=1, overwrite_a=1)
+    if failed or not np.isfinite(step[0]):
+        raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
+    step[3:] -= (space.across @ step[3:]) @ space.across
+    out: Floats = step
+    return out
