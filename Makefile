@@ -24,6 +24,8 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --constraint requirements.lock --editable '.[viz,test]'
+	@echo 'compiling the inner loops, once: about a minute'
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m harness.testing.compile_all
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.ready

@@ -87,7 +87,8 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
     if "out" in flags:
         verb.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
     if "jobs" in flags:
-        verb.add_argument("--jobs", type=positive, default=1, metavar="N", help="clips at the same time (default 1)")
+        text = "clips at the same time (default 1; the demo's is 2)"
+        verb.add_argument("--jobs", type=positive, default=1, metavar="N", help=text)
     if "mocap" in flags:
         text = "library of real motion (default: the HARNESS_MOCAP variable)"
         verb.add_argument("--mocap", type=Path, metavar="DIR", help=text)
@@ -103,7 +104,7 @@ def positive(text: str) -> int:
 def add_demo(verbs: Verbs) -> None:
     text = "run the main job on built-in motion and write its report"
     verb = add_verb(verbs, "demo", text, run_scenario, "seed", "out", "jobs")
-    verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True)
+    verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True, jobs=2)
 
 
 def add_run(verbs: Verbs) -> None:
