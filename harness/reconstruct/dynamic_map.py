@@ -118,7 +118,7 @@ WINDOW = DynamicMap(
 )
 LITERAL = DynamicMap(
     "dynamic_map:literal",
-    "Liu et al. 2011 to the letter: 99 % of the variance, weights as printed, one sigma, start at the closest example",
+    "Liu et al. 2011 to the letter: 99 % of the variance, weights and sigma as printed, start at the closest",
     like="window",
     neighbours=40,
     width=0.0,
