@@ -12,11 +12,12 @@ from harness.core.options import alternatives
 from harness.core.share import share_folder
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.score.cell import varied_text
+from harness.score.orders import Order
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
 
 SCHEMA = 1
-_FIXED = ("schema", "name", "methods", "inputs", "vary")
+_FIXED = ("schema", "name", "methods", "inputs", "vary", "order")
 
 
 @dataclass(frozen=True)
@@ -88,6 +89,8 @@ class Scenario:
     vary: dict[str, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
     or with each combination of them when there are several keys."""
+    order: tuple[Order, ...] = ()
+    """What a paper expects of the errors (see `harness.score.orders`)."""
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -104,6 +107,7 @@ def load_scenario(path: Path | str) -> Scenario:
     except (TypeError, ValueError) as error:
         raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
     check_scenario(path, scenario)
+    check_orders(path, scenario)
     return scenario
 
 
@@ -206,3 +210,26 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
             refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
         if station.stand_off_m < 0.0:
             refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Trackers sit on the skin.")
+
+
+def check_orders(path: Path, scenario: Scenario) -> None:
+    """That the orders a file states are of what it runs; BadFile. Whoever replaces its methods need not mind them."""
+    for order in scenario.order:
+        where, what, known = f"the order of {order.source!r}", "methods", scenario.methods
+        if order.inputs:
+            what, known = "inputs", scenario.inputs
+        strange = [name for name in order.names if name not in known]
+        if order.inputs and order.method not in scenario.methods:
+            strange, what, known = [order.method], "methods", scenario.methods
+        faults = {
+            "has no source": not order.source,
+            "names neither or both of methods and inputs": bool(order.methods) == bool(order.inputs),
+            "names a method whose inputs it does not compare": bool(order.method) > bool(order.inputs),
+            "names fewer than two": len(order.names) < 2,
+            "names something twice": len(set(order.names)) < len(order.names),
+            f"names {', '.join(map(repr, strange))}, none of the scenario's {what}": bool(strange),
+            "gives a reason for what is no step of it": not set(order.why_not) <= set(order.steps),
+        }
+        for fault in (text for text, found in faults.items() if found):
+            advice = f"Known {what}: {', '.join(known)}. Reasons belong to {', '.join(map(repr, order.steps))}."
+            raise BadFile(path, f"{where} {fault}", "two or more methods, or inputs and their method", advice)

@@ -83,6 +83,53 @@ def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, message: str
     assert message in str(caught.value)
 
 
+ORDER = """
+[[order]]
+source = "a paper"
+methods = ["mean_pose", "ik[loss.robust=false]", "ik"]
+why_not = { "mean_pose > ik[loss.robust=false]" = "because" }
+[[order]]
+source = "another paper"
+method = "ik"
+inputs = ["pos+ori", "pos"]
+"""
+ORDERED = MINIMAL.replace(
+    '["ik"]', '["ik", "mean_pose", "ik[loss.robust=true|false]"]\ninputs = ["pos", "pos+ori"]'
+).replace("[motion]", ORDER + "[motion]")
+
+
+def test_orders_are_of_what_is_run(tmp_path: Path) -> None:
+    of_methods, of_inputs = load_scenario(written(tmp_path, ORDERED)).order
+    assert of_methods.names == ("mean_pose", "ik[loss.robust=false]", "ik")
+    assert of_methods.steps == ["mean_pose > ik[loss.robust=false]", "ik[loss.robust=false] > ik"]
+    assert (of_inputs.names, of_inputs.by, of_inputs.method) == (("pos+ori", "pos"), "inputs", "ik")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('source = "a paper"', "", "missing source"),
+        ('source = "a paper"', 'source = ""', "has no source"),
+        ('methods = ["mean_pose", "ik[loss.robust=false]", "ik"]', "", "neither or both"),
+        ('method = "ik"', 'method = "ik"\nmethods = ["mean_pose", "ik"]', "neither or both"),
+        ('source = "a paper"', 'source = "a paper"\nmethod = "ik"', "whose inputs it does not compare"),
+        ('method = "ik"', "", "'', none of the scenario's methods"),
+        ('method = "ik"', 'method = "mean_poze"', "'mean_poze', none of the scenario's methods"),
+        ('"mean_pose", "ik[loss.robust=false]", "ik"]', '"mean_pose"]', "fewer than two"),
+        ('"ik[loss.robust=false]", "ik"]', '"kernel_cca", "ik"]', "'kernel_cca', none of the scenario's methods"),
+        ('"ik[loss.robust=false]", "ik"]', '"ik", "mean_pose"]', "twice"),
+        ('["pos+ori", "pos"]\n[motion]', '["pos+ori", "mixed"]\n[motion]', "'mixed', none of the scenario's inputs"),
+        ('"mean_pose > ik[', '"ik > ik[', "no step"),
+        ("why_not =", "why =", "Did you mean 'why_not'"),
+    ],
+)
+def test_what_is_wrong_with_an_order_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert ORDERED.count(old) == 1
+    with pytest.raises(HarnessError) as caught:
+        load_scenario(written(tmp_path, ORDERED.replace(old, new)))
+    assert message in str(caught.value)
+
+
 def test_a_scenario_that_does_not_exist_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'boxing'"):
         load_scenario("boxin")

@@ -24,6 +24,7 @@ from harness.errors import BadInput, Outcome, UnknownName
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.report.text import table
 from harness.score.files import TEMPORARY
+from harness.score.orders import Order
 from harness.score.results import read_cells, read_summary
 from harness.stream.frame import TrackerFrame
 
@@ -75,6 +76,22 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
     again = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     assert set(again) == set(made)
     assert {name for name in made if again[name] != made[name]} == {gone}
+
+
+def test_expected_orders_are_judged_and_are_no_part_of_what_a_run_is(tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    expected = Order("nobody", methods=SMALL.methods)
+    experiment.run(replace(SMALL, order=(expected,)), out)
+    walking, boxing = read_summary(out)["orders"]
+    assert (walking["behaviour"], boxing["behaviour"], boxing["clips"]) == ("walking", "boxing", 1)
+    errors = [row["joint_angle_mean_deg"] for row in rows(out) if row["behaviour"] == "boxing"]
+    assert boxing["means_deg"] == errors
+    assert boxing["holds"] == (round(errors[0], 2) < round(errors[1], 2))
+    assert "expected orders: " in table(read_summary(out))
+    made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
+    experiment.run(SMALL, out)
+    assert {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()} == made
+    assert read_summary(out)["orders"] == []
 
 
 def test_another_run_is_never_written_over(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.report import recovery, tables, varied
+from harness.report import orders, recovery, tables, varied
 from harness.report.markup import Markup, folded, joined, scrolling, table, tag
 from harness.report.run import Run
 from harness.report.style import Chart
@@ -94,6 +94,7 @@ def _sections(content: Content) -> list[tuple[str, str, Markup]]:
     return [
         ("Varied", "varied", joined(*(_chart(chart, 3) for chart in content.varied), varied.tables(run))),
         ("Results", "results", tables.results(run) if measured else nothing),
+        ("Expected orders", "orders", orders.section(run.whole)),
         ("Recovery", "recovery", recovery.section(run.summary)),
         ("Coverage", "coverage", tables.coverage(run)),
         ("Error over time", "time", joined(*(_chart(chart, 3) for chart in content.over_time))),

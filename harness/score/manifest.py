@@ -55,8 +55,8 @@ class Manifest:
 
 
 def of_run(scenario: Mapping[str, Any], *, motion_source: str, command: str) -> Manifest:
-    """The manifest of running a scenario here and now; its methods are circumstances, all else is input."""
-    inputs = {name: value for name, value in scenario.items() if name != "methods"}
+    """The manifest of running a scenario here and now; methods and orders are circumstances, all else is input."""
+    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "order")}
     return Manifest(
         inputs={**inputs, "motion_source": motion_source},
         metric_versions=VERSIONS,

@@ -7,7 +7,7 @@ the method and the source of both, so edited code never meets stale results.
 import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from harness.errors import BadFile, BadInput, Outcome
 from harness.score.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
 from harness.score.files import TEMPORARY, content_key, digest, read_json, write_json, write_text
 from harness.score.manifest import Manifest
+from harness.score.orders import Order, judged
 from harness.score.recovery import Recoveries
 from harness.score.summary import GROUP, Tally, as_csv
 
@@ -97,13 +98,19 @@ def summary_rows(cells: Iterable[Cell]) -> list[dict[str, Any]]:
 
 
 def write_summary(
-    out: Path, *, keys: Iterable[str], planned: int, failures: Mapping[str, str] | None = None
+    out: Path,
+    *,
+    keys: Iterable[str],
+    planned: int,
+    failures: Mapping[str, str] | None = None,
+    orders: Sequence[Order] = (),
 ) -> dict[str, Any]:
     """Write summary.csv (a row for each cell) and summary.json, whose content is returned.
 
     `keys` are the finished cells in the order of the table, `failures` cell -> what went wrong. summary.json has
-    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `Tally.rows`), and
-    recovery (see `recovery.Recoveries`), which is empty unless the scenario varies a disturbance.
+    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `Tally.rows`), recovery
+    (see `recovery.Recoveries`), which is empty unless the scenario varies a disturbance, and orders (see
+    `orders.judged`), empty unless it expects any.
     """
     failures = dict(failures or {})
     methods, behaviours, recoveries = Tally(*GROUP), Tally(*GROUP, "behaviour"), Recoveries()
@@ -123,6 +130,7 @@ def write_summary(
         "methods": methods.rows(),
         "behaviours": behaviours.rows(),
         "recovery": recoveries.rows(),
+        "orders": judged(orders, rows),
         "cells": rows,
     }
     write_text(out / "summary.csv", as_csv(rows))

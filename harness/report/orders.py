@@ -1,0 +1,74 @@
+"""Whether errors come in the orders that papers expect, for the terminal and for the page; nothing without any."""
+
+from collections.abc import Mapping, Sequence
+from itertools import groupby, pairwise
+from typing import Any
+
+from harness.report.markup import Markup, joined, table, tag
+from harness.score.cell import varied_text
+from harness.score.orders import DECIMALS, METRIC
+
+_WHAT = "means over the clips that all of them were measured on"
+_VERDICT = {True: "holds", False: "does not hold", None: "not judged"}
+
+
+def text(summary: Mapping[str, Any]) -> list[str]:
+    """Lines for the terminal."""
+    found = [f"expected orders: {METRIC}, {_WHAT}"]
+    for title, rows in _by_order(summary):
+        found += ["", title, *map(_line, rows)]
+    return [*found, ""] if len(found) > 1 else []
+
+
+def section(summary: Mapping[str, Any]) -> Markup:
+    """A table for each order, a row for each setting."""
+    return joined(*(_table(title, rows) for title, rows in _by_order(summary)))
+
+
+def _by_order(summary: Mapping[str, Any]) -> list[tuple[str, list[Mapping[str, Any]]]]:
+    groups = groupby(summary.get("orders", []), key=_title)
+    return [(title, list(rows)) for title, rows in groups]
+
+
+def _title(row: Mapping[str, Any]) -> str:
+    whose = f"{row['method']} with " if row["method"] else ""
+    return f"{whose}{' < '.join(row['names'])} ({row['source']})"
+
+
+def _line(row: Mapping[str, Any]) -> str:
+    where = f" ({', '.join(_where(row))})" if _where(row) else ""
+    why = f": {row['why']}" if row["why"] else ""
+    if row["means_deg"] is None:
+        return f"  {_VERDICT[None]}{where}{why}"
+    errors = _numbers(row)
+    signs = ["", *(f" {_sign(*pair)} " for pair in pairwise(errors))]
+    said = "".join(f"{sign}{name} {error}" for sign, name, error in zip(signs, row["names"], errors, strict=True))
+    return f"  {said}: {_VERDICT[row['holds']]}{where}{why}"
+
+
+def _table(title: str, rows: Sequence[Mapping[str, Any]]) -> Markup:
+    lines = []
+    for row in rows:
+        errors = _numbers(row) or ["not measured"] * len(row["names"])
+        verdict = joined(tag("b", _VERDICT[row["holds"]]), f": {row['why']}" if row["why"] else None)
+        lines.append([", ".join(_where(row)) or "everywhere", *errors, tag("span", verdict, class_="prose")])
+    caption = joined("Expected: ", tag("b", title), f". {METRIC} [deg], {_WHAT}.")
+    return table(caption, ["setting", *rows[0]["names"], "order"], lines, label="expected order")
+
+
+def _where(row: Mapping[str, Any]) -> list[str]:
+    """The setting in words, then how many clips."""
+    named = (row["behaviour"].replace("_", " "), row["inputs"], row["performer"] and f"{row['performer']} performers")
+    words = [*named, varied_text(row["varied"])]
+    if row["clips_of_any"]:
+        some = f"{row['clips']} of " if row["clips"] < row["clips_of_any"] else ""
+        words.append(f"{some}{row['clips_of_any']} clip{'s'[: row['clips_of_any'] != 1]}")
+    return [word for word in words if word]
+
+
+def _numbers(row: Mapping[str, Any]) -> list[str]:
+    return [f"{mean:.{DECIMALS}f}" for mean in row["means_deg"] or []]
+
+
+def _sign(one: str, next_one: str) -> str:
+    return "<" if float(one) < float(next_one) else "=" if one == next_one else ">"

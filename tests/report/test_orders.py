@@ -1,0 +1,52 @@
+"""What a reader is told of expected orders."""
+
+from harness.report.orders import section, text
+
+ROW = {
+    "source": "a paper",
+    "method": "",
+    "names": ["new", "old", "ik"],
+    "behaviour": "table_tennis",
+    "inputs": "pos+ori",
+    "performer": "known",
+    "varied": {"noise": "clean"},
+    "clips": 2,
+    "clips_of_any": 2,
+    "means_deg": [0.8349, 0.97, 2.14],
+    "holds": True,
+    "why": "",
+}
+ROWS = [
+    ROW,
+    ROW | {"performer": "new", "clips": 1, "means_deg": [2.4, 2.4, 1.9], "holds": False, "why": "old > ik: because"},
+    ROW | {"clips": 0, "clips_of_any": 0, "means_deg": None, "holds": None, "why": "old not measured"},
+    ROW | {"names": ["pos+ori", "pos"], "method": "new", "inputs": "", "varied": {}, "means_deg": [1.0, 2.0]},
+]
+
+
+def test_each_order_is_stated_once_with_a_line_for_each_setting() -> None:
+    assert text({"orders": ROWS})[1:] == [
+        "",
+        "new < old < ik (a paper)",
+        "  new 0.83 < old 0.97 < ik 2.14: holds (table tennis, pos+ori, known performers, noise=clean, 2 clips)",
+        "  new 2.40 = old 2.40 > ik 1.90: does not hold (table tennis, pos+ori, new performers, noise=clean, "
+        "1 of 2 clips): old > ik: because",
+        "  not judged (table tennis, pos+ori, known performers, noise=clean): old not measured",
+        "",
+        "new with pos+ori < pos (a paper)",
+        "  pos+ori 1.00 < pos 2.00: holds (table tennis, known performers, 2 clips)",
+        "",
+    ]
+
+
+def test_the_page_says_the_same_and_keeps_text_text() -> None:
+    page = section({"orders": [*ROWS, ROW | {"source": "<b>", "holds": None, "means_deg": None, "why": "a & b"}]})
+    assert page.count("<table") == 3
+    assert "<b>does not hold</b>: old &gt; ik: because" in page
+    assert "(&lt;b&gt;)" in page
+    assert "<b>not judged</b>: a &amp; b" in page
+
+
+def test_a_run_without_expectations_says_nothing() -> None:
+    assert text({"orders": []}) == text({}) == []
+    assert section({}) == ""
