@@ -22,7 +22,7 @@ from harness.core.motion import Take
 from harness.mocap import performer
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.examples import station_poses
-from harness.reconstruct.index import INDEXES, Graph, Index, Table, Vectors
+from harness.reconstruct.index import INDEXES, Graph, Index, Lookup, Table, Vectors
 from harness.reconstruct.index.choose import best_for
 from harness.reconstruct.local_examples import LocalExamples, Weights
 from harness.reconstruct.viewpoint import View, twist_rad
@@ -113,7 +113,7 @@ def _worn(body: humanoid.Body) -> Calibration:
 def _compared(search: Search) -> list[Row]:
     """Exact search is the judge, and the reference for speed."""
     indexes = {name: kind(search.vectors, search.count) for name, kind in INDEXES.items()}
-    begin: dict[str, Callable[[], Index]] = {name: partial(_same, index) for name, index in indexes.items()}
+    begin: dict[str, Callable[[], Lookup]] = {name: partial(_same, index) for name, index in indexes.items()}
     if search.follows is not None:
         begin["graph"] = Graph(search.vectors, search.follows, indexes["inverted_file"]).follow
     seconds: dict[str, list[float]] = {name: [] for name in begin}
@@ -141,6 +141,6 @@ def _compared(search: Search) -> list[Row]:
     return out
 
 
-def _same(index: Index) -> Index:
+def _same(index: Index) -> Lookup:
     """One without memory is its own session."""
     return index

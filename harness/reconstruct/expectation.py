@@ -23,8 +23,7 @@ from harness.reconstruct.database import Windows
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.examples import Worn
 from harness.reconstruct.footing import readings
-from harness.reconstruct.index import Index, choose
-from harness.reconstruct.index.protocol import Table
+from harness.reconstruct.index import Found, Index, Table, choose
 from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
 
 _CHUNK = 2048
@@ -142,23 +141,32 @@ class Expectation:
         """For sessions that know the `usual` columns (D + 9 S,) as a rule and ask for so many neighbours."""
         self._evidence, self._usual = evidence, usual
         self._directions = evidence.directions(usual)
-        self._maps: dict[bytes, Floats] = {}
-        self.table: Singles = np.empty((len(evidence), self._directions.shape[1]), np.float32)
-        """(N, 40) z of every window."""
+        self._maps: dict[bytes, tuple[Floats, Floats]] = {}
+        table: Singles = np.empty((len(evidence), self._directions.shape[1]), np.float32)
         start = 0
         for known, _ in evidence.parts(np.arange(len(evidence))):
             away = (known - evidence.mean)[:, usual]
-            self.table[start : start + len(known)] = away @ self._directions
+            table[start : start + len(known)] = away @ self._directions
             start += len(known)
         evidence.let_go()
-        self.index: Index = choose(index, Table(self.table), wanted)
+        self._index: Index = choose(index, Table(table), wanted)
 
-    def query(self, known: Floats, columns: Bools) -> Singles:
-        """z (40,) of evidence (D + 9 S,) of which only some columns (D + 9 S,) mean something."""
-        key = columns.tobytes()
+    def around(self, known: Floats, measured: Bools, count: int) -> Found:
+        """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.
+
+        What they differ by are z, or as much of it along other axes.
+        """
+        key = measured.tobytes()
         if key not in self._maps:
             if len(self._maps) >= _MAPS:
                 self._maps.clear()
-            self._maps[key] = self._evidence.filled(columns, self._usual) @ self._directions
-        out: Singles = ((known - self._evidence.mean)[columns] @ self._maps[key]).astype(np.float32)
-        return out
+            self._maps[key] = self._map(self._evidence.columns(measured))
+        to_z, mean = self._maps[key]
+        return self._index.around((known @ to_z - mean).astype(np.float32), count)
+
+    def _map(self, columns: Bools) -> tuple[Floats, Floats]:
+        """(D + 9 S, 40) from evidence to z when some columns are known, the others count nothing; (40,) of the mean."""
+        evidence = self._evidence
+        to_z = np.zeros((evidence.size, self._directions.shape[1]))
+        to_z[columns] = evidence.filled(columns, self._usual) @ self._directions
+        return to_z, evidence.mean @ to_z

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import lapack
 
 from harness.core.arrays import Floats, Singles
+from harness.core.compiled import compiled
 
 Real = TypeVar("Real", Floats, Singles)
 """Either precision; the numbers that come out have that of those that went in."""
@@ -25,12 +26,12 @@ class Forecast(NamedTuple):
     """(D,) of what the regression leaves unexplained."""
 
 
-def closeness(squared: Floats, variance: float) -> Floats:
+def closeness(squared: Floats | Singles, variance: float) -> Floats:
     """Eq. 6 with D_w = 1 / variance for squared distances (K,), ascending; of sum 1.
 
     The smallest distance is taken out, which changes no ratio and keeps the weights above 0.
     """
-    weight = np.exp((squared[0] - squared) * (0.5 / variance))
+    weight = np.exp((squared[0] - squared.astype(float)) * (0.5 / variance))
     out: Floats = weight / weight.sum()
     return out
 
@@ -85,21 +86,79 @@ def _ridged(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole:
 def _of_many(away: Real, after: Real, share: Real, ridge: float) -> Forecast:
     """Eq. 4 with a ridge, in the space of the N numbers: cheaper when examples outnumber them.
 
-    One product of all that is known with itself holds X^T X, X^T y and y^T y; residuals need not be worked out.
+    The product of W X (K, N) with all that is known, X, y and 1 (K, N + D + 1), holds X^T W X, X^T W y and the mean.
     """
-    count = away.shape[1]
-    middle, after_middle = share @ away, share @ after
-    known = np.empty((len(share), count + after.shape[1]), away.dtype)
-    np.subtract(away, middle, out=known[:, :count])  # means taken out, eq. 2
-    np.subtract(after, after_middle, out=known[:, count:])
-    known *= np.sqrt(share)[:, None]  # W of eq. 7
-    product = known.T @ known
-    outer, mixed = product[:count, :count], product[:count, count:]
-    least = max(ridge, 1e-6 if product.dtype == np.float32 else 1e-9) * float(outer.trace()) + 1e-30
-    damped = outer.astype(float)
-    damped.reshape(-1)[:: count + 1] += least
-    factor, _ = lapack.dpotrf(damped, lower=1, clean=0, overwrite_a=1)
-    slope, _ = lapack.dpotrs(factor, mixed, lower=1)
-    explained = np.einsum("nd,nd->d", slope, mixed + least * slope)  # |y|^2 - |y - x slope|^2
-    variance = np.maximum(product.diagonal()[count:] - explained, 0.0)  # sigma_d^2 of eq. 8
-    return Forecast(after_middle - middle @ slope, variance)
+    weighed, known, after_middle, squares = _weighed(away, after, share)
+    least = max(ridge, 1e-6 if away.dtype == np.float32 else 1e-9)
+    shift, variance = _regressed(known.T @ weighed, after_middle, squares, least)
+    return Forecast(after[0] + shift, variance)
+
+
+@compiled
+def _weighed(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Real]:
+    """W X (K, N); X, y and 1 (K, N + D + 1); weighted mean (D,) of y and of its squares (D,).
+
+    y is taken about the nearest example's, so that single precision loses little.
+    """
+    count, size, following = len(away), away.shape[1], after.shape[1]
+    weighed, known = np.empty_like(away), np.empty((count, size + following + 1), away.dtype)
+    middle, squares = np.zeros((2, following), away.dtype)
+    for k in range(count):
+        row = known[k]
+        for i in range(size):
+            row[i], weighed[k, i] = away[k, i], share[k] * away[k, i]
+        for i in range(following):
+            value = after[k, i] - after[0, i]
+            row[size + i] = value
+            middle[i] += share[k] * value
+            squares[i] += share[k] * value * value
+        row[size + following] = 1.0
+    return weighed, known, middle, squares
+
+
+@compiled
+def _regressed(product: Real, after_middle: Real, squares: Real, ridge: float) -> tuple[Floats, Floats]:
+    """Eq. 8's mean (D,), about the nearest example's y, and variance (D,)."""
+    size, following = product.shape[1], len(squares)
+    middle = product[size + following].astype(np.float64)
+    outer, slope = np.empty((size, size)), np.empty((size, following))
+    for i in range(size):  # means taken out, eq. 2
+        for j in range(size):
+            outer[i, j] = product[i, j] - middle[i] * middle[j]
+        for j in range(following):
+            slope[i, j] = product[size + j, i] - middle[i] * after_middle[j]
+    mixed, least = slope.copy(), ridge * np.trace(outer) + 1e-30
+    for i in range(size):
+        outer[i, i] += least
+    _solve(outer, slope)
+    mean, variance = np.empty(following), np.empty(following)
+    for j in range(following):
+        mean[j], variance[j] = after_middle[j], squares[j] - np.float64(after_middle[j]) ** 2
+    for i in range(size):
+        for j in range(following):
+            mean[j] -= middle[i] * slope[i, j]
+            variance[j] -= slope[i, j] * (mixed[i, j] + least * slope[i, j])  # |y|^2 - |y - x slope|^2
+    return mean, np.maximum(variance, 0.0)  # sigma_d^2 of eq. 8
+
+
+@compiled
+def _solve(matrix: Floats, rows: Floats) -> None:
+    """Puts A^-1 B in the place of B (N, D), and Cholesky's factor in that of A (N, N), positive definite."""
+    count, width = rows.shape
+    for i in range(count):
+        for k in range(i):
+            share = matrix[i, k] * matrix[k, k]  # the diagonal holds the factor's reciprocals
+            matrix[i, k] = share
+            for j in range(k + 1, i + 1):
+                matrix[i, j] -= share * matrix[j, k]
+            for j in range(width):
+                rows[i, j] -= share * rows[k, j]
+        matrix[i, i] = 1.0 / np.sqrt(matrix[i, i])
+        for j in range(width):
+            rows[i, j] *= matrix[i, i]
+    for i in range(count - 1, -1, -1):
+        for j in range(width):
+            rows[i, j] *= matrix[i, i]
+        for k in range(i):
+            for j in range(width):
+                rows[k, j] -= matrix[i, k] * rows[i, j]

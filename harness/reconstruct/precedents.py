@@ -4,28 +4,17 @@ Both answer a `DynamicMapSession`: which windows, how far (squared), and the win
 local model regresses.
 """
 
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from harness.core import rotations
-from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.arrays import Bools, Floats
 from harness.reconstruct.database import Windows
 from harness.reconstruct.expectation import Evidence, Expectation
-from harness.reconstruct.index import Index
+from harness.reconstruct.index import Found, Index
 from harness.reconstruct.residuals import Residuals
 from harness.reconstruct.viewpoint import View, twist_rad
-
-
-class Found(NamedTuple):
-    """K windows, nearest first."""
-
-    rows: Ints
-    """(K,)"""
-    squared: Floats
-    """(K,) distances from the query."""
-    away: Singles
-    """(K, N) windows minus query."""
 
 
 class Precedents(Protocol):
@@ -51,7 +40,7 @@ class ByWindow:
         rows, squared = self._index.nearest(query, count)
         away = self._windows.gather(rows)
         away -= query
-        return Found(rows, squared.astype(float), away)
+        return Found(rows, squared, away)
 
     def read(self) -> None:
         pass
@@ -69,15 +58,12 @@ class ByEvidence:
 
     def nearest(self, past: Floats, count: int) -> Found:
         evidence, residuals = self._evidence, self._residuals
-        columns = evidence.columns(residuals.measured)
         if self._expectation is None:
             usual = evidence.columns(self._ever | residuals.measured)
             self._expectation = evidence.expectation(usual, self._kind, count)
         window = self._windows.query(past)
         known = evidence.known(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
-        query = self._expectation.query(known, columns)
-        rows, squared = self._expectation.index.nearest(query, count)
-        return Found(rows, squared.astype(float), self._expectation.table.take(rows, 0) - query)
+        return self._expectation.around(known, residuals.measured, count)
 
     def read(self) -> None:
         self._ever |= self._residuals.measured

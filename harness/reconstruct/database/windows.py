@@ -64,11 +64,7 @@ class Windows:
 
     def successors(self, rows: Ints | slice) -> Singles:
         """(K, 55) posture (52) and step (3) of the frame after each window; only of `followed` windows."""
-        after = self.frames[rows] + 1
-        out = np.empty((len(after), POSTURE + 3), np.float32)
-        self.database.posture.take(after, 0, out[:, :POSTURE])
-        self.database.step.take(after, 0, out[:, POSTURE:])
-        return out
+        return _after(self.database.posture.view(np.ndarray), self.database.step.view(np.ndarray), self.frames[rows])
 
     def query(self, qpos: Floats) -> Singles:
         """The vector (D,) of m configurations (m, 55), newest first, hinges in the database's representation."""
@@ -97,6 +93,20 @@ def _gather(posture: Singles, step: Singles, newest: Ints, out: Singles) -> None
             at = (POSTURE + 3) * age
             out[k, at - 3], out[k, at - 2], out[k, at - 1] = x, y, yaw
             out[k, at : at + POSTURE] = posture[frame - age]
+
+
+@compiled
+def _after(posture: Singles, step: Singles, newest: Ints) -> Singles:
+    """(K, 55) posture and step of the frames after some (K,)."""
+    width = posture.shape[1]
+    out = np.empty((len(newest), width + 3), np.float32)
+    for k in range(len(newest)):
+        frame = newest[k] + 1
+        for i in range(width):
+            out[k, i] = posture[frame, i]
+        for i in range(3):
+            out[k, width + i] = step[frame, i]
+    return out
 
 
 @compiled

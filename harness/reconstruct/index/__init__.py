@@ -6,6 +6,19 @@ from harness.reconstruct.index.graph import Graph
 from harness.reconstruct.index.inverted_file import InvertedFile
 from harness.reconstruct.index.kd_tree import KDTree
 from harness.reconstruct.index.masked import nearest_known
-from harness.reconstruct.index.protocol import Index, Table, Vectors
+from harness.reconstruct.index.protocol import Found, Index, Lookup, Table, Vectors
 
-__all__ = ["INDEXES", "Flat", "Graph", "Index", "InvertedFile", "KDTree", "Table", "Vectors", "choose", "nearest_known"]
+__all__ = [
+    "INDEXES",
+    "Flat",
+    "Found",
+    "Graph",
+    "Index",
+    "InvertedFile",
+    "KDTree",
+    "Lookup",
+    "Table",
+    "Vectors",
+    "choose",
+    "nearest_known",
+]

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Ints, Singles
-from harness.reconstruct.index.protocol import CHUNK, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
 
 _ROUNDING = 1e-6
 """Of the first pass, beside the largest of its terms."""
@@ -30,6 +30,11 @@ class Flat:
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """As `Index`."""
+        rows, squared, _ = self.around(query, count)
+        return rows, squared
+
+    def around(self, query: Singles, count: int) -> Found:
+        """As `Index`."""
         asked = np.asarray(query, np.float32) - self._mean
         score = self._half_squares - self._values @ asked
         count = min(count, len(score))
@@ -39,8 +44,8 @@ class Flat:
         return ranked(rows, self._values[rows] - asked, count)
 
 
-def ranked(rows: Ints, away: Singles, count: int) -> tuple[Ints, Singles]:
+def ranked(rows: Ints, away: Singles, count: int) -> Found:
     """The nearest of candidates (M,) whose differences from the query are (M, D), nearest first."""
     squared = np.vecdot(away, away)
     order = np.lexsort((rows, squared))[:count]
-    return rows[order], squared[order]
+    return Found(rows[order], squared[order], away[order])

@@ -66,7 +66,7 @@ class Graph:
 
 
 class Following:
-    """One session's search: an `Index` whose answers depend on the queries before."""
+    """One session's search: a `Lookup` whose answers depend on the queries before."""
 
     def __init__(self, graph: Graph) -> None:
         self._graph, self._rows, self._age = graph, np.zeros(0, np.int64), EVERY

@@ -11,7 +11,7 @@ from harness.core.arrays import Floats, Ints, Singles
 from harness.core.seeds import generator
 from harness.reconstruct.index.flat import ranked
 from harness.reconstruct.index.principal import Principal
-from harness.reconstruct.index.protocol import CHUNK, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
 
 _SPARE = 4
 """Looked up beyond the answer, for rounding may have swapped those about the last place."""
@@ -35,6 +35,11 @@ class KDTree:
         return len(self._vectors)
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """As `Index`."""
+        rows, squared, _ = self.around(query, count)
+        return rows, squared
+
+    def around(self, query: Singles, count: int) -> Found:
         """As `Index`."""
         query = np.asarray(query, np.float32)
         count = min(count, len(self))

@@ -1,7 +1,7 @@
 """What an index searches, and what it answers."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from harness.core.arrays import Ints, Singles
 
@@ -24,14 +24,33 @@ class Vectors(Protocol):
         ...
 
 
-class Index(Protocol):
-    """A search among N vectors: immutable, deterministic, shared by sessions."""
+class Found(NamedTuple):
+    """K vectors, nearest first."""
+
+    rows: Ints
+    """(K,)"""
+    squared: Singles
+    """(K,) distances from the query."""
+    away: Singles
+    """(K, d) the vectors minus the query, along axes of the index's choice."""
+
+
+class Lookup(Protocol):
+    """Something that finds the nearest of N vectors."""
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """Rows (count,) of the nearest vectors to a query (D,), and their squared Euclidean distances (count,).
 
         Nearest first, of equals that were found the lower row first. There are fewer when N is smaller.
         """
+        ...
+
+
+class Index(Lookup, Protocol):
+    """A search among N vectors: immutable, deterministic, shared by sessions."""
+
+    def around(self, query: Singles, count: int) -> Found:
+        """The same, and how the vectors differ from the query."""
         ...
 
 
