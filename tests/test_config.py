@@ -43,6 +43,16 @@ def test_there_is_one_for_each_behaviour_and_the_demo() -> None:
     assert {"demo", "walking", "boxing", "jumping", "golf", "table_tennis"} <= {p.stem for p in shipped_scenarios()}
 
 
+@pytest.mark.parametrize("name", ["boxing", "walking", "jumping", "boxing_inputs"])
+def test_the_tables_expect_the_order_of_the_first_paper(name: str) -> None:
+    assert load_scenario(name).order[0].methods == ("dynamic_map", "local_pca", "ik")
+
+
+@pytest.mark.parametrize("name", ["sparse_walking", "sparse_table_tennis"])
+def test_the_sparse_databases_expect_the_order_of_the_second_paper(name: str) -> None:
+    assert load_scenario(name).order[0].methods == ("kernel_cca", "weighted_blend", "ik")
+
+
 def test_a_minimal_scenario_takes_its_name_from_the_file(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL))
     assert (scenario.name, scenario.noise, scenario.stations["head"].bone) == ("mine", "default", "head")

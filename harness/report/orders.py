@@ -16,7 +16,7 @@ def text(summary: Mapping[str, Any]) -> list[str]:
     """Lines for the terminal."""
     found = [f"expected orders: {METRIC}, {_WHAT}"]
     for title, rows in _by_order(summary):
-        found += ["", title, *map(_line, rows)]
+        found += ["", title, *map(_line, rows), *(f"  where {reason}" for reason in _reasons(rows))]
     return [*found, ""] if len(found) > 1 else []
 
 
@@ -36,34 +36,45 @@ def _title(row: Mapping[str, Any]) -> str:
 
 
 def _line(row: Mapping[str, Any]) -> str:
-    where = f" ({', '.join(_where(row))})" if _where(row) else ""
-    why = f": {row['why']}" if row["why"] else ""
+    words = [*_where(row), *([f"{_clips(row)} clip{'s'[: row['clips_of_any'] != 1]}"] if row["clips_of_any"] else [])]
+    where = f" ({', '.join(words)})" if words else ""
     if row["means_deg"] is None:
-        return f"  {_VERDICT[None]}{where}{why}"
+        return f"  {_verdict(row)}{where}"
     errors = _numbers(row)
     signs = ["", *(f" {_sign(*pair)} " for pair in pairwise(errors))]
     said = "".join(f"{sign}{name} {error}" for sign, name, error in zip(signs, row["names"], errors, strict=True))
-    return f"  {said}: {_VERDICT[row['holds']]}{where}{why}"
+    return f"  {said}: {_verdict(row)}{where}"
 
 
 def _table(title: str, rows: Sequence[Mapping[str, Any]]) -> Markup:
     lines = []
     for row in rows:
         errors = _numbers(row) or ["not measured"] * len(row["names"])
-        verdict = joined(tag("b", _VERDICT[row["holds"]]), f": {row['why']}" if row["why"] else None)
-        lines.append([", ".join(_where(row)) or "everywhere", *errors, tag("span", verdict, class_="prose")])
-    caption = joined("Expected: ", tag("b", title), f". {METRIC} [deg], {_WHAT}.")
-    return table(caption, ["setting", *rows[0]["names"], "order"], lines, label="expected order")
+        count = tag("span", f" n {_clips(row)}", class_="spread")
+        lines.append([joined(", ".join(_where(row)) or "everywhere", count), *errors, _verdict(row)])
+    caption = joined("Expected: ", tag("b", title), f". {METRIC} [deg], {_WHAT} (n).")
+    reasons = [tag("li", f"Where {reason}") for reason in _reasons(rows)]
+    body = table(caption, ["setting", *rows[0]["names"], "order"], lines, label="expected order")
+    return joined(body, tag("ul", *reasons) if reasons else None)
+
+
+def _verdict(row: Mapping[str, Any]) -> str:
+    return _VERDICT[row["holds"]] + (f": {row['why'][0]}" if row["holds"] is None else "")
+
+
+def _reasons(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Why it does not hold: each reason once, however often it is called for."""
+    return list(dict.fromkeys(reason for row in rows if row["holds"] is False for reason in row["why"]))
 
 
 def _where(row: Mapping[str, Any]) -> list[str]:
-    """The setting in words, then how many clips."""
+    """The setting in words."""
     named = (row["behaviour"].replace("_", " "), row["inputs"], row["performer"] and f"{row['performer']} performers")
-    words = [*named, varied_text(row["varied"])]
-    if row["clips_of_any"]:
-        some = f"{row['clips']} of " if row["clips"] < row["clips_of_any"] else ""
-        words.append(f"{some}{row['clips_of_any']} clip{'s'[: row['clips_of_any'] != 1]}")
-    return [word for word in words if word]
+    return [word for word in (*named, varied_text(row["varied"])) if word]
+
+
+def _clips(row: Mapping[str, Any]) -> str:
+    return f"{row['clips']} of {row['clips_of_any']}" if row["clips"] < row["clips_of_any"] else f"{row['clips']}"
 
 
 def _numbers(row: Mapping[str, Any]) -> list[str]:

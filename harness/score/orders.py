@@ -62,7 +62,7 @@ def judged(orders: Sequence[Order], rows: Sequence[Mapping[str, Any]]) -> list[d
 
     Each says `source`, `method` (whose inputs are compared, or ""), `names`, the setting (`behaviour`, `inputs`,
     `performer`, `varied`), on how many `clips` all were measured and on how many any, their `means_deg` or None,
-    whether it `holds` (None: not judged), and `why` it does not or was not judged.
+    whether it `holds` (None: not judged), and `why` it does not, step by step, or was not judged.
     """
     return [found for order in orders for found in _in_each_setting(order, rows)]
 
@@ -97,10 +97,10 @@ def _outcome(order: Order, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     found = {"clips": len(shared), "clips_of_any": len({clip for each in errors.values() for clip in each})}
     if not shared:
         missing = [name for name, each in errors.items() if not each]
-        why = f"{', '.join(missing)} not measured" if missing else "no clip on which all were measured"
-        return {**found, "means_deg": None, "holds": None, "why": why}
+        gap = f"{', '.join(missing)} not measured" if missing else "no clip on which all were measured"
+        return {**found, "means_deg": None, "holds": None, "why": [gap]}
     means = [float(np.mean([each[clip] for clip in shared])) for each in errors.values()]
     as_printed = [round(mean, DECIMALS) for mean in means]
     wrong = [step for step, (less, more) in zip(order.steps, pairwise(as_printed), strict=True) if not less < more]
-    why = "; ".join(f"{step}: {order.why_not.get(step, 'no reason is known')}" for step in wrong)
+    why = [f"{step}: {order.why_not.get(step, 'no reason is known')}" for step in wrong]
     return {**found, "means_deg": means, "holds": not wrong, "why": why}

@@ -14,12 +14,13 @@ ROW = {
     "clips_of_any": 2,
     "means_deg": [0.8349, 0.97, 2.14],
     "holds": True,
-    "why": "",
+    "why": [],
 }
 ROWS = [
     ROW,
-    ROW | {"performer": "new", "clips": 1, "means_deg": [2.4, 2.4, 1.9], "holds": False, "why": "old > ik: because"},
-    ROW | {"clips": 0, "clips_of_any": 0, "means_deg": None, "holds": None, "why": "old not measured"},
+    ROW | {"performer": "new", "clips": 1, "means_deg": [2.4, 2.4, 1.9], "holds": False, "why": ["old > ik: because"]},
+    ROW | {"inputs": "pos", "means_deg": [0.8, 2.0, 1.9], "holds": False, "why": ["old > ik: because"]},
+    ROW | {"clips": 0, "clips_of_any": 0, "means_deg": None, "holds": None, "why": ["old not measured"]},
     ROW | {"names": ["pos+ori", "pos"], "method": "new", "inputs": "", "varied": {}, "means_deg": [1.0, 2.0]},
 ]
 
@@ -30,8 +31,10 @@ def test_each_order_is_stated_once_with_a_line_for_each_setting() -> None:
         "new < old < ik (a paper)",
         "  new 0.83 < old 0.97 < ik 2.14: holds (table tennis, pos+ori, known performers, noise=clean, 2 clips)",
         "  new 2.40 = old 2.40 > ik 1.90: does not hold (table tennis, pos+ori, new performers, noise=clean, "
-        "1 of 2 clips): old > ik: because",
-        "  not judged (table tennis, pos+ori, known performers, noise=clean): old not measured",
+        "1 of 2 clips)",
+        "  new 0.80 < old 2.00 > ik 1.90: does not hold (table tennis, pos, known performers, noise=clean, 2 clips)",
+        "  not judged: old not measured (table tennis, pos+ori, known performers, noise=clean)",
+        "  where old > ik: because",
         "",
         "new with pos+ori < pos (a paper)",
         "  pos+ori 1.00 < pos 2.00: holds (table tennis, known performers, 2 clips)",
@@ -40,11 +43,12 @@ def test_each_order_is_stated_once_with_a_line_for_each_setting() -> None:
 
 
 def test_the_page_says_the_same_and_keeps_text_text() -> None:
-    page = section({"orders": [*ROWS, ROW | {"source": "<b>", "holds": None, "means_deg": None, "why": "a & b"}]})
+    page = section({"orders": [*ROWS, ROW | {"source": "<b>", "holds": None, "means_deg": None, "why": ["a & b"]}]})
     assert page.count("<table") == 3
-    assert "<b>does not hold</b>: old &gt; ik: because" in page
+    assert page.count("<td>does not hold</td>") == 2
+    assert page.count("<li>Where old &gt; ik: because</li>") == 1
     assert "(&lt;b&gt;)" in page
-    assert "<b>not judged</b>: a &amp; b" in page
+    assert "<td>not judged: a &amp; b</td>" in page
 
 
 def test_a_run_without_expectations_says_nothing() -> None:
