@@ -23,11 +23,11 @@ def freeze(record: Any, dtype: type = np.float64, **shapes: tuple[str | int, ...
     sizes: dict[str, int] = {}
     for field, shape in shapes.items():
         array: NDArray[Any] = np.array(getattr(record, field), dtype=dtype, order="C")
-        expected = "(" + ", ".join(str(sizes.get(s, s) if isinstance(s, str) else s) for s in shape) + ")"
-        if array.ndim != len(shape):
+        if array.ndim != len(shape) or any(
+            found != (sizes.setdefault(wanted, found) if isinstance(wanted, str) else wanted)
+            for found, wanted in zip(array.shape, shape, strict=True)
+        ):
+            expected = "(" + ", ".join(str(sizes.get(s, s) if isinstance(s, str) else s) for s in shape) + ")"
             raise ShapeError(type(record).__name__, field, array.shape, expected)
-        for found, wanted in zip(array.shape, shape, strict=True):
-            if found != (sizes.setdefault(wanted, found) if isinstance(wanted, str) else wanted):
-                raise ShapeError(type(record).__name__, field, array.shape, expected)
         array.setflags(write=False)
         object.__setattr__(record, field, array)

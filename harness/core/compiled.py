@@ -19,3 +19,12 @@ def compiled(function: F) -> F:
         return cast(F, numba.njit(cache=True, error_model="numpy")(function))
     except RuntimeError:  # nowhere to keep it: neither beside its file nor in a cache of the user's
         return cast(F, numba.njit(error_model="numpy")(function))
+
+
+def bound(function: F, *arguments: Any) -> F:
+    """A compiled function for arguments of the very types of these, for loops that give it the same arrays.
+
+    Finding out what it is given takes a compiled function longer than many a small task does. This one does not look:
+    given anything else, it reads nonsense.
+    """
+    return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))

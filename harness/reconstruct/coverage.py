@@ -1,5 +1,7 @@
 """Status of an estimate, from how many of the configured stations report (docs/methods.md E, "lost tracker")."""
 
+import numpy as np
+
 from harness.core.estimate import Status
 from harness.stream.frame import TrackerFrame
 
@@ -18,9 +20,8 @@ class Coverage:
 
         SOLVED with at least half of the stations, else HELD, else LOST once that has lasted too long.
         """
-        reporting = frame.position_valid | frame.orientation_valid
-        count = int(reporting.sum())
-        if 2 * count >= len(reporting) and count:
+        count = int(np.count_nonzero(frame.position_valid | frame.orientation_valid))
+        if 2 * count >= len(frame.position_valid) and count:
             self._enough_at_s = frame.received_s
             return Status.SOLVED, True
         if self._enough_at_s is None:

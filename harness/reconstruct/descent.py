@@ -63,6 +63,14 @@ class Tracker(NamedTuple):
     """(3,)"""
     to_bone: Floats
     """(S, 4, 4) from a station's quaternion to that of its bone in the world."""
+    precision: Floats
+    """(2S,) of readings that are fully trusted: one over variance."""
+    twice_scale_squared: Floats
+    """(2S,) of the Lorentzian; inf for plain squares."""
+    by_quality: bool
+    """Whether quality says how far to trust a reading."""
+    suspect_weight: float
+    """What a suspect reading counts beside that."""
 
 
 class Placed(NamedTuple):
@@ -132,15 +140,22 @@ def read(
     turned: Floats,
     position_valid: Bools,
     orientation_valid: Bools,
+    quality: Floats,
+    suspect: Bools,
     measured: Bools,
+    trust: Floats,
 ) -> None:
-    """Brings a frame's readings (S, 3), (S, 4) into the world and onto the bones, and says which are `measured` (2S,).
+    """Brings a frame's readings (S, 3), (S, 4) into the world and onto the bones.
 
-    Zero and identity stand where nothing was measured.
+    Says which are `measured` (2S,), and how much they are to be trusted (2S,), 0 where not measured. Zero and identity
+    stand there.
     """
     count = len(position_m)
     for s in range(count):
+        said = quality[s] if tracker.by_quality else 1.0
+        said *= tracker.suspect_weight if suspect[s] else 1.0
         measured[s], measured[count + s] = position_valid[s], orientation_valid[s]
+        trust[s], trust[count + s] = said * position_valid[s], said * orientation_valid[s]
         readings.target_m[s] = 0.0
         readings.world_from_target[s] = 0.0
         readings.world_from_target[s, 0] = 1.0
@@ -154,6 +169,9 @@ def read(
             for i in range(4):
                 for j in range(4):
                     readings.world_from_target[s, i] += tracker.to_bone[s, i, j] * turned[s, j]
+    for row in range(2 * count):
+        readings.precision[row] = tracker.precision[row] * trust[row]
+        readings.twice_scale_squared[row] = tracker.twice_scale_squared[row]
 
 
 @compiled

@@ -36,7 +36,7 @@ class Gate:
         """Have the residuals read the frame, but for what jumped."""
         residuals.read(frame)
         jumped = self.jumped(frame.received_s, residuals.target_m, frame.position_valid)
-        self.left_out = bool(jumped.any())
+        self.left_out = bool(np.count_nonzero(jumped))
         if self.left_out:
             residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
@@ -47,19 +47,16 @@ class Gate:
 
     def jumped(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
         """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""
+        out, self.all_moved = np.zeros(len(measured), bool), False
         period_s = now_s - self._known_at_s
-        none, self.all_moved = np.zeros(len(measured), bool), False
-        if not (self._moving and 0.0 < period_s <= _LONGEST_PERIOD_S):
+        if self._moving and 0.0 < period_s <= _LONGEST_PERIOD_S:
+            expected_m = self._station_m + period_s * self._velocity_m_s
+            self.all_moved = _jumps(
+                *(target_m, measured, expected_m, self._jump_m),
+                *(now_s, self._patience_s, self._believed_at_s, out),
+            )
+        else:
             self._believed_at_s[:] = now_s
-            return none
-        far = np.zeros(len(measured), bool)
-        _strays(target_m, self._station_m, self._velocity_m_s, period_s, self._jump_m, far)
-        far &= measured
-        self._believed_at_s[~far] = now_s
-        if far.any() and 2 * np.count_nonzero(far) >= np.count_nonzero(measured):
-            self.all_moved = True
-            return none
-        out: Bools = far & (now_s - self._believed_at_s <= self._patience_s)
         return out
 
     def settled(self, now_s: float, station_m: Floats) -> None:
@@ -72,12 +69,30 @@ class Gate:
 
 
 @compiled
-def _strays(
-    target_m: Floats, station_m: Floats, velocity_m_s: Floats, period_s: float, jump_m: float, far: Bools
-) -> None:
-    """Which targets (S, 3) are farther than a jump from where stations (S, 3) are after so long at their velocity."""
-    for s in range(len(far)):
+def _jumps(
+    target_m: Floats,
+    measured: Bools,
+    expected_m: Floats,
+    jump_m: float,
+    now_s: float,
+    patience_s: float,
+    believed_at_s: Floats,
+    out: Bools,
+) -> bool:
+    """Which of the measured (S,) are farther than a jump from where they were expected, and not for too long.
+
+    When at least half of them are, that is the answer, and none is left out. All others are believed now.
+    """
+    far = 0
+    for s in range(len(out)):
         squared = 0.0
         for i in range(3):
-            squared += (target_m[s, i] - station_m[s, i] - period_s * velocity_m_s[s, i]) ** 2
-        far[s] = squared > jump_m**2
+            squared += (target_m[s, i] - expected_m[s, i]) ** 2
+        out[s] = measured[s] and squared > jump_m**2
+        far += out[s]
+        if not out[s]:
+            believed_at_s[s] = now_s
+    all_moved = bool(far > 0 and 2 * far >= measured.sum())
+    for s in range(len(out)):
+        out[s] = out[s] and not all_moved and now_s - believed_at_s[s] <= patience_s
+    return all_moved

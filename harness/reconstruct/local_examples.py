@@ -20,7 +20,7 @@ from harness.reconstruct.examples import Worn
 from harness.reconstruct.index import choose
 from harness.reconstruct.index.choose import AUTO, FEW
 from harness.reconstruct.index.masked import nearest_known
-from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
+from harness.reconstruct.viewpoint import anchor_of, twist_rad
 
 _CHUNK = 512
 """Frames whose kinematics are worked out at a time: double precision and rotations take fifty times their features."""
@@ -53,17 +53,13 @@ class LocalExamples:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
         first = self._quaternions(slice(0, 1))
-        self._hemisphere: Floats = first[0].astype(float)
+        self.hemisphere: Floats = first[0].astype(float)
         """(S, 4) quaternions are taken with the sign that is nearer to it."""
         for start in range(0, len(database), _CHUNK):
             near = self._quaternions(slice(start, start + _CHUNK))
             near *= np.copysign(1.0, np.vecdot(near, first))[..., None]
         database.let_go()
         self._index = choose(_quickest(len(database)) if index == AUTO else index, self)
-
-    def query(self, position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View) -> Floats:
-        """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3) in the world."""
-        return _features(position_m, turned, velocity_m_s, view, self._hemisphere, self.scale)
 
     def nearest(self, query: Floats, trust: Floats, count: int) -> Ints:
         """Rows of the frames nearest to a query (10 S,) whose columns count as much as `trust` (10 S,), 0 to 1."""
@@ -84,14 +80,13 @@ class LocalExamples:
         """(K, 10 S) of some rows."""
         return self.features[rows]
 
-    def inputs(self, rows: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats]:
-        """What is learnt from: positions and orientations of some rows (m, n) and of the query (n,), n <= 7 S."""
-        count = 7 * self.count
-        return _trusted(self.features, rows, query[:count], trust[:count])
+    def pairs(self, rows: Ints, others: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats, Floats]:
+        """What is learnt of some rows and others, none of them twice: inputs (m, n), the query (n,), outputs (m, 55).
 
-    def poses(self, rows: Ints) -> Floats:
-        """(K, 55) what is learnt: posture (52), and the root's ground frame seen from the anchor (3)."""
-        return _side_by_side(self._posture, self.root, rows)
+        Inputs are positions and orientations, n <= 7 S; outputs are posture (52), and the root's ground frame seen from
+        the anchor (3).
+        """
+        return _pairs(self.features, self._posture, self.root, rows, others, query, np.sqrt(trust[: 7 * self.count]))
 
     def _quaternions(self, rows: slice) -> Singles:
         return self.features[rows, 3 * self.count : 7 * self.count].reshape(-1, self.count, 4)
@@ -127,49 +122,26 @@ def _quickest(count: int) -> str:
 
 
 @compiled
-def _features(
-    position_m: Floats, turned: Floats, velocity_m_s: Floats, view: View, hemisphere: Floats, scale: Floats
-) -> Floats:
-    """`LocalExamples.query`."""
-    count = len(position_m)
-    out = np.empty(10 * count)
-    cosine, sine = np.cos(view.yaw_rad), np.sin(view.yaw_rad)
-    c, s = np.cos(0.5 * view.yaw_rad), np.sin(0.5 * view.yaw_rad)
-    for k in range(count):
-        at, turn, gone = out[3 * k : 3 * k + 3], out[3 * count + 4 * k :], out[7 * count + 3 * k :]
-        x, y = position_m[k, 0] - view.x_m, position_m[k, 1] - view.y_m
-        at[0], at[1], at[2] = cosine * x + sine * y, cosine * y - sine * x, position_m[k, 2]
-        x, y = velocity_m_s[k, 0], velocity_m_s[k, 1]
-        gone[0], gone[1], gone[2] = cosine * x + sine * y, cosine * y - sine * x, velocity_m_s[k, 2]
-        q, like = turned[k], 0.0
-        turn[0], turn[1] = c * q[0] + s * q[3], c * q[1] + s * q[2]  # about_z(-yaw) q
-        turn[2], turn[3] = c * q[2] - s * q[1], c * q[3] - s * q[0]
-        for i in range(4):
-            like += turn[i] * hemisphere[k, i]
-        for i in range(4):
-            turn[i] = np.copysign(1.0, like) * turn[i]
-    return out * scale
-
-
-@compiled
-def _trusted(features: Singles, rows: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats]:
-    """The first n columns of some rows (m, n) and of the query (n,), each times the root of its trust (n,)."""
-    root = np.sqrt(trust)
-    values = np.empty((len(rows), len(query)))
-    for i in range(len(rows)):
-        for k in range(len(query)):
-            values[i, k] = features[rows[i], k] * root[k]
-    return values, query * root
-
-
-@compiled
-def _side_by_side(first: Singles, second: Singles, rows: Ints) -> Floats:
-    """Some rows of two tables (N, a), (N, b), as one (K, a + b)."""
-    width = first.shape[1]
-    out = np.empty((len(rows), width + second.shape[1]))
-    for i in range(len(rows)):
+def _pairs(
+    features: Singles, posture: Singles, root: Singles, rows: Ints, others: Ints, query: Floats, weight: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """`LocalExamples.pairs`, with the first n columns of inputs times a weight (n,)."""
+    every = np.empty(len(rows) + len(others), np.int64)
+    count = 0
+    for row in rows:
+        every[count] = row
+        count += 1
+    for row in others:
+        if not (rows == row).any():
+            every[count] = row
+            count += 1
+    size, width = len(weight), posture.shape[1]
+    inputs, outputs = np.empty((count, size)), np.empty((count, width + root.shape[1]))
+    for i in range(count):
+        for k in range(size):
+            inputs[i, k] = features[every[i], k] * weight[k]
         for k in range(width):
-            out[i, k] = first[rows[i], k]
-        for k in range(second.shape[1]):
-            out[i, width + k] = second[rows[i], k]
-    return out
+            outputs[i, k] = posture[every[i], k]
+        for k in range(root.shape[1]):
+            outputs[i, width + k] = root[every[i], k]
+    return inputs, query[:size] * weight, outputs

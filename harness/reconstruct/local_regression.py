@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.core.estimate import Estimate
@@ -31,13 +31,14 @@ from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.smoothing import smoothed
 from harness.reconstruct.solver import Prior, Solver, Stopping
-from harness.reconstruct.viewpoint import View
 from harness.stream.frame import TrackerFrame
 
 _LEAST_SPREAD_RAD = math.radians(1.0)
 """A hinge that rests in all examples may still give way a little."""
 _BARE_JUMP_M = 0.3
 """The gate without inverse kinematics, as for the best match: a learnt pose is never as near as a fitted one."""
+
+_NONE: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -135,32 +136,30 @@ class LocalSession:
         self._precision = np.repeat([options.root_sigma_m**-2, options.root_sigma_rad**-2], 3)
         self._precision = np.concatenate([self._precision, fitted.hinge_sigma_rad**-2])
         self._answer = fitted.database.qpos(np.array([0]), np.zeros(3))[0]
-        self._rows_before: list[int] = []
+        self._rows_before = _NONE
         self._poses_before: list[Floats] = []
 
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
         if not any_seen:
-            self._rows_before, self._poses_before = [], []
+            self._rows_before, self._poses_before = _NONE, []
             return Estimate(self._answer, status)
         self._gate.read(frame, self._residuals)
-        if not self._residuals.measured.any():
+        if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._answer, status)
         view, query, trust = self._outlook.seen(frame, self._answer)
         pose = self._smoothed(self._regressed(query, trust))
-        self._answer = self._fitted_to_trackers(stood(pose, view))
+        self._answer = self._fitted_to_trackers(stood(pose, *view))
         self._gate.answered(frame, self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _regressed(self, query: Floats, trust: Floats) -> Floats:
         """(55,) what is learnt (`LocalExamples.poses`), from the neighbours of this frame and the last."""
-        rows = self._examples.nearest(query, trust, self._options.neighbours).tolist()
-        training = np.array(list(dict.fromkeys([*rows, *self._rows_before])))
+        rows = self._examples.nearest(query, trust, self._options.neighbours)
+        inputs, asked, outputs = self._examples.pairs(rows, self._rows_before, query, trust)
         self._rows_before = rows
-        outputs = self._examples.poses(training)
-        if len(training) == 1:
+        if len(outputs) == 1:
             return outputs.reshape(-1)
-        inputs, asked = self._examples.inputs(training, query, trust)
         pose: Floats = np.matmul(self._options.weigh(inputs, asked, outputs), outputs)
         return pose
 
@@ -174,7 +173,7 @@ class LocalSession:
 
     def _fitted_to_trackers(self, qpos: Floats) -> Floats:
         qpos[7:] = self._limits.clipped(qpos[7:])
-        if not self._residuals.measured[: self._examples.count].any():
+        if not np.count_nonzero(self._residuals.measured[: self._examples.count]):
             qpos[:2] = self._answer[:2]  # orientations alone do not say where: stay
         if self._options.final_ik and self._options.solve == "limbs":
             return self._limbs.reach(qpos)
@@ -184,18 +183,18 @@ class LocalSession:
 
 
 @compiled
-def stood(pose: Floats, view: View) -> Floats:
-    """The configuration (55,) of a posture and the root's ground frame as seen from a view (55,)."""
-    cosine, sine = math.cos(view.yaw_rad), math.sin(view.yaw_rad)
+def stood(pose: Floats, x_m: float, y_m: float, yaw_rad: float) -> Floats:
+    """The configuration (55,) of a posture and the root's ground frame as seen from a view (55,) at that place."""
+    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
     height_m, roll, pitch = pose[0], pose[1], pose[2]
     forward_m, left_m, turn_rad = pose[52], pose[53], pose[54]
-    c, s = math.cos(0.5 * (view.yaw_rad + turn_rad)), math.sin(0.5 * (view.yaw_rad + turn_rad))
+    c, s = math.cos(0.5 * (yaw_rad + turn_rad)), math.sin(0.5 * (yaw_rad + turn_rad))
     lean = math.hypot(roll, pitch)
     w, by = math.cos(0.5 * lean), math.sin(0.5 * lean) / lean if lean > 0.0 else 0.5
     x, y = by * roll, by * pitch
     out = np.empty(55)
-    out[0] = view.x_m + cosine * forward_m - sine * left_m
-    out[1] = view.y_m + sine * forward_m + cosine * left_m
+    out[0] = x_m + cosine * forward_m - sine * left_m
+    out[1] = y_m + sine * forward_m + cosine * left_m
     out[2] = height_m
     out[3], out[4], out[5], out[6] = c * w, c * x - s * y, c * y + s * x, s * w  # about_z(yaw) tilt
     out[7:] = pose[4:52]

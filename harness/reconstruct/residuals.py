@@ -16,6 +16,7 @@ from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
+from harness.core.compiled import bound
 from harness.reconstruct import descent
 from harness.stream.frame import TrackerFrame
 
@@ -70,14 +71,18 @@ class Residuals:
 
         self._qpos = np.zeros(body.model.nq)
         self._tracker = descent.Tracker(
-            rotations.to_matrix(calibration.world_from_tracker),
-            np.array(calibration.tracker_origin_m),
-            _left(calibration.world_from_tracker) @ _right(rotations.inverse(calibration.bone_from_station)),
+            turn=rotations.to_matrix(calibration.world_from_tracker),
+            origin_m=np.array(calibration.tracker_origin_m),
+            to_bone=_left(calibration.world_from_tracker) @ _right(rotations.inverse(calibration.bone_from_station)),
+            precision=np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count),
+            twice_scale_squared=2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf),
+            by_quality=loss.quality,
+            suspect_weight=loss.suspect_weight,
         )
-        self._by_quality, self._suspect_weight = loss.quality, loss.suspect_weight
-        self._twice_scale_squared = 2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf)
-        self._said_trust = np.ones((2, count))
-        self._own_precision = np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count)
+        silent, never = np.zeros(count), np.zeros(count, bool)
+        nothing = TrackerFrame(0.0, silent, np.zeros((count, 3)), np.zeros((count, 4)), never, never, silent, never)
+        self._read = bound(descent.read, self._tracker, self.readings, *_told(nothing), self.measured, self.trust)
+        self._place = bound(descent.place, self.chain, self.readings, self.placed, self._qpos)
 
     @property
     def distance(self) -> Floats:
@@ -88,33 +93,21 @@ class Residuals:
     def read(self, frame: TrackerFrame) -> None:
         """Take up the valid readings of a frame."""
         self.measured = np.empty(2 * len(self.bones), bool)
-        descent.read(
-            *(self._tracker, self.readings, frame.position_m, frame.tracker_from_station),
-            *(frame.position_valid, frame.orientation_valid, self.measured),
-        )
-        self._said_trust[:] = frame.quality if self._by_quality else 1.0
-        if frame.suspect.any():
-            self._said_trust[:, frame.suspect] *= self._suspect_weight
-        self._weigh()
+        self._read(self._tracker, self.readings, *_told(frame), self.measured, self.trust)
 
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
         self.measured = self.measured & ~rows
-        self._weigh()
-
-    def _weigh(self) -> None:
-        np.multiply(self._said_trust.reshape(-1), self.measured, out=self.trust)
-        np.multiply(self._own_precision, self.trust, out=self.readings.precision)
-        self.widen(1.0)
+        self.trust[rows] = self.readings.precision[rows] = 0.0
 
     def widen(self, factor: float) -> None:
         """Let the Lorentzian reach `factor` times farther, until the next frame: for solving from far away."""
-        np.multiply(self._twice_scale_squared, factor * factor, out=self.readings.twice_scale_squared)
+        np.multiply(self._tracker.twice_scale_squared, factor * factor, out=self.readings.twice_scale_squared)
 
     def place(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""
         self._qpos[:] = qpos
-        return descent.place(self.chain, self.readings, self.placed, self._qpos)
+        return self._place(self.chain, self.readings, self.placed, self._qpos)
 
     def normal_equations(self, hessian: Floats) -> Floats:
         """Where `place` left the body: fills `hessian` (54, 54) with Gauss and Newton's, returns the descent (54,).
@@ -129,6 +122,12 @@ class Residuals:
     def add_curvature(self, hessian: Floats) -> None:
         """After `normal_equations`: adds to the lower triangle what Gauss and Newton leave out."""
         descent.add_curvature(self.chain, self.placed, hessian)
+
+
+def _told(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:
+    """What `descent.read` is told of a frame."""
+    valid = frame.position_valid, frame.orientation_valid
+    return frame.position_m, frame.tracker_from_station, *valid, frame.quality, frame.suspect
 
 
 def _left(q: Floats) -> Floats:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.compiled import bound
 from harness.reconstruct import descent
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Residuals
@@ -66,16 +67,16 @@ class Solver:
             decrease=stopping.decrease,
             most_steps=stopping.most_steps,
         )
+        self._arrays = (residuals.chain, residuals.readings, residuals.placed, self._model, self._trust)
+        self._descend = bound(descent.descend, *self._arrays, np.zeros(nv + 1))
 
     def solve(self, start: Floats, prior: Prior) -> Solution:
         """From a configuration (55,), clipped to the limits, downhill to a minimum."""
-        residuals, trust = self.residuals, self._trust
+        trust = self._trust
         trust.mean[:] = prior.qpos
         trust.precision[:] = 0.0 if prior.precision is None else prior.precision
         qpos = np.array(start, dtype=float)
-        cost, steps, converged = descent.descend(
-            residuals.chain, residuals.readings, residuals.placed, self._model, trust, qpos
-        )
+        cost, steps, converged = self._descend(*self._arrays, qpos)
         if steps < 0:
             raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
         return Solution(qpos, cost, steps, converged)

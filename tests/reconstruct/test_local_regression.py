@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.core import rotations
 from harness.core.estimate import Status
 from harness.core.humanoid24 import unpack
 from harness.errors import BadInput
@@ -13,7 +12,9 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.kernel_cca import KernelCca
 from harness.reconstruct.local_examples import LocalExamples, Weights
 from harness.reconstruct.local_regression import LocalRegression, stood
-from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
+from harness.reconstruct.outlook import Outlook
+from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.viewpoint import anchor_of
 from harness.reconstruct.weighted_blend import WeightedBlend
 from harness.testing.frames import exact_frames, without
 
@@ -97,21 +98,17 @@ def test_the_closed_form_meets_every_limb_tracker(walk: Scene, method: LocalRegr
 def test_features_tell_what_trackers_read(walk: Scene) -> None:
     database = MotionDatabase.build(walk.body, [walk.take])
     examples = LocalExamples(walk.body, database, walk.calibration, Weights(), "flat")
-    row, rate_hz = 20, 40.0
-    first, second = (f.position_m for f in walk.frames[row - 1 : row + 1])
-    world = walk.calibration.world_from_tracker
-    position_m = rotations.rotate(world, second) + walk.calibration.tracker_origin_m
-    velocity = rotations.rotate(world, second - first) * rate_hz
-    station_from_bone = rotations.inverse(walk.calibration.bone_from_station)
-    turned = rotations.multiply(world, walk.frames[row].tracker_from_station)
-    turned = rotations.multiply(turned, station_from_bone)
-    anchor = examples.anchor
-    view = View(float(position_m[anchor, 0]), float(position_m[anchor, 1]), float(twist_rad(turned[anchor])))
-    query = examples.query(position_m, turned, velocity, view)
+    row = 20
+    residuals = Residuals(walk.body, walk.calibration, Loss())
+    outlook = Outlook(residuals, walk.calibration, examples, 0.2)
+    for frame in walk.frames[row - 1 : row + 1]:
+        residuals.read(frame)
+        view, query, trust = outlook.seen(frame, walk.take.qpos[row])
     np.testing.assert_allclose(query, examples.features[row], atol=2e-5)
-    assert examples.nearest(query, np.ones(examples.size), 1).tolist() == [row]
-    pose = examples.poses(np.array([row]))[0]
-    np.testing.assert_allclose(stood(pose, view)[:3], walk.take.qpos[row, :3], atol=1e-5)
+    assert examples.nearest(query, trust, 1).tolist() == [row]
+    inputs, asked, poses = examples.pairs(np.array([row]), np.array([row]), query, trust)
+    np.testing.assert_allclose(inputs, asked[None], atol=2e-5)
+    np.testing.assert_allclose(stood(poses[0], *view)[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 
 def test_the_pelvis_is_the_first_choice_of_anchor() -> None:
