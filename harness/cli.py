@@ -299,7 +299,8 @@ def add_check(verbs: Verbs) -> None:
 
 def run_check(args: argparse.Namespace) -> Outcome:
     from harness.reconstruct import registry
-    from harness.testing.method_checks import RULES, Finding, examine
+    from harness.testing.method_checks import Finding, examine
+    from harness.testing.rules import RULES
 
     found: dict[str, list[Finding]] = {}
     with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk

@@ -67,7 +67,9 @@ class Writer(Kept):
     def __init__(self, folder: Path, beside: Path) -> None:
         super().__init__()
         self._folder, self._beside = folder, beside
-        self._files: dict[str, BinaryIO] = {name: open(beside / f"{name}.npy", "w+b") for name in COLUMNS}  # noqa: SIM115
+        self._files: dict[str, BinaryIO] = {}
+        for name in COLUMNS:
+            self._files[name] = open(beside / f"{name}.npy", "w+b")  # noqa: SIM115  # until `close`
         for name in COLUMNS:
             self._header(name, 0)
 

@@ -54,7 +54,8 @@ def test_nothing_is_overwritten(database: MotionDatabase, saved: Path) -> None:
 
 
 def test_a_write_that_fails_leaves_nothing(database: MotionDatabase, tmp_path: Path) -> None:
-    cut = MotionDatabase(40.0, database.posture, database.step, (*database.runs, None))  # type: ignore[arg-type]
+    unsaid: Any = None  # a run that cannot be written, after some that can
+    cut = MotionDatabase(40.0, database.posture, database.step, (*database.runs, unsaid))
     with pytest.raises(AttributeError):
         cut.save(tmp_path / "database")
     assert list(tmp_path.iterdir()) == []
@@ -115,7 +116,8 @@ def test_arrays_of_other_kinds_are_refused(saved: Path) -> None:
     np.save(saved / "step.npy", np.zeros((50, 3)))
     with pytest.raises(BadFile, match="50 x 3 float64; expected an array of 50 x 3 float32"):
         MotionDatabase.open(saved)
-    np.save(saved / "step.npy", np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    objects = np.array([{"a": 1}], dtype=object)
+    np.save(saved / "step.npy", objects, allow_pickle=True)  # a file that could do anything to whoever unpickles it
     with pytest.raises(BadFile, match="damaged"):
         MotionDatabase.open(saved)
 

@@ -1,6 +1,5 @@
 """Every index finds what looking at every vector finds, the approximate ones nearly always."""
 
-import pickle
 from collections.abc import Callable
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 
 from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
+from harness.core.workers import call_each
 from harness.errors import UnknownName
 from harness.reconstruct.index import Flat, Graph, Index, InvertedFile, KDTree, Table, Vectors, choose, nearest_known
 
@@ -81,14 +81,17 @@ def test_the_same_vectors_give_the_same_answers(name: str) -> None:
             np.testing.assert_array_equal(mine, theirs)
 
 
-@pytest.mark.parametrize("name", ALL)
-def test_an_index_travels_to_another_process(name: str) -> None:
+def answers(index: Index, queries: Singles) -> list[tuple[Ints, Singles]]:
+    return [index.nearest(query, 300) for query in queries]
+
+
+def test_indexes_travel_to_another_process() -> None:
     values = paths(1000, 16)
-    index = ALL[name](Table(values))
-    other = pickle.loads(pickle.dumps(index))  # noqa: S301
-    for query in values[::250] + np.float32(0.01):
-        for mine, theirs in zip(index.nearest(query, 300), other.nearest(query, 300), strict=True):
-            np.testing.assert_array_equal(mine, theirs)
+    tasks = [(make(Table(values)), values[::250] + np.float32(0.01)) for make in ALL.values()]
+    for which, done in call_each(answers, tasks, 1):
+        for here, there in zip(answers(*tasks[which]), done.result(), strict=True):
+            for mine, theirs in zip(here, there, strict=True):
+                np.testing.assert_array_equal(mine, theirs)
 
 
 def test_nothing_is_far_away_in_a_set_that_never_varies() -> None:
