@@ -70,7 +70,6 @@ class Writer(Kept):
         self._files: dict[str, BinaryIO] = {}
         for name in COLUMNS:
             self._files[name] = open(beside / f"{name}.npy", "w+b")  # noqa: SIM115  # until `close`
-        for name in COLUMNS:
             self._header(name, 0)
 
     def _store(self, name: str, rows: Singles) -> None:
