@@ -616,3 +616,164 @@ def _rotation_vector(w: float, x: float, y: float, z: float) -> Vector:
     sine = np.sqrt(x * x + y * y + z * z) + 1e-12
     factor = np.arctan2(sine, abs(w)) / sine * (2.0 if w >= 0.0 else -2.0)
     return factor * x, factor * y, factor * z
+
+
+class Space(NamedTuple):
+    """Postures near p, P numbers each, that leave it by nothing along N, at a cost of 1/2 a^T A a - b^T a for leaving
+    it by a; `subspace` says more."""
+
+    mean: Floats
+    """(P,) p."""
+    across: Floats
+    """(D, P) N, orthonormal."""
+    curvature: Floats
+    """(P, P) A, and a stiff spring along N."""
+    pull: Floats
+    """(P,) b."""
+    spring: Floats
+    """(P,) what of the diagonal of A is the spring's."""
+
+
+_WITHIN_DAMPING, _LEAST = 1e-3, 1e-6
+"""Of the first step among the postures of a space; what keeps a step of 0 where nothing was read about the ground."""
+
+
+@compiled
+def descend_within(
+    chain: Chain, readings: Readings, placed: Placed, space: Space, stop: tuple[float, float, int], z: Floats
+) -> tuple[Floats, float, int, bool]:
+    """Levenberg and Marquardt's method among the postures of a space, from a ground frame and a posture z (3 + P,).
+
+    `stop` is step, decrease, and most steps (`solver.Stopping`). The configuration (V + 1,), its cost, the steps,
+    whether it converged; -1 steps as for `descend`.
+    """
+    directions = len(chain.before)
+    hessian, descent = np.zeros((directions, directions)), np.empty(directions)
+    normal, gradient = np.empty((len(z), len(z))), np.empty(len(z))
+    z[3:] = nearest(space, z[3:])
+    qpos = stood(z[3:], z[:3])
+    cost = place(chain, readings, placed, qpos) + cost_within(space, z[3:])
+    damping = _WITHIN_DAMPING
+    for steps in range(1, stop[2] + 1):
+        normal_equations(chain, placed, hessian, descent)
+        refer(space, z, hessian, descent, normal, gradient)
+        while True:
+            step = damped(space, normal, gradient, damping)
+            longest = np.abs(step).max()
+            if not np.isfinite(longest):
+                return qpos, cost, -1, False
+            there = z + step
+            moved = stood(there[3:], there[:3])
+            new_cost = place(chain, readings, placed, moved) + cost_within(space, there[3:])
+            if new_cost <= cost or longest < stop[0]:
+                break
+            damping *= _RAISE
+        converged = longest < stop[0] or cost - new_cost < stop[1]
+        if new_cost <= cost:
+            z, qpos, cost, damping = there, moved, new_cost, damping / _LOWER
+        if converged:
+            return qpos, cost, steps, True
+    return qpos, cost, stop[2], False
+
+
+@compiled
+def nearest(space: Space, posture: Floats) -> Floats:
+    """The posture (P,) of the space that is nearest to one."""
+    out: Floats = posture - np.dot(np.dot(space.across, posture - space.mean), space.across)
+    return out
+
+
+@compiled
+def cost_within(space: Space, posture: Floats) -> float:
+    """Of a posture (P,)."""
+    away = posture - space.mean
+    return _dot(away, 0.5 * np.dot(space.curvature, away) - space.pull)
+
+
+@compiled
+def stood(posture: Floats, ground: Floats) -> Floats:
+    """The configuration (P + 3,) of a posture (P,), height, tilt and hinges, on a ground frame (3,)."""
+    out = np.empty(len(posture) + 3)
+    out[0], out[1], out[2] = ground[0], ground[1], posture[0]
+    angle = np.sqrt(posture[1] ** 2 + posture[2] ** 2 + posture[3] ** 2)
+    share = np.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    w, x, y, z = np.cos(0.5 * angle), share * posture[1], share * posture[2], share * posture[3]
+    c, s = np.cos(0.5 * ground[2]), np.sin(0.5 * ground[2])
+    out[3], out[4], out[5], out[6] = c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+    out[7:] = posture[4:]
+    return out
+
+
+@compiled
+def _root_slope(z: Floats) -> Floats:
+    """(4, 3) how the root turns, in its own axes, as yaw and tilt (3) do.
+
+    Its turn is about_z(yaw) exp(tilt): yaw turns it about exp(-tilt) z, and tilt by its right Jacobian.
+    """
+    x, y, up = z[4], z[5], z[6]
+    squared = x * x + y * y + up * up
+    angle = np.sqrt(squared)
+    half, sine, rest = 0.5, 1.0, 1.0 / 6.0
+    if angle > 1e-4:
+        half = (1.0 - np.cos(angle)) / squared
+        sine, rest = np.sin(angle) / angle, (angle - np.sin(angle)) / (squared * angle)
+    cross = np.array([[0.0, -up, y], [up, 0.0, -x], [-y, x, 0.0]])
+    twice = np.dot(cross, cross)
+    out = np.empty((4, 3))
+    out[0] = half * twice[2] + sine * cross[2]
+    out[0, 2] += 1.0
+    out[1:] = np.eye(3) + half * cross + rest * twice
+    return out
+
+
+@compiled
+def refer(space: Space, z: Floats, hessian: Floats, descent: Floats, normal: Floats, gradient: Floats) -> None:
+    """Makes normal equations (3 + P, 3 + P), lower triangle, and descent of z from those of the solver's directions.
+
+    Hinges are the same in both; so are the root's moves, with the height after the yaw. The space's cost is added.
+    """
+    slope, root, turn = np.zeros((7, 6)), np.empty((6, 6)), _root_slope(z)
+    slope[0, 0] = slope[1, 1] = slope[3, 2] = 1.0
+    slope[2, 3:], slope[4:, 3:] = turn[0], turn[1:]
+    for k in range(6):
+        for m in range(k + 1):
+            root[k, m] = root[m, k] = hessian[k, m]
+    normal[:7, :7] = np.dot(np.dot(slope, root), slope.T)
+    for r in range(6, len(hessian)):
+        row, was = normal[r + 1], hessian[r]
+        row[0], row[1], row[3] = was[0], was[1], was[2]
+        row[2] = turn[0, 0] * was[3] + turn[0, 1] * was[4] + turn[0, 2] * was[5]
+        for k in range(1, 4):
+            row[3 + k] = turn[k, 0] * was[3] + turn[k, 1] * was[4] + turn[k, 2] * was[5]
+        row[7 : r + 2] = was[6 : r + 1]
+    normal[3:, 3:] += space.curvature
+    gradient[:7] = np.dot(slope, descent[:6])
+    gradient[7:] = descent[6:]
+    gradient[3:] += space.pull - np.dot(space.curvature, z[3:] - space.mean)
+
+
+@compiled
+def damped(space: Space, normal: Floats, gradient: Floats, damping: float) -> Floats:
+    """Levenberg and Marquardt's step (3 + P,) within the space; NaN when the matrix is not positive definite."""
+    factor, step = normal.copy(), gradient.copy()
+    count = len(step)
+    for k in range(count):
+        if k >= 3:
+            factor[k, k] -= space.spring[k - 3] * (damping / (1.0 + damping))  # the spring is not damped
+        factor[k, k] = factor[k, k] * (1.0 + damping) + _LEAST
+    for k in range(count - 1, -1, -1):  # L^T D L, as `_factored`
+        pivot = factor[k]
+        if not pivot[k] > 0.0:
+            step[:] = np.nan
+            return step
+        for i in range(k):
+            share, row = pivot[i] / pivot[k], factor[i]
+            for j in range(i + 1):
+                row[j] -= share * pivot[j]
+            step[i] -= share * step[k]
+    for k in range(count):
+        for i in range(k):
+            step[k] -= factor[k, i] * step[i]
+        step[k] /= factor[k, k]
+    step[3:] -= np.dot(np.dot(space.across, step[3:]), space.across)
+    return step

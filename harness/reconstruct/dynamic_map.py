@@ -22,8 +22,9 @@ from harness.errors import BadInput
 from harness.reconstruct.coverage import LOST_AFTER_S
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.database.ground import HEIGHT, HINGES, POSTURE, TILT
+from harness.reconstruct.descent import stood
 from harness.reconstruct.expectation import Evidence, Terms
-from harness.reconstruct.footing import stepped, stood
+from harness.reconstruct.footing import stepped
 from harness.reconstruct.gate import JUMP_M
 from harness.reconstruct.index import Index, choose
 from harness.reconstruct.local_model import closeness, forecast

@@ -19,7 +19,7 @@ from harness.reconstruct.controls import Controls
 from harness.reconstruct.coverage import LOST_AFTER_S
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.database.ground import POSTURE
-from harness.reconstruct.footing import stepped, window
+from harness.reconstruct.footing import stepped
 from harness.reconstruct.gate import JUMP_M
 from harness.reconstruct.index import Index, Vectors, choose, nearest_known
 from harness.reconstruct.mean_pose import mean_posture
@@ -27,7 +27,7 @@ from harness.reconstruct.pursuit import LEANING_RAD, Leaning, Manner
 from harness.reconstruct.remembering import Remembering
 from harness.reconstruct.residuals import Loss
 from harness.reconstruct.solver import Solution, Stopping
-from harness.reconstruct.subspace import Subspace, solve
+from harness.reconstruct.subspace import Confined, spanned
 
 _PAST = 2
 """Poses of the query, C2."""
@@ -112,20 +112,19 @@ class LocalPcaSession(Remembering):
         leaning = Leaning(fitted.mean_qpos, np.full(48, LEANING_RAD))
         super().__init__(fitted.body, calibration, manner, leaning, _PAST, windows.database.rate_hz)
         self._options, self._windows = options, windows
+        self._confined = Confined(self.residuals, self.limits, options.stopping)
         self._controls, self._examples, self._index = fitted.seen_through(calibration)
 
     def continued(self) -> Solution:
         options = self._options
-        before = window(self.past)
+        before = self._windows.query(self.past)
         rows = self._nearest(before)
-        poses = self._windows.successors(rows).astype(float)
-        space = Subspace.of(poses[:, :POSTURE], options.components, options.prior_weight)
-        space = space.smoothed(
-            2.0 * before[:POSTURE].astype(float) - before[-POSTURE:],
-            options.smooth_weight / options.smooth_sigma_rad**2,
-        )
-        here = stepped(self.past[0], poses[0, POSTURE:])
-        return solve(self.residuals, self.limits, space, here, poses[0, :POSTURE], options.stopping)
+        poses = self._windows.successors(rows)
+        postures, closest = poses[:, :POSTURE], poses[0].astype(float)
+        steady = 2.0 * before[:POSTURE].astype(float) - before[-POSTURE:]
+        beta = options.smooth_weight / options.smooth_sigma_rad**2
+        space = spanned(postures, options.components, options.prior_weight, steady, beta)
+        return self._confined.solve(space, stepped(self.past[0], closest[POSTURE:]), closest[:POSTURE])
 
     def bridged(self) -> Floats:
         """Nothing was read, and there are no dynamics: as it was."""

@@ -7,18 +7,11 @@ from harness.body.kinematics import Kinematics
 from harness.reconstruct.controls import Controls
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import ground_of, moved, posture_of, standing
-from harness.reconstruct.footing import stepped, stood, window
+from harness.reconstruct.descent import stood
+from harness.reconstruct.footing import stepped
 
 from .conftest import Scene
 from .conftest import moved as elsewhere
-
-
-@pytest.mark.parametrize("poses", [1, 2, 4])
-@pytest.mark.parametrize("yaw_rad", [0.0, 3.0, -2.0])
-def test_windows_are_those_of_the_database(boxing: Scene, poses: int, yaw_rad: float) -> None:
-    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(poses)
-    past = elsewhere(boxing.take.qpos, yaw_rad, (3.0, 1.0, 0.0))[20 + poses : 20 : -1].copy()
-    np.testing.assert_allclose(window(past), windows.query(past), atol=1e-6)
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 3.0, -2.0])

@@ -3,27 +3,37 @@
 import numpy as np
 import pytest
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Singles
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import ground_of, posture_of
-from harness.reconstruct.footing import stood
+from harness.reconstruct.descent import Space, cost_within, damped, nearest, refer, stood
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.local_pca import LocalPca
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.solver import Stopping
-from harness.reconstruct.subspace import Subspace, damped, inverted, refer, solve
+from harness.reconstruct.subspace import Confined, inverted, spanned
 
 from .conftest import Scene
 
 
-def space_of(scene: Scene, components: int = 7) -> Subspace:
-    postures = MotionDatabase.build(scene.body, [scene.take]).posture[20:80].astype(float)
-    return Subspace.of(postures, components, 0.8)
+def postures_of(scene: Scene) -> Singles:
+    out: Singles = MotionDatabase.build(scene.body, [scene.take]).posture[20:80]
+    return out
+
+
+def scatter_of(postures: Singles) -> Floats:
+    away = postures - postures.mean(axis=0, dtype=float)
+    out: Floats = away.T @ away / len(away)
+    return out
+
+
+def space_of(scene: Scene, components: int = 7) -> Space:
+    return spanned(postures_of(scene), components, 0.8, np.zeros(52), 0.0)
 
 
 @pytest.mark.parametrize("lean_rad", [0.0, 1e-6, 1.2])
 def test_normal_equations_against_differences(walk: Scene, rng: np.random.Generator, lean_rad: float) -> None:
-    space = space_of(walk, 40).smoothed(posture_of(walk.take.qpos[33]), 20.0)
+    space = spanned(postures_of(walk), 40, 0.8, posture_of(walk.take.qpos[33]), 20.0)
     residuals = Residuals(walk.body, walk.calibration, Loss(robust=False))
     residuals.read(walk.frames[30])
     z = np.concatenate([ground_of(walk.take.qpos[30]) + 0.05, space.mean + 0.1 * rng.normal(size=52)])
@@ -47,7 +57,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     expected[3:, 3:] += space.curvature
     normal, found = np.empty((55, 55)), np.empty(55)
     refer(space, z, hessian, descent, normal, found)
-    np.testing.assert_allclose(np.triu(normal), np.triu(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
+    np.testing.assert_allclose(np.tril(normal), np.tril(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
     np.testing.assert_allclose(-found, gradient, rtol=1e-6, atol=1e-5 * np.abs(descent).max())
 
 
@@ -60,15 +70,12 @@ def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene,
     normal[3:, 3:] += space.curvature
     within = np.linalg.svd(basis)[0][:, :43]
     step = within @ np.linalg.solve(within.T @ normal @ within, within.T @ gradient)
-    np.testing.assert_allclose(damped(space, np.triu(normal), gradient, 0.0), step, atol=2e-3 * np.abs(step).max())
+    np.testing.assert_allclose(damped(space, np.tril(normal), gradient, 0.0), step, atol=2e-3 * np.abs(step).max())
 
 
 def test_what_is_left_out_varies_least(walk: Scene) -> None:
     """Found by inverse iteration: orthonormal, and next to no more variance than the smallest eigenvalues hold."""
-    postures = MotionDatabase.build(walk.body, [walk.take]).posture[20:80].astype(float)
-    space = Subspace.of(postures, 40, 0.8)
-    away = postures - postures.mean(axis=0)
-    scatter = away.T @ away / len(away)
+    space, scatter = space_of(walk, 40), scatter_of(postures_of(walk))
     np.testing.assert_allclose(space.across @ space.across.T, np.eye(12), atol=1e-10)
     held = np.trace(space.across @ scatter @ space.across.T)
     assert held <= 1.01 * np.sum(np.linalg.eigvalsh(scatter)[:12]) + 12 * 1e-9
@@ -81,32 +88,29 @@ def test_inverse(rng: np.random.Generator) -> None:
 
 def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
     """Up to a constant: alpha/2 (q - p)^T Lambda^-1 (q - p) and beta/2 |q - expected|^2, written out."""
-    postures = MotionDatabase.build(walk.body, [walk.take]).posture[20:80].astype(float)
-    expected = posture_of(walk.take.qpos[33])
-    space = Subspace.of(postures, 7, 0.8).smoothed(expected, 3.0)
-    away = postures - postures.mean(axis=0)
-    scatter = away.T @ away / len(away)
+    postures, expected = postures_of(walk), posture_of(walk.take.qpos[33])
+    space, scatter = spanned(postures, 7, 0.8, expected, 3.0), scatter_of(postures)
 
     def written_out(q: Floats) -> float:
         within = q - space.mean
         return float(0.4 * within @ np.linalg.pinv(scatter, rcond=1e-9) @ within + 1.5 * np.sum((q - expected) ** 2))
 
-    assert space.cost(space.mean) == 0.0
+    assert cost_within(space, space.mean) == 0.0
     for direction in 0.2 * rng.normal(size=(5, 52)):
-        q = space.nearest(space.mean + direction)
-        np.testing.assert_allclose(space.cost(q), written_out(q) - written_out(space.mean), rtol=1e-6)
+        q = nearest(space, space.mean + direction)
+        np.testing.assert_allclose(cost_within(space, q), written_out(q) - written_out(space.mean), rtol=1e-6)
 
 
 def test_the_answer_lies_in_the_subspace_and_is_a_minimum(walk: Scene, rng: np.random.Generator) -> None:
     space, residuals = space_of(walk), Residuals(walk.body, walk.calibration, Loss())
     residuals.read(walk.frames[50])
     ground, limits = ground_of(walk.take.qpos[50]), HingeLimits(walk.body, keep=False)
-    found = solve(residuals, limits, space, ground + 0.05, space.mean, Stopping(step=1e-7, decrease=0.0))
+    found = Confined(residuals, limits, Stopping(step=1e-7, decrease=0.0)).solve(space, ground + 0.05, space.mean)
     posture, ground = posture_of(found.qpos), ground_of(found.qpos)
-    np.testing.assert_allclose(space.nearest(posture), posture, atol=1e-9)
+    np.testing.assert_allclose(nearest(space, posture), posture, atol=1e-9)
     for step in 1e-3 * rng.normal(size=(20, 55)):
-        there = space.nearest(posture + step[3:])
-        assert residuals.place(stood(there, ground + step[:3])) + space.cost(there) > found.cost - 1e-9
+        there = nearest(space, posture + step[3:])
+        assert residuals.place(stood(there, ground + step[:3])) + cost_within(space, there) > found.cost - 1e-9
 
 
 def test_few_directions_follow_trackers_worse_than_many(walk: Scene, boxing: Scene) -> None:
