@@ -21,8 +21,10 @@ MAY_IMPORT: dict[str, set[str]] = {
     "reconstruct": {"body", "stream", "calibrate"},
     "score": set(),
     "report": {"score", "body"},
-    "bench": (EVERYTHING | {"config", "setting", "progress"}) - {"study", "testing"},  # measures what the tables do
-    "testing": EVERYTHING - {"study", "bench"},
+    # the bench measures what the tables do
+    "bench": (EVERYTHING | {"config", "setting", "progress"}) - {"study", "testing", "commands"},
+    "testing": EVERYTHING - {"study", "bench", "commands"},
+    "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress"},
 }
 TOP = {"cli", "catalogue", "config", "doctor", "errors", "experiment", "progress", "setting", "__init__", "__main__"}
 USES_MUJOCO = {"body", "simulate", "bench"}
