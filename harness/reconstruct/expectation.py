@@ -23,10 +23,10 @@ from harness.reconstruct.database import Windows
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.examples import Worn
 from harness.reconstruct.footing import readings
-from harness.reconstruct.index import Found, Index, Table, choose
+from harness.reconstruct.index import Found, Index, choose
 from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
 
-_CHUNK = 2048
+_CHUNK = 256
 """Windows worked on at a time."""
 _HERE: Floats = np.zeros(3)
 """A ground frame to stand on."""
@@ -134,6 +134,34 @@ class Evidence:
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class _Expected:
+    """`Vectors`: z of every window, worked out anew whenever it is asked for."""
+
+    evidence: Evidence
+    usual: Bools
+    """(D + 9 S,) columns that are known."""
+    directions: Floats
+    """(C, 40) from them to z."""
+
+    def __len__(self) -> int:
+        return len(self.evidence)
+
+    @property
+    def size(self) -> int:
+        return int(self.directions.shape[1])
+
+    def gather(self, rows: Ints | slice) -> Singles:
+        evidence, wanted = self.evidence, np.arange(len(self))[rows]
+        out: Singles = np.empty((len(wanted), self.size), np.float32)
+        start = 0
+        for known, _ in evidence.parts(wanted):
+            out[start : start + len(known)] = (known - evidence.mean)[:, self.usual] @ self.directions
+            start += len(known)
+        evidence.let_go()
+        return out
+
+
 class Expectation:
     """The search among N windows, in terms of the postures that certain readings lead to expect."""
 
@@ -142,14 +170,7 @@ class Expectation:
         self._evidence, self._usual = evidence, usual
         self._directions = evidence.directions(usual)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
-        table: Singles = np.empty((len(evidence), self._directions.shape[1]), np.float32)
-        start = 0
-        for known, _ in evidence.parts(np.arange(len(evidence))):
-            away = (known - evidence.mean)[:, usual]
-            table[start : start + len(known)] = away @ self._directions
-            start += len(known)
-        evidence.let_go()
-        self._index: Index = choose(index, Table(table), wanted)
+        self._index: Index = choose(index, _Expected(evidence, usual, self._directions), wanted)
 
     def around(self, known: Floats, measured: Bools, count: int) -> Found:
         """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.

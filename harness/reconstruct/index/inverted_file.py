@@ -45,7 +45,9 @@ class InvertedFile:
         self._principal = Principal(vectors, rng, KEPT)
         width, cells = self._principal.width, cells_for(count)
         sample = np.sort(rng.choice(count, min(count, _PER_CELL * cells), replace=False))
-        seen = np.concatenate([self._principal.seen(vectors.gather(rows)) for rows in chunks(sample)])
+        seen = np.empty((len(sample), width), np.float32)
+        for some in chunks(np.arange(len(sample))):
+            seen[some] = self._principal.seen(vectors.gather(sample[some]))
         with _faiss() as faiss:
             flat = faiss.IndexFlatL2(width)
             clustering = faiss.Clustering(width, cells)
@@ -161,7 +163,7 @@ def _looked_into(centroids: Singles, starts: Ints, codes: Codes, asked: Singles,
 
 
 @compiled
-def _differences(codes: Codes, starts: Ints, at: Ints, asked: Singles, step: float) -> Singles:
+def _differences(codes: Codes, starts: Ints, at: Ints, asked: Singles, step: np.float32) -> Singles:
     """(K, d) the vectors kept at (2, K), minus the query in steps (d,)."""
     width = len(asked)
     out = np.empty((at.shape[1], width), np.float32)

@@ -5,7 +5,7 @@ from typing import NamedTuple, Protocol
 
 from harness.core.arrays import Ints, Singles
 
-CHUNK = 4096
+CHUNK = 1024
 """Vectors gathered at a time while an index is made."""
 
 
