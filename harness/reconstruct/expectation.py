@@ -58,28 +58,24 @@ class Evidence:
 
     def __init__(self, body: Body, windows: Windows, worn: Calibration, terms: Terms) -> None:
         self.terms, self.count, self.anchor = terms, len(worn.stations), anchor_of(worn.bones)
-        self._windows, self._trackers = windows, Worn(body, worn)
+        self.windows, self._trackers = windows, Worn(body, worn)
         self.size = windows.size + 9 * self.count
         self._expectations: dict[bytes, Expectation] = {}
         every = np.arange(len(windows))
         rows = every if len(every) <= _LEARNT_FROM else np.linspace(0, len(every) - 1, _LEARNT_FROM).astype(np.int64)
         self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE)
-        for known, after in self.parts(rows):
+        for known, after in self.parts(windows, rows):
             self.mean += known.sum(axis=0) / len(rows)
             self._mean_after += after.sum(axis=0) / len(rows)
         self.scatter: Floats = np.zeros((self.size, self.size))
         """(D + 9 S, D + 9 S) covariance of the evidence."""
         self._shared = np.zeros((self.size, POSTURE))
-        for known, after in self.parts(rows):
+        for known, after in self.parts(windows, rows):
             away = known - self.mean
             self.scatter += away.T @ away / len(rows)
             self._shared += away.T @ (after - self._mean_after) / len(rows)
-        self.let_go()
+        windows.database.let_go()
         self.least = terms.ridge * float(np.trace(self.scatter))
-
-    def __len__(self) -> int:
-        """N, windows."""
-        return len(self._windows)
 
     def expectation(self, usual: Bools, index: str, wanted: int) -> "Expectation":
         """The search for sessions that know the `usual` columns; made once."""
@@ -88,21 +84,17 @@ class Evidence:
             self._expectations[key] = Expectation(self, usual, index, wanted)
         return self._expectations[key]
 
-    def let_go(self) -> None:
-        """Give back the memory of a database on disk that was gone through."""
-        self._windows.database.let_go()
-
-    def parts(self, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
+    def parts(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
         """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
         for start in range(0, len(rows), _CHUNK):
             some = rows[start : start + _CHUNK]
-            after = self._windows.successors(some)[:, :POSTURE].astype(float)
-            qpos = self._windows.database.qpos(self._windows.frames[some] + 1, _HERE)
+            after = windows.successors(some)[:, :POSTURE].astype(float)
+            qpos = windows.database.qpos(windows.frames[some] + 1, _HERE)
             at_m, turned = self._trackers.at(qpos)
             level = rotations.about_z(-twist_rad(turned[:, self.anchor]))[:, None]
             place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
             axes = self.terms.lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
-            window = self.terms.window_weight * self._windows.gather(some)
+            window = self.terms.window_weight * windows.gather(some)
             read = np.concatenate([place, axes.reshape(*place.shape[:2], 6)], axis=2)
             yield np.concatenate([window, read.reshape(len(some), -1)], axis=1), after
 
@@ -113,7 +105,7 @@ class Evidence:
 
     def columns(self, measured: Bools) -> Bools:
         """(D + 9 S,) which columns are known when these rows (2 S,) of positions, then orientations, are."""
-        window = np.ones(self._windows.size, bool)
+        window = np.ones(self.windows.size, bool)
         places, turns = measured[: self.count], measured[self.count :]
         return np.concatenate([window, np.repeat(np.stack([places, turns], axis=1), [3, 6], axis=1).reshape(-1)])
 
@@ -135,30 +127,30 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class _Expected:
-    """`Vectors`: z of every window, worked out anew whenever it is asked for."""
+class Expected:
+    """`Vectors`: z of windows, worked out anew whenever it is asked for."""
 
     evidence: Evidence
+    windows: Windows
     usual: Bools
-    """(D + 9 S,) columns that are known."""
+    """(D + 9 S,) columns of the evidence that are known."""
     directions: Floats
     """(C, 40) from them to z."""
 
     def __len__(self) -> int:
-        return len(self.evidence)
+        return len(self.windows)
 
     @property
     def size(self) -> int:
         return int(self.directions.shape[1])
 
     def gather(self, rows: Ints | slice) -> Singles:
-        evidence, wanted = self.evidence, np.arange(len(self))[rows]
+        wanted, start = np.arange(len(self))[rows], 0
         out: Singles = np.empty((len(wanted), self.size), np.float32)
-        start = 0
-        for known, _ in evidence.parts(wanted):
-            out[start : start + len(known)] = (known - evidence.mean)[:, self.usual] @ self.directions
+        for known, _ in self.evidence.parts(self.windows, wanted):
+            out[start : start + len(known)] = (known - self.evidence.mean)[:, self.usual] @ self.directions
             start += len(known)
-        evidence.let_go()
+        self.windows.database.let_go()
         return out
 
 
@@ -167,10 +159,9 @@ class Expectation:
 
     def __init__(self, evidence: Evidence, usual: Bools, index: str, wanted: int) -> None:
         """For sessions that know the `usual` columns (D + 9 S,) as a rule and ask for so many neighbours."""
-        self._evidence, self._usual = evidence, usual
-        self._directions = evidence.directions(usual)
+        self.vectors = Expected(evidence, evidence.windows, usual, evidence.directions(usual))
+        self.index: Index = choose(index, self.vectors, wanted)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
-        self._index: Index = choose(index, _Expected(evidence, usual, self._directions), wanted)
 
     def around(self, known: Floats, measured: Bools, count: int) -> Found:
         """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.
@@ -181,13 +172,13 @@ class Expectation:
         if key not in self._maps:
             if len(self._maps) >= _MAPS:
                 self._maps.clear()
-            self._maps[key] = self._map(self._evidence.columns(measured))
+            self._maps[key] = self._map(self.vectors.evidence.columns(measured))
         to_z, mean = self._maps[key]
-        return self._index.around((known @ to_z - mean).astype(np.float32), count)
+        return self.index.around((known @ to_z - mean).astype(np.float32), count)
 
     def _map(self, columns: Bools) -> tuple[Floats, Floats]:
         """(D + 9 S, 40) from evidence to z when some columns are known, the others count nothing; (40,) of the mean."""
-        evidence = self._evidence
-        to_z = np.zeros((evidence.size, self._directions.shape[1]))
-        to_z[columns] = evidence.filled(columns, self._usual) @ self._directions
+        vectors, evidence = self.vectors, self.vectors.evidence
+        to_z = np.zeros((evidence.size, vectors.size))
+        to_z[columns] = evidence.filled(columns, vectors.usual) @ vectors.directions
         return to_z, evidence.mean @ to_z

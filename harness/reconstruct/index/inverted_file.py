@@ -46,8 +46,8 @@ class InvertedFile:
         width, cells = self._principal.width, cells_for(count)
         sample = np.sort(rng.choice(count, min(count, _PER_CELL * cells), replace=False))
         seen = np.empty((len(sample), width), np.float32)
-        for some in chunks(np.arange(len(sample))):
-            seen[some] = self._principal.seen(vectors.gather(sample[some]))
+        for rows in chunks(np.arange(len(sample))):
+            seen[rows] = self._principal.seen(vectors.gather(sample[rows]))
         with _faiss() as faiss:
             flat = faiss.IndexFlatL2(width)
             clustering = faiss.Clustering(width, cells)
