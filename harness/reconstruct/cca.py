@@ -9,8 +9,6 @@ orthonormal basis of what sums to 0, which leaves m - 1 dimensions and nothing s
 back by the same ridge, x^T H (H + kH I) x in place of x^T H^2 x: as it is written, the last bases follow noise.
 """
 
-from functools import lru_cache
-
 import numpy as np
 
 from harness.core.arrays import Floats
@@ -18,53 +16,44 @@ from harness.core.compiled import compiled
 
 _TINY = 1e-12
 """Added to eigenvalues from 0 to 1, so that outputs may lie in fewer dimensions."""
-
-
-def weights(inputs: Floats, outputs: Floats, query: Floats, *, bases: int, kappa: float, held: bool) -> Floats:
-    """(m,) what each of m >= 2 outputs counts, from Gram matrices (m, m) of both sides and the query's kernel (m,).
-
-    With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
-    """
-    return _weights(inputs, outputs, query, contrasts(len(query)), bases, kappa, held)
+_ROUNDING = 1e-15
 
 
 def correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
     """The largest canonical correlations (l,) of two Gram matrices (m, m), falling."""
-    basis = contrasts(len(inputs))
-    squared, _, _, _ = _solution(_centred(inputs, basis), _centred(outputs, basis), bases, kappa)
+    squared, _, _ = _solution(_centred(inputs), _centred(outputs), bases, kappa)
     out: Floats = np.sqrt(np.maximum(squared[::-1], 0.0))
     return out
 
 
 @compiled
 def regressed(
-    inputs: Floats, query: Floats, outputs: Floats, basis: Floats, width: float, bases: int, kappa: float, held: bool
+    inputs: Floats, query: Floats, outputs: Floats, width: float, bases: int, kappa: float, held: bool
 ) -> Floats:
-    """`weights` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d); `basis` of `contrasts`.
+    """`weights` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d).
 
     Kernels are `width` root mean square distances of two examples wide. When inputs or outputs are all the same, they
     count the same.
     """
     between, across = squared_distances(inputs), squared_distances(outputs)
-    count = len(query)
     if between.sum() <= 0.0 or across.sum() <= 0.0:
         return np.full(len(inputs), 1.0 / len(inputs))
     sharpness = _sharpness(between, width)
     near = np.empty(len(inputs))
     for i in range(len(inputs)):
         far = 0.0
-        for k in range(count):
+        for k in range(len(query)):
             far += (inputs[i, k] - query[k]) ** 2
         near[i] = np.exp(-sharpness * far)
-    kernel_x, kernel_y = np.exp(between * -sharpness), np.exp(across * -_sharpness(across, width))
-    return _weights(kernel_x, kernel_y, near, basis, bases, kappa, held)
+    kernel_x, kernel_y = _gaussian(between, sharpness), _gaussian(across, _sharpness(across, width))
+    return weights(kernel_x, kernel_y, near, bases, kappa, held)
 
 
 @compiled
 def squared_distances(points: Floats) -> Floats:
     """(m, m) between points (m, n), exactly 0 between equal ones when all are."""
     away = points - points[0]
-    gram = away @ np.ascontiguousarray(away.T)
+    gram = away @ away.T
     out: Floats = np.zeros_like(gram)
     for i in range(len(gram)):
         for j in range(i):
@@ -80,54 +69,179 @@ def _sharpness(squared: Floats, width: float) -> float:
 
 
 @compiled
-def _weights(
-    inputs: Floats, outputs: Floats, query: Floats, basis: Floats, bases: int, kappa: float, held: bool
-) -> Floats:
-    middled = _centred(inputs, basis)
-    squared, x, y, inverse = _solution(middled, _centred(outputs, basis), bases, kappa)
-    new = np.ascontiguousarray(basis.T) @ (query - inputs.sum(axis=1) / len(query))
-    y_across = np.ascontiguousarray(y.T)
-    reduced = y_across @ (inverse @ new)  # eq. 4, held: H (H + kH I) and F y make the same diagonal of squares
-    if not held:
-        reduced = squared * np.linalg.solve(np.ascontiguousarray(x.T) @ x, reduced)
-    reduced = np.linalg.solve(y_across @ y, reduced)  # eq. 5
-    return basis @ (y @ reduced) + 1.0 / len(query)
+def _gaussian(squared: Floats, sharpness: float) -> Floats:
+    """(m, m) from squared distances (m, m)."""
+    out: Floats = np.ones_like(squared)
+    for i in range(len(out)):
+        for j in range(i):
+            out[i, j] = out[j, i] = np.exp(-sharpness * squared[i, j])
+    return out
 
 
 @compiled
-def _solution(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tuple[Floats, Floats, Floats, Floats]:
+def weights(inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, held: bool) -> Floats:
+    """(m,) what each of m >= 2 outputs counts, from Gram matrices (m, m) of both sides and the query's kernel (m,).
+
+    With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
+    """
+    count = len(query)
+    squared, y, root = _solution(_centred(inputs), _centred(outputs), bases, kappa)
+    new = _contrasts((query - inputs.sum(axis=1) / count).reshape(-1, 1)).reshape(-1)
+    if held:  # H (H + kH I) and F y make the same diagonal of squares: eq. 4 and 5 project onto the F y
+        found = _projected(root.T @ (root @ new), y)
+    else:
+        seen = y @ root.T
+        x = y - _ridge(_centred(inputs), kappa) * (seen @ root)
+        reduced = squared * np.linalg.solve(x @ x.T, seen @ (root @ new))  # eq. 4
+        found = y.T @ np.linalg.solve(y @ y.T, reduced)  # eq. 5
+    return _from_contrasts(found) + 1.0 / count
+
+
+@compiled
+def _solution(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tuple[Floats, Floats, Floats]:
     """The l best pairs of bases of centred Gram matrices of n = m - 1 dimensions.
 
     With R = H (H + kH I)^-1 and the Cholesky factor L of F (F + kF I)^-1, the matrix L^T R L is symmetric, and its
     eigenvectors w give  F y = L w  and, up to length,  x = (H + kH I)^-1 L w. Returned are squared correlations (l,),
-    rising, then H x and F y (n, l), the examples' reduced inputs and outputs, and (H + kH I)^-1 (n, n).
+    rising, the examples' reduced outputs F y (l, n), and a root W (n, n) of (H + kH I)^-1 = W^T W.
     """
-    identity = np.eye(len(inputs))
+    count = len(inputs)
     ridge_x, ridge_y = _ridge(inputs, kappa), _ridge(outputs, kappa)
     if ridge_x <= 0.0 or ridge_y <= 0.0:
         raise ArithmeticError("a Gram matrix is not positive definite: are all examples the same?")
-    inverse = _inverse(inputs + ridge_x * identity)
-    kept_x = identity - ridge_x * inverse
-    kept_y = identity - ridge_y * _inverse(outputs + ridge_y * identity)
-    lower = np.linalg.cholesky(0.5 * (kept_y + kept_y.T) + _TINY * identity)
-    squared, vectors = np.linalg.eigh(np.ascontiguousarray(lower.T) @ (kept_x @ lower))
-    first = max(len(squared) - bases, 0)
-    y = lower @ np.ascontiguousarray(vectors[:, first:])
-    return squared[first:], kept_x @ y, y, inverse
+    root_x, root_y = _inverse_root(inputs, ridge_x), _inverse_root(outputs, ridge_y)
+    upper = (root_y.T @ root_y) * -ridge_y
+    for i in range(count):
+        upper[i, i] += 1.0 + _TINY
+    _factor(upper)
+    left_out = root_x @ upper.T
+    squared, vectors = eigen(upper @ upper.T - ridge_x * (left_out.T @ left_out))
+    best = np.argsort(squared)[max(count - bases, 0) :]
+    return squared[best], vectors[best] @ upper, root_x
 
 
 @compiled
-def _inverse(gram: Floats) -> Floats:
-    """Of a positive definite matrix (n, n), by that of its Cholesky factor."""
-    lower = np.linalg.cholesky(0.5 * (gram + gram.T))
-    out = np.zeros_like(lower)
-    for i in range(len(lower)):
-        out[i, i] = 1.0 / lower[i, i]
+def _factor(gram: Floats) -> None:
+    """A positive definite matrix (n, n) becomes the upper triangle U of U^T U."""
+    for k in range(len(gram)):
+        share = 1.0 / np.sqrt(gram[k, k])
+        for j in range(len(gram)):
+            gram[k, j] = gram[k, j] * share if j >= k else 0.0
+        for i in range(k + 1, len(gram)):
+            _add(gram[i], -gram[k, i], gram[k])
+
+
+@compiled
+def _inverse_root(gram: Floats, ridge: float) -> Floats:
+    """(n, n) W of (G + ridge I)^-1 = W^T W."""
+    upper, out = gram.copy(), np.eye(len(gram))
+    for i in range(len(gram)):
+        upper[i, i] += ridge
+    _factor(upper)
+    for i in range(len(gram)):
+        for k in range(i):
+            _add(out[i], -upper[k, i], out[k])
+        out[i] /= upper[i, i]
+    return out
+
+
+@compiled
+def eigen(matrix: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues (n,) and eigenvectors, in rows (n, n), of a symmetric matrix, which is spoilt; in no order.
+
+    Householder's reflections to a tridiagonal one, then QL steps with implicit shifts (Golub & Van Loan 1996, 8.3). On
+    so few numbers LAPACK takes twice as long.
+    """
+    size = len(matrix)
+    rows, beside = np.eye(size), np.zeros(size)
+    mirror, along, turned = np.zeros(size), np.zeros(size), np.zeros(size)
+    for k in range(size - 1):
+        mirror[:] = matrix[k]
+        mirror[: k + 1] = 0.0
+        beside[k] = -np.copysign(np.sqrt(_dot(mirror, mirror)), mirror[k + 1])
+        mirror[k + 1] -= beside[k]
+        if mirror[k + 1] == 0.0:
+            continue
+        share = np.sqrt(0.5 * _dot(mirror, mirror))
+        for i in range(k + 1, size):
+            mirror[i] /= share  # I - v v^T is the reflection
+        along[:], turned[:] = 0.0, 0.0
+        for i in range(k + 1, size):
+            row, other, share = matrix[i], rows[i], mirror[i]
+            for j in range(size):
+                along[j] += share * row[j]
+                turned[j] += share * other[j]
+        _add(along, -0.5 * _dot(along, mirror), mirror)
+        for i in range(k + 1, size):
+            row, other, share, more = matrix[i], rows[i], mirror[i], along[i]
+            for j in range(size):
+                row[j] -= share * along[j] + more * mirror[j]
+                other[j] -= share * turned[j]
+    values = np.diag(matrix).copy()
+    for low in range(size):
+        while True:
+            high = low
+            while high < size - 1 and abs(beside[high]) > _ROUNDING * (abs(values[high]) + abs(values[high + 1])):
+                high += 1
+            if high == low:
+                break
+            _ql_step(values, beside, rows, low, high)
+    return values, rows
+
+
+@compiled
+def _ql_step(values: Floats, beside: Floats, rows: Floats, low: int, high: int) -> None:
+    """One on the block from low to high of a tridiagonal matrix, whose eigenvectors are in terms of `rows`."""
+    shift = (values[low + 1] - values[low]) / (2.0 * beside[low])
+    shift = values[low] - beside[low] / (shift + np.copysign(np.sqrt(shift * shift + 1.0), shift))
+    g, c, s, p = values[high] - shift, 1.0, 1.0, 0.0
+    for i in range(high - 1, low - 1, -1):
+        f, b = s * beside[i], c * beside[i]
+        r = np.sqrt(f * f + g * g)
+        beside[i + 1] = r
+        if r == 0.0:
+            values[i + 1] -= p
+            beside[high] = 0.0
+            return
+        share = 1.0 / r
+        s, c = share * f, share * g
+        g = values[i + 1] - p
+        r = (values[i] - g) * s + 2.0 * c * b
+        p = s * r
+        values[i + 1] = g + p
+        g = c * r - b
+        one, other = rows[i], rows[i + 1]
+        for k in range(len(values)):
+            one[k], other[k] = c * one[k] - s * other[k], s * one[k] + c * other[k]
+    values[low] -= p
+    beside[low], beside[high] = g, 0.0
+
+
+@compiled
+def _projected(vector: Floats, across: Floats) -> Floats:
+    """Of a vector (n,), what lies in the span of l others (l, n), which become orthonormal."""
+    out = np.zeros_like(vector)
+    for i in range(len(across)):
         for j in range(i):
-            for k in range(j, i):
-                out[i, j] -= lower[i, k] * out[k, j]
-            out[i, j] /= lower[i, i]
-    return np.ascontiguousarray(out.T) @ out
+            _add(across[i], -_dot(across[i], across[j]), across[j])
+        across[i] /= np.sqrt(_dot(across[i], across[i]))
+        _add(out, _dot(across[i], vector), across[i])
+    return out
+
+
+@compiled
+def _add(to: Floats, share: float, other: Floats) -> None:
+    """To a vector (n,) a share of another."""
+    for k in range(len(to)):
+        to[k] += share * other[k]
+
+
+@compiled
+def _dot(one: Floats, other: Floats) -> float:
+    total = 0.0
+    for k in range(len(one)):
+        total += one[k] * other[k]
+    return total
 
 
 @compiled
@@ -136,16 +250,29 @@ def _ridge(gram: Floats, kappa: float) -> float:
 
 
 @compiled
-def _centred(gram: Floats, basis: Floats) -> Floats:
+def _centred(gram: Floats) -> Floats:
     """(n, n) Gram matrix (m, m) about the mean of its m vectors."""
-    return np.ascontiguousarray(basis.T) @ (gram @ basis)
+    return _contrasts(np.ascontiguousarray(_contrasts(gram).T))
 
 
-@lru_cache(maxsize=64)
-def contrasts(count: int) -> Floats:
-    """(m, m - 1) orthonormal columns that sum to 0 (Helmert's)."""
-    rank = np.arange(1, count)
-    upper = np.triu(np.ones((count, count - 1)))
-    upper[rank, rank - 1] = -rank
-    out: Floats = upper / np.sqrt(rank * (rank + 1.0))
+@compiled
+def _contrasts(values: Floats) -> Floats:
+    """(m - 1, k) of values (m, k), in Helmert's orthonormal basis of what sums to 0."""
+    out, total = np.empty((len(values) - 1, values.shape[1])), values[0].copy()
+    for rank in range(1, len(values)):
+        share = 1.0 / np.sqrt(rank * (rank + 1.0))
+        for k in range(len(total)):
+            out[rank - 1, k] = share * (total[k] - rank * values[rank, k])
+            total[k] += values[rank, k]
+    return out
+
+
+@compiled
+def _from_contrasts(values: Floats) -> Floats:
+    """(m,) of sum 0 whose contrasts these are (m - 1,)."""
+    out = np.zeros(len(values) + 1)
+    for rank in range(1, len(out)):
+        share = values[rank - 1] / np.sqrt(rank * (rank + 1.0))
+        out[:rank] += share
+        out[rank] -= rank * share
     return out

@@ -52,22 +52,22 @@ def test_correlations_and_answer_are_those_of_the_problem_as_written(rng: np.ran
     h, f, k = grams(x, y, new)
     correlations, answer = as_written(h, f, k, y, 6, held)
     np.testing.assert_allclose(cca.correlations(h, f, bases=6, kappa=KAPPA), correlations, atol=1e-9)
-    np.testing.assert_allclose(cca.weights(h, f, k, bases=6, kappa=KAPPA, held=held) @ y, answer, atol=1e-9)
+    np.testing.assert_allclose(cca.weights(h, f, k, 6, KAPPA, held) @ y, answer, atol=1e-9)
 
 
 def test_a_planted_linear_system_comes_back(rng: np.random.Generator) -> None:
     x, new = rng.normal(size=(PAIRS, 4)), rng.normal(size=4)
     linear, offset = rng.normal(size=(4, 6)), rng.normal(size=6)
     y = x @ linear + offset
-    weights = cca.weights(x @ x.T, y @ y.T, x @ new, bases=4, kappa=KAPPA, held=False)
+    weights = cca.weights(x @ x.T, y @ y.T, x @ new, 4, KAPPA, False)
     np.testing.assert_allclose(weights @ y, new @ linear + offset, atol=1e-9)
 
 
 def test_weights_sum_to_one_and_unite_at_an_example_when_nothing_is_held_back(rng: np.random.Generator) -> None:
     x, y, _ = planted(rng)
     h, f, k = grams(x, y, x[3])
-    np.testing.assert_allclose(cca.weights(h, f, k, bases=3, kappa=KAPPA, held=True).sum(), 1.0, atol=1e-12)
-    np.testing.assert_allclose(cca.weights(h, f, k, bases=PAIRS, kappa=1e-13, held=True), np.eye(PAIRS)[3], atol=1e-9)
+    np.testing.assert_allclose(cca.weights(h, f, k, 3, KAPPA, True).sum(), 1.0, atol=1e-12)
+    np.testing.assert_allclose(cca.weights(h, f, k, PAIRS, 1e-13, True), np.eye(PAIRS)[3], atol=1e-9)
 
 
 def test_without_regularisation_every_direction_correlates_fully(rng: np.random.Generator) -> None:
@@ -79,13 +79,13 @@ def test_without_regularisation_every_direction_correlates_fully(rng: np.random.
 
 def test_two_pairs_are_enough() -> None:
     gram = np.array([[1.0, 0.2], [0.2, 1.0]])
-    weights = cca.weights(gram, gram, np.array([1.0, 0.2]), bases=6, kappa=1e-13, held=True)
+    weights = cca.weights(gram, gram, np.array([1.0, 0.2]), 6, 1e-13, True)
     np.testing.assert_allclose(weights, [1.0, 0.0], atol=1e-9)
 
 
 def test_pairs_that_are_the_same_are_refused() -> None:
     with pytest.raises(ArithmeticError, match="same"):
-        cca.weights(np.ones((3, 3)), np.eye(3), np.ones(3), bases=2, kappa=KAPPA, held=True)
+        cca.weights(np.ones((3, 3)), np.eye(3), np.ones(3), 2, KAPPA, True)
 
 
 def test_distances_are_pairwise(rng: np.random.Generator) -> None:
@@ -97,6 +97,16 @@ def test_distances_are_pairwise(rng: np.random.Generator) -> None:
 def test_the_whole_regression_is_that_of_its_kernels(rng: np.random.Generator) -> None:
     x, y, new = planted(rng)
     h, f, k = grams(x, y, new)
-    expected = cca.weights(h, f, k, bases=6, kappa=KAPPA, held=True)
-    found = cca.regressed(x, new, y, cca.contrasts(PAIRS), 0.7, 6, KAPPA, True)
+    expected = cca.weights(h, f, k, 6, KAPPA, True)
+    found = cca.regressed(x, new, y, 0.7, 6, KAPPA, True)
     np.testing.assert_allclose(found, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 24])
+def test_eigenvectors_are_those_of_the_matrix(rng: np.random.Generator, size: int) -> None:
+    half = rng.normal(size=(size, max(size // 2, 1)))  # half of the values are 0
+    matrix = half @ half.T
+    values, rows = cca.eigen(matrix.copy())
+    np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(matrix), atol=1e-12)
+    np.testing.assert_allclose(rows @ rows.T, np.eye(size), atol=1e-12)
+    np.testing.assert_allclose((rows.T * values) @ rows, matrix, atol=1e-12)
