@@ -1,7 +1,8 @@
 """The charts of the page: error over time with quality under it, per-joint boxes, error CDF."""
 
+import math
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -16,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN = 8.6
+_LETTERS, _SIGN_LETTERS, _ROW_IN = 105, 9, 0.2
+"""Of a legend: the width of the page and of a line's sign with its margins in average letters, and one row's height."""
 _MOST_POINTS = 1500
 """Along one line; more are no sharper on a screen."""
 ANGLE, POSITION = "joint_angle_mean_deg", "mpjpe_mm"
@@ -40,7 +43,7 @@ def over_time(run: Run, behaviour: str) -> Chart:
         error.set_ylabel(UNITS[ANGLE])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
-        figure.legend(*error.get_legend_handles_labels(), **legend([trace.series for trace in shown]))
+        legend(figure, error)
         _quality(quality, max(shown, key=lambda trace: len(trace.time_s)))
 
     return drawn(
@@ -82,7 +85,7 @@ def per_joint(run: Run, series: str) -> Chart:
             axes.set_title(title)
             axes.grid(False, axis="y")
         if others:
-            figure.legend(*left.get_legend_handles_labels(), **legend(others))
+            legend(figure, left)
 
     return drawn(
         "per_joint",
@@ -113,7 +116,7 @@ def distribution(run: Run) -> Chart:
             axes.set_ylim(0.0, 100.0)
         first = figure.axes[0]
         first.set_ylabel("frames below [%]")
-        figure.legend(*first.get_legend_handles_labels(), **legend(run.series))
+        legend(figure, first)
 
     return drawn(
         "error_cdf",
@@ -169,9 +172,18 @@ def _boxes(axes: "Axes", values: Floats, colour: str) -> None:
     axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
 
 
-def legend(names: Sequence[str]) -> dict[str, Any]:
-    """Above the chart, in one row if the names are short enough."""
-    return {"loc": "outside upper left", "ncols": len(names) if sum(len(name) + 6 for name in names) < 95 else 3}
+def legend(figure: "Figure", axes: "Axes") -> None:
+    """What the lines of `axes` are called, above the chart; it grows by the rows that do not fit into the first."""
+    handles, names = axes.get_legend_handles_labels()
+    columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= _LETTERS), 1)
+    figure.legend(handles, names, loc="outside upper left", ncols=columns)
+    further_rows = max(math.ceil(len(names) / columns) - 1, 0)
+    figure.set_figheight(figure.get_figheight() + _ROW_IN * further_rows)
+
+
+def _legend_letters(names: Sequence[str], columns: int) -> int:
+    """As wide as so many letters; matplotlib fills columns one after another."""
+    return sum(_SIGN_LETTERS + max(map(len, part)) for part in np.array_split(np.array(names, object), columns))
 
 
 def _logarithmic(axes: "Axes", which: Literal["x", "y"]) -> None:

@@ -5,6 +5,7 @@ from itertools import groupby, pairwise
 from typing import Any
 
 from harness.report.markup import Markup, joined, table, tag
+from harness.report.tables import count
 from harness.score.cell import varied_text
 from harness.score.orders import DECIMALS, METRIC
 
@@ -50,8 +51,8 @@ def _table(title: str, rows: Sequence[Mapping[str, Any]]) -> Markup:
     lines = []
     for row in rows:
         errors = _numbers(row) or ["not measured"] * len(row["names"])
-        count = tag("span", f" n {_clips(row)}", class_="spread")
-        lines.append([joined(", ".join(_where(row)) or "everywhere", count), *errors, _verdict(row)])
+        setting = joined(", ".join(_where(row)) or "everywhere", count(_clips(row)))
+        lines.append([setting, *errors, _verdict(row)])
     caption = joined("Expected: ", tag("b", title), f". {METRIC} [deg], {_WHAT} (n).")
     reasons = [tag("li", f"Where {reason}") for reason in _reasons(rows)]
     body = table(caption, ["setting", *rows[0]["names"], "order"], lines, label="expected order")

@@ -28,8 +28,12 @@ def statistics(found: Mapping[str, Any] | None, unit: str, *, n: int | None = No
     if found is None or found["mean"] is None:
         return NOT_MEASURED
     spread = None if found["sd"] is None else tag("span", f" ± {number(found['sd'], unit)}", class_="spread")
-    count = None if found["sequences"] == n else tag("span", f" n {found['sequences']}", class_="spread")
-    return joined(number(found["mean"], unit), spread, count)
+    return joined(number(found["mean"], unit), spread, None if found["sequences"] == n else count(found["sequences"]))
+
+
+def count(n: int | str) -> Markup:
+    """Of how many sequences, never broken across lines."""
+    return tag("span", f" n\u00a0{n}", class_="spread")
 
 
 def results(run: Run) -> Markup:
@@ -59,7 +63,7 @@ def by_behaviour(run: Run, metric: str) -> Markup:
         text = statistics(found.get((name, column)), unit, n=counts[column])
         return tag("strong", text) if name == best[column] else text
 
-    numbers = [tag("span", f" n {counts[column]}", class_="spread") for column in columns]
+    numbers = [count(counts[column]) for column in columns]
     names = [*(name.replace("_", " ") for name in run.behaviours), "all"]
     titles = [joined(name, n) for name, n in zip(names, numbers, strict=True)]
     rows = [[name, *(cell(name, column) for column in columns)] for name in run.series]

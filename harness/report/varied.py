@@ -6,7 +6,7 @@ from harness.report.figures import UNITS, drawn, legend
 from harness.report.markup import Markup, joined, table, tag
 from harness.report.run import Row, Run, file_name
 from harness.report.style import Chart, line_style
-from harness.report.tables import statistics
+from harness.report.tables import count, statistics
 from harness.score.cell import varied_text
 from harness.score.metrics import DEFINITIONS
 
@@ -47,7 +47,7 @@ def _chart(run: Run, behaviour: str, key: str) -> Chart:
             axes.set_xlabel(key)
             axes.set_ylabel(unit)
             axes.set_ylim(bottom=0.0)
-        figure.legend(*figure.axes[0].get_legend_handles_labels(), **legend(names))
+        legend(figure, figure.axes[0])
 
     return drawn(
         f"varied_{file_name(key)}_{file_name(behaviour)}",
@@ -71,8 +71,9 @@ def _table(run: Run, behaviour: str, metric: str) -> Markup:
         if name in found:
             each = [found[name].get(column) for column in columns]
             n = max(row["metrics"][metric]["sequences"] for row in each if row)
-            title = joined(name, tag("span", f" n {n}", class_="spread"))
-            rows.append([title, *(statistics(row and row["metrics"][metric], unit, n=n) for row in each)])
+            rows.append(
+                [joined(name, count(n)), *(statistics(row and row["metrics"][metric], unit, n=n) for row in each)]
+            )
     caption = joined(tag("b", f"{behaviour.replace('_', ' ')}, {metric} [{unit}]"), ": mean ± sd over n clips.")
     return table(caption, ["method", *columns], rows, label=f"{metric} against the varied values")
 
