@@ -144,11 +144,12 @@ def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
     """The share of the true neighbours that the index finds which methods choose, for every so manyth query."""
     held_out = [index.built_in(which, seed + trials.HELD_OUT) for which in range(len(performer.BEHAVIOURS))]
     rows = []
-    for search in (index.poses(learnt, held_out), index.readings(trials.body(), learnt, held_out)):
+    for kind in index.KINDS:
+        search = kind(trials.body(), learnt, held_out)
         judge, used, shares = Flat(search.vectors), choose(AUTO, search.vectors, search.count), []
         for query in np.concatenate(search.queries)[::every]:
             true, found = (set(one.nearest(query, search.count)[0].tolist()) for one in (judge, used))
-            shares.append(len(true & found) / search.count)
+            shares.append(len(true & found) / len(true))
         what = f"recall@{search.count}, {search.name}, {len(search.vectors):,} frames"
         rows.append(Row(what, float(np.mean(shares)), "", "exact search", ">= 0.95"))
     return rows

@@ -6,7 +6,7 @@ from harness.bench.index import bench_index
 def test_recall_of_every_index_on_a_small_set() -> None:
     rows = {row.name: row for row in bench_index(sizes=(800,))}
     recall = {name: row.value for name, row in rows.items() if "recall@" in name}
-    assert len(rows) == 2 * len(recall) == 2 * (4 + 3)
+    assert len(rows) == 2 * len(recall) == 2 * (4 + 3 + 3 + 3)
     for name, share in recall.items():
         if name.startswith(("flat", "kd_tree")):
             assert share == 1.0
@@ -14,4 +14,4 @@ def test_recall_of_every_index_on_a_small_set() -> None:
             assert 0.5 < share <= 1.0
     assert all(row.value > 0.0 for row in rows.values())
     held = {name: row.target for name, row in rows.items() if row.target}
-    assert len(held) == 4
+    assert len(held) == 8
