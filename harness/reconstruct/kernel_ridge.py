@@ -24,10 +24,9 @@ from harness.reconstruct.gate import Gate
 from harness.reconstruct.mean_pose import mean_posture
 from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.viewpoint import anchor_of
 from harness.stream.frame import TrackerFrame
 
-_TRUNK = ("thorax", "upperback", "lowerback", "lhipjoint", "rhipjoint", "lowerneck", "upperneck", "head")
-"""Bones whose heading the readings are seen from, best first; else the first station's."""
 _JUMP_M = 0.3
 """As for the best match: a learnt pose is never as near as a fitted one."""
 
@@ -83,7 +82,7 @@ class KernelRidgeSession:
         self._lever_m = options.lever_m
         self._residuals = Residuals(body, calibration, Loss())
         self._coverage, self._gate = Coverage(), Gate(count, _JUMP_M)
-        self._anchor = min(range(count), key=lambda k: _rank(calibration.bones[k]))
+        self._anchor = anchor_of(calibration.bones)
         self._mean_qpos = self._answer = mean_posture(body, fitted.takes)
 
         read = [station_poses(body, take, calibration) for take in fitted.takes]
@@ -136,10 +135,6 @@ class KernelRidgeSession:
         far = np.sum(x**2, axis=1)[:, None] + np.sum(self._x**2, axis=1) - 2.0 * x @ self._x.T
         out: Floats = np.exp(-far / self._width)
         return out
-
-
-def _rank(bone: str) -> int:
-    return _TRUNK.index(bone) if bone in _TRUNK else len(_TRUNK)
 
 
 def _no_turn(count: int) -> Floats:
