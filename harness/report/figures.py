@@ -35,10 +35,10 @@ def over_time(run: Run, behaviour: str) -> Chart:
 
     def draw(figure: "Figure") -> None:
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
-        for trace in shown:
+        for trace in (trace for trace in shown if trace.series in run.lines):
             values = np.where(trace.scored, trace.errors[ANGLE], np.nan)
             time_s, values = _thinned(*_with_gaps(trace.time_s, values))
-            error.plot(time_s, values, label=trace.series, **line_style(run.series.index(trace.series)))
+            error.plot(time_s, values, label=trace.series, **line_style(run.lines.index(trace.series)))
         _logarithmic(error, "y")
         error.set_ylabel(UNITS[ANGLE])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
@@ -49,20 +49,22 @@ def over_time(run: Run, behaviour: str) -> Chart:
     return drawn(
         f"error_{file_name(behaviour)}",
         behaviour.replace("_", " "),
-        f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).",
-        f"Joint angle error of {len(shown)} methods over time on {clip}, and the quality of every station below it.",
+        f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).{left_out(run)}",
+        f"Joint angle error of methods over time on {clip}, and the quality of every station below it.",
         draw,
         2.6 + 0.2 * len(shown[0].stations),
     )
 
 
 def per_joint(run: Run, series: str) -> Chart:
-    """Boxes of the errors of each joint for one method, the medians of the others as points."""
+    """Boxes of the errors of each joint for one method; medians of others as points, as many as colours tell apart."""
     skeleton = standard_skeleton()
     bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
     joints = list(joint_names(skeleton))
     own = _pool(run, series)
-    others = [name for name in run.series if name != series and len(_pool(run, name)[0])]
+    others = [name for name in run.ranked if name != series and len(_pool(run, name)[0])]
+    shown = others[: len(COLOURS) - 1]
+    which = f"the {len(shown)} methods with the next least error" if len(shown) < len(others) else "the other methods"
 
     def draw(figure: "Figure") -> None:
         left, right = figure.subplots(1, 2)
@@ -71,10 +73,9 @@ def per_joint(run: Run, series: str) -> Chart:
             (right, joints, 1, "position of the far end [mm]"),
         ):
             places = np.arange(len(names))
-            _boxes(axes, own[part], COLOURS[run.series.index(series) % len(COLOURS)])
-            for name in others:
+            _boxes(axes, own[part], COLOURS[0])
+            for colour, name in zip(COLOURS[1:], shown, strict=False):
                 middle = np.median(_pool(run, name)[part], axis=0)
-                colour = line_style(run.series.index(name))["color"]
                 axes.plot(middle, places, "o", markersize=3.5, color=colour, label=name)
             axes.set_yticks(places, names)
             axes.set_ylim(len(names) - 0.3, -0.7)
@@ -84,14 +85,14 @@ def per_joint(run: Run, series: str) -> Chart:
             axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
             axes.set_title(title)
             axes.grid(False, axis="y")
-        if others:
+        if shown:
             legend(figure, left)
 
     return drawn(
         "per_joint",
         f"Each joint, {series}",
         f"{series}: box from quartile to quartile, line at the median, whiskers at the 5th and 95th percentile of all "
-        f"scored frames. Points: medians of the other methods. The axes are square-root scaled.",
+        f"scored frames. Points: medians of {which}. The axes are square-root scaled.",
         f"Box plots of the rotation error of 22 bones and the position error of 25 joint centres for {series}.",
         draw,
         6.4,
@@ -104,7 +105,7 @@ def distribution(run: Run) -> Chart:
 
     def draw(figure: "Figure") -> None:
         for axes, metric in zip(figure.subplots(1, 2, sharey=True), UNITS, strict=True):
-            for place, name in enumerate(run.series):
+            for place, name in enumerate(run.lines):
                 values = np.concatenate(
                     [t.errors[metric][t.scored] for t in run.traces if t.series == name] or [np.empty(0)]
                 )
@@ -121,11 +122,17 @@ def distribution(run: Run) -> Chart:
     return drawn(
         "error_cdf",
         "How often an error stays below",
-        "All scored frames of all clips; the axis of the error is logarithmic. Further left is better.",
-        f"Cumulative distribution of joint angle and joint position error of {len(run.series)} methods.",
+        f"All scored frames of all clips; the axis of the error is logarithmic. Further left is better.{left_out(run)}",
+        "Cumulative distribution of joint angle and joint position error of methods.",
         draw,
         3.3,
     )
+
+
+def left_out(run: Run) -> str:
+    """What a caption says of series that have no line."""
+    lines, series = len(run.lines), len(run.series)
+    return f" Shown are the {lines} of {series} with the least error." if lines < series else ""
 
 
 def drawn(name: str, title: str, caption: str, alt: str, draw: Callable[["Figure"], None], height_in: float) -> Chart:

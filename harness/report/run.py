@@ -10,6 +10,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.humanoid24 import standard_skeleton
+from harness.report.style import STYLES
 from harness.score.angles import local_errors_deg
 from harness.score.cell import Cell, cell_folder, varied_text
 from harness.score.manifest import Manifest
@@ -88,6 +89,17 @@ class Run:
     def series(self) -> tuple[str, ...]:
         """Names of the groups that are compared: methods, told apart by inputs, protocol, performer where they vary."""
         return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
+
+    @cached_property
+    def ranked(self) -> tuple[str, ...]:
+        """The series, that with the least mean error first."""
+        errors = {self.series_of(row): row["metrics"][WORST_METRICS[0]]["mean"] for row in self.summary["methods"]}
+        return tuple(sorted(self.series, key=lambda name: np.inf if errors[name] is None else errors[name]))
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The series that charts show: as many as colours and dashes tell apart, those with the least error."""
+        return tuple(name for name in self.series if name in self.ranked[:STYLES])
 
     @cached_property
     def behaviours(self) -> tuple[str, ...]:

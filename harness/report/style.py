@@ -16,6 +16,8 @@ COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", FAI
 """Okabe & Ito 2008, Color Universal Design, without the yellow that paper swallows."""
 DASHES: tuple[Any, ...] = ("solid", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
 """Change after every round of colours."""
+STYLES = len(COLOURS) * len(DASHES)
+"""Lines that look different."""
 SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 10.0,

@@ -43,14 +43,14 @@ def results(run: Run) -> Markup:
 
 
 def by_behaviour(run: Run, metric: str) -> Markup:
-    """One metric: a row for each method, a column for each behaviour, then all sequences."""
+    """One metric: a row for each method, a column for each behaviour, then all sequences of several."""
     found: dict[tuple[str, str | None], Row] = {}
     for row in run.summary["behaviours"]:
         found[run.series_of(row), str(row["behaviour"])] = row["metrics"][metric]
     for row in run.summary["methods"]:
         found[run.series_of(row), None] = row["metrics"][metric]
     unit = DEFINITIONS[metric].unit
-    columns = [*run.behaviours, None]
+    columns = [*run.behaviours, *([None] if len(run.behaviours) > 1 else [])]
     counts, best = {}, {}
     for column in columns:
         here = {name: found[name, column] for name in run.series if (name, column) in found}
@@ -64,7 +64,7 @@ def by_behaviour(run: Run, metric: str) -> Markup:
         return tag("strong", text) if name == best[column] else text
 
     numbers = [count(counts[column]) for column in columns]
-    names = [*(name.replace("_", " ") for name in run.behaviours), "all"]
+    names = [(column or "all").replace("_", " ") for column in columns]
     titles = [joined(name, n) for name, n in zip(names, numbers, strict=True)]
     rows = [[name, *(cell(name, column) for column in columns)] for name in run.series]
     caption = joined(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")

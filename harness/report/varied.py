@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from harness.report.figures import UNITS, drawn, legend
+from harness.report.figures import UNITS, drawn, left_out, legend
 from harness.report.markup import Markup, joined, table, tag
 from harness.report.run import Row, Run, file_name
 from harness.report.style import Chart, line_style
@@ -35,7 +35,7 @@ def tables(run: Run) -> Markup:
 
 def _chart(run: Run, behaviour: str, key: str) -> Chart:
     found = _rows(run, behaviour)
-    names = [name for name in run.series if name in found]
+    names = [name for name in run.lines if name in found]
 
     def draw(figure: "Figure") -> None:
         for axes, (metric, unit) in zip(figure.subplots(1, 2), UNITS.items(), strict=True):
@@ -52,7 +52,7 @@ def _chart(run: Run, behaviour: str, key: str) -> Chart:
     return drawn(
         f"varied_{file_name(key)}_{file_name(behaviour)}",
         f"{behaviour.replace('_', ' ')}: error against {key}",
-        "Mean over clips; the table below has the numbers.",
+        f"Mean over clips; the table below has the numbers.{left_out(run)}",
         f"Joint angle and joint position error of {len(names)} methods against {key}.",
         draw,
         3.6,
@@ -60,7 +60,7 @@ def _chart(run: Run, behaviour: str, key: str) -> Chart:
 
 
 def _line(run: Run, name: str) -> dict[str, Any]:
-    return {"label": name, **line_style(run.series.index(name))}
+    return {"label": name, **line_style(run.lines.index(name))}
 
 
 def _table(run: Run, behaviour: str, metric: str) -> Markup:

@@ -126,7 +126,7 @@ def test_what_failed_and_what_was_not_measured_is_said(tmp_path: Path) -> None:
     assert "ValueError: &lt;b&gt;no&lt;/b&gt; pose &amp; no plan" in page.read_text(encoding="utf-8")
     table = re.search(r"joint_angle_mean_deg \[deg\](.*?)mpjpe_mm \[mm\]", said)
     assert table is not None
-    assert table[1].count("not measured") == 6
+    assert table[1].count("not measured") == 3
     assert "metrics in some cells" in said
 
 
@@ -171,6 +171,18 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
     assert f"ik is best: {last:.2f}° mean joint-angle error on 1 sequence" in said
     assert "the next, with components.echo.share=0.1." in said
     assert {trace.key for trace in read_run(out).traces} == {row["key"] for row in read_run(out).whole["cells"][-2:]}
+
+
+def test_charts_show_no_more_lines_than_look_different(tmp_path: Path) -> None:
+    methods = {f"method_{n:02d}": 20.0 if n < 2 else 1.0 for n in range(30)}
+    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods=methods, duration_s=2.0))
+    page = write_report(out, rendered=False).read_text()
+    for name in ("error_walking", "error_cdf"):
+        drawn = (out / "plots" / f"{name}.svg").read_text()
+        assert [n for n, method in enumerate(methods) if method in drawn] == list(range(2, 30))
+    assert page.count("Shown are the 28 of 30 with the least error.") == 2
+    assert "medians of the 6 methods with the next least error" in page
+    assert "method_00" in page
 
 
 def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
