@@ -1,8 +1,10 @@
 """The inner loop of the solvers, compiled: residuals of stations, their slopes, and steps within the joint limits.
 
 A hinge moves only what lies beyond it, so the normal equations of trackers couple two hinges only when one lies
-beyond the other. Eliminated from the limbs inwards, such a matrix fills nowhere else (Featherstone 2008, ch. 8.3): a
-step for 54 degrees of freedom costs a few microseconds. `residuals` and `solver` say what is minimised.
+beyond the other. Eliminated from the limbs inwards, such a matrix fills nowhere else (Featherstone 2008, ch. 8.3). So
+row i of such a matrix (V, D) holds what couples direction i with those inwards of it, by their depth, and with itself
+last: two rows agree about where they begin, and a step for 54 degrees of freedom costs a few microseconds. `residuals`
+and `solver` say what is minimised.
 """
 
 from collections.abc import Sequence
@@ -15,6 +17,7 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.compiled import compiled
 
 Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 Pull = tuple[float, float, float, float, float, float]
 
 
@@ -31,8 +34,10 @@ class Chain(NamedTuple):
     """(V, 3) of hinges, in the body's frame; rows 0 to 5, the root's, mean nothing."""
     body: Ints
     """(V,) that each direction moves."""
-    before: Ints
-    """(V,) the next direction inwards, -1 for the first."""
+    depth: Ints
+    """(V,) how many directions lie inwards of each."""
+    inwards: Ints
+    """(V, D) which those are, by their depth, and then the direction itself."""
     station_body: Ints
     """(S,)"""
     last: Ints
@@ -91,7 +96,7 @@ class Placed(NamedTuple):
     weight: Floats
     """(2S,) precision as the Lorentzian leaves it."""
     slope: Floats
-    """(V, 6) of the station at hand: how it moves, then how it turns."""
+    """(6, D) of the station at hand by directions of each depth: how it moves, then how it turns."""
 
 
 def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
@@ -99,7 +104,14 @@ def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
     model, stations = body.model, body.bone_body_ids[np.asarray(bones)]
     hinges = np.array(model.body_dofnum[1:])
     hinges[0] = 6
-    before, last = np.array(model.dof_parentid, dtype=np.int64), []
+    depth = np.zeros(model.nv, dtype=np.int64)
+    for direction, before in enumerate(model.dof_parentid):
+        depth[direction] = depth[before] + 1 if before >= 0 else 0
+    inwards = np.zeros((model.nv, depth.max() + 1), dtype=np.int64)
+    for direction, before in enumerate(model.dof_parentid):
+        inwards[direction] = inwards[before]
+        inwards[direction, depth[direction]] = direction
+    last = []
     for station in stations:
         while model.body_dofnum[station] == 0:
             station = model.body_parentid[station]
@@ -110,7 +122,8 @@ def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
         first_hinge=np.concatenate([[6], np.cumsum(hinges)]),
         axis=np.concatenate([np.zeros((6, 3)), model.jnt_axis[1:]]),
         body=np.array(model.dof_bodyid - 1, dtype=np.int64),
-        before=before,
+        depth=depth,
+        inwards=inwards,
         station_body=stations - 1,
         last=np.array(last, dtype=np.int64),
         mount_m=np.array(mount_m, dtype=float),
@@ -119,7 +132,7 @@ def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
 
 def unplaced(chain: Chain) -> Placed:
     """Arrays for one session."""
-    bodies, directions, stations = len(chain.parent), len(chain.before), len(chain.station_body)
+    bodies, directions, stations = len(chain.parent), len(chain.depth), len(chain.station_body)
     return Placed(
         at_m=np.zeros((bodies, 3)),
         turned=np.zeros((bodies, 4)),
@@ -128,7 +141,7 @@ def unplaced(chain: Chain) -> Placed:
         error=np.zeros((2 * stations, 3)),
         squared=np.zeros(2 * stations),
         weight=np.zeros(2 * stations),
-        slope=np.zeros((directions, 6)),
+        slope=np.zeros((6, chain.inwards.shape[1])),
     )
 
 
@@ -178,27 +191,27 @@ def read(
 def stand(chain: Chain, placed: Placed, qpos: Floats) -> None:
     """Forward kinematics of a configuration (V + 1,)."""
     at_m, turned, axis = placed.at_m, placed.turned, placed.axis
-    at_m[0] = qpos[:3]
     length = np.sqrt(qpos[3] ** 2 + qpos[4] ** 2 + qpos[5] ** 2 + qpos[6] ** 2)
-    turned[0] = qpos[3:7] / length
-    axis[3], axis[4], axis[5] = (
-        _rotated(turned[0], 1.0, 0.0, 0.0),
-        _rotated(turned[0], 0.0, 1.0, 0.0),
-        _rotated(turned[0], 0.0, 0.0, 1.0),
-    )
+    for i in range(3):
+        at_m[0, i] = qpos[i]
+    for i in range(4):
+        turned[0, i] = qpos[3 + i] / length
+    q = _four(turned[0])
+    axis[3], axis[4], axis[5] = _rotated(q, 1.0, 0.0, 0.0), _rotated(q, 0.0, 1.0, 0.0), _rotated(q, 0.0, 0.0, 1.0)
     for body in range(1, len(chain.parent)):
         parent, start = chain.parent[body], chain.start_m[body]
-        x, y, z = _rotated(turned[parent], start[0], start[1], start[2])
+        q = _four(turned[parent])
+        x, y, z = _rotated(q, start[0], start[1], start[2])
         at_m[body, 0], at_m[body, 1], at_m[body, 2] = at_m[parent, 0] + x, at_m[parent, 1] + y, at_m[parent, 2] + z
-        turned[body] = turned[parent]
         for hinge in range(chain.first_hinge[body], chain.first_hinge[body + 1]):
             own, half = chain.axis[hinge], 0.5 * qpos[hinge + 1]
-            axis[hinge] = _rotated(turned[body], own[0], own[1], own[2])
+            axis[hinge, 0], axis[hinge, 1], axis[hinge, 2] = _rotated(q, own[0], own[1], own[2])
             sine = np.sin(half)
-            turned[body] = _times(turned[body], np.cos(half), sine * own[0], sine * own[1], sine * own[2])
+            q = _times(q, np.cos(half), sine * own[0], sine * own[1], sine * own[2])
+        turned[body, 0], turned[body, 1], turned[body, 2], turned[body, 3] = q
     for s in range(len(chain.station_body)):
         body, mount = chain.station_body[s], chain.mount_m[s]
-        x, y, z = _rotated(turned[body], mount[0], mount[1], mount[2])
+        x, y, z = _rotated(_four(turned[body]), mount[0], mount[1], mount[2])
         placed.station_m[s] = at_m[body, 0] + x, at_m[body, 1] + y, at_m[body, 2] + z
 
 
@@ -220,7 +233,9 @@ def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> flo
     for s in range(count):
         placed.error[s] = readings.target_m[s] - placed.station_m[s]
         q = placed.turned[chain.station_body[s]]
-        placed.error[count + s] = _rotation_vector(*_times(readings.world_from_target[s], q[0], -q[1], -q[2], -q[3]))
+        placed.error[count + s] = _rotation_vector(
+            *_times(_four(readings.world_from_target[s]), q[0], -q[1], -q[2], -q[3])
+        )
     for row in range(2 * count):
         error, precision, scale = placed.error[row], readings.precision[row], readings.twice_scale_squared[row]
         squared = error[0] ** 2 + error[1] ** 2 + error[2] ** 2
@@ -234,38 +249,51 @@ def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> flo
 
 
 @compiled
-def normal_equations(chain: Chain, placed: Placed, hessian: Floats, descent: Floats) -> None:
-    """Gauss and Newton's matrix (V, V), lower triangle, zero elsewhere; the descent (V,)."""
-    hessian[:], descent[:] = 0.0, 0.0
-    count, slope = len(chain.station_body), placed.slope
+def normal_equations(chain: Chain, placed: Placed, hessian: Floats, descent: Floats, bent: bool = False) -> None:
+    """Gauss and Newton's matrix (V, V), lower triangle, zero elsewhere, the curvature added if asked; the descent."""
+    rows = np.empty(chain.inwards.shape)
+    normal_rows(chain, placed, rows, descent)
+    if bent:
+        add_curvature(chain, placed, rows)
+    hessian[:] = 0.0
+    for i in range(len(rows)):
+        for d in range(chain.depth[i] + 1):
+            hessian[i, chain.inwards[i, d]] = rows[i, d]
+
+
+@compiled
+def normal_rows(chain: Chain, placed: Placed, rows: Floats, descent: Floats) -> None:
+    """The same as rows (V, D)."""
+    rows[:], descent[:] = 0.0, 0.0
+    count = len(chain.station_body)
+    m0, m1, m2, t0, t1, t2 = _each(placed.slope)
     for s in range(count):
         moving, turning = placed.weight[s], placed.weight[count + s]
         if moving == 0.0 and turning == 0.0:
             continue
         _slopes(chain, placed, s)
         off, twist = placed.error[s], placed.error[count + s]
-        i = chain.last[s]
-        while i >= 0:
-            a0, a1, a2 = moving * slope[i, 0], moving * slope[i, 1], moving * slope[i, 2]
-            b0, b1, b2 = turning * slope[i, 3], turning * slope[i, 4], turning * slope[i, 5]
+        for d in range(chain.depth[chain.last[s]] + 1):
+            i = chain.inwards[chain.last[s], d]
+            a0, a1, a2 = moving * m0[d], moving * m1[d], moving * m2[d]
+            b0, b1, b2 = turning * t0[d], turning * t1[d], turning * t2[d]
             descent[i] += a0 * off[0] + a1 * off[1] + a2 * off[2] + b0 * twist[0] + b1 * twist[1] + b2 * twist[2]
-            j = i
-            while j >= 0:
-                hessian[i, j] += a0 * slope[j, 0] + a1 * slope[j, 1] + a2 * slope[j, 2]
-                hessian[i, j] += b0 * slope[j, 3] + b1 * slope[j, 4] + b2 * slope[j, 5]
-                j = chain.before[j]
-            i = chain.before[i]
+            row = rows[i]
+            for e in range(d + 1):
+                row[e] += a0 * m0[e] + a1 * m1[e] + a2 * m2[e]
+                row[e] += b0 * t0[e] + b1 * t1[e] + b2 * t2[e]
 
 
 @compiled
-def add_curvature(chain: Chain, placed: Placed, hessian: Floats) -> None:
-    """Adds to the lower triangle what Gauss and Newton leave out.
+def add_curvature(chain: Chain, placed: Placed, rows: Floats) -> None:
+    """Adds to rows (V, D) what Gauss and Newton leave out.
 
     A hinge j turns the slope J_i of everything beyond it: the derivative of J_i by q_j is a_j x J_i where i lies
     beyond j, half of it between axes of orientations. Trackers pin a pose so stiffly against so weak a prior that
     this term outweighs the prior as soon as residuals reach 1 mm.
     """
     count, slope = len(chain.station_body), placed.slope
+    _, _, _, t0, t1, t2 = _each(slope)
     for s in range(count):
         moving, turning = placed.weight[s], 0.5 * placed.weight[count + s]
         if moving == 0.0 and turning == 0.0:
@@ -276,55 +304,57 @@ def add_curvature(chain: Chain, placed: Placed, hessian: Floats) -> None:
             *(moving * off[0], moving * off[1], moving * off[2]),
             *(turning * twist[0], turning * twist[1], turning * twist[2]),
         )
-        i = chain.last[s]
-        while i >= 3:
-            x, y, z = _across(pull, slope[i])
-            j = i
-            while j >= 3:
-                here = x * slope[j, 3] + y * slope[j, 4] + z * slope[j, 5]
-                if i < 6:  # the root turns all three ways at once: the mean of both orders
-                    x1, y1, z1 = _across(pull, slope[j])
-                    here = 0.5 * (here + x1 * slope[i, 3] + y1 * slope[i, 4] + z1 * slope[i, 5])
-                hessian[i, j] += here
-                j = chain.before[j]
-            i = chain.before[i]
+        for d in range(3, chain.depth[chain.last[s]] + 1):
+            x, y, z = _across(pull, slope, d)
+            row = rows[chain.inwards[chain.last[s], d]]
+            if d >= 6:
+                for e in range(3, d + 1):
+                    row[e] += x * t0[e] + y * t1[e] + z * t2[e]
+                continue
+            for e in range(3, d + 1):  # the root turns all three ways at once: the mean of both orders
+                x1, y1, z1 = _across(pull, slope, e)
+                here = x * t0[e] + y * t1[e] + z * t2[e]
+                row[e] += 0.5 * (here + x1 * t0[d] + y1 * t1[d] + z1 * t2[d])
 
 
 @compiled
-def _across(pull: Pull, slope: Floats) -> Vector:
-    """What moves times how a station moves, plus what turns times how it turns (6,)."""
-    p0, p1, p2, t0, t1, t2 = pull
+def _each(slope: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+    return slope[0], slope[1], slope[2], slope[3], slope[4], slope[5]
+
+
+@compiled
+def _across(pull: Pull, slope: Floats, d: int) -> Vector:
+    """What moves times how a station moves by the direction of a depth, plus what turns times how it turns."""
+    p0, p1, p2, u0, u1, u2 = pull
+    m0, m1, m2, t0, t1, t2 = slope[0, d], slope[1, d], slope[2, d], slope[3, d], slope[4, d], slope[5, d]
     return (
-        p1 * slope[2] - p2 * slope[1] + t1 * slope[5] - t2 * slope[4],
-        p2 * slope[0] - p0 * slope[2] + t2 * slope[3] - t0 * slope[5],
-        p0 * slope[1] - p1 * slope[0] + t0 * slope[4] - t1 * slope[3],
+        p1 * m2 - p2 * m1 + u1 * t2 - u2 * t1,
+        p2 * m0 - p0 * m2 + u2 * t0 - u0 * t2,
+        p0 * m1 - p1 * m0 + u0 * t1 - u1 * t0,
     )
 
 
 @compiled
 def _slopes(chain: Chain, placed: Placed, station: int) -> None:
     """How the station moves and turns by every direction that moves it."""
-    slope, at = placed.slope, placed.station_m[station]
-    i = chain.last[station]
-    while i >= 3:
+    slope, at, last = placed.slope, placed.station_m[station], chain.last[station]
+    slope[:, :3] = 0.0
+    slope[0, 0] = slope[1, 1] = slope[2, 2] = 1.0
+    for d in range(3, chain.depth[last] + 1):
+        i = chain.inwards[last, d]
         a, start = placed.axis[i], placed.at_m[chain.body[i]]
         x, y, z = at[0] - start[0], at[1] - start[1], at[2] - start[2]
-        slope[i, 0], slope[i, 1], slope[i, 2] = a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x
-        slope[i, 3], slope[i, 4], slope[i, 5] = a[0], a[1], a[2]
-        i = chain.before[i]
-    while i >= 0:
-        slope[i] = 0.0
-        slope[i, i] = 1.0
-        i = chain.before[i]
+        slope[0, d], slope[1, d], slope[2, d] = a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x
+        slope[3, d], slope[4, d], slope[5, d] = a[0], a[1], a[2]
 
 
 class Model(NamedTuple):
     """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, and what finding its minimum takes."""
 
     hessian: Floats
-    """(V, V) Gauss and Newton's with prior and damping, lower triangle."""
+    """(V, D) Gauss and Newton's with prior and damping."""
     bent: Floats
-    """(V, V) the same with the full curvature."""
+    """(V, D) the same with the full curvature."""
     gradient: Floats
     low: Floats
     high: Floats
@@ -335,7 +365,7 @@ class Model(NamedTuple):
     moved: Floats
     """(V + 1,) the configuration after the step."""
     factor: Floats
-    """(V, V)"""
+    """(V, D)"""
     clamped: Bools
     """Which lie at a bound."""
     slope: Floats
@@ -345,10 +375,11 @@ class Model(NamedTuple):
     bend: Floats
 
 
-def unsolved(directions: int) -> Model:
+def unsolved(chain: Chain) -> Model:
     """Arrays for one solver."""
+    directions = len(chain.depth)
     gradient, step, away, slope, toward, there, gone, bend = np.zeros((8, directions))
-    hessian, bent, factor = np.zeros((3, directions, directions))
+    hessian, bent, factor = np.zeros((3, *chain.inwards.shape))
     return Model(
         hessian,
         bent,
@@ -410,10 +441,10 @@ def descend(
     damping, kept, fresh = _DAMPING, 1.0, False
     for steps in range(1, trust.most_steps + 1):
         if not fresh:
-            normal_equations(chain, placed, hessian, gradient)
+            normal_rows(chain, placed, hessian, gradient)
             for i in range(len(step)):
                 gradient[i] = -gradient[i] - trust.precision[i] * model.away[i]
-                hessian[i, i] += trust.precision[i] + damping
+                hessian[i, chain.depth[i]] += trust.precision[i] + damping
             for i in range(6, len(step)):
                 model.low[i] = min(trust.low_rad[i - 6] - qpos[i + 1], 0.0)
                 model.high[i] = max(trust.high_rad[i - 6] - qpos[i + 1], 0.0)
@@ -422,8 +453,8 @@ def descend(
         if kept < _GOOD:
             model.bent[:] = hessian
             add_curvature(chain, placed, model.bent)
-            solved = lowest(chain.before, model, model.bent)
-        if not solved and not lowest(chain.before, model, hessian):
+            solved = lowest(chain, model, model.bent)
+        if not solved and not lowest(chain, model, hessian):
             return cost, -1, False
         promised, longest = -0.5 * _dot(gradient, step), np.abs(step).max()
         if longest > _LONGEST_TURN_RAD:
@@ -445,7 +476,7 @@ def descend(
             place(chain, readings, placed, qpos)
             more = max(_RAISE, damping * _RAISE)
             for i in range(len(step)):
-                hessian[i, i] += more - damping
+                hessian[i, chain.depth[i]] += more - damping
             damping = more
     return cost, trust.most_steps, False
 
@@ -456,8 +487,7 @@ def _prior_cost(trust: Trust, qpos: Floats, away: Floats) -> float:
     mean, q, cost = trust.mean, qpos[3:7], 0.0
     away[:3] = mean[:3] - qpos[:3]
     w, x, y, z = mean[3], mean[4], mean[5], mean[6]
-    inverse = np.array([q[0], -q[1], -q[2], -q[3]])
-    away[3], away[4], away[5] = _rotation_vector(*_times(inverse, w, x, y, z))
+    away[3], away[4], away[5] = _rotation_vector(*_times((q[0], -q[1], -q[2], -q[3]), w, x, y, z))
     away[6:] = mean[7:] - qpos[7:]
     for i in range(len(away)):
         cost += 0.5 * trust.precision[i] * away[i] ** 2
@@ -470,14 +500,14 @@ def _move(qpos: Floats, step: Floats, moved: Floats) -> None:
     moved[:3] = qpos[:3] + step[:3]
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
     sine = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    turned = _times(qpos[3:7], np.cos(0.5 * angle), sine * step[3], sine * step[4], sine * step[5])
+    turned = _times(_four(qpos[3:7]), np.cos(0.5 * angle), sine * step[3], sine * step[4], sine * step[5])
     moved[3], moved[4], moved[5], moved[6] = turned
     moved[3:7] /= np.sqrt(_dot(moved[3:7], moved[3:7]))
     moved[7:] = qpos[7:] + step[6:]
 
 
 @compiled
-def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
+def lowest(chain: Chain, model: Model, hessian: Floats) -> bool:
     """Fills in `model.step` by projected Newton steps (Tassa et al. 2014); 0 must lie within the bounds.
 
     False unless H is positive definite on the directions that the bounds leave free.
@@ -498,9 +528,9 @@ def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
             toward[i] = 0.0 if clamped else -slope[i]
         if whole and not changed:
             return True
-        if changed and not _factored(before, hessian, model.clamped, model.factor):
+        if changed and not _factored(chain, hessian, model.clamped, model.factor):
             return False
-        _solve(before, model.factor, toward)
+        _solve(chain, model.factor, toward)
         if not _dot(slope, toward) < -_NOTHING:
             return True
         share, bound = 1.0, 0
@@ -516,7 +546,7 @@ def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
             if whole and bound == 0:
                 x[:] = there
                 return True
-            _product(before, hessian, gone, bend)
+            _product(chain, hessian, gone, bend)
             if whole or promised + 0.5 * _dot(gone, bend) <= 0.1 * promised or share < 1e-9:
                 break
             share *= 0.5
@@ -527,57 +557,48 @@ def lowest(before: Ints, model: Model, hessian: Floats) -> bool:
 
 
 @compiled
-def _factored(before: Ints, hessian: Floats, clamped: Bools, factor: Floats) -> bool:
-    """L^T D L of the free directions, D on the diagonal; False unless positive definite (Featherstone 2008, 6.5)."""
-    for k in range(len(before)):
-        i = k
-        while i >= 0:
-            factor[k, i] = 0.0 if clamped[k] or clamped[i] else hessian[k, i]
-            i = before[i]
+def _factored(chain: Chain, hessian: Floats, clamped: Bools, factor: Floats) -> bool:
+    """L^T D L of the free directions, D last in each row; False unless positive definite (Featherstone 2008, 6.5)."""
+    for k in range(len(factor)):
+        for d in range(chain.depth[k] + 1):
+            factor[k, d] = 0.0 if clamped[k] or clamped[chain.inwards[k, d]] else hessian[k, d]
         if clamped[k]:
-            factor[k, k] = 1.0
-    for k in range(len(before) - 1, -1, -1):
-        if not factor[k, k] > 0.0:
+            factor[k, chain.depth[k]] = 1.0
+    for k in range(len(factor) - 1, -1, -1):
+        row, depth = factor[k], chain.depth[k]
+        if not row[depth] > 0.0:
             return False
-        i = before[k]
-        while i >= 0:
-            share = factor[k, i] / factor[k, k]
+        for d in range(depth - 1, -1, -1):
+            share = row[d] / row[depth]
             if share != 0.0:
-                j = i
-                while j >= 0:
-                    factor[i, j] -= share * factor[k, j]
-                    j = before[j]
-                factor[k, i] = share
-            i = before[i]
+                other = factor[chain.inwards[k, d]]
+                for e in range(d + 1):
+                    other[e] -= share * row[e]
+                row[d] = share
     return True
 
 
 @compiled
-def _solve(before: Ints, factor: Floats, x: Floats) -> None:
+def _solve(chain: Chain, factor: Floats, x: Floats) -> None:
     """x := (L^T D L)^-1 x"""
     for k in range(len(x) - 1, -1, -1):
-        i = before[k]
-        while i >= 0:
-            x[i] -= factor[k, i] * x[k]
-            i = before[i]
+        for d in range(chain.depth[k]):
+            x[chain.inwards[k, d]] -= factor[k, d] * x[k]
     for k in range(len(x)):
-        x[k] /= factor[k, k]
-        i = before[k]
-        while i >= 0:
-            x[k] -= factor[k, i] * x[i]
-            i = before[i]
+        x[k] /= factor[k, chain.depth[k]]
+        for d in range(chain.depth[k]):
+            x[k] -= factor[k, d] * x[chain.inwards[k, d]]
 
 
 @compiled
-def _product(before: Ints, hessian: Floats, x: Floats, out: Floats) -> None:
-    """H x, from the lower triangle."""
+def _product(chain: Chain, hessian: Floats, x: Floats, out: Floats) -> None:
+    """H x."""
     for k in range(len(x)):
-        out[k] = hessian[k, k] * x[k]
-        i = before[k]
-        while i >= 0:
-            out[k] += hessian[k, i] * x[i]
-            out[i] += hessian[k, i] * x[k]
-            i = before[i]
+        out[k] = hessian[k, chain.depth[k]] * x[k]
+        for d in range(chain.depth[k]):
+            i = chain.inwards[k, d]
+            out[k] += hessian[k, d] * x[i]
+            out[i] += hessian[k, d] * x[k]
 
 
 @compiled
@@ -589,7 +610,12 @@ def _dot(a: Floats, b: Floats) -> float:
 
 
 @compiled
-def _times(q: Floats, w: float, x: float, y: float, z: float) -> tuple[float, float, float, float]:
+def _four(q: Floats) -> Quaternion:
+    return q[0], q[1], q[2], q[3]
+
+
+@compiled
+def _times(q: Quaternion, w: float, x: float, y: float, z: float) -> Quaternion:
     """The product of two quaternions."""
     return (
         q[0] * w - q[1] * x - q[2] * y - q[3] * z,
@@ -600,7 +626,7 @@ def _times(q: Floats, w: float, x: float, y: float, z: float) -> tuple[float, fl
 
 
 @compiled
-def _rotated(q: Floats, x: float, y: float, z: float) -> Vector:
+def _rotated(q: Quaternion, x: float, y: float, z: float) -> Vector:
     """A vector turned by a unit quaternion."""
     u, v, w = q[2] * z - q[3] * y, q[3] * x - q[1] * z, q[1] * y - q[2] * x
     return (
@@ -647,7 +673,7 @@ def descend_within(
     `stop` is step, decrease, and most steps (`solver.Stopping`). The configuration (V + 1,), its cost, the steps,
     whether it converged; -1 steps as for `descend`.
     """
-    directions = len(chain.before)
+    directions = len(chain.depth)
     hessian, descent = np.zeros((directions, directions)), np.empty(directions)
     normal, gradient = np.empty((len(z), len(z))), np.empty(len(z))
     z[3:] = nearest(space, z[3:])

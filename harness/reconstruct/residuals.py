@@ -109,19 +109,16 @@ class Residuals:
         self._qpos[:] = qpos
         return self._place(self.chain, self.readings, self.placed, self._qpos)
 
-    def normal_equations(self, hessian: Floats) -> Floats:
+    def normal_equations(self, hessian: Floats, bent: bool = False) -> Floats:
         """Where `place` left the body: fills `hessian` (54, 54) with Gauss and Newton's, returns the descent (54,).
 
-        The descent, minus the cost's gradient, is exact; the matrix holds the Lorentzian's weights as they are.
+        The descent, minus the cost's gradient, is exact; the matrix holds the Lorentzian's weights as they are. If it
+        is `bent`, it has what Gauss and Newton leave out as well.
         """
         found = np.empty(len(hessian))
-        descent.normal_equations(self.chain, self.placed, hessian, found)
+        descent.normal_equations(self.chain, self.placed, hessian, found, bent)
         hessian += np.tril(hessian, -1).T
         return found
-
-    def add_curvature(self, hessian: Floats) -> None:
-        """After `normal_equations`: adds to the lower triangle what Gauss and Newton leave out."""
-        descent.add_curvature(self.chain, self.placed, hessian)
 
 
 def _told(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:

@@ -57,7 +57,7 @@ class Solver:
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
         nv = residuals.kinematics.nv
-        self._model = descent.unsolved(nv)
+        self._model = descent.unsolved(residuals.chain)
         self._trust = descent.Trust(
             mean=np.zeros(nv + 1),
             precision=np.zeros(nv),
