@@ -758,24 +758,25 @@ def refer(space: Space, z: Floats, hessian: Floats, descent: Floats, normal: Flo
 
     Hinges are the same in both; so are the root's moves, with the height after the yaw. The space's cost is added.
     """
-    slope, root, turn = np.zeros((7, 6)), np.empty((6, 6)), _root_slope(z)
+    slope, root, turn, curvature = np.zeros((7, 6)), np.empty((6, 6)), _root_slope(z), space.curvature
     slope[0, 0] = slope[1, 1] = slope[3, 2] = 1.0
     slope[2, 3:], slope[4:, 3:] = turn[0], turn[1:]
     for k in range(6):
         for m in range(k + 1):
             root[k, m] = root[m, k] = hessian[k, m]
     normal[:7, :7] = np.dot(np.dot(slope, root), slope.T)
+    normal[3:7, 3:7] += curvature[:4, :4]
     for r in range(6, len(hessian)):
-        row, was = normal[r + 1], hessian[r]
-        row[0], row[1], row[3] = was[0], was[1], was[2]
+        row, was, more = normal[r + 1], hessian[r], curvature[r - 2]
+        row[0], row[1], row[3] = was[0], was[1], was[2] + more[0]
         row[2] = turn[0, 0] * was[3] + turn[0, 1] * was[4] + turn[0, 2] * was[5]
         for k in range(1, 4):
-            row[3 + k] = turn[k, 0] * was[3] + turn[k, 1] * was[4] + turn[k, 2] * was[5]
-        row[7 : r + 2] = was[6 : r + 1]
-    normal[3:, 3:] += space.curvature
+            row[3 + k] = turn[k, 0] * was[3] + turn[k, 1] * was[4] + turn[k, 2] * was[5] + more[k]
+        for c in range(6, r + 1):
+            row[c + 1] = was[c] + more[c - 2]
     gradient[:7] = np.dot(slope, descent[:6])
     gradient[7:] = descent[6:]
-    gradient[3:] += space.pull - np.dot(space.curvature, z[3:] - space.mean)
+    gradient[3:] += space.pull - np.dot(curvature, z[3:] - space.mean)
 
 
 @compiled

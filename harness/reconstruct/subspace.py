@@ -49,12 +49,8 @@ class Confined:
 def spanned(postures: Singles, components: int, alpha: float, expected: Floats, beta: float) -> Space:
     """By the leading directions of K postures (K, P); `expected` (P,) is q'."""
     count, size = postures.shape
-    values, mean = np.empty((count, size)), np.zeros(size)
-    for k in range(count):
-        for i in range(size):
-            values[k, i] = postures[k, i]
-            mean[i] += values[k, i]
-    mean /= count
+    values = postures.astype(np.float64)
+    mean = np.dot(np.full(count, 1.0 / count), values)
     scatter = np.dot(values.T, values)
     for i in range(size):
         for j in range(size):
@@ -121,9 +117,11 @@ def least(inverse: Floats, count: int, rounds: int) -> Floats:
         if 0 < turn < rounds:
             out = np.dot(out, inverse)
         for i in range(count):  # Gram and Schmidt's method, at the end twice
-            out[i] /= np.sqrt(np.dot(out[i], out[i]))
+            row = out[i]
+            row /= np.sqrt(np.dot(row, row))
+            shares = np.dot(out[i + 1 :], row)
             for j in range(i + 1, count):
-                share = np.dot(out[j], out[i])
-                for k in range(out.shape[1]):
-                    out[j, k] -= share * out[i, k]
+                other, share = out[j], shares[j - i - 1]
+                for k in range(len(row)):
+                    other[k] -= share * row[k]
     return out
