@@ -93,8 +93,8 @@ def _sections(content: Content) -> list[tuple[str, str, Markup]]:
     nothing = Markup()
     return [
         ("Varied", "varied", joined(*(_chart(chart, 3) for chart in content.varied), varied.tables(run))),
-        ("Results", "results", tables.results(run) if measured else nothing),
         ("Expected orders", "orders", orders.section(run.whole)),
+        ("Results", "results", tables.results(run) if measured else nothing),
         ("Recovery", "recovery", recovery.section(run.summary)),
         ("Coverage", "coverage", tables.coverage(run)),
         ("Error over time", "time", joined(*(_chart(chart, 3) for chart in content.over_time))),

@@ -59,8 +59,8 @@ def _ranked(run: Run, kind: str, measured: Mapping[str, Mapping[Take, float]]) -
         sequences = f"the {sequences} that all methods were measured on"
     best = f"{order[0]} is best" if len(order) > 1 else order[0]
     several = len({_performer(run, name) for name in run.series}) > 1
-    whose = f" of {kind} performers" if several and kind else ""
-    start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences}{whose} of {_source(run)}"
+    whose = f" by {kind} performers" if several and kind else ""
+    start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences} of {_source(run)}{whose}"
     lead = _lead(measured, order[0], order[1], shared) if len(order) > 1 else "; no other method was measured"
     at = f", with {run.varied}" if run.varied else ""
     return f"{start}{lead}{at}.{_positions(run, order, shared)}", order[0]
@@ -105,7 +105,7 @@ def _by_sequence(run: Run, series: str, metric: str) -> dict[Take, float]:
 
 def _source(run: Run) -> str:
     source = str(run.manifest.inputs.get("motion_source", "unknown source"))
-    return "the built-in performer" if "built-in" in source else f"motion from {source}"
+    return "built-in motion" if "built-in" in source else f"motion from {source}"
 
 
 def _motion(run: Run) -> str:
@@ -130,10 +130,10 @@ def _tracker(run: Run) -> str:
 
 def _learning(run: Run) -> str:
     """What methods that learn were allowed to see."""
-    learners: dict[str, list[str]] = {}
+    learners: dict[str, dict[str, None]] = {}
     for row in run.summary["methods"]:
-        learners.setdefault(str(row["protocol"]), []).append(run.series_of(row))
-    without = learners.pop("none", [])
+        learners.setdefault(str(row["protocol"]), {})[str(row["method"])] = None
+    without = learners.pop("none", {})
     parts = [f"{', '.join(names)} from other motion (protocol {protocol})" for protocol, names in learners.items()]
     return "; ".join([*parts, *([f"{', '.join(without)} from none"] if without else [])])
 
@@ -141,7 +141,7 @@ def _learning(run: Run) -> str:
 def _varied(run: Run) -> str:
     """The combinations that were run, and which of them is shown."""
     texts = list(dict.fromkeys(varied_text(row["varied"]) for row in run.whole["cells"]))
-    return f"{'; '.join(texts)}. Everything below the table of them is about {run.varied}" if run.varied else ""
+    return f"{'; '.join(texts)}. From the results on everything is about {run.varied}" if run.varied else ""
 
 
 def _finished(run: Run) -> str:

@@ -41,7 +41,7 @@ def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     assert heading is not None
     assert page.index("<h1>") < page.index("<table")
     assert heading[1].startswith("best_match+ik is best: ")
-    assert "on 2 sequences of the built-in performer" in heading[1]
+    assert "on 2 sequences of built-in motion" in heading[1]
     assert "better on 2 of 2" in heading[1]
 
 
@@ -140,7 +140,7 @@ def test_a_run_without_any_finished_cell_has_a_page(tmp_path: Path) -> None:
 def test_a_perfect_method_breaks_no_axis(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"oracle": 0.0}, duration_s=4.0)
     said = text_of(write_report(fabricate(tmp_path / "run", plan), rendered=False))
-    assert "oracle: 0.00° mean joint-angle error on 1 sequence of the built-in performer; no other" in said
+    assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion; no other" in said
     assert "Its joints are 0 mm off." in said
 
 
@@ -200,7 +200,7 @@ def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
     )
     for kind in ("known", "new"):
         assert f"ik ({kind} performer) is best: " in said
-        assert f"on 1 sequence of {kind} performers of the built-in performer" in said
+        assert f"on 1 sequence of built-in motion by {kind} performers" in said
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
