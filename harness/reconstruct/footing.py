@@ -7,17 +7,18 @@ from harness.core.compiled import compiled
 
 
 @compiled
+def moved(ground: Floats, step: Floats) -> Floats:
+    """The ground frame (3,) a step (3,) away from another."""
+    cosine, sine = np.cos(ground[2]), np.sin(ground[2])
+    forward, left, turn = step[0], step[1], step[2]
+    x, y = ground[0] + cosine * forward - sine * left, ground[1] + sine * forward + cosine * left
+    return np.array([x, y, ground[2] + turn])
+
+
+@compiled
 def stepped(qpos: Floats, step: Floats) -> Floats:
     """The ground frame (3,) a step (3,) away from that of a configuration (55,)."""
-    yaw = 2.0 * np.arctan2(qpos[6], qpos[3])
-    cosine, sine = np.cos(yaw), np.sin(yaw)
-    return np.array(
-        [
-            qpos[0] + cosine * step[0] - sine * step[1],
-            qpos[1] + sine * step[0] + cosine * step[1],
-            yaw + step[2],
-        ]
-    )
+    return moved(np.array([qpos[0], qpos[1], 2.0 * np.arctan2(qpos[6], qpos[3])]), step)
 
 
 @compiled

@@ -15,12 +15,14 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
-from harness.core.compiled import compiled
 from harness.core.estimate import Estimate
 from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.coverage import Coverage
 from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database.ground import POSTURE
+from harness.reconstruct.descent import stood
+from harness.reconstruct.footing import moved
 from harness.reconstruct.gate import JUMP_M, Gate
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.limbs import Limbs
@@ -149,7 +151,7 @@ class LocalSession:
             return Estimate(self._answer, status)
         view, query, trust = self._outlook.seen(frame, self._answer)
         pose = self._smoothed(self._regressed(query, trust))
-        self._answer = self._fitted_to_trackers(stood(pose, *view))
+        self._answer = self._fitted_to_trackers(stood(pose[:POSTURE], moved(np.array(view), pose[POSTURE:])))
         self._gate.answered(frame, self._residuals, self._answer)
         return Estimate(self._answer, status)
 
@@ -180,22 +182,3 @@ class LocalSession:
         if self._options.final_ik:
             return self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
         return nearest_placed(self._residuals, qpos)
-
-
-@compiled
-def stood(pose: Floats, x_m: float, y_m: float, yaw_rad: float) -> Floats:
-    """The configuration (55,) of a posture and the root's ground frame as seen from a view (55,) at that place."""
-    cosine, sine = math.cos(yaw_rad), math.sin(yaw_rad)
-    height_m, roll, pitch = pose[0], pose[1], pose[2]
-    forward_m, left_m, turn_rad = pose[52], pose[53], pose[54]
-    c, s = math.cos(0.5 * (yaw_rad + turn_rad)), math.sin(0.5 * (yaw_rad + turn_rad))
-    lean = math.hypot(roll, pitch)
-    w, by = math.cos(0.5 * lean), math.sin(0.5 * lean) / lean if lean > 0.0 else 0.5
-    x, y = by * roll, by * pitch
-    out = np.empty(55)
-    out[0] = x_m + cosine * forward_m - sine * left_m
-    out[1] = y_m + sine * forward_m + cosine * left_m
-    out[2] = height_m
-    out[3], out[4], out[5], out[6] = c * w, c * x - s * y, c * y + s * x, s * w  # about_z(yaw) tilt
-    out[7:] = pose[4:52]
-    return out

@@ -8,10 +8,10 @@ import pytest
 from harness.core.estimate import Status
 from harness.core.humanoid24 import unpack
 from harness.errors import BadInput
-from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.database import MotionDatabase, ground
 from harness.reconstruct.kernel_cca import KernelCca
 from harness.reconstruct.local_examples import LocalExamples, Weights
-from harness.reconstruct.local_regression import LocalRegression, stood
+from harness.reconstruct.local_regression import LocalRegression
 from harness.reconstruct.outlook import Outlook
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.viewpoint import anchor_of
@@ -108,7 +108,8 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     assert examples.nearest(query, trust, 1).tolist() == [row]
     inputs, asked, poses = examples.pairs(np.array([row]), np.array([row]), query, trust)
     np.testing.assert_allclose(inputs, asked[None], atol=2e-5)
-    np.testing.assert_allclose(stood(poses[0], *view)[:3], walk.take.qpos[row, :3], atol=1e-5)
+    stood = ground.standing(poses[0, :52], ground.moved(np.array(view), poses[0, 52:]))
+    np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 
 def test_the_pelvis_is_the_first_choice_of_anchor() -> None:
