@@ -1,10 +1,10 @@
-"""The inner loop of the solvers, compiled: residuals of stations, their slopes, and steps within the joint limits.
+"""The inner loop of the solvers, compiled: residuals of stations, their slopes, and steps within limits or a space.
 
 A hinge moves only what lies beyond it, so the normal equations of trackers couple two hinges only when one lies
 beyond the other. Eliminated from the limbs inwards, such a matrix fills nowhere else (Featherstone 2008, ch. 8.3). So
 row i of such a matrix (V, D) holds what couples direction i with those inwards of it, by their depth, and with itself
-last: two rows agree about where they begin, and a step for 54 degrees of freedom costs a few microseconds. `residuals`
-and `solver` say what is minimised.
+last: two rows agree about where they begin, and a step for 54 degrees of freedom costs a few microseconds. `residuals`,
+`solver` and `subspace` say what is minimised.
 """
 
 from collections.abc import Sequence
