@@ -93,7 +93,7 @@ def readings(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> 
         turned = asked[:, 3 * len(STATIONS) : 7 * len(STATIONS)].reshape(len(asked), -1, 4)
         turned *= np.copysign(1.0, np.vecdot(turned, examples.hemisphere * turned.dtype.type(1.0)))[..., None]
         queries.append(asked)
-    return Search(f"{len(STATIONS)} stations", Table(examples.features), queries, NEIGHBOURS, None)
+    return Search(f"{len(STATIONS)} stations", Table(examples.gather(slice(None))), queries, NEIGHBOURS, None)
 
 
 def both(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:

@@ -8,6 +8,7 @@ Columns: 3 S positions, 4 S orientations, 3 S velocities.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from harness.body.humanoid import Body
 from harness.core import rotations
@@ -22,6 +23,9 @@ from harness.reconstruct.index.choose import AUTO, FEW
 from harness.reconstruct.index.masked import nearest_known
 from harness.reconstruct.viewpoint import anchor_of, twist_rad
 
+Codes = NDArray[np.int16]
+_POSITION_M, _QUATERNION, _VELOCITY_M_S, _MOST = 2e-4, 1.0 / 32_000, 1e-3, 32_767
+"""Features are kept as whole steps of so much, which is finer than trackers are: up to 6.5 m and 32 m/s."""
 _CHUNK = 512
 """Frames whose kinematics are worked out at a time: double precision and rotations take fifty times their features."""
 
@@ -44,20 +48,20 @@ class LocalExamples:
             np.repeat([weights.position, weights.orientation, weights.velocity], np.multiply([3, 4, 3], self.count))
         )
         """(10 S,)"""
-        self.features: Singles = np.empty((len(database), 10 * self.count), np.float32)
+        units = np.repeat([_POSITION_M, _QUATERNION, _VELOCITY_M_S], np.multiply([3, 4, 3], self.count))
+        self._units: Singles = units.astype(np.float32)
+        self._step: Singles = (units * self.scale).astype(np.float32)
+        self._codes: Codes = np.empty((len(database), 10 * self.count), np.int16)
+        """(N, 10 S) features in steps."""
         self.root: Singles = np.empty((len(database), 3), np.float32)
         """(N, 3) the root's ground frame as seen from the anchor: forward, left [m], turn [rad]."""
+        self.hemisphere: Floats = np.zeros((self.count, 4))
+        """(S, 4) quaternions are taken with the sign that is nearer to it: to the first frame's."""
         self._database, self._trackers = database, Worn(body, worn)
         self._posture: Singles = np.asarray(database.posture)
         for run in database.runs:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
-        first = self._quaternions(slice(0, 1))
-        self.hemisphere: Floats = first[0].astype(float)
-        """(S, 4) quaternions are taken with the sign that is nearer to it."""
-        for start in range(0, len(database), _CHUNK):
-            near = self._quaternions(slice(start, start + _CHUNK))
-            near *= np.copysign(1.0, np.vecdot(near, first))[..., None]
         database.let_go()
         self._index = choose(_quickest(len(database)) if index == AUTO else index, self)
 
@@ -69,7 +73,7 @@ class LocalExamples:
         return nearest_known(self._index, self, asked, trust.astype(np.float32), count)[0]
 
     def __len__(self) -> int:
-        return len(self.features)
+        return len(self._codes)
 
     @property
     def size(self) -> int:
@@ -78,7 +82,8 @@ class LocalExamples:
 
     def gather(self, rows: Ints | slice) -> Singles:
         """(K, 10 S) of some rows."""
-        return self.features[rows]
+        out: Singles = self._codes[rows] * self._step
+        return out
 
     def pairs(self, rows: Ints, others: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats, Floats]:
         """What is learnt of some rows and others, none of them twice: inputs (m, n), the query (n,), outputs (m, 55).
@@ -86,10 +91,8 @@ class LocalExamples:
         Inputs are positions and orientations, n <= 7 S; outputs are posture (52), and the root's ground frame seen from
         the anchor (3).
         """
-        return _pairs(self.features, self._posture, self.root, rows, others, query, np.sqrt(trust[: 7 * self.count]))
-
-    def _quaternions(self, rows: slice) -> Singles:
-        return self.features[rows, 3 * self.count : 7 * self.count].reshape(-1, self.count, 4)
+        weight = np.sqrt(trust[: 7 * self.count])
+        return _pairs(self._codes, self._step, self._posture, self.root, rows, others, query, weight)
 
     def _fill(self, first: int, start: int, stop: int) -> None:
         """Rows from start to stop; `first` is the frame before, or start where a run begins."""
@@ -108,11 +111,15 @@ class LocalExamples:
         at_m, turned, velocity = at_m[kept], turned[kept], velocity[kept]
         anchor = np.concatenate([at_m[:, self.anchor, :2], twist_rad(turned[:, self.anchor])[:, None]], axis=1)
         level, flat = rotations.about_z(-anchor[:, None, 2]), anchor[:, None] * [1.0, 1.0, 0.0]
-        out = self.features[start:stop]
+        out = np.empty((stop - start, 10 * count))
         out[:, : 3 * count] = rotations.rotate(level, at_m - flat).reshape(len(out), -1)
-        out[:, 3 * count : 7 * count] = rotations.multiply(level, turned).reshape(len(out), -1)
+        seen = rotations.multiply(level, turned)
+        if start == 0:
+            self.hemisphere = seen[0]
+        seen *= np.copysign(1.0, np.vecdot(seen, self.hemisphere))[..., None]
+        out[:, 3 * count : 7 * count] = seen.reshape(len(out), -1)
         out[:, 7 * count :] = rotations.rotate(level, velocity).reshape(len(out), -1)
-        out *= self.scale
+        self._codes[start:stop] = np.clip(np.rint(out / self._units), -_MOST, _MOST)
         self.root[start:stop] = seen_from(anchor, np.zeros(3))
 
 
@@ -123,7 +130,14 @@ def _quickest(count: int) -> str:
 
 @compiled
 def _pairs(
-    features: Singles, posture: Singles, root: Singles, rows: Ints, others: Ints, query: Floats, weight: Floats
+    codes: Codes,
+    step: Singles,
+    posture: Singles,
+    root: Singles,
+    rows: Ints,
+    others: Ints,
+    query: Floats,
+    weight: Floats,
 ) -> tuple[Floats, Floats, Floats]:
     """`LocalExamples.pairs`, with the first n columns of inputs times a weight (n,)."""
     every = np.empty(len(rows) + len(others), np.int64)
@@ -139,7 +153,7 @@ def _pairs(
     inputs, outputs = np.empty((count, size)), np.empty((count, width + root.shape[1]))
     for i in range(count):
         for k in range(size):
-            inputs[i, k] = features[every[i], k] * weight[k]
+            inputs[i, k] = codes[every[i], k] * step[k] * weight[k]
         for k in range(width):
             outputs[i, k] = posture[every[i], k]
         for k in range(root.shape[1]):

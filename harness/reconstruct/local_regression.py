@@ -6,6 +6,7 @@ before; one weight for each of them, which is where the methods differ; the weig
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -44,7 +45,7 @@ _NONE: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
-class LocalRegression:
+class LocalRegression(ABC):
     """Options that both methods share; each adds its own, and `weigh`."""
 
     name: str
@@ -90,9 +91,9 @@ class LocalRegression:
             sigma_rad *= own / np.sqrt(np.mean(own**2))
         return FittedLocal(self, body, database, sigma_rad)
 
+    @abstractmethod
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
         """(m,) weights, of sum 1, of m >= 2 outputs (m, 55), for inputs (m, n) and a query (n,)."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +109,7 @@ class FittedLocal:
     """The examples as the last calibration has the trackers worn: sessions of one performer share them."""
 
     def begin(self, calibration: Calibration) -> "LocalSession":
+        self.database.let_go()  # what the sessions before have read
         return LocalSession(self, calibration)
 
     def seen_through(self, calibration: Calibration) -> LocalExamples:

@@ -1,5 +1,6 @@
 """Following a performer with a memory: the last answers, one for each period of the examples."""
 
+from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import numpy as np
@@ -12,7 +13,7 @@ from harness.reconstruct.solver import Solution
 from harness.stream.frame import TrackerFrame
 
 
-class Remembering(Pursuit):
+class Remembering(Pursuit, ABC):
     """A `Session` that answers by `continued` as soon as it has enough of a past, and by inverse kinematics before.
 
     Examples advance by one period from row to row, so the past must, too: over a short gap it is filled by what
@@ -32,13 +33,13 @@ class Remembering(Pursuit):
         self._free = np.isinf(self.limits.high_rad)
         self._replaced = np.array(self.past[-1])
 
+    @abstractmethod
     def continued(self) -> Solution:
         """The pose that follows `past`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def bridged(self) -> Floats:
         """The configuration (55,) that follows `past` when nothing was read."""
-        raise NotImplementedError
 
     def followed(self, frame: TrackerFrame) -> Solution:
         if self._known >= len(self.past):

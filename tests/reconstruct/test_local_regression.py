@@ -104,10 +104,10 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     for frame in walk.frames[row - 1 : row + 1]:
         residuals.read(frame)
         view, query, trust = outlook.seen(frame, walk.take.qpos[row])
-    np.testing.assert_allclose(query, examples.features[row], atol=2e-5)
+    np.testing.assert_allclose(query, examples.gather(np.array([row]))[0], atol=5e-4)
     assert examples.nearest(query, trust, 1).tolist() == [row]
     inputs, asked, poses = examples.pairs(np.array([row]), np.array([row]), query, trust)
-    np.testing.assert_allclose(inputs, asked[None], atol=2e-5)
+    np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
     stood = ground.standing(poses[0, :52], ground.moved(np.array(view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
