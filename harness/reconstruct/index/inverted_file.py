@@ -32,6 +32,8 @@ _ENOUGH = 3.0
 """Vectors looked into for each neighbour that is wanted, at least: a recall of 0.98 for 800 of 66,000."""
 _PER_CELL, _ROUNDS = 39, 6
 """Of the clustering: vectors that each centroid is found from, and rounds."""
+_FEW = 32
+"""Neighbours that are picked out one by one; more are parted from the rest at once."""
 _MOST = 32_000
 """Steps to the farthest number from the middle."""
 
@@ -99,8 +101,11 @@ class InvertedFile:
         while len(squared) < count:  # the cells looked into hold fewer
             probes = min(4 * probes, len(self._starts) - 1)
             squared, at = _looked_into(self._centroids, self._starts, self._codes, asked, probes)
-        best = squared.argpartition(count - 1)[:count]
-        best = best[squared[best].argsort()]
+        if count <= _FEW:
+            best = _smallest(squared, count)
+        else:
+            best = squared.argpartition(count - 1)[:count]
+            best = best[squared[best].argsort()]
         near, rows = squared[best], self._rows[at[0, best]].astype(np.int64)
         if not np.all(near[1:] > near[:-1]):
             order = np.lexsort((rows, near))
@@ -160,6 +165,21 @@ def _looked_into(centroids: Singles, starts: Ints, codes: Codes, asked: Singles,
             at[0, done + j], at[1, done + j] = first + j, cell
         done += count
     return squared, at
+
+
+@compiled
+def _smallest(values: Singles, count: int) -> Ints:
+    """Where the smallest of many values are, rising."""
+    out, done = np.empty(count, np.int64), 0
+    for i in range(len(values)):
+        if done < count or values[i] < values[out[done - 1]]:
+            done = min(done + 1, count)
+            k = done - 1
+            while k > 0 and values[out[k - 1]] > values[i]:
+                out[k] = out[k - 1]
+                k -= 1
+            out[k] = i
+    return out
 
 
 @compiled
