@@ -31,7 +31,7 @@ def closeness(squared: Floats | Singles, variance: float) -> Floats:
 
     The smallest distance is taken out, which changes no ratio and keeps the weights above 0.
     """
-    weight = np.exp((squared[0] - squared.astype(float)) * (0.5 / variance))
+    weight = np.exp((squared[0] - squared) * (0.5 / variance))
     out: Floats = weight / weight.sum()
     return out
 

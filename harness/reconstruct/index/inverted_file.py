@@ -36,6 +36,9 @@ _FEW = 32
 """Neighbours that are picked out one by one; more are parted from the rest at once."""
 _MOST = 32_000
 """Steps to the farthest number from the middle."""
+_ROW_BITS = 32
+_ROW = (1 << _ROW_BITS) - 1
+"""Candidates are sorted as whole numbers: the bits of a distance, which rise with it, then those of the row."""
 
 
 class InvertedFile:
@@ -73,7 +76,10 @@ class InvertedFile:
         """(d, C) in steps."""
         self._codes: Codes = np.empty(count * width, np.int16)
         """(N d,) cell after cell (d, n): one number of all vectors of a cell lies together."""
-        where = np.empty(count, np.int32)
+        self._cell_of = cell_of
+        """(N,) of each row."""
+        self._where = where = np.empty(count, np.int32)
+        """(N,) of each row among `_rows`."""
         where[self._rows] = np.arange(count, dtype=np.int32)
         for start in range(0, count, CHUNK):
             some = slice(start, start + CHUNK)
@@ -85,32 +91,27 @@ class InvertedFile:
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """As `Index`; most of the nearest, not always all."""
-        rows, squared, _, _ = self._searched(query, count)
+        rows, squared, _ = self._searched(query, count)
         return rows, squared
 
     def around(self, query: Singles, count: int) -> Found:
         """As `Index`, along the axes that were kept."""
-        rows, squared, asked, at = self._searched(query, count)
-        return Found(rows, squared, _differences(self._codes, self._starts, at, asked, self._step))
+        rows, squared, asked = self._searched(query, count)
+        away = _differences(self._codes, self._starts, self._cell_of, self._where, rows, asked, self._step)
+        return Found(rows, squared, away)
 
-    def _searched(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles, Ints]:
-        """Rows (K,), squared distances (K,), the query in steps (d,), and where the vectors are kept (2, K)."""
+    def _searched(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles]:
+        """Rows (K,), squared distances (K,), and the query in steps (d,)."""
         count, probes = min(count, len(self)), self._probes
         asked = self._principal.seen(np.asarray(query, np.float32)) / self._step
-        squared, at = _looked_into(self._centroids, self._starts, self._codes, asked, probes)
-        while len(squared) < count:  # the cells looked into hold fewer
+        found = _looked_into(self._centroids, self._starts, self._codes, self._rows, asked, probes)
+        while len(found) < count:  # the cells looked into hold fewer
             probes = min(4 * probes, len(self._starts) - 1)
-            squared, at = _looked_into(self._centroids, self._starts, self._codes, asked, probes)
-        if count <= _FEW:
-            best = _smallest(squared, count)
-        else:
-            best = squared.argpartition(count - 1)[:count]
-            best = best[squared[best].argsort()]
-        near, rows = squared[best], self._rows[at[0, best]].astype(np.int64)
-        if not np.all(near[1:] > near[:-1]):
-            order = np.lexsort((rows, near))
-            best, near, rows = best[order], near[order], rows[order]
-        return rows, near * self._step**2, asked, at[:, best]
+            found = _looked_into(self._centroids, self._starts, self._codes, self._rows, asked, probes)
+        found.partition(count - 1)
+        best = np.sort(found[:count])
+        squared = (best >> _ROW_BITS).astype(np.int32).view(np.float32)
+        return best & _ROW, squared * self._step**2, asked
 
 
 def cells_for(count: int) -> int:
@@ -135,61 +136,50 @@ def _store(seen: Codes, where: Places, cell_of: Places, starts: Ints, codes: Cod
 
 
 @compiled
-def _looked_into(centroids: Singles, starts: Ints, codes: Codes, asked: Singles, probes: int) -> tuple[Singles, Ints]:
-    """Squared distances (M,) of all vectors in the nearest cells, and where each is kept and in which cell (2, M)."""
+def _looked_into(centroids: Singles, starts: Ints, codes: Codes, rows: Places, asked: Singles, probes: int) -> Ints:
+    """(M,) squared distances and rows of all vectors in the nearest cells, as whole numbers."""
     width, cells = centroids.shape
     far = np.zeros(cells, np.float32)
     for i in range(width):
         here, value = centroids[i], asked[i]
         for c in range(cells):
             far[c] += (here[c] - value) * (here[c] - value)
-    nearest, total = np.empty(probes, np.int64), 0
+    nearest, total, most = np.empty(probes, np.int64), 0, 0
     for p in range(probes):
         best = 0
         for c in range(1, cells):
             if far[c] < far[best]:
                 best = c
         nearest[p], far[best] = best, np.inf
-        total += starts[best + 1] - starts[best]
-    squared, at, done = np.zeros(total, np.float32), np.empty((2, total), np.int64), 0
+        total, most = total + starts[best + 1] - starts[best], max(most, starts[best + 1] - starts[best])
+    out, squared, done = np.empty(total, np.int64), np.empty(most, np.float32), 0
+    bits = squared.view(np.int32)
     for cell in nearest:
         first, count = starts[cell], starts[cell + 1] - starts[cell]
-        some = squared[done : done + count]
+        squared[:count] = 0.0
         for i in range(width):
             begin, value = first * width + i * count, asked[i]
             here = codes[begin : begin + count]
             for j in range(count):
                 away = np.float32(here[j]) - value
-                some[j] += away * away
+                squared[j] += away * away
         for j in range(count):
-            at[0, done + j], at[1, done + j] = first + j, cell
+            out[done + j] = (np.int64(bits[j]) << _ROW_BITS) | np.int64(rows[first + j])
         done += count
-    return squared, at
-
-
-@compiled
-def _smallest(values: Singles, count: int) -> Ints:
-    """Where the smallest of many values are, rising."""
-    out, done = np.empty(count, np.int64), 0
-    for i in range(len(values)):
-        if done < count or values[i] < values[out[done - 1]]:
-            done = min(done + 1, count)
-            k = done - 1
-            while k > 0 and values[out[k - 1]] > values[i]:
-                out[k] = out[k - 1]
-                k -= 1
-            out[k] = i
     return out
 
 
 @compiled
-def _differences(codes: Codes, starts: Ints, at: Ints, asked: Singles, step: np.float32) -> Singles:
-    """(K, d) the vectors kept at (2, K), minus the query in steps (d,)."""
+def _differences(
+    codes: Codes, starts: Ints, cell_of: Places, where: Places, rows: Ints, asked: Singles, step: np.float32
+) -> Singles:
+    """(K, d) the vectors of some rows, minus the query in steps (d,)."""
     width = len(asked)
-    out = np.empty((at.shape[1], width), np.float32)
-    for k in range(at.shape[1]):
-        first, last = starts[at[1, k]], starts[at[1, k] + 1]
-        begin = first * width + at[0, k] - first
+    out = np.empty((len(rows), width), np.float32)
+    for k in range(len(rows)):
+        cell = cell_of[rows[k]]
+        first, last = starts[cell], starts[cell + 1]
+        begin = first * width + where[rows[k]] - first
         for i in range(width):
             out[k, i] = (codes[begin + i * (last - first)] - asked[i]) * step
     return out
