@@ -5,8 +5,10 @@ Known at a frame are the window of the last m answers (Liu et al. 2011, eq. 6 an
 leading directions are the coordinates z in which neighbours are sought and from which local models regress. So eq. 6's
 D_w is learnt rather than the identity: what says nothing about the posture does not count, and 40 numbers do.
 
-Readings are seen from above the station on the trunk, along its heading. What was not read is replaced by what the
-rest of the evidence leads to expect of it, which for a linear map is the same as learning it without.
+Readings are seen from above the station on the trunk, along its heading or, where its orientation is not measured,
+along one that the positions themselves define: a heading lent by the last answer feeds its error back. What was not
+read is replaced by what the rest of the evidence leads to expect of it, which for a linear map is the same as learning
+it without.
 """
 
 from collections.abc import Iterator
@@ -24,7 +26,7 @@ from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.examples import Worn
 from harness.reconstruct.footing import readings
 from harness.reconstruct.index import Found, Index, choose
-from harness.reconstruct.viewpoint import View, anchor_of, twist_rad
+from harness.reconstruct.viewpoint import Bearing, View, anchor_of, twist_rad
 
 _CHUNK = 256
 """Windows worked on at a time."""
@@ -34,6 +36,8 @@ _MAPS = 64
 """Combinations of silent stations whose maps are kept."""
 _LEARNT_FROM = 20_000
 """Windows, evenly spread, that the map is learnt from."""
+_TOLD = 0.8
+"""Share of the heading that positions must tell to be asked for it: six stations told 0.94 or more, two below 0.78."""
 
 
 @dataclass(frozen=True)
@@ -56,13 +60,16 @@ class Evidence:
     A row is the window before the frame (D), then each station's place (3) and two axes of its bone (6).
     """
 
-    def __init__(self, body: Body, windows: Windows, worn: Calibration, terms: Terms) -> None:
-        self.terms, self.count, self.anchor = terms, len(worn.stations), anchor_of(worn.bones)
+    def __init__(
+        self, body: Body, windows: Windows, worn: Calibration, terms: Terms, bearing: Bearing | None = None
+    ) -> None:
+        """Seen along a `bearing`; None for along the anchor's own heading."""
+        self.terms, self.count, self.anchor, self.bearing = terms, len(worn.stations), anchor_of(worn.bones), bearing
         self.windows, self._trackers = windows, Worn(body, worn)
         self.size = windows.size + 9 * self.count
+        self._body, self._worn, self._by_positions = body, worn, dict[bytes, Evidence]()
         self._expectations: dict[bytes, Expectation] = {}
-        every = np.arange(len(windows))
-        rows = every if len(every) <= _LEARNT_FROM else np.linspace(0, len(every) - 1, _LEARNT_FROM).astype(np.int64)
+        rows = self._learnt_from()
         self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE)
         for known, after in self.parts(windows, rows):
             self.mean += known.sum(axis=0) / len(rows)
@@ -77,6 +84,24 @@ class Evidence:
         windows.database.let_go()
         self.least = terms.ridge * float(np.trace(self.scatter))
 
+    def _learnt_from(self) -> Ints:
+        every = np.arange(len(self.windows))
+        return every if len(every) <= _LEARNT_FROM else np.linspace(0, len(every) - 1, _LEARNT_FROM).astype(np.int64)
+
+    def facing(self, usual: Bools) -> "Evidence":
+        """The same seen as a session sees it that has the `usual` readings (2 S,) of positions, then orientations."""
+        places = usual[: self.count]
+        if usual[self.count + self.anchor] or not places[self.anchor]:
+            return self
+        key = places.tobytes()
+        if key not in self._by_positions:
+            at_m = [at_m for _, at_m, _ in self._stood(self.windows, self._learnt_from())]
+            bearing = Bearing.learnt(np.concatenate(at_m), self.anchor, places)
+            told = bearing.told > _TOLD
+            seen = Evidence(self._body, self.windows, self._worn, self.terms, bearing) if told else self
+            self._by_positions[key] = seen
+        return self._by_positions[key]
+
     def expectation(self, usual: Bools, index: str, wanted: int) -> "Expectation":
         """The search for sessions that know the `usual` columns; made once."""
         key = usual.tobytes()
@@ -86,17 +111,21 @@ class Evidence:
 
     def parts(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
         """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
-        for start in range(0, len(rows), _CHUNK):
-            some = rows[start : start + _CHUNK]
+        for some, at_m, turned in self._stood(windows, rows):
             after = windows.successors(some)[:, :POSTURE].astype(float)
-            qpos = windows.database.qpos(windows.frames[some] + 1, _HERE)
-            at_m, turned = self._trackers.at(qpos)
-            level = rotations.about_z(-twist_rad(turned[:, self.anchor]))[:, None]
+            facing = twist_rad(turned[:, self.anchor]) if self.bearing is None else self.bearing.heading_rad(at_m)
+            level = rotations.about_z(-facing)[:, None]
             place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
             axes = self.terms.lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
             window = self.terms.window_weight * windows.gather(some)
             read = np.concatenate([place, axes.reshape(*place.shape[:2], 6)], axis=2)
             yield np.concatenate([window, read.reshape(len(some), -1)], axis=1), after
+
+    def _stood(self, windows: Windows, rows: Ints) -> Iterator[tuple[Ints, Floats, Floats]]:
+        """Rows (K,), station positions (K, S, 3) and orientations (K, S, 4), roots heading along x, chunk by chunk."""
+        for start in range(0, len(rows), _CHUNK):
+            some = rows[start : start + _CHUNK]
+            yield some, *self._trackers.at(windows.database.qpos(windows.frames[some] + 1, _HERE))
 
     def known(self, window: Singles, position_m: Floats, turned: Floats, view: View) -> Floats:
         """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""

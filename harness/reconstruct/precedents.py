@@ -57,24 +57,26 @@ class ByEvidence:
         self._no_turn = np.tile(rotations.IDENTITY, (evidence.count, 1))
 
     def nearest(self, past: Floats, count: int) -> Found:
-        evidence, residuals = self._evidence, self._residuals
+        residuals = self._residuals
         if self._expectation is None:
-            usual = evidence.columns(self._ever | residuals.measured)
-            self._expectation = evidence.expectation(usual, self._kind, count)
+            usual = self._ever | residuals.measured
+            self._evidence = self._evidence.facing(usual)
+            self._expectation = self._evidence.expectation(self._evidence.columns(usual), self._kind, count)
         window = self._windows.query(past)
-        known = evidence.known(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
+        known = self._evidence.known(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
         return self._expectation.around(known, residuals.measured, count)
 
     def read(self) -> None:
         self._ever |= self._residuals.measured
 
     def _view(self, last: Floats) -> View:
-        """From above the anchor, along its heading; the last answer (55,) lends what was not read of it."""
-        residuals, anchor = self._residuals, self._evidence.anchor
-        here, facing = residuals.measured[anchor], residuals.measured[self._evidence.count + anchor]
-        at_m, turned = residuals.target_m[anchor], residuals.world_from_target[anchor]
-        if not (here and facing):
+        """From above the anchor, along its heading or the positions'; the last answer (55,) lends what was not read."""
+        residuals, anchor, bearing = self._residuals, self._evidence.anchor, self._evidence.bearing
+        here, facing = residuals.measured[: len(residuals.bones)], residuals.measured[len(residuals.bones) + anchor]
+        at_m, turned = residuals.target_m, residuals.world_from_target[anchor]
+        if not (here[anchor] and facing if bearing is None else here[bearing.asked].all()):
             residuals.kinematics.set(last)
             lent_m, lent = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
-            at_m, turned = (at_m if here else lent_m[anchor]), (turned if facing else lent[anchor])
-        return View(float(at_m[0]), float(at_m[1]), float(twist_rad(turned)))
+            at_m, turned = np.where(here[:, None], at_m, lent_m), (turned if facing else lent[anchor])
+        yaw = twist_rad(turned) if bearing is None else bearing.heading_rad(at_m)
+        return View(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))

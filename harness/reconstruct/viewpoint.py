@@ -2,15 +2,19 @@
 
 Kim et al. 2012 compare readings with examples in the room of the T-pose calibration (B2), where the database knows
 only the places at which it was captured. Here everything is seen from an anchor on the trunk (docs/methods.md E,
-"world invariance"). A bone's heading is its twist about the vertical, as in `database.ground`.
+"world invariance"). A bone's heading is its twist about the vertical, as in `database.ground`. Without orientations
+the heading is a direction that the positions themselves define, the same for examples and readings (F5).
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Bools, Floats
+
+Complexes = NDArray[np.complex128]
 
 _TRUNK = ("lhipjoint", "rhipjoint", "lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
 """Bones that may be anchors, best first."""
@@ -37,4 +41,38 @@ def on_trunk(bone: str) -> bool:
 def twist_rad(turned: Floats) -> Floats:
     """(...,) heading of orientations (..., 4)."""
     out: Floats = 2.0 * np.arctan2(turned[..., 3], turned[..., 0])
+    return out
+
+
+class Bearing(NamedTuple):
+    """Which way a performer faces, by where stations are about the anchor; it turns with them."""
+
+    anchor: int
+    asked: Bools
+    """(S,) which stations it goes by, the anchor among them."""
+    weight: Complexes
+    """(S,) what each one's place over the ground, x + i y from the anchor, counts; 0 for those that are not asked."""
+    told: float
+    """Share of the heading that it tells in the examples that it was learnt from, 0 to 1."""
+
+    @classmethod
+    def learnt(cls, at_m: Floats, anchor: int, asked: Bools) -> "Bearing":
+        """From stations (N, S, 3) of performers who all face along x, least squares over those `asked` (S,)."""
+        over = _over_ground(at_m, anchor)[:, asked]
+        product, towards = over.conj().T @ over, over.conj().sum(axis=0)
+        weight = np.zeros(len(asked), complex)
+        least = 1e-6 * np.trace(product).real + 1e-12  # the anchor is at 0 from itself
+        weight[asked] = np.linalg.solve(product + least * np.eye(len(product)), towards)
+        return cls(anchor, asked, weight, float((towards.conj() @ weight[asked]).real) / len(at_m))
+
+    def heading_rad(self, at_m: Floats) -> Floats:
+        """(...,) of stations (..., S, 3)."""
+        out: Floats = np.angle(_over_ground(at_m, self.anchor) @ self.weight)
+        return out
+
+
+def _over_ground(at_m: Floats, anchor: int) -> Complexes:
+    """(..., S) x + i y from the anchor to every station (..., S, 3)."""
+    away = at_m[..., :2] - at_m[..., anchor, None, :2]
+    out: Complexes = away[..., 0] + 1j * away[..., 1]
     return out

@@ -125,3 +125,43 @@ def test_what_is_far_from_all_examples_is_believed_less(walk: Scene) -> None:
         assert precision is not None
         spreads.append(precision)
     assert (spreads[1] < spreads[0]).all()
+
+
+def test_with_positions_alone_the_heading_of_the_last_answers_does_not_matter(walk: Scene) -> None:
+    """Lent to the view, its error would come back with the next answer (docs/methods.md F5)."""
+    for inputs in ("pos", "pos+ori"):
+        session = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).begin(walk.calibration)
+        for frame in walk.only(inputs)[:20]:
+            session.step(frame)
+        before = session.predicted().qpos[7:]
+        session.past = moved(session.past, 0.3, (0.0, 0.0, 0.0))
+        np.testing.assert_allclose(session.predicted().qpos[7:], before, atol=1e-4)
+
+
+def test_positions_are_asked_for_the_heading_only_where_no_orientation_and_enough_of_them_tell_it(walk: Scene) -> None:
+    evidence = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).evidence(walk.calibration)
+    torso, count = walk.calibration.stations.index("torso"), len(walk.calibration.stations)
+    positions = np.repeat([True, False], count)
+    assert evidence.facing(positions).bearing is not None
+    assert evidence.facing(positions) is evidence.facing(positions)
+    with_torso, without_torso, lone = np.array(positions), np.array(positions), np.zeros(2 * count, bool)
+    with_torso[count + torso], without_torso[torso] = True, False
+    lone[torso] = True
+    for usual in (with_torso, without_torso, lone):
+        assert evidence.facing(usual) is evidence
+
+
+def test_the_room_does_not_matter_with_positions_alone(walk: Scene) -> None:
+    elsewhere = replace(
+        walk, frames=exact_frames(walk.body, walk.calibration, moved(walk.take.qpos, 2.3, (4.0, -3.0, 0.0)))
+    )
+    here, there = (scene.run(DynamicMap(), scene.only("pos")) for scene in (walk, elsewhere))
+    angles = [np.array([e.qpos[7:] for e in estimates[5:]]) for estimates in (here, there)]
+    np.testing.assert_allclose(angles[1], angles[0], atol=1e-3)
+
+
+def test_with_positions_alone_the_anchor_may_fall_silent(walk: Scene) -> None:
+    torso = walk.calibration.stations.index("torso")
+    frames = [without(f, [torso]) if 40 <= i < 60 else f for i, f in enumerate(walk.only("pos"))]
+    off_m = walk.off_m(walk.run(DynamicMap(neighbours=30), frames), walk.take.qpos)
+    assert off_m[40:60].max() < 0.03
