@@ -53,7 +53,7 @@ class DynamicMap:
     """What examples must be like: the last answers and the readings, or the last answers alone as in the paper."""
     terms: Terms = field(default_factory=Terms)
     """Of that evidence."""
-    poses: int = 2
+    poses: int = 3
     """m, answers that the next is predicted from."""
     neighbours: int = 800
     """K, examples of the local model."""
@@ -107,6 +107,7 @@ WINDOW = DynamicMap(
     "dynamic_map:window",
     "the same with a local model of the last answers alone, as in Liu et al. 2011, its known traps mended",
     like="window",
+    poses=2,
     neighbours=100,
     width=1.0,
     ridge=0.1,
@@ -121,6 +122,7 @@ LITERAL = DynamicMap(
     "dynamic_map:literal",
     "Liu et al. 2011 to the letter: 99 % of the variance, weights and sigma as printed, start at the closest",
     like="window",
+    poses=2,
     neighbours=40,
     width=0.0,
     kept=0.99,
