@@ -34,6 +34,7 @@ from harness.reconstruct.pursuit import LEANING_RAD, Leaning, Manner
 from harness.reconstruct.remembering import Remembering
 from harness.reconstruct.residuals import Loss
 from harness.reconstruct.solver import Prior, Solution, Stopping
+from harness.reconstruct.worn import WhileWorn
 from harness.stream.frame import TrackerFrame
 
 _NEAREST = 1e-6
@@ -151,14 +152,11 @@ class FittedDynamicMap:
     """Of the windows, where they are searched."""
     mean_qpos: Floats
     """(55,) for starts without a past."""
-    _evidence: dict[bytes, Evidence] = field(default_factory=dict)
+    _evidence: WhileWorn[Evidence] = field(default_factory=WhileWorn)
 
     def evidence(self, worn: Calibration) -> Evidence:
         """Of the database, for stations worn like this; made once."""
-        key = repr(worn.bones).encode() + worn.mount_m.tobytes()
-        if key not in self._evidence:
-            self._evidence[key] = Evidence(self.body, self.windows, worn, self.options.terms)
-        return self._evidence[key]
+        return self._evidence.get(worn, lambda: Evidence(self.body, self.windows, worn, self.options.terms))
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
         return DynamicMapSession(self, calibration)

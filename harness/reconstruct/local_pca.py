@@ -28,6 +28,7 @@ from harness.reconstruct.remembering import Remembering
 from harness.reconstruct.residuals import Loss
 from harness.reconstruct.solver import Solution, Stopping
 from harness.reconstruct.subspace import Confined, spanned
+from harness.reconstruct.worn import WhileWorn
 
 _PAST = 2
 """Poses of the query, C2."""
@@ -85,7 +86,7 @@ class FittedLocalPca:
     mean_qpos: Floats
     """(55,) for starts without a past."""
 
-    worn: "dict[bytes, tuple[Controls, Vectors, Index]]" = field(default_factory=dict, repr=False)
+    worn: "WhileWorn[tuple[Controls, Vectors, Index]]" = field(default_factory=WhileWorn, repr=False)
     """What the last calibration has the trackers read, and the search in it: sessions of one performer share it."""
 
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
@@ -93,14 +94,12 @@ class FittedLocalPca:
 
     def seen_through(self, calibration: Calibration) -> "tuple[Controls, Vectors, Index]":
         """What trackers worn so would have read after every window; both together, and an index of them."""
-        key = repr(calibration.bones).encode() + calibration.mount_m.tobytes()
-        if key not in self.worn:
-            options = self.options
-            controls = Controls(self.body, self.windows, calibration, options.lever_m)
-            examples = _Examples(self.windows, controls.values, np.sqrt(options.control_weight))
-            self.worn.clear()
-            self.worn[key] = controls, examples, choose(options.index, examples)
-        return self.worn[key]
+        return self.worn.get(calibration, lambda: self._seen_through(calibration))
+
+    def _seen_through(self, calibration: Calibration) -> "tuple[Controls, Vectors, Index]":
+        controls = Controls(self.body, self.windows, calibration, self.options.lever_m)
+        examples = _Examples(self.windows, controls.values, np.sqrt(self.options.control_weight))
+        return controls, examples, choose(self.options.index, examples)
 
 
 class LocalPcaSession(Remembering):

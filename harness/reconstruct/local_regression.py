@@ -34,6 +34,7 @@ from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.smoothing import smoothed
 from harness.reconstruct.solver import Prior, Solver, Stopping
+from harness.reconstruct.worn import WhileWorn
 from harness.stream.frame import TrackerFrame
 
 _LEAST_SPREAD_RAD = math.radians(1.0)
@@ -105,8 +106,7 @@ class FittedLocal:
     database: MotionDatabase
     hinge_sigma_rad: Floats
     """(48,)"""
-    worn: dict[bytes, LocalExamples] = field(default_factory=dict, repr=False)
-    """The examples as the last calibration has the trackers worn: sessions of one performer share them."""
+    worn: WhileWorn[LocalExamples] = field(default_factory=WhileWorn, repr=False)
 
     def begin(self, calibration: Calibration) -> "LocalSession":
         self.database.let_go()  # what the sessions before have read
@@ -114,14 +114,12 @@ class FittedLocal:
 
     def seen_through(self, calibration: Calibration) -> LocalExamples:
         """What trackers worn so would have read in the examples."""
-        key = repr(calibration.bones).encode() + calibration.mount_m.tobytes()
-        if key not in self.worn:
-            options, weights = self.options, self.options.weights
-            if self.database.rate_hz * options.longest_gap_s < 1.0:
-                weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
-            self.worn.clear()
-            self.worn[key] = LocalExamples(self.body, self.database, calibration, weights, options.index)
-        return self.worn[key]
+        options, weights = self.options, self.options.weights
+        if self.database.rate_hz * options.longest_gap_s < 1.0:
+            weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
+        return self.worn.get(
+            calibration, lambda: LocalExamples(self.body, self.database, calibration, weights, options.index)
+        )
 
 
 class LocalSession:
