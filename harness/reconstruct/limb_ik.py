@@ -40,64 +40,62 @@ class Limb(NamedTuple):
     high_rad: Floats
 
 
-@compiled
-def reach(
-    limb: Limb,
-    angles: Floats,
-    parent: Floats,
-    joint_m: Floats,
-    level: int,
-    mount_m: Floats,
-    point_m: Floats,
-    turned: Floats,
-    here: bool,
-    facing: bool,
-) -> None:
-    """Changes angles (7,) so that a station comes to where it was measured.
+class Hung(NamedTuple):
+    """Where a limb hangs."""
 
-    The limb hangs at `joint_m` (3,) on a bone of orientation `parent` (4,); the station sits at `mount_m` (3,) on the
-    bone of that `level`; measured are its position `point_m` (3,) if `here`, and the orientation `turned` (4,) of its
-    bone if `facing`.
-    """
-    hung, bone = _matrix(parent), _matrix(turned)
-    if level == UPPER:
-        if facing:
-            _set_ball(limb, angles, _inverse_times(hung, bone))
+    parent: Floats
+    """(4,) orientation of the bone that carries it."""
+    joint_m: Floats
+    """(3,) shoulder or hip."""
+
+
+class Aim(NamedTuple):
+    """A station on a limb, and where it was measured."""
+
+    level: int
+    """What carries it."""
+    mount_m: Floats
+    """(3,) in that bone's frame."""
+    point_m: Floats
+    """(3,) position, if `here`."""
+    turned: Floats
+    """(4,) orientation of that bone, if `facing`."""
+    here: bool
+    facing: bool
+
+
+@compiled
+def reach(limb: Limb, angles: Floats, hung: Hung, aim: Aim) -> None:
+    """Changes angles (7,) so that the station comes to where it was measured."""
+    parent, bone = _matrix(hung.parent), _matrix(aim.turned)
+    if aim.level == UPPER:
+        if aim.facing:
+            _set_ball(limb, angles, _inverse_times(parent, bone))
         return
-    if here:
-        _reach_point(limb, angles, hung, joint_m, level, mount_m, point_m, bone, facing)
-    if facing:
-        lower = _times(_times(hung, _ball(limb, angles)), _turn(limb.hinge, angles[3]))
-        _turn_end(limb, angles, level, _inverse_times(lower, bone))
+    if aim.here:
+        _reach_point(limb, angles, parent, aim.point_m - hung.joint_m, aim, bone)
+    if aim.facing:
+        lower = _times(_times(parent, _ball(limb, angles)), _turn(limb.hinge, angles[3]))
+        _turn_end(limb, angles, aim.level, _inverse_times(lower, bone))
 
 
 @compiled
-def _reach_point(
-    limb: Limb,
-    angles: Floats,
-    parent: Floats,
-    joint_m: Floats,
-    level: int,
-    mount_m: Floats,
-    point_m: Floats,
-    turned: Floats,
-    facing: bool,
-) -> None:
+def _reach_point(limb: Limb, angles: Floats, parent: Floats, goal: Floats, aim: Aim, turned: Floats) -> None:
+    """To a goal (3,) seen from the joint, with orientations (3, 3) of the bones that carry limb and station."""
     twist = _turn(limb.twist, angles[4])
-    goal = point_m - joint_m
-    if level == LOWER:
-        beyond = mount_m
-    elif level == TWIST and facing:  # where the forearm starts turning, which its turning does not move
-        goal = goal - _rotated(turned, mount_m)
+    if aim.level == LOWER:
+        beyond = aim.mount_m
+    elif aim.level == TWIST and aim.facing:  # where the forearm starts turning, which its turning does not move
+        goal = goal - _rotated(turned, aim.mount_m)
         beyond = limb.lower_m
-    elif level == TWIST:
-        beyond = limb.lower_m + _rotated(twist, mount_m)
-    elif facing:  # the end is where its own orientation puts it
-        goal = goal - _rotated(turned, mount_m)
+    elif aim.level == TWIST:
+        beyond = limb.lower_m + _rotated(twist, aim.mount_m)
+    elif aim.facing:  # the end is where its own orientation puts it
+        goal = goal - _rotated(turned, aim.mount_m)
         beyond = limb.lower_m + _rotated(twist, limb.twist_m)
     else:
         end = _times(_turn(limb.end[1], angles[6]), _turn(limb.end[0], angles[5]))
-        beyond = limb.lower_m + _rotated(twist, limb.twist_m + _rotated(end, mount_m))
+        beyond = limb.lower_m + _rotated(twist, limb.twist_m + _rotated(end, aim.mount_m))
     far = np.sqrt(_dot(goal, goal))
     if far < 1e-9:
         return
@@ -106,8 +104,8 @@ def _reach_point(
     world = _times(parent, _ball(limb, angles))
     way = goal / far
     world = _times(_shortest(_rotated(world, limb.upper_m + _rotated(bend, beyond)), way), world)
-    if facing:
-        world = _times(_turn(way, _swivel(limb, level, way, _times(world, bend), turned)), world)
+    if aim.facing:
+        world = _times(_turn(way, _swivel(limb, aim.level, way, _times(world, bend), turned)), world)
     _set_ball(limb, angles, _inverse_times(parent, world))
 
 

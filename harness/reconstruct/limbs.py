@@ -14,7 +14,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.reconstruct.hinges import HingeLimits
-from harness.reconstruct.limb_ik import END, LOWER, TWIST, UPPER, Limb, reach
+from harness.reconstruct.limb_ik import END, LOWER, TWIST, UPPER, Aim, Hung, Limb, reach
 from harness.reconstruct.residuals import Residuals
 from harness.reconstruct.viewpoint import anchor_of, on_trunk
 
@@ -105,11 +105,7 @@ class _Part:
             if not (here[station] or facing[station]):
                 continue
             angles = np.where(self._known, qpos[self._qpos], 0.0)
-            reach(
-                self._limb,
-                angles,
-                turned[self._parent],
-                at_m[self._body],
+            aim = Aim(
                 level,
                 residuals.mount_m[station],
                 residuals.target_m[station],
@@ -117,5 +113,6 @@ class _Part:
                 bool(here[station]),
                 bool(facing[station]),
             )
+            reach(self._limb, angles, Hung(turned[self._parent], at_m[self._body]), aim)
             qpos[self._qpos[self._known]] = angles[self._known]
             return
