@@ -1,16 +1,13 @@
-"""One method in a process of its own: its speed, and the memory that it takes above an empty process.
+"""One method in a process of its own: the memory that it takes.
 
     python -m harness.bench.alone METHOD FOLDER SEED
 
-prints JSON. With METHOD "nothing" the process does all that is not learning: it has loaded everything, libraries of
-linear algebra with their work space too, made the frames, and stepped through them once with plain inverse kinematics.
+prints the peak in bytes. With METHOD "nothing" the process does all that is not learning: it has loaded everything,
+libraries of linear algebra with their work space too, made the frames, and followed them with plain inverse kinematics.
 """
 
-import json
 import subprocess
 import sys
-import time
-from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -28,39 +25,24 @@ SECONDS = 4.0
 _STATUS = Path("/proc/self/status")
 
 
-@dataclass(frozen=True)
-class Alone:
-    """What a process found out about itself."""
-
-    fit_s: float
-    step_ms: float
-    """Median."""
-    peak_bytes: int
-    """Largest resident memory of the whole process."""
-
-
-def run_alone(method: str, folder: Path, seed: int) -> Alone:
-    """In a fresh process; RuntimeError when that fails."""
+def run_alone(method: str, folder: Path, seed: int) -> int:
+    """The largest resident memory of a fresh process [bytes]; RuntimeError when it fails."""
     command = [sys.executable, "-m", "harness.bench.alone", method, str(folder), str(seed)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         raise RuntimeError(f"{method} alone: {done.stderr.strip()[-2000:]}")
-    return Alone(**json.loads(done.stdout))
+    return int(done.stdout)
 
 
-def alone(name: str, folder: Path, seed: int) -> Alone:
-    """In this process."""
+def alone(name: str, folder: Path, seed: int) -> int:
+    """The same of this process."""
     _load_libraries()
     body, shown = trials.body(), trials.trials(seed, SECONDS)
-    warm = registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone"))
-    step_ms = _steps_ms(warm, shown)
-    start = time.perf_counter()
-    if name == NOTHING:
-        return Alone(0.0, float(np.median(step_ms)), peak_bytes())
-    fitted = trials.fitted(registry.resolve(name), body, MotionDatabase.open(folder), generator(seed, "method", name))
-    fit_s = time.perf_counter() - start
-    step_ms = _steps_ms(fitted, shown)
-    return Alone(fit_s, float(np.median(step_ms)), peak_bytes())
+    _follow(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), shown)
+    if name != NOTHING:
+        database = MotionDatabase.open(folder)
+        _follow(trials.fitted(registry.resolve(name), body, database, generator(seed, "method", name)), shown)
+    return peak_bytes()
 
 
 def _load_libraries() -> None:
@@ -74,16 +56,11 @@ def _load_libraries() -> None:
     faiss.IndexFlatL2(8).add(np.zeros((1, 8), np.float32))
 
 
-def _steps_ms(fitted: Reconstructor, shown: list[trials.Trial]) -> list[float]:
-    spent = []
+def _follow(fitted: Reconstructor, shown: list[trials.Trial]) -> None:
     for trial in shown:
         session = fitted.begin(trial.simulation.calibration)
-        for which, frame in enumerate(trial.simulation.frames):
-            start = time.perf_counter()
+        for frame in trial.simulation.frames:
             session.step(frame)
-            if which >= trials.WARM_UP:
-                spent.append(1e3 * (time.perf_counter() - start))
-    return spent
 
 
 def peak_bytes() -> int:
@@ -97,4 +74,4 @@ def peak_bytes() -> int:
 
 
 if __name__ == "__main__":
-    print(json.dumps(asdict(alone(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])))))
+    print(alone(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])))

@@ -87,9 +87,9 @@ def poses(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Sea
 def readings(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
     """What six stations read: `kernel_cca`, `weighted_blend`."""
     worn, queries = _worn(body), list[Singles]()
-    examples = LocalExamples(body, database, worn, Weights(), "flat")
+    examples = LocalExamples(body, database, worn, Weights(), "flat", NEIGHBOURS)
     for take in held_out:
-        asked = LocalExamples(body, _alone(body, take), worn, Weights(), "flat").gather(_FOLLOWED)
+        asked = LocalExamples(body, _alone(body, take), worn, Weights(), "flat", NEIGHBOURS).gather(_FOLLOWED)
         turned = asked[:, 3 * len(STATIONS) : 7 * len(STATIONS)].reshape(len(asked), -1, 4)
         turned *= np.copysign(1.0, np.vecdot(turned, examples.hemisphere * turned.dtype.type(1.0)))[..., None]
         queries.append(asked)
@@ -172,7 +172,7 @@ def _compared(search: Search) -> list[Row]:
 
 
 class FaissFile:
-    """faiss's inverted file of the same cells, all numbers of each vector in half precision: a `Lookup`."""
+    """faiss's inverted file of as many cells, all numbers of each vector in half precision: a `Lookup`."""
 
     def __init__(self, vectors: Vectors, wanted: int) -> None:
         import faiss

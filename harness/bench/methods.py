@@ -8,14 +8,14 @@ all alike. What memory and a larger database cost is measured in processes of th
 import hashlib
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
 from harness.bench import index, trials
-from harness.bench.alone import NOTHING, Alone, run_alone
+from harness.bench.alone import NOTHING, run_alone
 from harness.bench.rows import Row
 from harness.bench.trials import Progress, Trial
 from harness.body import humanoid
@@ -27,7 +27,7 @@ from harness.core.seeds import generator
 from harness.mocap import performer
 from harness.progress import ProgressBar
 from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Session
+from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.dynamic_map import DynamicMap
@@ -64,40 +64,34 @@ class Tally:
 
 def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
     """Rows of each method; with `large`, also beside a database of a million frames."""
-    many: dict[str, Alone] = {}
-    frames_many, recalls = 0, list[Row]()
+    others: dict[str, list[Row]] = {name: [] for name in (*HELD_TO, *BESIDE)}
+    recalls: list[Row] = []
     with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
         small, vast = Path(folder) / "small", Path(folder) / "large"
         with ProgressBar("takes") as bar:
             learnt = trials.database(small, FRAMES, seed, WORKERS, bar)
         with ProgressBar("turns") as bar:
-            tallies = contest(learnt, seed, bar)
+            tallies = contest({name: learner(name, learnt, seed) for name in others}, seed, bar)
+        nothing = run_alone(NOTHING, small, seed)
         with ProgressBar("methods") as bar:
-            nothing, alone = run_alone(NOTHING, small, seed), _each_alone(small, seed, bar)
+            for done, name in enumerate(HELD_TO):
+                bar(name, done, len(HELD_TO))
+                others[name].append(memory_row(name, nothing, run_alone(name, small, seed), len(learnt)))
         if large:
             with ProgressBar("takes") as bar:
-                frames_many = len(trials.database(vast, LARGE, seed, WORKERS, bar))
-            with ProgressBar("methods") as bar:
-                many = _each_alone(vast, seed, bar)
-            recalls = recall_rows(MotionDatabase.open(vast), seed)
-        rows = []
-        for name in (*HELD_TO, *BESIDE):
-            memory: list[Row] = []
-            if name in alone:
-                memory.append(memory_row(name, nothing, alone[name], len(learnt)))
-            if name in many:
-                memory.append(slower_row(name, alone[name], many[name], len(learnt), frames_many))
-                memory.append(memory_row(name, nothing, many[name], frames_many))
-            rows += [*rows_of(name, tallies, memory), *memory]
+                many = trials.database(vast, LARGE, seed, WORKERS, bar)
+            for name in HELD_TO:
+                with ProgressBar(name) as bar:
+                    others[name].append(slower_row(name, learnt, many, seed, bar))
+                others[name].append(memory_row(name, nothing, run_alone(name, vast, seed), len(many)))
+            recalls = recall_rows(many, seed)
+    rows = [row for name in others for row in (*rows_of(name, tallies, others[name]), *others[name])]
     return [*rows, *recalls]
 
 
-def _each_alone(folder: Path, seed: int, progress: Progress) -> dict[str, Alone]:
-    found = {}
-    for done, name in enumerate(HELD_TO):
-        progress(name, done, len(HELD_TO))
-        found[name] = run_alone(name, folder, seed)
-    return found
+def learner(name: str, learnt: MotionDatabase, seed: int) -> Reconstructor:
+    """A method that has learnt from a database."""
+    return trials.fitted(registry.resolve(name), trials.body(), learnt, generator(seed, "method", name))
 
 
 def rows_of(name: str, tallies: dict[str, Tally], others: Sequence[Row]) -> list[Row]:
@@ -126,18 +120,21 @@ def rows_of(name: str, tallies: dict[str, Tally], others: Sequence[Row]) -> list
     return rows
 
 
-def memory_row(name: str, nothing: Alone, found: Alone, frames: int) -> Row:
+def memory_row(name: str, nothing_bytes: int, peak_bytes: int, frames: int) -> Row:
     """Above an empty process, over one float32 copy of poses and query vectors."""
     needed = 4 * frames * (POSTURE + 3 + query_numbers(registry.resolve(name)))
-    took = found.peak_bytes - nothing.peak_bytes
+    took = peak_bytes - nothing_bytes
     text = f"{took / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
     return Row(f"{name}, peak memory, {frames:,} frames", took / needed, "x", text, f"<= {RATIO_MEMORY:g}")
 
 
-def slower_row(name: str, small: Alone, large: Alone, frames: int, frames_many: int) -> Row:
-    """What a larger database costs."""
-    text = f"{large.step_ms:.3f} against {small.step_ms:.3f} ms a step, {frames_many:,} against {frames:,} frames"
-    return Row(f"{name}, larger / smaller database", large.step_ms / small.step_ms, "x", text, f"<= {RATIO_LARGE:g}")
+def slower_row(name: str, few: MotionDatabase, many: MotionDatabase, seed: int, progress: Progress) -> Row:
+    """What a larger database costs: both take turns."""
+    tallies = contest({"few": learner(name, few, seed), "many": learner(name, many, seed)}, seed, progress, mink=False)
+    few_ms, many_ms = (float(np.median(tallies[which].step_ms)) for which in ("few", "many"))
+    text = f"{many_ms:.3f} against {few_ms:.3f} ms a step, {len(many):,} against {len(few):,} frames"
+    ratio = _ratio(tallies["many"], tallies["few"])
+    return Row(f"{name}, larger / smaller database", ratio, "x", text, f"<= {RATIO_LARGE:g}")
 
 
 def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
@@ -181,20 +178,19 @@ Follower = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
 """Takes a frame and the true pose of the one before to a configuration (55,) and the seconds that it took."""
 
 
-def contest(learnt: MotionDatabase, seed: int, progress: Progress) -> dict[str, Tally]:
+def contest(
+    fitted: Mapping[str, Reconstructor], seed: int, progress: Progress, *, mink: bool = True
+) -> dict[str, Tally]:
     """All contenders on all held-out takes, in turns; the first second of a take is not counted."""
-    shown, body = trials.trials(seed, SECONDS), trials.body()
-    fitted = {
-        name: trials.fitted(registry.resolve(name), body, learnt, generator(seed, "method", name))
-        for name in (*HELD_TO, *BESIDE)
-    }
-    tallies = {name: Tally() for name in (*fitted, MINK)}
+    shown = trials.trials(seed, SECONDS)
+    tallies = {name: Tally() for name in (*fitted, *([MINK] if mink else []))}
     planned = sum(len(trial.simulation.frames) // TURN for trial in shown)
     done = 0
     for trial in shown:
         worn = trial.simulation.calibration
         followers = {name: _following(learner.begin(worn)) for name, learner in fitted.items()}
-        followers[MINK] = _mink(trial)
+        if mink:
+            followers[MINK] = _mink(trial)
         count = len(trial.simulation.frames)
         for start in range(0, count - TURN + 1, TURN):
             progress(trial.take, done, planned)

@@ -17,6 +17,8 @@ from harness.core.compiled import compiled
 _TINY = 1e-12
 """Added to eigenvalues from 0 to 1, so that outputs may lie in fewer dimensions."""
 _ROUNDING = 1e-15
+_NOTHING = 1e-290
+"""A square so small is rounding, and would underflow."""
 
 
 def correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
@@ -158,10 +160,11 @@ def eigen(matrix: Floats) -> tuple[Floats, Floats]:
     for k in range(size - 1):
         mirror[:] = matrix[k]
         mirror[: k + 1] = 0.0
-        beside[k] = -np.copysign(np.sqrt(_dot(mirror, mirror)), mirror[k + 1])
-        mirror[k + 1] -= beside[k]
-        if mirror[k + 1] == 0.0:
+        squared = _dot(mirror, mirror)
+        if squared < _NOTHING:
             continue
+        beside[k] = -np.copysign(np.sqrt(squared), mirror[k + 1])
+        mirror[k + 1] -= beside[k]
         share = np.sqrt(0.5 * _dot(mirror, mirror))
         for i in range(k + 1, size):
             mirror[i] /= share  # I - v v^T is the reflection

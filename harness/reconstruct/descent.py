@@ -646,7 +646,7 @@ def _rotation_vector(w: float, x: float, y: float, z: float) -> Vector:
 
 class Space(NamedTuple):
     """Postures near p, P numbers each, that leave it by nothing along N, at a cost of 1/2 a^T A a - b^T a for leaving
-    it by a; `subspace` says more."""
+    it by a. `subspace.spanned` makes it: touch that file when fields change here, for compiled code is kept by file."""
 
     mean: Floats
     """(P,) p."""

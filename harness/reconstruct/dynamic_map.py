@@ -69,7 +69,8 @@ class DynamicMap:
 
     Their ratios say which hinges to believe; at 1 the prior is a wall that pulls the body off exact trackers."""
     novelty: float = 0.0
-    """Times the root mean square distance of the nearest example per number of its window, added to every sigma."""
+    """Times the root mean square distance of the nearest example per number that neighbours are told apart by, added to
+    every sigma."""
     least_sigma_rad: float = math.radians(5.0)
     """Floor of every hinge's standard deviation [rad]."""
     tilt_sigma_rad: float = math.radians(30.0)

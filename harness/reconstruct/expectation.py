@@ -82,7 +82,7 @@ class Evidence:
             self.scatter += away.T @ away / len(rows)
             self._shared += away.T @ (after - self._mean_after) / len(rows)
         windows.database.let_go()
-        self.least = terms.ridge * float(np.trace(self.scatter))
+        self.least = terms.ridge * float(np.trace(self.scatter)) + 1e-12
 
     def _learnt_from(self) -> Ints:
         every = np.arange(len(self.windows))
@@ -198,11 +198,12 @@ class Expectation:
         What they differ by are z, or as much of it along other axes.
         """
         key = measured.tobytes()
-        if key not in self._maps:
+        found = self._maps.get(key)
+        if found is None:
             if len(self._maps) >= _MAPS:
                 self._maps.clear()
-            self._maps[key] = self._map(self.vectors.evidence.columns(measured))
-        to_z, mean = self._maps[key]
+            found = self._maps[key] = self._map(self.vectors.evidence.columns(measured))
+        to_z, mean = found
         return self.index.around((known @ to_z - mean).astype(np.float32), count)
 
     def _map(self, columns: Bools) -> tuple[Floats, Floats]:

@@ -42,7 +42,10 @@ class Weights:
 class LocalExamples:
     """N frames of examples with S stations worn as a calibration says."""
 
-    def __init__(self, body: Body, database: MotionDatabase, worn: Calibration, weights: Weights, index: str) -> None:
+    def __init__(
+        self, body: Body, database: MotionDatabase, worn: Calibration, weights: Weights, index: str, wanted: int
+    ) -> None:
+        """For queries of so many `wanted` neighbours."""
         self.count, self.anchor = len(worn.stations), anchor_of(worn.bones)
         self.scale: Floats = np.sqrt(
             np.repeat([weights.position, weights.orientation, weights.velocity], np.multiply([3, 4, 3], self.count))
@@ -63,7 +66,7 @@ class LocalExamples:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
         database.let_go()
-        self._index = choose(_quickest(len(database)) if index == AUTO else index, self)
+        self._index = choose(_quickest(len(database)) if index == AUTO else index, self, wanted)
 
     def nearest(self, query: Floats, trust: Floats, count: int) -> Ints:
         """Rows of the frames nearest to a query (10 S,) whose columns count as much as `trust` (10 S,), 0 to 1."""

@@ -90,7 +90,7 @@ def _of_many(away: Real, after: Real, share: Real, ridge: float) -> Forecast:
     """
     weighed, known, after_middle, squares = _weighed(away, after, share)
     least = max(ridge, 1e-6 if away.dtype == np.float32 else 1e-9)
-    shift, variance = _regressed(known.T @ weighed, after_middle, squares, least)
+    shift, variance = _regressed(known.T @ weighed, after_middle, squares, away[0], least)
     return Forecast(after[0] + shift, variance)
 
 
@@ -98,7 +98,7 @@ def _of_many(away: Real, after: Real, share: Real, ridge: float) -> Forecast:
 def _weighed(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Real]:
     """W X (K, N); X, y and 1 (K, N + D + 1); weighted mean (D,) of y and of its squares (D,).
 
-    y is taken about the nearest example's, so that single precision loses little.
+    Both are taken about the nearest example's, so that single precision loses little however far off the query is.
     """
     count, size, following = len(away), away.shape[1], after.shape[1]
     weighed, known = np.empty_like(away), np.empty((count, size + following + 1), away.dtype)
@@ -106,7 +106,8 @@ def _weighed(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Re
     for k in range(count):
         row = known[k]
         for i in range(size):
-            row[i], weighed[k, i] = away[k, i], share[k] * away[k, i]
+            row[i] = away[k, i] - away[0, i]
+            weighed[k, i] = share[k] * row[i]
         for i in range(following):
             value = after[k, i] - after[0, i]
             row[size + i] = value
@@ -117,8 +118,8 @@ def _weighed(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Re
 
 
 @compiled
-def _regressed(product: Real, after_middle: Real, squares: Real, ridge: float) -> tuple[Floats, Floats]:
-    """Eq. 8's mean (D,), about the nearest example's y, and variance (D,)."""
+def _regressed(product: Real, after_middle: Real, squares: Real, first: Real, ridge: float) -> tuple[Floats, Floats]:
+    """Eq. 8's mean (D,), about the nearest example's y, and variance (D,); x is about the nearest's `first` (N,)."""
     size, following = product.shape[1], len(squares)
     middle = product[size + following].astype(np.float64)
     outer, slope = np.empty((size, size)), np.empty((size, following))
@@ -136,7 +137,7 @@ def _regressed(product: Real, after_middle: Real, squares: Real, ridge: float) -
         mean[j], variance[j] = after_middle[j], squares[j] - np.float64(after_middle[j]) ** 2
     for i in range(size):
         for j in range(following):
-            mean[j] -= middle[i] * slope[i, j]
+            mean[j] -= (first[i] + middle[i]) * slope[i, j]
             variance[j] -= slope[i, j] * (mixed[i, j] + least * slope[i, j])  # |y|^2 - |y - x slope|^2
     return mean, np.maximum(variance, 0.0)  # sigma_d^2 of eq. 8
 

@@ -99,7 +99,7 @@ class FittedLocalPca:
     def _seen_through(self, calibration: Calibration) -> "tuple[Controls, Vectors, Index]":
         controls = Controls(self.body, self.windows, calibration, self.options.lever_m)
         examples = _Examples(self.windows, controls.values, np.sqrt(self.options.control_weight))
-        return controls, examples, choose(self.options.index, examples)
+        return controls, examples, choose(self.options.index, examples, self.options.neighbours)
 
 
 class LocalPcaSession(Remembering):

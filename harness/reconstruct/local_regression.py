@@ -118,7 +118,8 @@ class FittedLocal:
         if self.database.rate_hz * options.longest_gap_s < 1.0:
             weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
         return self.worn.get(
-            calibration, lambda: LocalExamples(self.body, self.database, calibration, weights, options.index)
+            calibration,
+            lambda: LocalExamples(self.body, self.database, calibration, weights, options.index, options.neighbours),
         )
 
 
@@ -156,7 +157,7 @@ class LocalSession:
         return Estimate(self._answer, status)
 
     def _regressed(self, query: Floats, trust: Floats) -> Floats:
-        """(55,) what is learnt (`LocalExamples.poses`), from the neighbours of this frame and the last."""
+        """(55,) what is learnt (`LocalExamples.pairs`), from the neighbours of this frame and the last."""
         rows = self._examples.nearest(query, trust, self._options.neighbours)
         inputs, asked, outputs = self._examples.pairs(rows, self._rows_before, query, trust)
         self._rows_before = rows

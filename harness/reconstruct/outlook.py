@@ -15,7 +15,7 @@ from harness.core.compiled import compiled
 from harness.reconstruct.local_examples import LocalExamples
 from harness.reconstruct.placing import nearest_placed
 from harness.reconstruct.residuals import Residuals
-from harness.reconstruct.viewpoint import View, on_trunk
+from harness.reconstruct.viewpoint import View
 from harness.stream.frame import TrackerFrame
 
 
@@ -25,7 +25,6 @@ class Outlook:
     def __init__(self, residuals: Residuals, worn: Calibration, examples: LocalExamples, longest_gap_s: float) -> None:
         count = len(worn.stations)
         self._residuals, self._examples, self._longest_gap_s = residuals, examples, longest_gap_s
-        self._on_trunk = on_trunk(worn.bones[examples.anchor])
         self._no_turn = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)

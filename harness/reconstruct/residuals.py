@@ -17,6 +17,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import bound
+from harness.errors import ShapeError
 from harness.reconstruct import descent
 from harness.stream.frame import TrackerFrame
 
@@ -91,7 +92,11 @@ class Residuals:
         return out
 
     def read(self, frame: TrackerFrame) -> None:
-        """Take up the valid readings of a frame."""
+        """Take up the valid readings of a frame; ShapeError when it is not of the calibration's stations."""
+        if len(frame.position_m) != len(self.bones):
+            raise ShapeError(
+                "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
+            )
         self.measured = np.empty(2 * len(self.bones), bool)
         self._read(self._tracker, self.readings, *_told(frame), self.measured, self.trust)
 

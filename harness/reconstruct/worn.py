@@ -12,15 +12,13 @@ class WhileWorn(Generic[T]):
     """Something made for the last calibration: sessions of one performer share it."""
 
     def __init__(self) -> None:
-        self._key: tuple[tuple[str, ...], bytes] | None = None
-        self._kept: list[T] = []
+        self._kept: tuple[tuple[tuple[str, ...], bytes], T] | None = None
 
     def get(self, worn: Calibration, make: Callable[[], T]) -> T:
         """What `make` made when trackers were last worn otherwise; the one before is given up first."""
         key = tuple(worn.bones), worn.mount_m.tobytes()
-        if key != self._key:
-            self._key = None
-            self._kept.clear()
-            self._kept.append(make())
-            self._key = key
-        return self._kept[0]
+        kept = self._kept
+        if kept is None or kept[0] != key:
+            kept = self._kept = None
+            kept = self._kept = (key, make())
+        return kept[1]

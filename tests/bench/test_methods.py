@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 
 from harness.bench import alone, methods, trials
-from harness.bench.alone import NOTHING, Alone
+from harness.bench.alone import NOTHING
 from harness.core.seeds import generator
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
@@ -39,13 +39,13 @@ def test_takes_of_a_database_are_its_motion(folder: Path) -> None:
 
 
 def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "HELD_TO", {"weighted_blend": 2000})
-    monkeypatch.setattr(methods, "BESIDE", ("ik",))
     monkeypatch.setattr(methods, "SECONDS", 2.0)
-    tallies = methods.contest(MotionDatabase.open(folder), 1, lambda *_: None)
+    learnt = MotionDatabase.open(folder)
+    fitted = {name: methods.learner(name, learnt, 1) for name in ("weighted_blend", "ik")}
+    tallies = methods.contest(fitted, 1, lambda *_: None)
     assert set(tallies) == {"weighted_blend", "ik", "mink"}
     assert {len(tally.turn_s) for tally in tallies.values()} == {5}
-    memory = methods.memory_row("weighted_blend", Alone(0.0, 1.0, 0), Alone(0.0, 1.0, 1_000_000), 1_000)
+    memory = methods.memory_row("weighted_blend", 0, 1_000_000, 1_000)
     assert memory.value == pytest.approx(1e6 / (4 * 1_000 * (55 + 60)))
     row, tail = methods.rows_of("weighted_blend", tallies, [memory])
     said = row.as_dict()
@@ -57,6 +57,14 @@ def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monke
     assert float(said["ratio_to_mink"]) > float(said["ratio_to_ik"]) > 0.0
 
 
+def test_a_database_is_as_fast_as_itself(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(methods, "SECONDS", 2.0)
+    learnt = MotionDatabase.open(folder)
+    row = methods.slower_row("weighted_blend", learnt, learnt, 1, lambda *_: None)
+    assert 0.3 < row.value < 3.0
+    assert row.target == "<= 1.5"
+
+
 def test_options_change_the_hash() -> None:
     plain, other = (registry.resolve(name) for name in ("ik", "ik[prior_sigma_rad=0.4]"))
     assert methods.config_hash(plain) == methods.config_hash(registry.resolve("ik")) != methods.config_hash(other)
@@ -66,9 +74,9 @@ def test_memory_is_that_of_the_process_alone(folder: Path) -> None:
     held = np.ones(30_000_000)  # 240 MB that a child must not count
     nothing = alone.run_alone(NOTHING, folder, 1)
     assert held[-1] == 1.0
-    assert nothing.peak_bytes > 50e6
+    assert nothing > 50e6
     if sys.platform == "linux":
-        assert nothing.peak_bytes < alone.peak_bytes()
+        assert nothing < alone.peak_bytes()
 
 
 def test_a_method_takes_what_it_is_given(folder: Path) -> None:

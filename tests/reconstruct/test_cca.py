@@ -110,3 +110,12 @@ def test_eigenvectors_are_those_of_the_matrix(rng: np.random.Generator, size: in
     np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(matrix), atol=1e-12)
     np.testing.assert_allclose(rows @ rows.T, np.eye(size), atol=1e-12)
     np.testing.assert_allclose((rows.T * values) @ rows, matrix, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [2, 12, 20, 24, 31])
+@pytest.mark.parametrize("value", [0.0, 1e-200, 0.3, 1.0])
+def test_eigenvectors_of_next_to_nothing_are_numbers(size: int, value: float) -> None:
+    """What reflections leave of a matrix of rank 1 falls below what squares can hold."""
+    values, rows = cca.eigen(np.full((size, size), value))
+    np.testing.assert_allclose(np.sort(values)[-1], size * value, rtol=1e-9, atol=1e-140)
+    np.testing.assert_allclose(rows @ rows.T, np.eye(size), atol=1e-9)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Singles
 from harness.reconstruct.local_model import closeness, forecast
 
 
@@ -100,6 +100,20 @@ def test_single_precision_is_good_enough(rng: np.random.Generator) -> None:
     found = forecast(away.astype(np.float32), after.astype(np.float32), weight, 1.0, 0.1)
     np.testing.assert_allclose(found.mean, exact.mean, atol=1e-4)
     np.testing.assert_allclose(found.variance, exact.variance, rtol=1e-3)
+
+
+@pytest.mark.parametrize("spread", [1e-3, 0.01, 0.1])
+def test_single_precision_is_good_enough_far_from_the_examples(rng: np.random.Generator, spread: float) -> None:
+    """As after a turn of all readings: neighbours are alike, and none is near."""
+    away, weight = examples(rng, 800, 40)
+    far: Singles = (spread * away + rng.normal(0.0, 0.5, away.shape[1])).astype(np.float32)
+    after: Singles = (far @ rng.normal(0.0, 0.1, (away.shape[1], 6)) + rng.normal(0.0, 0.1 * spread, (800, 6))).astype(
+        np.float32
+    )
+    exact = forecast(far.astype(float), after.astype(float), weight, 1.0, 1e-3)
+    found = forecast(far, after, weight, 1.0, 1e-3)
+    np.testing.assert_allclose(found.mean, exact.mean, atol=2e-3)
+    np.testing.assert_allclose(found.variance, exact.variance, rtol=0.05)
 
 
 def test_examples_that_are_all_the_same_answer_what_they_are() -> None:

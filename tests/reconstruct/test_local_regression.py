@@ -97,7 +97,7 @@ def test_the_closed_form_meets_every_limb_tracker(walk: Scene, method: LocalRegr
 
 def test_features_tell_what_trackers_read(walk: Scene) -> None:
     database = MotionDatabase.build(walk.body, [walk.take])
-    examples = LocalExamples(walk.body, database, walk.calibration, Weights(), "flat")
+    examples = LocalExamples(walk.body, database, walk.calibration, Weights(), "flat", 8)
     row = 20
     residuals = Residuals(walk.body, walk.calibration, Loss())
     outlook = Outlook(residuals, walk.calibration, examples, 0.2)

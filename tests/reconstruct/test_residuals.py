@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from harness.errors import ShapeError
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.residuals import Loss, Residuals
 from harness.reconstruct.solver import Prior, Solver, Stopping
@@ -138,3 +139,22 @@ def test_quality_and_suspicion_may_be_ignored_or_taken_in_earnest(walk: Scene) -
         assert residuals.trust == pytest.approx([0.0, *expected[1:], *expected])
         residuals.read(walk.frames[0])
         assert residuals.trust == pytest.approx(np.ones(12))
+
+
+@pytest.mark.parametrize("stations", [3, 7])
+def test_a_frame_of_other_stations_is_refused(walk: Scene, stations: int) -> None:
+    residuals = Residuals(walk.body, walk.calibration, Loss())
+    kept = np.arange(stations) % len(walk.calibration.stations)
+    frame = walk.frames[0]
+    fields = (
+        "measured_s",
+        "position_m",
+        "tracker_from_station",
+        "position_valid",
+        "orientation_valid",
+        "quality",
+        "suspect",
+    )
+    other = replace(frame, **{name: getattr(frame, name)[kept] for name in fields})
+    with pytest.raises(ShapeError, match="as calibrated"):
+        residuals.read(other)

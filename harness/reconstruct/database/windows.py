@@ -64,7 +64,10 @@ class Windows:
 
     def successors(self, rows: Ints | slice) -> Singles:
         """(K, 55) posture (52) and step (3) of the frame after each window; only of `followed` windows."""
-        return _after(self.database.posture.view(np.ndarray), self.database.step.view(np.ndarray), self.frames[rows])
+        newest, database = self.frames[rows], self.database
+        if len(newest) and newest.max() + 1 >= len(database):
+            raise IndexError("the last window of the database has no successor: ask for windows that are followed")
+        return _after(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest)
 
     def query(self, qpos: Floats) -> Singles:
         """The vector (D,) of m configurations (m, 55), newest first, hinges in the database's representation."""

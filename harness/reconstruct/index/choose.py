@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 from harness.errors import UnknownName
 from harness.reconstruct.index.flat import Flat
-from harness.reconstruct.index.inverted_file import InvertedFile, probes_for
+from harness.reconstruct.index.inverted_file import InvertedFile
 from harness.reconstruct.index.kd_tree import KDTree
 from harness.reconstruct.index.protocol import Index, Vectors
 
 INDEXES: dict[str, Callable[[Vectors, int], Index]] = {
     "flat": lambda vectors, wanted: Flat(vectors),
     "kd_tree": lambda vectors, wanted: KDTree(vectors),
-    "inverted_file": lambda vectors, wanted: InvertedFile(vectors, probes_for(wanted, len(vectors))),
+    "inverted_file": lambda vectors, wanted: InvertedFile(vectors, wanted),
 }
 AUTO = "auto"
 SMALL, LOW, FEW = 3000, 20, 16

@@ -102,6 +102,19 @@ def test_nothing_is_far_away_in_a_set_that_never_varies() -> None:
         np.testing.assert_allclose(make(Table(values)).nearest(values[0], 4)[1], 0.0, atol=1e-6)
 
 
+def test_odd_queries_are_answered_or_refused() -> None:
+    same = InvertedFile(Table(np.full((4000, 12), 3.0, np.float32)))
+    rows, squared = same.nearest(np.full(12, 3.001, np.float32), 8)
+    assert len(set(rows.tolist())) == 8
+    assert np.all(np.isfinite(squared))
+    index = InvertedFile(Table(paths(4000, 12)))
+    rows, squared = index.nearest(np.full(12, 1e20, np.float32), 8)
+    assert len(set(rows.tolist())) == 8
+    assert np.all(np.isfinite(squared))
+    with pytest.raises(ArithmeticError, match="not a number"):
+        index.nearest(np.full(12, np.nan, np.float32), 8)
+
+
 def test_unknown_columns_decide_nothing(rng: np.random.Generator) -> None:
     values = paths(3000, 12)
     table, known = Table(values), np.array([1.0] * 8 + [0.0] * 4, np.float32)
