@@ -293,10 +293,17 @@ def test_a_killed_run_leaves_whole_cells_and_resumes(tmp_path: Path) -> None:
     assert len(rows(out)) == len(scenario.methods) * len(scenario.motion.test)
 
 
+def heeding_interrupts() -> None:
+    """As from a terminal: what a shell starts in the background ignores them, and so would its children."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     out = tmp_path / "run"
     command = [sys.executable, "-m", "harness.cli", "run", "demo", "--no-report", "--out", str(out)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
+    ) as program:
         deadline = time.monotonic() + 60.0
         while len(list(out.glob("cells/*/cell.json"))) < 2 and time.monotonic() < deadline:
             time.sleep(0.02)
@@ -314,7 +321,12 @@ def test_workers_end_with_the_run(tmp_path: Path, end: signal.Signals, code: int
     out = tmp_path / "run"
     command = [sys.executable, "-m", "harness.cli", "run", "demo", "--no-report", "--jobs", "2", "--out", str(out)]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=heeding_interrupts,
     ) as program:
         deadline = time.monotonic() + 60.0
         while len(list(out.glob("cells/*/cell.json"))) < 2 and time.monotonic() < deadline:

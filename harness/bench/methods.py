@@ -138,10 +138,10 @@ def slower_row(name: str, few: MotionDatabase, many: MotionDatabase, seed: int, 
 
 
 def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
-    """The share of the true neighbours that the index finds which methods choose, for every so manyth query."""
+    """The share of the true neighbours that each method's index finds, for every so manyth query."""
     held_out = [index.built_in(which, seed + trials.HELD_OUT) for which in range(len(performer.BEHAVIOURS))]
     rows = []
-    for kind in index.KINDS:
+    for kind in (index.readings, index.both, index.evidence):
         search = kind(trials.body(), learnt, held_out)
         judge, used, shares = Flat(search.vectors), choose(AUTO, search.vectors, search.count), []
         for query in np.concatenate(search.queries)[::every]:

@@ -89,5 +89,5 @@ def test_a_method_takes_what_it_is_given(folder: Path) -> None:
 
 def test_recall_is_judged_by_exact_search(folder: Path) -> None:
     rows = methods.recall_rows(MotionDatabase.open(folder), 1, every=40)
-    assert [row.target for row in rows] == [">= 0.95"] * 4
+    assert [row.target for row in rows] == [">= 0.95"] * 3
     assert all(0.9 < row.value <= 1.0 for row in rows)
