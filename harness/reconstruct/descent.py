@@ -4,7 +4,8 @@ A hinge moves only what lies beyond it, so the normal equations of trackers coup
 beyond the other. Eliminated from the limbs inwards, such a matrix fills nowhere else (Featherstone 2008, ch. 8.3). So
 row i of such a matrix (V, D) holds what couples direction i with those inwards of it, by their depth, and with itself
 last: two rows agree about where they begin, and a step for 54 degrees of freedom costs a few microseconds. `residuals`,
-`solver` and `subspace` say what is minimised.
+`solver` and `subspace` say what is minimised. All of it stands in one file because compiled functions call only those
+of their own (`core.compiled`).
 """
 
 from collections.abc import Sequence

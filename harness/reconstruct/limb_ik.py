@@ -5,6 +5,7 @@ to a point beyond the elbow or knee depends on that one hinge alone, and the law
 bone is then turned the shortest way until the point lies where it was measured. What is left is a turn about the line
 from joint to point. It stays as predicted, unless a measured orientation determines it: that of the shin or forearm, or
 of a foot, whose two hinges cannot reach every orientation. Hinges keep their limits, at the point's cost.
+The algebra of 3 x 3 matrices is at the end, for compiled functions call only those of their own file (`core.compiled`).
 """
 
 from typing import NamedTuple

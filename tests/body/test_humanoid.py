@@ -1,6 +1,6 @@
 """The model file, and bodies scaled from it."""
 
-import pickle
+import pickle  # the size of what is sent to a worker; nothing is read back
 from dataclasses import replace
 from pathlib import Path
 
