@@ -24,9 +24,21 @@ MAY_IMPORT: dict[str, set[str]] = {
     # the bench measures what the tables do
     "bench": (EVERYTHING | {"config", "setting", "progress"}) - {"study", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
-    "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress"},
+    "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "rehearsal"},
 }
-TOP = {"cli", "catalogue", "config", "doctor", "errors", "experiment", "progress", "setting", "__init__", "__main__"}
+TOP = {
+    "cli",
+    "catalogue",
+    "config",
+    "doctor",
+    "errors",
+    "experiment",
+    "progress",
+    "rehearsal",
+    "setting",
+    "__init__",
+    "__main__",
+}
 USES_MUJOCO = {"body", "simulate", "bench"}
 
 

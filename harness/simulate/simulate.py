@@ -21,7 +21,7 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.reader import FrameReader, WireFormat
 from harness.stream.records import Said, encode
 
-__all__ = ["Simulation", "TrackerConfig", "simulate"]
+__all__ = ["Simulation", "TrackerConfig", "sense", "simulate"]
 
 WORLD_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 """The tracker's axes are x forward, y right, z down (docs/is900.md 5.3): half a turn about x from the world's."""
@@ -71,9 +71,8 @@ def simulate(
     wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
     trajectory = Trajectory(body, take)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
-    calibration = _exact(body, mounts, tracker)
-    sensed = _sensed(trajectory, mounts, time_s, tracker, calibration, seed, take.name)
-    noise.spoil(sensed)
+    calibration = exact_calibration(body, mounts, tracker)
+    sensed = sense(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name)
     sent, wire = _transmitted(sensed, wire_format, tracker)
     reader = FrameReader(wire_format)
     frames = (*reader.feed_all(wire), *reader.finish())
@@ -99,7 +98,8 @@ def sampling_times_s(duration_s: float, tracker: TrackerConfig, stations: int) -
     return np.arange(count)[:, None] / tracker.rate_hz + turns_s
 
 
-def _exact(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calibration:
+def exact_calibration(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calibration:
+    """The nominal mounts and the true frame of the tracker."""
     places = [place(body.skeleton, mount) for mount in mounts]
     return Calibration(
         kind="exact",
@@ -112,33 +112,41 @@ def _exact(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calib
     )
 
 
-def _sensed(
+def sense(
     trajectory: Trajectory,
     mounts: Sequence[Mount],
-    time_s: Floats,
     tracker: TrackerConfig,
-    calibration: Calibration,
+    noise: Noise,
+    time_s: Floats,
+    *,
     seed: int,
     take: str,
+    begins_s: float = 0.0,
 ) -> Sensed:
-    """The truth in the tracker's frame."""
+    """What the tracker believes at the moments `time_s` (E, S) of a trajectory, before it goes over the line.
+
+    `begins_s` is the time of the trajectory's beginning, for the device's clock and for errors that have a moment.
+    """
+    calibration = exact_calibration(trajectory.body, mounts, tracker)
     motion = trajectory.station_motion(calibration, time_s)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     skeleton = trajectory.body.skeleton
     along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
-    return Sensed(
+    sensed = Sensed(
         seed=seed,
         take=take,
         stations=calibration.stations,
-        time_s=time_s,
+        time_s=time_s + begins_s,
         rate_hz=tracker.rate_hz,
         velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
         radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
         position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
         quality=np.ones(time_s.shape),
-        device_s=time_s.copy(),
+        device_s=time_s + begins_s,
     )
+    noise.spoil(sensed)
+    return sensed
 
 
 def _transmitted(sensed: Sensed, wire_format: WireFormat, tracker: TrackerConfig) -> tuple[Bools, Capture]:

@@ -8,12 +8,13 @@ from harness.simulate.sensed import Sensed
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock that was set to zero some time before the take and does not run at the host's pace (docs/is900.md 13.5).
+    """A clock that was set to zero as the take begins, or before, and that does not run at the pace of the host's
+    (docs/is900.md 13.5).
 
     Rounding to 32-bit milliseconds is the wire's doing and happens at every level.
     """
 
-    offset_s: float = 5.0
+    offset_s: float = 0.0
     """What it shows when the take begins [s]."""
     drift_ppm: float = 20.0
     """How much faster it runs [1e-6]."""

@@ -1,0 +1,104 @@
+"""A scenario's clip made ready to be worn outside a run: played by an emulator, tracked live, or recorded."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+from harness.body.humanoid import Body
+from harness.config import Scenario, load_scenario
+from harness.core.calibration import Calibration
+from harness.core.protocol import Part
+from harness.errors import BadInput, UnknownName
+from harness.experiment import check_names, source_of
+from harness.setting import Setting, mounts_of, noise_of, tracker_of
+from harness.simulate.lap import lap
+from harness.simulate.simulate import Simulation, TrackerConfig, exact_calibration
+from harness.stream.samples import Samples
+
+
+class Rehearsal:
+    """One clip of a scenario with some of its stations; each part is made when it is first asked for."""
+
+    def __init__(self, setting: Setting) -> None:
+        self.setting = setting
+
+    @property
+    def scenario(self) -> Scenario:
+        """As asked for: stations, rate and noise are put in."""
+        return self.setting.scenario
+
+    @property
+    def tracker(self) -> TrackerConfig:
+        return tracker_of(self.scenario)
+
+    @property
+    def body(self) -> Body:
+        return self.setting.body
+
+    @property
+    def calibration(self) -> Calibration:
+        """Exact: the nominal mounts and the true frame of the tracker."""
+        return exact_calibration(self.body, mounts_of(self.scenario), self.tracker)
+
+    @property
+    def simulation(self) -> Simulation:
+        """The first lap as a run of the scenario sees it, with the truth."""
+        return self.setting.simulation
+
+    @cached_property
+    def samples(self) -> Samples:
+        """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
+        noise = self.scenario.disturbance.added(noise_of(self.scenario), tuple(self.scenario.stations))
+        mounts = mounts_of(self.scenario)
+        return lap(self.body, self.setting.take, mounts, self.tracker, noise, seed=self.scenario.seed)
+
+
+def rehearse(
+    scenario: Path | str,
+    *,
+    clip: str | None = None,
+    stations: int | Sequence[str] | None = None,
+    rate_hz: float | None = None,
+    noise: str | None = None,
+    seed: int | None = None,
+    folder: Path | None = None,
+) -> Rehearsal:
+    """A clip of a scenario (its first by default), with the first so many of its stations or those that are named.
+
+    What is not given is as the scenario has it. UnknownName, BadFile and BadInput as for a run of the scenario.
+    """
+    asked = load_scenario(scenario)
+    if stations is not None:
+        asked = replace(asked, stations={name: asked.stations[name] for name in _chosen(asked, stations)})
+    if rate_hz is not None:
+        asked = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz))
+    if noise is not None:
+        asked = replace(asked, noise=noise)  # type: ignore[arg-type]  # `noise_of` refuses other names
+    if seed is not None:
+        asked = replace(asked, seed=seed)
+    asked = replace(asked, vary={}, inputs=("pos+ori",))
+    part = Part.parse(clip or asked.motion.test[0])
+    source = source_of(asked.motion, folder, asked.seed)
+    check_names(asked, source, [part])
+    return Rehearsal(Setting(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)))
+
+
+def _chosen(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
+    names = list(scenario.stations)
+    if isinstance(stations, int):
+        if not 1 <= stations <= len(names):
+            raise BadInput(f"{stations} stations of {len(names)}.", f"{scenario.name} has: {', '.join(names)}.")
+        return names[:stations]
+    for name in stations:
+        if name not in names:
+            raise UnknownName("station", name, names)
+    return stations
+
+
+def _behaviour(scenario: Scenario, part: Part) -> str:
+    """What a test clip shows; "" for a clip that the scenario does not judge."""
+    tested, behaviours = scenario.motion.test, scenario.motion.behaviours
+    if str(part) not in tested:
+        return ""
+    return behaviours[tested.index(str(part))] if len(behaviours) > 1 else behaviours[0]

@@ -1,0 +1,40 @@
+"""A clip of a scenario made ready to be worn outside a run."""
+
+import pytest
+
+from harness.errors import BadInput, HarnessError, UnknownName
+from harness.rehearsal import rehearse
+
+
+def test_what_is_not_asked_for_is_as_the_scenario_has_it() -> None:
+    made = rehearse("demo")
+    assert str(made.setting.part) == "walking_p1_01"
+    assert made.setting.behaviour == "walking"
+    assert made.samples.stations == made.calibration.stations == tuple(made.scenario.stations)
+    assert made.samples.first_lap == made.simulation.expected
+
+
+def test_clip_stations_rate_and_noise_are_put_in() -> None:
+    made = rehearse("demo", clip="boxing_p1_02", stations=4, rate_hz=75.0, noise="clean")
+    assert made.samples.stations == ("left_hand", "right_hand", "left_ankle", "right_ankle")
+    assert made.samples.rate_hz == made.tracker.rate_hz == 75.0
+    assert made.tracker.slot_s == 0.0
+    assert made.setting.behaviour == "boxing"
+    assert rehearse("demo", stations=["head", "torso"]).calibration.stations == ("head", "torso")
+
+
+@pytest.mark.parametrize(
+    ("asked", "kind", "says"),
+    [
+        ({"scenario": "dmeo"}, UnknownName, "demo"),
+        ({"scenario": "demo", "clip": "nobody_p1_01"}, HarnessError, "nobody"),
+        ({"scenario": "demo", "stations": 7}, BadInput, "7 stations of 6"),
+        ({"scenario": "demo", "stations": 0}, BadInput, "0 stations"),
+        ({"scenario": "demo", "stations": ["haed"]}, UnknownName, "head"),
+        ({"scenario": "demo", "rate_hz": 0.0}, BadInput, "rate"),
+        ({"scenario": "demo", "noise": "loud"}, UnknownName, "loud"),
+    ],
+)
+def test_what_cannot_be_worn_is_refused(asked: dict[str, object], kind: type[Exception], says: str) -> None:
+    with pytest.raises(kind, match=says):
+        rehearse(**asked)  # type: ignore[arg-type]
