@@ -23,23 +23,28 @@ class WireFormat:
     """What both ends agree on before data flow."""
 
     stations: tuple[str, ...]
-    """Names; the first is station `1` of the device, and so on."""
+    """Names, in the order of the device's stations."""
     rate_hz: float
     """Records per second of each station."""
     items: tuple[int, ...] = STANDARD_LIST
     """Output list of every station."""
     settings: Settings = field(default_factory=Settings)
+    characters: bytes = b""
+    """What the stations are called on the wire, ascending; by default the first is `1`, and so on."""
 
     def __post_init__(self) -> None:
+        if not self.characters:
+            object.__setattr__(self, "characters", STATION_CHARACTERS[: len(self.stations)])
         if not 1 <= len(self.stations) <= len(STATION_CHARACTERS):
             raise BadInput(f"{len(self.stations)} stations.", f"An IS-900 has 1 to {len(STATION_CHARACTERS)}.")
         if len(set(self.stations)) < len(self.stations):
             raise BadInput(f"Stations {', '.join(self.stations)}: a name twice.", "Each has a name of its own.")
-
-    @property
-    def characters(self) -> bytes:
-        """What the stations are called on the wire."""
-        return STATION_CHARACTERS[: len(self.stations)]
+        known = [STATION_CHARACTERS.find(character) for character in self.characters]
+        if len(known) != len(self.stations) or min(known) < 0 or known != sorted(set(known)):
+            raise BadInput(
+                f"Stations {self.characters.decode('latin-1')!r} for {len(self.stations)} names.",
+                f"One of {STATION_CHARACTERS.decode()} for each, ascending, as the device reads them.",
+            )
 
 
 class FrameReader:

@@ -27,6 +27,14 @@ class Settings:
     """0.01 after `u` (centimetres), 0.0254 after `U` or power-on (inches)."""
     seconds_per_tick: float = 1e-3
     """1e-3 after `MT` or power-on, 1e-6 after `Mt`."""
+    binary: bool = True
+    """True after `f`; False (ASCII) after `F` or power-on."""
+    stylus_bytes: int = 2
+    """Of item 16, which has 1 or 2 by the source (section 14)."""
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.metres_per_unit and 0.0 < self.seconds_per_tick and self.stylus_bytes in (1, 2)):
+            raise BadInput(f"Not a device's settings: {self}.", "Units are positive; item 16 has 1 or 2 bytes.")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,128 @@
+"""What a host says to an IS-900: commands as bytes, and bytes into commands (docs/is900.md 3 and 4).
+
+Eight letters and `W` act at once; so do four control characters, wherever they stand. Everything else is a line.
+Builders end lines in CR LF, as the manuals do. Stations are their characters, "1" to "9" and "A" to "C".
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+POLL, STREAM, STOP = b"P", b"C", b"c"
+ASCII, BINARY = b"F", b"f"
+INCHES, CENTIMETRES = b"U", b"u"
+STATUS, FACTORY_DEFAULTS = b"S", b"W"
+SAVE, RESUME, SUSPEND, RESTART = b"\x0b", b"\x11", b"\x13", b"\x19"
+MILLISECONDS, MICROSECONDS, ZERO_CLOCK = b"MT\r\n", b"Mt\r\n", b"MZ\r\n"
+STATION_STATES, TRACKING, SYSTEM, GENLOCK, EMITTERS = b"l*\r\n", b"MP\r\n", b"MS\r\n", b"MG\r\n", b"MCF\r\n"
+
+IMMEDIATE = b"PCcFfSUuW"
+"""Letters that act at once at the start of a line."""
+CONTROL = SAVE + RESUME + SUSPEND + RESTART
+"""Characters that act at once anywhere."""
+LONGEST_LINE = 256
+"""No command in the sources is half as long; what goes on is cut [bytes]."""
+
+
+def _line(text: str) -> bytes:
+    return text.encode("ascii") + b"\r\n"
+
+
+def output_list(station: str, items: Sequence[int]) -> bytes:
+    """Set the output list of a station; it answers nothing."""
+    return _line(f"O{station}," + ",".join(map(str, items)))
+
+
+def read_list(station: str) -> bytes:
+    return _line(f"O{station}")
+
+
+def switch_station(station: str, active: bool) -> bytes:
+    """Switch a station on or off; it answers nothing."""
+    return _line(f"l{station},{int(active)}")
+
+
+def boresight(station: str) -> bytes:
+    """The way it points now becomes heading 0."""
+    return _line(f"B{station}")
+
+
+def undo_boresight(station: str) -> bytes:
+    return _line(f"b{station}")
+
+
+def alignment(station: str, origin_cm: Sequence[float], on_x_cm: Sequence[float], on_y_cm: Sequence[float]) -> bytes:
+    """A new frame: its origin, a point on its X axis and one on its Y axis, on top of the present one [cm]."""
+    return _line(f"A{station}," + ",".join(f"{value:.2f}" for value in (*origin_cm, *on_x_cm, *on_y_cm)))
+
+
+def undo_alignment(station: str) -> bytes:
+    return _line(f"R{station}")
+
+
+def prediction(station: str, ahead_ms: int) -> bytes:
+    """0 to 50 ms."""
+    return _line(f"Mp{station},{ahead_ms}")
+
+
+def enhancement(station: str, mode: int) -> bytes:
+    """0 most exact, 1 less jitter, 2 for head displays."""
+    return _line(f"MF{station},{mode}")
+
+
+def sensitivity(station: str, level: int) -> bytes:
+    """To rotation, 1 to 5."""
+    return _line(f"MQ{station},{level}")
+
+
+def serial_line(baud: int) -> bytes:
+    """The device's side of the line: 8N1 at this rate [bit/s], no handshake."""
+    return _line(f"o{baud // 100},N,8,0")
+
+
+@dataclass(frozen=True)
+class Command:
+    """One command: a letter or control character that acts at once, or a line."""
+
+    line: bytes
+    """Without its terminator."""
+    cut: bool = False
+    """Whether it was longer than `LONGEST_LINE`; the rest is gone."""
+
+    @property
+    def immediate(self) -> bool:
+        """Whether it needed no terminator."""
+        return len(self.line) == 1 and self.line in IMMEDIATE + CONTROL
+
+
+class CommandReader:
+    """Takes bytes as they come, gives commands as they become complete.
+
+    A line ends at CR or LF; empty ones are ignored. A letter acts at once only at the start of a line: in the middle
+    of one no source says what happens, and this worked with every client tried. A restart forgets the line begun.
+    """
+
+    def __init__(self) -> None:
+        self._line = bytearray()
+        self._cut = False
+
+    def feed(self, data: bytes) -> list[Command]:
+        """The commands that these bytes complete."""
+        out: list[Command] = []
+        for byte in data:
+            if byte in CONTROL or (not self._line and byte in IMMEDIATE):
+                out.append(Command(bytes([byte])))
+                if byte == RESTART[0]:
+                    self._forget()
+            elif byte in b"\r\n":
+                if self._line:
+                    out.append(Command(bytes(self._line), self._cut))
+                self._forget()
+            elif len(self._line) < LONGEST_LINE:
+                self._line.append(byte)
+            else:
+                self._cut = True
+        return out
+
+    def _forget(self) -> None:
+        self._line.clear()
+        self._cut = False

@@ -1,0 +1,174 @@
+"""The replies that InterSense added to the Fastrak's: lines that start with `3` (docs/is900.md 6.4 and 7)."""
+
+import re
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SystemRecord:
+    """The answer to `MS`."""
+
+    product: str = "g"
+    """`4` IS-300, `8` IS-600, `g` IS-900; one manual calls it reserved."""
+    platform: bool = False
+    boresight_as_fastrak: bool = False
+    microseconds: bool = False
+    lights: bool = False
+
+    def line(self) -> bytes:
+        flags = self.boresight_as_fastrak << 1 | self.microseconds << 2 | self.lights << 3
+        return f"31S{self.product}{int(self.platform)}{flags:X}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "SystemRecord | None":
+        found = re.fullmatch(r"31S(.)([0-9A-Fa-f])([0-9A-Fa-f])", text)
+        if found is None:
+            return None
+        flags = int(found[3], 16)
+        return cls(found[1], bool(int(found[2], 16) & 1), bool(flags & 2), bool(flags & 4), bool(flags & 8))
+
+
+@dataclass(frozen=True)
+class StationRecord:
+    """The answer to `Ms{st}`."""
+
+    station: str
+    enhancement: int = 0
+    """0 most exact, 1 less jitter, 2 for head displays."""
+    compass: int = 0
+    """0 off, 1 partial, 2 full."""
+
+    def line(self) -> bytes:
+        return f"3{self.station}s0{self.enhancement}{self.compass << 1:X}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "StationRecord | None":
+        found = re.fullmatch(r"3([1-9A-C])s.([0-2])([0-9A-Fa-f])", text)
+        return found and cls(found[1], int(found[2]), int(found[3], 16) >> 1 & 3)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """The answer to `Mp{st}`."""
+
+    station: str
+    ahead_ms: int
+
+    def line(self) -> bytes:
+        return f"3{self.station}p{self.ahead_ms:2d}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "Prediction | None":
+        found = re.fullmatch(r"3([1-9A-C])p([ \d]\d)", text)
+        return found and cls(found[1], int(found[2]))
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """The answer to `MQ{st}`: how closely rotation is followed, 1 to 5."""
+
+    station: str
+    level: int
+
+    def line(self) -> bytes:
+        return f"3{self.station}Q{self.level}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "Sensitivity | None":
+        found = re.fullmatch(r"3([1-9A-C])Q(\d)", text)
+        return found and cls(found[1], int(found[2]))
+
+
+@dataclass(frozen=True)
+class Digits:
+    """The answer to `MU` (ultrasonic time-out, two digits), `Mg` (ultrasonic sensitivity, one) or `MCI{st}` (the
+    InertiaCube that serves a station, one or two)."""
+
+    station: str
+    letter: str
+    """`U`, `g` or `I`."""
+    value: int
+
+    def line(self) -> bytes:
+        digits = f"{self.value:2d}" if self.letter == "U" else f"{self.value:d}"
+        return f"3{self.station}{self.letter}{digits}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "Digits | None":
+        found = re.fullmatch(r"3([1-9A-C])(U(?=..$)|g(?=.$)|I)([ \d]?\d)", text)
+        return found and cls(found[1], found[2], int(found[3]))
+
+
+@dataclass(frozen=True)
+class Genlock:
+    """The answer to `MG`."""
+
+    state: str = "0"
+    rate_hz: float = 0.0
+    cycles: int = 0
+
+    def line(self) -> bytes:
+        return f"31G{self.state}{self.rate_hz:7.2f}{self.cycles:3d}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "Genlock | None":
+        found = re.fullmatch(r"31G(.)(?=.{7}.{3}$)( *\d+\.\d\d)( *\d+)", text)
+        return found and cls(found[1], float(found[2]), int(found[3]))
+
+
+@dataclass(frozen=True)
+class Emitter:
+    """One of the lines that answer `MCF`: a fixed emitter."""
+
+    number: int
+    position_m: tuple[float, float, float]
+    normal: tuple[float, float, float]
+    identity: int
+
+    def line(self) -> bytes:
+        place = "".join(f"{value:10.4f}" for value in self.position_m)
+        normal = "".join(f"{value:7.2f}" for value in self.normal)
+        return f"31F{self.number:7d}{place}{normal}{self.identity:7d}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "Emitter | None":
+        """By blanks, since some firmware widens the number."""
+        number = r" *(-?\d+\.\d+)"
+        found = re.fullmatch(rf"31F *(\d+){number * 6} *(\d+)", text)
+        if found is None:
+            return None
+        x, y, z, a, b, c = map(float, found.groups()[1:7])
+        return cls(int(found[1]), (x, y, z), (a, b, c), int(found[8]))
+
+
+@dataclass(frozen=True)
+class TrackingStatus:
+    """The answer to `MP`: 48 bytes on how all twelve stations are tracked."""
+
+    states: str
+    """(12,) `T` tracking, `L` lost, `X` absent or not valid."""
+    received: tuple[int, ...]
+    """(12,) ranges of the last cycle, 0 to 15."""
+    rejected: tuple[int, ...]
+    """(12,) likewise."""
+    rate_hz: float
+    genlock: str = " "
+    """`G`, `X` or blank."""
+
+    def line(self) -> bytes:
+        ranges = zip(self.states, self.received, self.rejected, strict=True)
+        stations = "".join(f"{state}{min(got, 15):X}{min(dropped, 15):X}" for state, got, dropped in ranges)
+        return f"31P{stations}{self.rate_hz:5.0f} {self.genlock}\r\n".encode("latin-1")
+
+    @classmethod
+    def parse(cls, text: str) -> "TrackingStatus | None":
+        found = re.fullmatch(r"(?=.{46}$)31P((?:[TLX][0-9A-Fa-f ]{2}){12})( *\d+(?:\.\d*)? *) (.)", text)
+        if found is None:
+            return None
+        received, rejected = (tuple(int(digit.strip() or "0", 16) for digit in found[1][k::3]) for k in (1, 2))
+        return cls(found[1][::3], received, rejected, float(found[2]), found[3])
+
+    @property
+    def lost(self) -> bytes:
+        """Characters of the stations that are not tracked."""
+        return bytes(c for c, state in zip(b"123456789ABC", self.states, strict=True) if state != "T")
