@@ -1,0 +1,6 @@
+"""A real IS-900 on a serial port or a TCP connection, as a `TrackerStream` (docs/device.md, Driver)."""
+
+from harness.stream.driver.events import LineEvent, Witness
+from harness.stream.driver.wanted import Wanted
+
+__all__ = ["LineEvent", "Wanted", "Witness"]
