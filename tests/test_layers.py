@@ -21,6 +21,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "reconstruct": {"body", "stream", "calibrate"},
     "score": set(),
     "report": {"score", "body"},
+    # writes BVH as an export does; there is no truth in a live session that its wall would have to hide
+    "live": {"stream", "calibrate", "reconstruct", "body", "mocap"},
     # the bench measures what the tables do
     "bench": (EVERYTHING | {"config", "setting", "progress"}) - {"study", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},

@@ -20,7 +20,7 @@ _ROTATION = "Zrotation Yrotation Xrotation"
 
 def bvh_files(motion: Motion) -> dict[str, str]:
     """Ending -> text of the file."""
-    return {".bvh": "\n".join([*_hierarchy(motion.skeleton), *_motion(motion)]) + "\n"}
+    return {".bvh": "\n".join([*hierarchy(motion.skeleton), *_motion(motion)]) + "\n"}
 
 
 def euler_zyx_deg(rotation: Floats) -> Floats:
@@ -35,7 +35,8 @@ def euler_zyx_deg(rotation: Floats) -> Floats:
     return out
 
 
-def _hierarchy(skeleton: Skeleton) -> Iterator[str]:
+def hierarchy(skeleton: Skeleton) -> Iterator[str]:
+    """The first part of a file, line by line."""
     offset_cm = skeleton.bone_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
     children = {
         p: [b for b, parent in enumerate(skeleton.parents) if parent == p] for p in (-1, *range(len(offset_cm)))
@@ -44,14 +45,14 @@ def _hierarchy(skeleton: Skeleton) -> Iterator[str]:
     def joint(bone: int, at_cm: Floats, tab: str) -> Iterator[str]:
         yield f"{tab}JOINT {skeleton.names[bone]}"
         yield f"{tab}{{"
-        yield f"{tab}\tOFFSET {_row(at_cm)}"
+        yield f"{tab}\tOFFSET {row(at_cm)}"
         yield f"{tab}\tCHANNELS 3 {_ROTATION}"
         for child in children[bone]:
             yield from joint(child, offset_cm[bone], tab + "\t")
         if not children[bone]:
             yield f"{tab}\tEnd Site"
             yield f"{tab}\t{{"
-            yield f"{tab}\t\tOFFSET {_row(offset_cm[bone])}"
+            yield f"{tab}\t\tOFFSET {row(offset_cm[bone])}"
             yield f"{tab}\t}}"
         yield f"{tab}}}"
 
@@ -65,20 +66,26 @@ def _hierarchy(skeleton: Skeleton) -> Iterator[str]:
 def _motion(motion: Motion) -> Iterator[str]:
     grid = np.arange(motion.frame_index[0], motion.frame_index[-1] + 1)
     shown = np.searchsorted(motion.frame_index, grid, side="right") - 1
-    world_from_root = rotations.to_matrix(motion.world_from_root)
+    table = channels(
+        motion.skeleton, motion.joints_m[:, 0], rotations.to_matrix(motion.world_from_root), motion.world_from_bone
+    )
+    table[:, 3:] = np.unwrap(table[:, 3:], period=360.0, axis=0)
+    yield from ("MOTION", f"Frames: {len(grid)}", f"Frame Time: {1.0 / motion.rate_hz:.9f}")
+    yield from map(row, table[shown])
+
+
+def channels(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, world_from_bone: Floats) -> Floats:
+    """The numbers (F, 6 + 3 B) of frames: root (F, 3) [m], rotations (F, 3, 3), (F, B, 3, 3); angles within +-180."""
     local = [world_from_root]
-    for bone, parent in enumerate(motion.skeleton.parents):
-        above = world_from_root if parent < 0 else motion.world_from_bone[:, parent]
-        local.append(np.swapaxes(above, -1, -2) @ motion.world_from_bone[:, bone])
+    for bone, parent in enumerate(skeleton.parents):
+        above = world_from_root if parent < 0 else world_from_bone[:, parent]
+        local.append(np.swapaxes(above, -1, -2) @ world_from_bone[:, bone])
     # joints are listed depth first, which the skeleton's order need not be
-    order = [0, *(1 + bone for bone in _depth_first(motion.skeleton))]
+    order = [0, *(1 + bone for bone in _depth_first(skeleton))]
     turned = np.stack([local[j] for j in order], axis=1)
     angles_deg = euler_zyx_deg(WORLD_FROM_ASF.T @ turned @ WORLD_FROM_ASF)
-    angles_deg = np.unwrap(angles_deg, period=360.0, axis=0)
-    root_cm = motion.joints_m[:, 0] @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
-    table = np.concatenate([root_cm, angles_deg.reshape(len(root_cm), -1)], axis=1)[shown]
-    yield from ("MOTION", f"Frames: {len(table)}", f"Frame Time: {1.0 / motion.rate_hz:.9f}")
-    yield from map(_row, table)
+    root_cm = root_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
+    return np.concatenate([root_cm, angles_deg.reshape(len(root_cm), -1)], axis=1)
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:
@@ -91,5 +98,6 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
     return list(below(-1))
 
 
-def _row(values: Floats) -> str:
+def row(values: Floats) -> str:
+    """As it stands in the file."""
     return " ".join(f"{value:.6f}" for value in values)

@@ -1,0 +1,119 @@
+"""Files of a live session: the same as those of an export, and whole at any moment."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.body import humanoid
+from harness.body.kinematics import Kinematics
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.estimate import Estimate, Status
+from harness.core.humanoid24 import unpack
+from harness.errors import BadFile
+from harness.live.bvh import Bvh
+from harness.live.pose import LivePose
+from harness.live.table import Table
+from harness.mocap.export_bvh import bvh_files
+from harness.mocap.export_motion import Motion
+from tests.live.posing import configuration, frame, live_pose
+
+RATE_HZ = 40.0
+BODY = humanoid.build()
+
+
+def walked(rng: np.random.Generator, frames: int) -> Floats:
+    """(F, 55) that turns over and over, so that angles wrap."""
+    qpos = np.array([configuration(rng, 0.1) for _ in range(frames)])
+    turns = np.cumsum(rng.normal(scale=0.4, size=(frames, 3)), axis=0)
+    qpos[:, 3:7] = rotations.exp(turns)
+    return qpos
+
+
+def exported(qpos: Floats, frame_index: list[int]) -> str:
+    """The file that `harness export` writes of these frames."""
+    _, world_from_root, angles_rad = unpack(qpos)
+    kinematics = Kinematics(BODY)
+    posed = [live_pose(row, kinematics=kinematics) for row in qpos]
+    joints_m, bones = [], []
+    for pose in posed:
+        joints_m.append(pose.joints_m)
+        bones.append(rotations.to_matrix(pose.bones[1]))
+    index = np.array(frame_index)
+    motion = Motion(
+        BODY.skeleton, RATE_HZ, index, index / RATE_HZ, world_from_root,
+        angles_rad, np.array(joints_m), np.array(bones), {},
+    )  # fmt: skip
+    return bvh_files(motion)[".bvh"]
+
+
+def written(path: Path, qpos: Floats, frame_index: list[int]) -> Bvh:
+    """A BVH output that was sent these frames, still open."""
+    output, kinematics = Bvh(path, BODY.skeleton, RATE_HZ), Kinematics(BODY)
+    for row, index in zip(qpos, frame_index, strict=True):
+        at_s = index / RATE_HZ
+        output.send(LivePose(index, frame(at_s), at_s, at_s, at_s, Estimate(row, Status.SOLVED), kinematics))
+    return output
+
+
+@pytest.mark.parametrize("frame_index", [list(range(12)), [0, 1, 2, 5, 6, 10, 11, 12, 13, 14, 15, 16]])
+def test_a_live_bvh_is_an_exported_one(tmp_path: Path, rng: np.random.Generator, frame_index: list[int]) -> None:
+    qpos = walked(rng, len(frame_index))
+    written(tmp_path / "live.bvh", qpos, frame_index).close()
+    live, export = (tmp_path / "live.bvh").read_text().split("\n"), exported(qpos, frame_index).split("\n")
+    assert [line.split() for line in live[:-1] if "." not in line] == [x.split() for x in export[:-1] if "." not in x]
+    first = export.index("MOTION") + 3
+    assert [line.split() for line in live[:first]] == [line.split() for line in export[:first]]
+    np.testing.assert_allclose(np.loadtxt(live[first:]), np.loadtxt(export[first:]), atol=2e-6)
+
+
+def test_a_bvh_that_was_never_closed_keeps_its_frames(tmp_path: Path, rng: np.random.Generator) -> None:
+    qpos = walked(rng, 100)
+    output = written(tmp_path / "live.bvh", qpos, list(range(100)))
+    lines = (tmp_path / "live.bvh").read_text().split("\n")
+    (count,) = (int(line.split()[1]) for line in lines if line.startswith("Frames:"))
+    assert count > 100 - RATE_HZ - 2  # it is saved every second
+    assert len(lines) >= lines.index("MOTION") + 3 + count
+    output.close()
+
+
+def test_a_long_break_is_one_frame(tmp_path: Path, rng: np.random.Generator) -> None:
+    written(tmp_path / "live.bvh", walked(rng, 3), [0, 4000, 3]).close()
+    assert "Frames:          3\n" in (tmp_path / "live.bvh").read_text()
+
+
+def test_a_table_is_read_back_exactly(tmp_path: Path, rng: np.random.Generator) -> None:
+    qpos, kinematics = walked(rng, 4), Kinematics(BODY)
+    output = Table(tmp_path / "poses.csv", BODY.skeleton, ("head", "hand"))
+    for n, row in enumerate(qpos):
+        output.send(
+            LivePose(n, frame(n / 3, n / 7), n / 3 + 0.1, n / 3 + 0.2, 0.0, Estimate(row, Status.HELD), kinematics)
+        )
+    output.close()
+    with (tmp_path / "poses.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["frame"]) for row in rows] == [0, 1, 2, 3]
+    assert {row["status"] for row in rows} == {"held"}
+    for n, row in enumerate(rows):
+        assert (float(row["received_s"]), float(row["ready_s"])) == (n / 3, n / 3 + 0.2)
+        assert float(row["device_s.hand"]) == n / 7
+        np.testing.assert_array_equal([float(value) for value in list(row.values())[7:]], qpos[n])
+    names = list(rows[0])[7:]
+    for name in ("lradius.rx_rad", "lfemur.rz_rad"):
+        joint = BODY.model.joint(name.removesuffix("_rad"))
+        assert names.index(name) == int(joint.qposadr[0])
+
+
+def test_nothing_is_written_over_unless_told(tmp_path: Path) -> None:
+    path = tmp_path / "there"
+    path.write_text("mine")
+    for make in (lambda: Bvh(path, BODY.skeleton, RATE_HZ), lambda: Table(path, BODY.skeleton, ())):
+        with pytest.raises(BadFile, match="it exists"):
+            make()
+    assert path.read_text() == "mine"
+    Table(path, BODY.skeleton, (), force=True).close()
+    assert path.read_text().startswith("frame,status")
+    with pytest.raises(BadFile, match="cannot be written"):
+        Table(tmp_path / "no" / "folder", BODY.skeleton, ())
