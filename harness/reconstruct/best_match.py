@@ -88,7 +88,7 @@ class BestMatchSession:
             self._gate.read(frame, self._residuals)
             velocity_m_s, moving = self._velocities(frame)
             self._answer = self._nearest(velocity_m_s, moving)
-            self._gate.answered(frame, self._residuals, self._answer)
+            self._gate.answered(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:

@@ -80,5 +80,5 @@ class CleanUpSession:
         self._gate.read(frame, self._residuals)
         start = np.concatenate([guess.qpos[:7], self._limits.clipped(self._limits.principal(guess.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
-        self._gate.answered(frame, self._residuals, qpos)
+        self._gate.answered(self._residuals, qpos)
         return Estimate(qpos, guess.status)

@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
+from harness.reconstruct.device_time import DeviceTime
 from harness.reconstruct.residuals import Residuals
 from harness.stream.frame import TrackerFrame
 
@@ -27,6 +28,7 @@ class Gate:
         self._velocity_m_s: Floats = np.zeros((stations, 3))
         self._believed_at_s: Floats = np.full(stations, -np.inf)
         self._known_at_s, self._moving = -np.inf, False
+        self._time, self._now_s = DeviceTime(), -np.inf
         self.left_out = False
         """Whether anything was left out of the last frame."""
         self.all_moved = False
@@ -35,15 +37,16 @@ class Gate:
     def read(self, frame: TrackerFrame, residuals: Residuals) -> None:
         """Have the residuals read the frame, but for what jumped."""
         residuals.read(frame)
-        jumped = self.jumped(frame.received_s, residuals.target_m, frame.position_valid)
+        self._now_s = self._time.of(frame)
+        jumped = self.jumped(self._now_s, residuals.target_m, frame.position_valid)
         self.left_out = bool(np.count_nonzero(jumped))
         if self.left_out:
             residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
-    def answered(self, frame: TrackerFrame, residuals: Residuals, qpos: Floats) -> None:
-        """The configuration (55,) that was given for the frame."""
+    def answered(self, residuals: Residuals, qpos: Floats) -> None:
+        """The configuration (55,) that was given for the frame that was read."""
         residuals.place(qpos)
-        self.settled(frame.received_s, residuals.station_m)
+        self.settled(self._now_s, residuals.station_m)
 
     def jumped(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
         """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""

@@ -108,7 +108,7 @@ class KernelRidgeSession:
             qpos[7:] += (near @ self._weights)[0]
             qpos[:7] = self._answer[:7]
             self._answer = nearest_placed(self._residuals, qpos)
-            self._gate.answered(frame, self._residuals, self._answer)
+            self._gate.answered(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _filled(self) -> tuple[Floats, Floats]:

@@ -153,7 +153,7 @@ class LocalSession:
         view, query, trust = self._outlook.seen(frame, self._answer)
         pose = self._smoothed(self._regressed(query, trust))
         self._answer = self._fitted_to_trackers(stood(pose[:POSTURE], moved(np.array(view), pose[POSTURE:])))
-        self._gate.answered(frame, self._residuals, self._answer)
+        self._gate.answered(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _regressed(self, query: Floats, trust: Floats) -> Floats:

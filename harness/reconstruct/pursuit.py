@@ -14,6 +14,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.reconstruct.coverage import LOST_AFTER_S, Coverage
+from harness.reconstruct.device_time import DeviceTime
 from harness.reconstruct.gate import JUMP_M, PATIENCE_S, Gate
 from harness.reconstruct.hinges import HingeLimits
 from harness.reconstruct.placing import placed, postures
@@ -78,6 +79,8 @@ class Pursuit:
         self._leaning = leaning
         self._coverage = Coverage(manner.lost_after_s)
         self._gate = Gate(len(calibration.stations), manner.jump_m)
+        self._time, self.now_s = DeviceTime(), 0.0
+        """The moment of this frame [s]."""
         self._starts = [*postures(body), *([] if leaning.mean_qpos is None else [leaning.mean_qpos])]
         self._started, self._following = False, False
         self._contradicted_since_s: float | None = None
@@ -100,31 +103,32 @@ class Pursuit:
 
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
+        self.now_s = self._time.of(frame)
         if any_seen:
             self._gate.read(frame, self.residuals)
             anew = self._gate.all_moved or (not self._following and (status is Status.SOLVED or not self._started))
             if anew:
                 solution = self._sought()
             else:
-                solution, anew = self._checked(self.followed(frame), frame.received_s)
+                solution, anew = self._checked(self.followed(frame))
             self.qpos = self._tidy(solution.qpos)
             self._started = True
             self.noted(frame, anew)
-            self._gate.answered(frame, self.residuals, self.qpos)
+            self._gate.answered(self.residuals, self.qpos)
         self._following = status is Status.SOLVED or (self._following and status is not Status.LOST)
         return Estimate(self.qpos, status)
 
-    def _checked(self, warm: Solution, now_s: float) -> tuple[Solution, bool]:
+    def _checked(self, warm: Solution) -> tuple[Solution, bool]:
         """The pose as it was followed, or one sought anew when the readings contradict it; and whether so."""
         contradicted = self.contradiction()
         if contradicted == 0.0 and not self._gate.left_out:
             self._contradicted_since_s = None
             return warm, False
         if self._contradicted_since_s is None:
-            self._contradicted_since_s = now_s
-        if contradicted < _MANY and (self._gate.left_out or now_s - self._contradicted_since_s < PATIENCE_S):
+            self._contradicted_since_s = self.now_s
+        if contradicted < _MANY and (self._gate.left_out or self.now_s - self._contradicted_since_s < PATIENCE_S):
             return warm, False
-        self._contradicted_since_s = now_s
+        self._contradicted_since_s = self.now_s
         cold = self._sought()
         return (cold, True) if cold.cost < 0.8 * warm.cost else (warm, False)
 

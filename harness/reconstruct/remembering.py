@@ -29,7 +29,7 @@ class Remembering(Pursuit, ABC):
         super().__init__(body, calibration, manner, leaning)
         self.past: Floats = np.tile(self.qpos, (poses, 1))
         """(m, 55) the last answers, newest first."""
-        self._rate_hz, self._known, self._now_s = rate_hz, 0, -np.inf
+        self._rate_hz, self._known, self._noted_s = rate_hz, 0, -np.inf
         self._free = np.isinf(self.limits.high_rad)
         self._replaced = np.array(self.past[-1])
 
@@ -43,7 +43,7 @@ class Remembering(Pursuit, ABC):
 
     def followed(self, frame: TrackerFrame) -> Solution:
         if self._known >= len(self.past):
-            periods = round((frame.received_s - self._now_s) * self._rate_hz)
+            periods = round((self.now_s - self._noted_s) * self._rate_hz)
             if periods == 0:
                 self.past[:-1], self.past[-1] = self.past[1:].copy(), self._replaced
             if periods <= self.longest_gap:
@@ -56,7 +56,7 @@ class Remembering(Pursuit, ABC):
     def noted(self, frame: TrackerFrame, anew: bool) -> None:
         self._known = 0 if anew else self._known
         self._remember(self.qpos)
-        self._now_s = frame.received_s
+        self._noted_s = self.now_s
 
     def _remember(self, qpos: Floats) -> None:
         """In the representation that most examples share."""
