@@ -1,0 +1,290 @@
+"""Recordings: what goes in comes out, whatever is cut off or damaged, and nothing else is ever written to."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.errors import BadFile
+from harness.stream.blocks import HEADER, LONGEST, MARKER, RECEIVED, SENT, VERSION, Block, Lost, blocks, encode
+from harness.stream.reader import WireFormat
+from harness.stream.recording import Recording, RecordingWriter, read_recording
+from harness.stream.records import Settings
+from tests.stream.wire import FOUR
+
+ENTRIES = [
+    Block(SENT, 10.0, 1e9, b"C"),
+    Block(RECEIVED, 10.5, 1e9 + 0.5, b"01 some bytes\r\n"),
+    Block(RECEIVED, 11.0, 1e9 + 1.0, MARKER + b"among data" + bytes(range(256))),
+    Block(RECEIVED, 11.5, 1e9 + 1.5, b""),
+]
+WHOLE = HEADER + b"".join(map(encode, ENTRIES))
+
+
+@dataclass(frozen=True)
+class Unplugged:
+    after_s: float
+
+
+def entries(data: bytes) -> tuple[list[Block], list[Lost]]:
+    found = list(blocks(data, 0 if data[: len(HEADER)] != HEADER else len(HEADER)))
+    return [e for e in found if isinstance(e, Block)], [e for e in found if isinstance(e, Lost)]
+
+
+def written(path: Path) -> Path:
+    """A small recording with something of everything."""
+    with RecordingWriter(path, {"source": "a test"}) as writer:
+        writer.sent(b"c", 1.0, 101.0)
+        writer.configured(FOUR, 1.1, 101.1)
+        writer.sent(b"C", 1.2, 101.2)
+        writer.received(b"01 ", 1.3, 101.3)
+        writer.happened(Unplugged(1.5))
+        writer.received(b"02 ", 1.4, 101.4)
+    return path
+
+
+def test_what_was_written_is_read(tmp_path: Path) -> None:
+    recording = read_recording(written(tmp_path / "a.rec"))
+    assert recording.lost == ()
+    assert recording.note == {"source": "a test"}
+    assert recording.formats == (FOUR,)
+    assert recording.events == [{"event": "Unplugged", "after_s": 1.5}]
+    over_the_line = [b for b in recording.blocks() if b.kind in (SENT, RECEIVED)]
+    assert over_the_line == [
+        Block(SENT, 1.0, 101.0, b"c"),
+        Block(SENT, 1.2, 101.2, b"C"),
+        Block(RECEIVED, 1.3, 101.3, b"01 "),
+        Block(RECEIVED, 1.4, 101.4, b"02 "),
+    ]
+
+
+@settings(max_examples=50)
+@given(data=st.binary(max_size=300), monotonic_s=st.floats(0.0, 1e9), wall_s=st.floats(0.0, 1e10))
+def test_any_bytes_at_any_time_come_back(data: bytes, monotonic_s: float, wall_s: float) -> None:
+    block = Block(RECEIVED, monotonic_s, wall_s, data)
+    assert list(blocks(encode(block) * 2, 0)) == [block, block]
+
+
+def test_a_format_says_all_that_a_reader_needs(tmp_path: Path) -> None:
+    odd = WireFormat(("head", "torso"), 75.0, (18, 20, 21), Settings(0.0254, 1e-6, binary=False), b"2A")
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.configured(odd)
+    assert read_recording(tmp_path / "a.rec").formats == (odd,)
+
+
+def test_more_than_a_block_holds_is_cut_in_two(tmp_path: Path) -> None:
+    data = os.urandom(LONGEST + 5)
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.received(data, 1.0, 2.0)
+    read = [b for b in read_recording(tmp_path / "a.rec").blocks() if b.kind == RECEIVED]
+    assert [len(b.payload) for b in read] == [LONGEST, 5]
+    assert b"".join(b.payload for b in read) == data
+
+
+def test_cut_at_any_byte_it_opens_and_says_what_was_lost(tmp_path: Path) -> None:
+    whole = written(tmp_path / "a.rec").read_bytes()
+    every = list(Recording(tmp_path, whole).blocks())
+    ends = [len(HEADER)]
+    for block in every:
+        ends.append(ends[-1] + len(encode(block)))
+    assert ends[-1] == len(whole)
+    for cut in range(1, len(whole)):
+        (tmp_path / "cut.rec").write_bytes(whole[:cut])
+        recording = read_recording(tmp_path / "cut.rec")
+        kept = sum(end <= cut for end in ends[1:])
+        assert list(recording.blocks()) == every[:kept]
+        begin = ends[kept] if cut >= len(HEADER) else 0
+        assert [f"the last {cut - begin} bytes" in lost for lost in recording.lost] == [True] * (cut > begin)
+
+
+@given(at=st.integers(0, len(WHOLE) - 1), flip=st.integers(1, 255))
+def test_a_flipped_byte_costs_its_block_and_is_named(at: int, flip: int) -> None:
+    data = bytearray(WHOLE)
+    data[at] ^= flip
+    found, lost = entries(bytes(data))
+    end, hit = len(HEADER), 0
+    while at >= end:
+        end += len(encode(ENTRIES[hit]))
+        hit += 1
+    expected = [e for i, e in enumerate(ENTRIES) if i != hit - 1]
+    assert found == expected
+    assert len(lost) == 1
+    assert lost[0].begin <= at < lost[0].end
+
+
+@given(pieces=st.lists(st.binary(max_size=80) | st.sampled_from([MARKER, encode(ENTRIES[0])[:20]]), max_size=5))
+def test_rubbish_between_blocks_hides_none_of_them(pieces: list[bytes]) -> None:
+    data = HEADER + b"".join(encode(ENTRIES[1]) + piece for piece in pieces) + encode(ENTRIES[2])
+    found, lost = entries(data)
+    assert found == [*[ENTRIES[1]] * len(pieces), ENTRIES[2]]
+    assert sum(e.end - e.begin for e in lost) == sum(map(len, pieces))
+
+
+def test_damage_in_the_middle_is_named_by_place_and_time(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.rec")
+    data = bytearray(path.read_bytes())
+    at = data.index(b"01 ")
+    data[at] ^= 1
+    path.write_bytes(data)
+    (lost,) = read_recording(path).lost
+    assert "damaged: between 1.200 s and" in lost
+
+
+def test_a_damaged_header_does_not_cost_the_rest(tmp_path: Path) -> None:
+    data = bytearray(written(tmp_path / "a.rec").read_bytes())
+    data[9] ^= 0xFF
+    (tmp_path / "a.rec").write_bytes(data)
+    recording = read_recording(tmp_path / "a.rec")
+    assert recording.formats == (FOUR,)
+    assert recording.lost == ("bytes 0 to 16 are damaged: the beginning, until 1.000 s",)
+
+
+def test_recording_goes_on_behind_what_is_there(tmp_path: Path) -> None:
+    """Also behind a block that was cut off: nothing is ever taken away."""
+    path = written(tmp_path / "a.rec")
+    cut = path.read_bytes()[:-7]
+    path.write_bytes(cut)
+    with RecordingWriter(path, {"source": "another test"}) as writer:
+        writer.configured(FOUR, 5.0, 105.0)
+        writer.received(b"03 ", 5.1, 105.1)
+    assert path.read_bytes()[: len(cut)] == cut
+    recording = read_recording(path)
+    assert [b.payload for b in recording.blocks() if b.kind == RECEIVED] == [b"01 ", b"03 "]
+    assert len(recording.formats) == 2
+    assert recording.note == {"source": "another test"}
+    assert len(recording.lost) == 1
+
+
+@pytest.mark.parametrize("kept", range(len(HEADER)))
+def test_a_header_that_was_cut_is_completed(kept: int, tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    path.write_bytes(HEADER[:kept])
+    with RecordingWriter(path) as writer:
+        writer.sent(b"c", 1.0, 2.0)
+    assert path.read_bytes().startswith(HEADER + MARKER)
+    assert read_recording(path).lost == ()
+
+
+def test_nothing_happens_to_a_file_before_there_is_something_to_write(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "a.rec"):
+        pass
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("content", [b"x", b"# a scenario\nschema = 1\n" * 100, b"\x00" * 5000, HEADER[:7] + b"?"])
+def test_another_file_is_refused_untouched(content: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(content)
+    for use in (RecordingWriter, read_recording):
+        with pytest.raises(BadFile, match="no recording"):
+            use(path)
+    assert path.read_bytes() == content
+
+
+def newer(version: int = VERSION + 1) -> bytes:
+    import struct
+    import zlib
+
+    head = HEADER[:8] + struct.pack("<I", version)
+    return head + struct.pack("<I", zlib.crc32(head)) + b"what nobody knows yet"
+
+
+def test_a_newer_version_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    path.write_bytes(newer())
+    for use in (RecordingWriter, read_recording):
+        with pytest.raises(BadFile, match=r"version 2; expected version 1 at most\. A newer version of the harness"):
+            use(path)
+    assert path.read_bytes() == newer()
+
+
+def test_what_is_no_place_to_record_into_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="The port comes first"):
+        RecordingWriter("/dev/null")
+    with pytest.raises(BadFile, match="The port comes first"):
+        RecordingWriter(tmp_path)
+    with pytest.raises(BadFile, match="no such folder"):
+        RecordingWriter(tmp_path / "none" / "a.rec")
+
+
+def test_reading_what_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="no such file"):
+        read_recording(tmp_path / "a.rec")
+    with pytest.raises(BadFile, match="a folder"):
+        read_recording(tmp_path)
+    (tmp_path / "empty.rec").touch()
+    with pytest.raises(BadFile, match="an empty file"):
+        read_recording(tmp_path / "empty.rec")
+
+
+def test_other_stations_are_refused(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.rec")
+    before = path.read_bytes()
+    with (
+        RecordingWriter(path) as writer,
+        pytest.raises(BadFile, match="Record other stations into another file"),
+    ):
+        writer.configured(WireFormat(("head",), 40.0))
+    assert path.read_bytes() == before
+
+
+def test_two_cannot_record_into_one_file(tmp_path: Path) -> None:
+    pytest.importorskip("fcntl", reason="only where the system has flock")
+    with RecordingWriter(tmp_path / "a.rec") as first:
+        first.sent(b"c", 1.0, 2.0)
+        with RecordingWriter(tmp_path / "a.rec") as second, pytest.raises(BadFile, match="Another process"):
+            second.sent(b"c", 1.0, 2.0)
+    assert len(list(read_recording(tmp_path / "a.rec").blocks())) == 2
+
+
+def test_a_full_disk_is_said() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("no /dev/full to stand for a full disk")
+    writer = RecordingWriter("unused")
+    writer._file = os.open("/dev/full", os.O_WRONLY)
+    with pytest.raises(BadFile, match="No space left"):
+        writer.sent(b"c", 1.0, 2.0)
+    os.close(writer._file)
+
+
+ENDLESS = """
+import sys
+from harness.stream.reader import WireFormat
+from harness.stream.recording import RecordingWriter
+writer = RecordingWriter(sys.argv[1], {"source": "a test"})
+writer.configured(WireFormat(("head",), 40.0), 0.0, 0.0)
+for count in range(10**9):
+    writer.received(b"%d\\n" % count, float(count), float(count))
+    if count % 1000 == 0:
+        print(count, flush=True)
+"""
+
+
+def test_a_killed_process_loses_at_most_the_block_it_was_writing(tmp_path: Path) -> None:
+    """As by `kill -9`: all that it had handed over is there."""
+    path = tmp_path / "a.rec"
+    with subprocess.Popen([sys.executable, "-c", ENDLESS, str(path)], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        said = [int(process.stdout.readline()) for _ in range(3)][-1]
+        time.sleep(0.02)
+        process.send_signal(signal.SIGKILL)
+    recording = read_recording(path)
+    counts = [int(b.payload) for b in recording.blocks() if b.kind == RECEIVED]
+    assert counts == list(range(len(counts)))
+    assert len(counts) > said
+    assert len(recording.lost) <= 1
+
+
+def test_blocks_are_json_where_the_layout_says_so(tmp_path: Path) -> None:
+    configured = next(b for b in read_recording(written(tmp_path / "a.rec")).blocks() if b.kind == "conf")
+    content = json.loads(configured.payload)
+    assert content["stations"] == list(FOUR.stations)
+    assert content["items"] == list(FOUR.items)
