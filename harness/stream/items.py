@@ -1,20 +1,23 @@
 """What a data record may hold: the items of an output list, as data (docs/is900.md 5.1).
 
-Sizes and layouts are those of the binary form; a structured numpy type per list does the packing.
+A record is a row of a structured numpy type, one field per item, whether it came in binary or as text: the type is
+the binary layout itself, and `ascii` turns text into the same rows.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from harness.errors import UnknownName
+from harness.errors import BadInput, UnknownName
 
 HEAD = ord("0")
 """Byte 0 of every data record."""
 BLANK = ord(" ")
 """Byte 2, the status, of an IS-900."""
+HEADER = 3
+"""Bytes before the items: head, station, status."""
 STATION_CHARACTERS = b"123456789ABC"
 STANDARD_LIST = (40, 2, 11, 21, 1)
 """Quality, position, quaternion, time, CR LF: 38 bytes."""
@@ -22,66 +25,105 @@ STANDARD_LIST = (40, 2, 11, 21, 1)
 
 @dataclass(frozen=True)
 class Item:
-    """One entry of an output list."""
+    """One entry of an output list: `count` values."""
 
     name: str
     kind: str
-    """numpy's name of one value."""
+    """numpy's name of one value in binary."""
     count: int
+    width: int = 0
+    """Characters of one value in ASCII, right-aligned; 0 where ASCII records hold the same bytes as binary ones."""
+    decimals: int = 0
+    blanks: int = 0
+    """After the values, in ASCII."""
     fixed: bytes = b""
     """The bytes themselves where they never change."""
+    sevens: bool = False
+    """Whether these are the 7-bit pairs of section 5.2."""
+
+    @property
+    def ascii_size(self) -> int:
+        """Bytes in an ASCII record."""
+        return self.count * (self.width or np.dtype(self.kind).itemsize) + self.blanks
 
 
 ITEMS: dict[int, Item] = {
-    0: Item("space", "u1", 1, b" "),
-    1: Item("end_of_line", "u1", 2, b"\r\n"),
-    2: Item("position", "<f4", 3),
-    4: Item("yaw_pitch_roll_deg", "<f4", 3),
-    5: Item("x_cosines", "<f4", 3),
-    6: Item("y_cosines", "<f4", 3),
-    7: Item("z_cosines", "<f4", 3),
-    11: Item("quaternion", "<f4", 4),
-    16: Item("stylus", "u1", 2),
-    18: Item("position_16", "u1", 6),
-    19: Item("yaw_pitch_roll_16", "u1", 6),
-    20: Item("quaternion_16", "u1", 8),
-    21: Item("time", "<f4", 1),
-    22: Item("buttons", "u1", 1),
-    23: Item("joystick", "u1", 2),
-    38: Item("camera_position", "<f4", 3),
-    39: Item("camera_yaw_pitch_roll_deg", "<f4", 3),
-    40: Item("quality", "u1", 1),
-    41: Item("time_code", "u1", 4),
-    42: Item("user_bits", "u1", 4),
-    43: Item("encoder_1", "u1", 4),
-    44: Item("encoder_2", "u1", 4),
-    45: Item("encoder_3", "u1", 4),
-    46: Item("lens_1", "<f4", 1),
-    47: Item("lens_2", "<f4", 1),
-    48: Item("lens_3", "<f4", 1),
-    49: Item("lens_4", "<f4", 1),
+    0: Item("space", "u1", 1, fixed=b" "),
+    1: Item("end_of_line", "u1", 2, fixed=b"\r\n"),
+    2: Item("position", "<f4", 3, 7, 2),
+    4: Item("yaw_pitch_roll_deg", "<f4", 3, 7, 2),
+    5: Item("x_cosines", "<f4", 3, 7, 4),
+    6: Item("y_cosines", "<f4", 3, 7, 4),
+    7: Item("z_cosines", "<f4", 3, 7, 4),
+    11: Item("quaternion", "<f4", 4, 7, 4),
+    16: Item("stylus", "u1", 2, 1),
+    18: Item("position_16", "u1", 6, sevens=True),
+    19: Item("yaw_pitch_roll_16", "u1", 6, sevens=True),
+    20: Item("quaternion_16", "u1", 8, sevens=True),
+    21: Item("time", "<f4", 1, 14),
+    22: Item("buttons", "u1", 1, 4, blanks=1),
+    23: Item("joystick", "u1", 2, 4),
+    38: Item("camera_position", "<f4", 3, 7, 2),
+    39: Item("camera_yaw_pitch_roll_deg", "<f4", 3, 7, 2),
+    40: Item("quality", "u1", 1, 4),
+    41: Item("time_code", "<u4", 1, 10),
+    42: Item("user_bits", "<u4", 1, 10),
+    43: Item("encoder_1", "<i4", 1, 8),
+    44: Item("encoder_2", "<i4", 1, 8),
+    45: Item("encoder_3", "<i4", 1, 8),
+    46: Item("lens_1", "<f4", 1, 7, 2),
+    47: Item("lens_2", "<f4", 1, 7, 2),
+    48: Item("lens_3", "<f4", 1, 7, 2),
+    49: Item("lens_4", "<f4", 1, 7, 2),
+    75: Item("radio_integrity", "u1", 1, 4),
+    76: Item("measurement_quality", "u1", 1, 4),
 }
-"""By code. Item 16 has two sizes in the sources; 2 bytes is what section 14 settles on."""
+"""By code. Inferred, not documented: what the bytes of 41 to 45 mean (integers), how 16 looks in ASCII (a digit per
+byte), and 75 and 76 altogether (their ranges are known, the layout is taken to be that of 40)."""
+UNREADABLE = (68, 69, 70, 71)
+"""The auxiliary inputs: their sizes stand on pages of the manual that nobody could read."""
 
 
 @lru_cache(maxsize=64)
-def record_type(items: tuple[int, ...]) -> np.dtype[Any]:
-    """The packed layout of a record: `head`, `station`, `status`, then each item by its name.
+def fields(items: tuple[int, ...], stylus_bytes: int = 2) -> tuple[Item, ...]:
+    """The items of a list; those that come again are spaces and line ends, and are given names of their own.
 
-    UnknownName for a code that no source gives a size for; an item may be listed once.
+    UnknownName for a code that no source has, BadInput for one of unknown size or one listed twice.
     """
-    fields: list[Any] = [("head", "u1"), ("station", "u1"), ("status", "u1")]
-    for code in items:
+    out: list[Item] = []
+    for at, code in enumerate(items):
+        if code in UNREADABLE:
+            raise BadInput(
+                f"Output item {code} (auxiliary input): no source tells its size, so records cannot be found.",
+                "Leave it out of the list.",
+            )
         if code not in ITEMS:
             raise UnknownName("output item", str(code), [str(known) for known in ITEMS])
-        item = ITEMS[code]
-        fields.append((item.name, item.kind) if item.count == 1 else (item.name, item.kind, (item.count,)))
-    return np.dtype(fields)
+        item = ITEMS[code] if code != 16 else replace(ITEMS[code], count=stylus_bytes)
+        if code in items[:at]:
+            if not item.fixed:
+                raise BadInput(f"Output item {code} ({item.name}) is listed twice.", "List it once.")
+            item = replace(item, name=f"{item.name}_{at}")
+        out.append(item)
+    return tuple(out)
 
 
-def size(items: tuple[int, ...]) -> int:
-    """Bytes of a binary record."""
-    return int(record_type(items).itemsize)
+@lru_cache(maxsize=64)
+def record_type(items: tuple[int, ...], stylus_bytes: int = 2) -> np.dtype[Any]:
+    """The packed layout of a binary record: `head`, `station`, `status`, then each item by its name."""
+    own = [
+        (item.name, item.kind) if item.count == 1 else (item.name, item.kind, (item.count,))
+        for item in fields(items, stylus_bytes)
+    ]
+    return np.dtype([("head", "u1"), ("station", "u1"), ("status", "u1"), *own])
+
+
+@lru_cache(maxsize=64)
+def size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int = 2) -> int:
+    """Bytes of a record on the wire."""
+    if binary:
+        return int(record_type(items, stylus_bytes).itemsize)
+    return HEADER + sum(item.ascii_size for item in fields(items, stylus_bytes))
 
 
 def terminator(items: tuple[int, ...]) -> bytes:

@@ -56,7 +56,7 @@ class FrameReader:
         self.garbage_bytes = 0
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that were no data."""
-        self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items))
+        self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
         self._clock = Unwrapper()
         self._assembler = Assembler(len(wire.stations), 1.0 / wire.rate_hz)
         self._stamped = 21 in wire.items
@@ -112,7 +112,7 @@ class FrameReader:
     def _readings(self, run: Records) -> Readings:
         count = len(run.table)
         self.records += count
-        last_byte = run.offset + run.table.itemsize * np.arange(1, count + 1)
+        last_byte = run.offset + run.size * np.arange(1, count + 1)
         received_s = self._ends_s[np.searchsorted(self._ends, last_byte)]
         raw = readings(run.table, received_s, self.wire.characters, self.wire.settings)
         measured_s = self._clock.unwrap(raw.measured_s, received_s)

@@ -1,4 +1,4 @@
-"""Binary data records, to be sent: SI units into the items of an output list (docs/is900.md 5)."""
+"""Data records to be sent: SI units into the items of an output list, and those into bytes (docs/is900.md 5)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
-from harness.stream.items import BLANK, HEAD, ITEMS, record_type
+from harness.stream import ascii as text
+from harness.stream.items import BLANK, HEAD, fields, record_type
 
 Table = NDArray[Any]
 """Records (N,) of one output list, with a field for each item (`items.record_type`)."""
@@ -33,7 +34,7 @@ class Settings:
     """Of item 16, which has 1 or 2 by the source (section 14)."""
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.metres_per_unit and 0.0 < self.seconds_per_tick and self.stylus_bytes in (1, 2)):
+        if not (self.metres_per_unit > 0.0 and self.seconds_per_tick > 0.0 and self.stylus_bytes in (1, 2)):
             raise BadInput(f"Not a device's settings: {self}.", "Units are positive; item 16 has 1 or 2 bytes.")
 
 
@@ -49,24 +50,31 @@ class Said:
     """(N, 4) unit quaternions."""
     quality: Floats
     """(N,) 0 lost to 1 best."""
+    buttons: Ints | int = 0
+    """(N,) bits, 0 where all are up (item 22)."""
+    joystick: Ints | int = 127
+    """(N, 2) left to right and rear to front, 0 to 255, centre 127 (item 23)."""
 
 
 def encode(items: tuple[int, ...], stations: NDArray[np.uint8], said: Said, settings: Settings) -> Table:
-    """Records (N,) ready for the wire, for these station characters (N,); `tobytes()` gives the bytes.
+    """Records (N,) of these station characters (N,), of which `to_bytes` makes the bytes.
 
-    Buttons are up and joysticks centred. BadInput for an item that no source says how to fill.
+    Nothing is said of cameras, lenses and the stylus: their items are 0, and the frame of a camera set is the
+    tracker's. Radio never loses a packet. UnknownName or BadInput for an item of unknown size.
     """
-    table = np.zeros(len(stations), record_type(items))
+    table = np.zeros(len(stations), record_type(items, settings.stylus_bytes))
     table["head"], table["station"], table["status"] = HEAD, stations, BLANK
-    for code in items:
-        item = ITEMS[code]
+    for item in fields(items, settings.stylus_bytes):
         if item.fixed:
             table[item.name] = np.frombuffer(item.fixed, np.uint8) if item.count > 1 else item.fixed[0]
         elif item.name in _COLUMNS:
             table[item.name] = _COLUMNS[item.name](said, settings)
-        else:
-            raise BadInput(f"Item {code} ({item.name}) cannot be written.", "Leave it out of the output list.")
     return table
+
+
+def to_bytes(items: tuple[int, ...], table: Table, settings: Settings) -> bytes:
+    """Records (N,) as they go over the wire, binary or ASCII."""
+    return table.tobytes() if settings.binary else text.write(items, table, settings.stylus_bytes)
 
 
 def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
@@ -103,19 +111,31 @@ def from_yaw_pitch_roll_deg(angles: Floats) -> Floats:
     return rotations.multiply(rotations.multiply(yaw, pitch), roll)
 
 
+def cosines(turn: Floats, axis: int) -> Floats:
+    """The station's X, Y or Z axis (N, 3) in the tracker's frame, of quaternions (N, 4) (items 5, 6, 7)."""
+    out: Floats = rotations.to_matrix(turn)[:, :, axis]
+    return out
+
+
 _COLUMNS: dict[str, Callable[[Said, Settings], Any]] = {
     "position": lambda said, settings: said.position_m / settings.metres_per_unit,
     "yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
+    "x_cosines": lambda said, settings: cosines(said.tracker_from_station, 0),
+    "y_cosines": lambda said, settings: cosines(said.tracker_from_station, 1),
+    "z_cosines": lambda said, settings: cosines(said.tracker_from_station, 2),
     "quaternion": lambda said, settings: said.tracker_from_station,
-    "stylus": lambda said, settings: 0,
     "position_16": lambda said, settings: pack_14_bit(said.position_m / FULL_SCALE_M),
     "yaw_pitch_roll_16": lambda said, settings: pack_14_bit(
         yaw_pitch_roll_deg(said.tracker_from_station) / FULL_SCALE_DEG
     ),
     "quaternion_16": lambda said, settings: pack_14_bit(said.tracker_from_station),
     "time": lambda said, settings: said.measured_s / settings.seconds_per_tick,
-    "buttons": lambda said, settings: 0,
-    "joystick": lambda said, settings: 127,
+    "buttons": lambda said, settings: said.buttons,
+    "joystick": lambda said, settings: said.joystick,
+    "camera_position": lambda said, settings: said.position_m / settings.metres_per_unit,
+    "camera_yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
     "quality": lambda said, settings: np.round(255.0 * np.clip(said.quality, 0.0, 1.0)),
+    "radio_integrity": lambda said, settings: 100,
+    "measurement_quality": lambda said, settings: np.round(100.0 * np.clip(said.quality, 0.0, 1.0)),
 }
-"""How each item is filled, in wire units."""
+"""How each item is filled, in wire units; the others are 0."""

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.errors import UnknownName
+from harness.errors import BadInput, UnknownName
 from harness.stream import items
 from harness.stream.readings import Readings, readings
 from harness.stream.records import Said, Settings, encode, pack_14_bit, unpack_14_bit
@@ -102,8 +102,12 @@ def test_lengths_are_those_of_the_table(codes: tuple[int, ...], length: int) -> 
 
 
 def test_an_item_without_a_known_size_is_refused() -> None:
-    with pytest.raises(UnknownName, match="output item called '76'"):
-        items.record_type((2, 76, 1))
+    with pytest.raises(BadInput, match=r"item 70 \(auxiliary input\): no source tells its size"):
+        items.record_type((2, 70, 1))
+    with pytest.raises(UnknownName, match="output item called '17'"):
+        items.record_type((2, 17, 1))
+    with pytest.raises(BadInput, match="listed twice"):
+        items.record_type((2, 2, 1))
 
 
 @pytest.mark.parametrize(
