@@ -1,0 +1,49 @@
+"""What kind of IS-900 is played, and on what kind of line."""
+
+import re
+from dataclasses import dataclass
+
+from harness.errors import BadInput
+from harness.stream.emulator.faults import Fault
+
+RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+"""Of the serial line [bit/s] (docs/is900.md 2)."""
+_FIRMWARE = re.compile(r"\d\.\d{2}\d{0,2}")
+
+
+@dataclass(frozen=True)
+class EmulatorConfig:
+    """The defaults are what was seen of a real one (docs/is900.md 6.1), on the line that every client opens."""
+
+    firmware: str = "4.2301"
+    """Version, as in the status record; item 40 needs 4.13, item 76 needs 4.26 (docs/is900.md 5.1)."""
+    identification: str = "IS900VET"
+    """Name in the status record."""
+    status_bytes: int = 55
+    """Length of the status record; 54 is what VRPN has met too (docs/is900.md 14)."""
+    baud: int = 115200
+    """Bits per second of the line at power-on."""
+    paced: bool = True
+    """False sends everything at once, as over Ethernet."""
+    queue_records: int = 12
+    """Records that wait for the line before the oldest is dropped (docs/is900.md 14; the size is a choice)."""
+    restart_s: float = 0.25
+    """Silence after a restart [s]; clients wait 10 to 20 s for a real one (docs/is900.md 4.1)."""
+    check_baud: bool = False
+    """On a pty: garble both directions while the client has set another rate than the device's."""
+    faults: tuple[Fault, ...] = ()
+    """What goes wrong, and when."""
+    seed: int = 1
+    """Of the faults' draws."""
+
+    def __post_init__(self) -> None:
+        if not _FIRMWARE.fullmatch(self.firmware):
+            raise BadInput(f"firmware {self.firmware!r}.", "Give a version such as 4.2301: one digit, a point, 2 to 4.")
+        if not (self.identification.isascii() and self.identification.isprintable() and len(self.identification) < 32):
+            raise BadInput(f"identification {self.identification!r}.", "Give up to 31 ASCII characters.")
+        if self.status_bytes not in (54, 55):
+            raise BadInput(f"status records of {self.status_bytes} bytes.", "They have 55 or 54.")
+        if self.baud not in RATES:
+            raise BadInput(f"{self.baud} baud.", f"An IS-900 knows {', '.join(map(str, RATES))}.")
+        if self.queue_records < 1 or self.restart_s < 0.0:
+            raise BadInput(f"Not an emulator: {self}.", "It queues a record at least, and no time is negative.")

@@ -1,0 +1,117 @@
+"""A pseudo terminal with a name of its own, for clients that know nothing but serial ports. Not for Windows."""
+
+import array
+import contextlib
+import fcntl
+import os
+import termios
+import tty
+from pathlib import Path
+
+from harness.errors import BadInput
+
+_CHUNK = 4096
+_MOST_WAITING = 4000
+"""Bytes that a client may leave unread before records are dropped; the terminal holds 4095."""
+
+
+class PtyPort:
+    """A pty in raw mode behind a symbolic link; its own end stays open, so that a client may close and open it."""
+
+    def __init__(self, link: Path | str) -> None:
+        """BadInput when something else is there."""
+        self._link = Path(link)
+        self._rest = b""
+        self._master = self._slave = -1
+        self.plug()
+
+    @property
+    def name(self) -> str:
+        return str(self._link)
+
+    def readable(self) -> list[int]:
+        return [] if self._master < 0 else [self._master]
+
+    def writable(self) -> list[int]:
+        return [self._master] if self._rest and self._master >= 0 else []
+
+    def read(self) -> bytes:
+        self._flush()
+        try:
+            return os.read(self._master, _CHUNK) if self._master >= 0 else b""
+        except BlockingIOError:
+            return b""
+
+    def write(self, data: bytes) -> bool:
+        self._flush()
+        if self._master < 0 or self._rest or self._waiting() + len(data) > _MOST_WAITING:
+            return False
+        self._rest = data
+        self._flush()
+        if len(self._rest) < len(data):
+            return True
+        self._rest = b""
+        return False
+
+    def baud(self) -> int | None:
+        rate = termios.tcgetattr(self._slave)[5]
+        return next((int(name[1:]) for name in dir(termios) if _is_rate(name) and getattr(termios, name) == rate), None)
+
+    def plug(self) -> None:
+        if self._master >= 0:
+            return
+        _refuse_other(self._link)
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        try:
+            if self._link.is_symlink():
+                self._link.unlink()
+            self._link.symlink_to(os.ttyname(self._slave))
+        except OSError as error:
+            self._shut()
+            raise BadInput(
+                f"{self._link}: {error.strerror}.", "Name a link in a folder that you may write to."
+            ) from error
+
+    def unplug(self) -> None:
+        """The client's end goes dead, as when an adapter is pulled out."""
+        if self._master >= 0:
+            with contextlib.suppress(OSError):
+                if os.readlink(self._link) == os.ttyname(self._slave):
+                    self._link.unlink()
+            self._shut()
+
+    def close(self) -> None:
+        self.unplug()
+
+    def _shut(self) -> None:
+        os.close(self._slave)
+        os.close(self._master)
+        self._master = self._slave = -1
+        self._rest = b""
+
+    def _waiting(self) -> int:
+        """Bytes that the client has not read."""
+        count = array.array("i", [0])
+        fcntl.ioctl(self._slave, termios.FIONREAD, count)
+        return count[0]
+
+    def _flush(self) -> None:
+        if self._rest and self._master >= 0:
+            with contextlib.suppress(BlockingIOError):
+                self._rest = self._rest[os.write(self._master, self._rest) :]
+
+
+def _refuse_other(link: Path) -> None:
+    """BadInput unless the place is free, or a link to a pty that is gone."""
+    if link.is_symlink():
+        target = os.readlink(link)
+        if not target.startswith("/dev/pts/") or os.path.exists(target):
+            raise BadInput(f"{link} is there and leads to {target}.", "Name another link, or remove it.")
+    elif link.exists():
+        raise BadInput(f"{link} is there and is no link of an emulator.", "Name another link; nothing is overwritten.")
+
+
+def _is_rate(name: str) -> bool:
+    return name[0] == "B" and name[1:].isdigit()

@@ -1,0 +1,95 @@
+"""Everything a host may set, as one value: saving it and going back to it is keeping it."""
+
+from dataclasses import dataclass, field, replace
+
+from harness.stream.replies import Emitter
+
+STATIONS = "123456789ABC"
+DEFAULT_LIST = (2, 4, 1)
+"""Position, angles, CR LF (docs/is900.md 12)."""
+Vector = tuple[float, float, float]
+Turn = tuple[float, float, float, float]
+NOWHERE: Vector = (0.0, 0.0, 0.0)
+UNTURNED: Turn = (1.0, 0.0, 0.0, 0.0)
+CONSTELLATION = tuple(
+    Emitter(
+        1 + 3 * row + column, (0.9144 * row - 0.9144, 0.6096 * column - 0.6096, 0.0), (0.0, 0.0, 1.0), 5001 + number
+    )
+    for number, (row, column) in enumerate((row, column) for row in range(3) for column in range(3))
+)
+"""Three bars of three emitters that look down; made up, but for the spacings and the first number's form."""
+
+
+@dataclass(frozen=True)
+class StationSettings:
+    """One station."""
+
+    active: bool = False
+    items: tuple[int, ...] = DEFAULT_LIST
+    origin_m: Vector = NOWHERE
+    """Of the alignment frame, in the tracker's."""
+    tracker_from_aligned: Turn = UNTURNED
+    before: Turn = UNTURNED
+    """Boresight of the heading: turns what is reported about the frame's own axes."""
+    after: Turn = UNTURNED
+    """Full boresight: turns the station's axes."""
+    reference_deg: Vector = NOWHERE
+    """Angles that boresight makes of the present ones."""
+    tip_m: Vector = NOWHERE
+    """In the station's own axes."""
+    mounting_deg: Vector = NOWHERE
+    """Yaw, pitch and roll of the transmitter's mounting."""
+    envelope_m: tuple[float, ...] = (10.0, 10.0, 10.0, -10.0, -10.0, -10.0)
+    prediction_ms: int = 0
+    enhancement: int = 0
+    sensitivity: int = 3
+    compass: int = 0
+
+    @property
+    def plain(self) -> bool:
+        """Whether readings are reported as they were taken."""
+        return (
+            self.origin_m == self.tip_m == self.mounting_deg == NOWHERE
+            and self.tracker_from_aligned == self.before == self.after == UNTURNED
+        )
+
+
+@dataclass(frozen=True)
+class DeviceSettings:
+    """The device; the defaults are those after power-on (docs/is900.md 12)."""
+
+    stations: tuple[StationSettings, ...] = field(default_factory=lambda: (StationSettings(),) * len(STATIONS))
+    binary: bool = False
+    centimetres: bool = False
+    microseconds: bool = False
+    boresight_as_fastrak: bool = False
+    lights: bool = True
+    brightness: int = 100
+    timeout_ms: int = 20
+    """Ultrasonic time-out; the default is a choice."""
+    gain: int = 1
+    """Ultrasonic sensitivity; the default is a choice."""
+    genlock: str = "0"
+    genlock_hz: float = 0.0
+    genlock_source: int = 1
+    genlock_phase: float = 0.0
+    emitters: tuple[Emitter, ...] = CONSTELLATION
+    drafted: tuple[Emitter, ...] = CONSTELLATION
+    """Emitters as `MCe` would make them."""
+    error_log: bool = True
+    command_log: bool = False
+    scheduling: int = 1
+    lock: int = 0
+    address: str = "192.168.1.10"
+    udp: bool = False
+    udp_port: int = 5001
+    baud: int = 115200
+    framing: tuple[str, int, int] = ("N", 8, 0)
+    """Parity, bits and hardware handshake; kept and without effect."""
+
+    def station(self, name: str) -> StationSettings:
+        return self.stations[STATIONS.index(name)]
+
+    def with_station(self, name: str, station: StationSettings) -> "DeviceSettings":
+        k = STATIONS.index(name)
+        return replace(self, stations=(*self.stations[:k], station, *self.stations[k + 1 :]))

@@ -1,0 +1,118 @@
+"""A TCP port: the same bytes as on the serial line (docs/is900.md 9)."""
+
+import socket
+from collections.abc import Callable
+
+from harness.errors import BadInput
+
+Say = Callable[[str], None]
+"""Takes a line for whoever watches."""
+_CHUNK = 4096
+_LOOPBACK = ("127.0.0.1", "::1", "localhost")
+
+
+class TcpPort:
+    """A TCP port for one client at a time; others are turned away at once."""
+
+    def __init__(self, host: str, port: int, *, anywhere: bool = False, say: Say = lambda line: None) -> None:
+        """BadInput when it is taken, or open to others unless that is asked for."""
+        if host not in _LOOPBACK and not anywhere:
+            advice = "Use 127.0.0.1, or say --anywhere: whoever reaches the port may then command the emulator."
+            raise BadInput(f"{host} is not this computer alone.", advice)
+        self._say = say
+        self._client: socket.socket | None = None
+        self._rest = b""
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
+            self._server: socket.socket | None = socket.create_server((host, port), family=family, backlog=4)
+        except (OSError, OverflowError) as error:
+            raise BadInput(f"tcp://{host}:{port}: {error}.", "Choose another port; 0 takes a free one.") from error
+        self._server.setblocking(False)
+        self._address: tuple[str, int] = (host, self._server.getsockname()[1])
+
+    @property
+    def name(self) -> str:
+        host, port = self._address
+        return f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
+
+    def readable(self) -> list[int]:
+        return [end.fileno() for end in (self._server, self._client) if end is not None]
+
+    def writable(self) -> list[int]:
+        return [self._client.fileno()] if self._rest and self._client is not None else []
+
+    def read(self) -> bytes:
+        self._welcome()
+        self._flush()
+        if self._client is None:
+            return b""
+        try:
+            data = self._client.recv(_CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._leave()
+        return data
+
+    def write(self, data: bytes) -> bool:
+        self._flush()
+        if self._client is None or self._rest:
+            return False
+        self._rest = data
+        self._flush()
+        if self._client is not None and len(self._rest) < len(data):
+            return True
+        self._rest = b""
+        return False
+
+    def baud(self) -> int | None:
+        return None
+
+    def unplug(self) -> None:
+        self._leave()
+        if self._server is not None:
+            self._server.close()
+            self._server = None
+
+    def plug(self) -> None:
+        if self._server is None:
+            family = socket.AF_INET6 if ":" in self._address[0] else socket.AF_INET
+            self._server = socket.create_server(self._address, family=family, backlog=4)
+            self._server.setblocking(False)
+
+    def close(self) -> None:
+        self.unplug()
+
+    def _welcome(self) -> None:
+        """Let in whoever waits, if nobody is there."""
+        while self._server is not None:
+            try:
+                client, address = self._server.accept()
+            except (BlockingIOError, ConnectionError):
+                return
+            if self._client is not None:
+                client.close()
+                self._say(f"turned away {address[0]}:{address[1]}: one client at a time")
+                continue
+            client.setblocking(False)
+            client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
+            self._client = client
+            self._say(f"client {address[0]}:{address[1]}")
+
+    def _leave(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client, self._rest = None, b""
+            self._say("client gone")
+
+    def _flush(self) -> None:
+        if self._rest and self._client is not None:
+            try:
+                self._rest = self._rest[self._client.send(self._rest) :]
+            except BlockingIOError:
+                pass
+            except OSError:
+                self._leave()

@@ -1,0 +1,57 @@
+"""The emulator at real ports, with real clients: what it plays is the simulation, bit by bit."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.rehearsal import Rehearsal, rehearse
+from harness.stream import commands
+from harness.stream.emulator import EmulatorConfig, serving
+from harness.stream.frame import TrackerFrame
+from harness.stream.reader import FrameReader, WireFormat
+from harness.stream.transport import Transport, open_transport
+
+PATIENT_S = 30.0
+"""A loaded machine gets so long before a test fails."""
+
+
+@pytest.fixture(scope="module")
+def walk() -> Rehearsal:
+    return rehearse("builtin_walking", noise="default", stations=6)
+
+
+def set_up(client: Transport, stations: str = "123456") -> None:
+    client.write(commands.STOP)
+    for station in stations:
+        client.write(commands.output_list(station, (40, 2, 11, 21, 1)))
+    for command in (commands.BINARY, commands.CENTIMETRES, commands.MILLISECONDS, commands.ZERO_CLOCK, commands.STREAM):
+        client.write(command)
+
+
+def frames_of(client: Transport, wire: WireFormat, count: int) -> list[TrackerFrame]:
+    reader, frames, until_s = FrameReader(wire), list[TrackerFrame](), time.monotonic() + PATIENT_S
+    while len(frames) < count and time.monotonic() < until_s:
+        frames += reader.feed(client.read(1.0), time.monotonic())
+    return frames
+
+
+def same(one: TrackerFrame, other: TrackerFrame) -> bool:
+    names = [name for name in TrackerFrame.__slots__ if name != "received_s"]
+    return all(np.array_equal(getattr(one, n).astype(float), getattr(other, n).astype(float), True) for n in names)
+
+
+@pytest.mark.parametrize("where", ["pty", "tcp"])
+def test_the_frames_are_the_simulations(where: str, walk: Rehearsal, tmp_path: Path) -> None:
+    at = {"pty": tmp_path / "is900"} if where == "pty" else {"tcp": "127.0.0.1:0"}
+    with serving(walk.samples, EmulatorConfig(), **at) as emulator:  # type: ignore[arg-type]
+        client = open_transport(emulator.name)
+        set_up(client)
+        frames = frames_of(client, WireFormat(walk.samples.stations, walk.samples.rate_hz), 40)
+        client.close()
+    simulated = walk.simulation.frames
+    first = [frame.measured_s[0] for frame in simulated].index(frames[0].measured_s[0])
+    pairs = list(zip(frames, simulated[first:], strict=False))
+    assert len(pairs) >= 40
+    assert all(same(*pair) for pair in pairs)
