@@ -13,8 +13,9 @@ class DeviceTime:
     def __init__(self) -> None:
         self._known: dict[int, tuple[float, float]] = {}
         """Row of a station -> its last stamp, and the time of the frame that brought it [s]."""
-        self._now: tuple[float, float] | None = None
-        """Time and reception of the last frame [s]."""
+        self._host: tuple[float, float] | None = None
+        """Time and reception of the first frame, or of the last that had a stamp to go by [s]."""
+        self._now_s = 0.0
 
     def of(self, frame: TrackerFrame) -> float:
         """The time of the next frame since the first [s]; by the host's clock where no stamp can be used."""
@@ -25,17 +26,15 @@ class DeviceTime:
             )
             if stamp_s == stamp_s and not suspect
         ]
-        now_s = self._by_stamps(stamps, frame.received_s)
+        known = next(((row, stamp_s) for row, stamp_s in stamps if row in self._known), None)
+        if known is not None:
+            before_s, at_s = self._known[known[0]]
+            self._now_s = max(at_s + known[1] - before_s, self._now_s)
+            self._host = self._now_s, frame.received_s
+        elif self._host is not None:
+            self._now_s = max(self._host[0] + frame.received_s - self._host[1], self._now_s)
+        else:
+            self._host = self._now_s, frame.received_s
         for row, stamp_s in stamps:
-            self._known[row] = stamp_s, now_s
-        self._now = now_s, frame.received_s
-        return now_s
-
-    def _by_stamps(self, stamps: list[tuple[int, float]], received_s: float) -> float:
-        if self._now is None:
-            return 0.0
-        for row, stamp_s in stamps:
-            if row in self._known:
-                before_s, at_s = self._known[row]
-                return max(at_s + stamp_s - before_s, self._now[0])
-        return self._now[0] + received_s - self._now[1]
+            self._known[row] = stamp_s, self._now_s
+        return self._now_s
