@@ -40,6 +40,11 @@ class Sessions:
         return {"frames": self._frames} | {name: n + now.get(name, 0) for name, n in self._before.items()}
 
     @property
+    def reader(self) -> FrameReader | None:
+        """Of the session that runs; None before the first set-up."""
+        return self._reader
+
+    @property
     def silent_from_s(self) -> float:
         """When every unfinished frame is due if no byte comes before."""
         return self._heard_s + SILENCE * self._period_s
