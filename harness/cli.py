@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import motion, runs, trust
+from harness.commands import emulate, motion, runs, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -65,6 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
         trust.add_check,
         trust.add_bench,
         trust.add_doctor,
+        emulate.add_emulate,
     ):
         add(verbs)
     return parser

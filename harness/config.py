@@ -15,9 +15,10 @@ from harness.score.cell import varied_text
 from harness.score.orders import Order
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
+from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
-_FIXED = ("schema", "name", "methods", "inputs", "vary", "order")
+_FIXED = ("schema", "name", "methods", "inputs", "vary", "order", "fault")
 
 
 @dataclass(frozen=True)
@@ -91,6 +92,8 @@ class Scenario:
     or with each combination of them when there are several keys."""
     order: tuple[Order, ...] = ()
     """What a paper expects of the errors (see `harness.score.orders`)."""
+    fault: tuple[Fault, ...] = ()
+    """What goes wrong where an emulator plays the scenario (see `harness.stream.emulator`); runs know nothing of it."""
 
 
 def load_scenario(path: Path | str) -> Scenario:

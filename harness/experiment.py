@@ -115,7 +115,9 @@ def run(
     for _, made in reversed(variants(scenario)):
         source = source_of(made.motion, folder, made.seed)
         check_names(made, source, parts)
-    results.open_run(out, manifest.of_run(asdict(scenario), motion_source=source.title, command=command))
+    content = asdict(scenario)
+    del content["fault"]  # of an emulator alone: a run is the same with and without
+    results.open_run(out, manifest.of_run(content, motion_source=source.title, command=command))
     planned = _in_order(todo)
     ended: dict[str, Ended] = {}
     try:

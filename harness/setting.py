@@ -161,7 +161,7 @@ class Setting:
         """
         scenario = self.scenario
         content = asdict(scenario)
-        for many in ("methods", "inputs", "name", "components", "vary", "order"):
+        for many in ("methods", "inputs", "name", "components", "vary", "order", "fault"):
             del content[many]
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
         del content["motion"]["withheld"]

@@ -1,12 +1,12 @@
 """An emulator at a port, in real time: one loop that waits for the client or for the next byte that is due."""
 
+import contextlib
 import select
 import socket
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -131,6 +131,14 @@ class Server:
         }
 
 
+def play(samples: Samples, config: EmulatorConfig, port: Port) -> dict[str, float]:
+    """Play samples at a port until Ctrl-C, the normal end; what was sent, as `Server.summary` has it."""
+    server = Server(Emulator(samples, config, time.monotonic()), port)
+    with contextlib.suppress(KeyboardInterrupt):
+        server.run()
+    return server.summary()
+
+
 @dataclass(frozen=True)
 class Serving:
     """An emulator that runs in a thread of its own."""
@@ -147,7 +155,7 @@ class Serving:
         return self.server.summary()
 
 
-@contextmanager
+@contextlib.contextmanager
 def serving(
     samples: Samples,
     config: EmulatorConfig | None = None,

@@ -45,7 +45,7 @@ def same(one: TrackerFrame, other: TrackerFrame) -> bool:
 @pytest.mark.parametrize("where", ["pty", "tcp"])
 def test_the_frames_are_the_simulations(where: str, walk: Rehearsal, tmp_path: Path) -> None:
     at = {"pty": tmp_path / "is900"} if where == "pty" else {"tcp": "127.0.0.1:0"}
-    with serving(walk.samples, EmulatorConfig(), **at) as emulator:  # type: ignore[arg-type]
+    with serving(walk.samples, EmulatorConfig(), **at) as emulator:
         client = open_transport(emulator.name)
         set_up(client)
         frames = frames_of(client, WireFormat(walk.samples.stations, walk.samples.rate_hz), 40)

@@ -1,0 +1,129 @@
+"""The verb that plays a tracker."""
+
+import argparse
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+from harness.commands.verb import Verbs, add_verb, positive, say
+from harness.errors import Outcome
+
+if TYPE_CHECKING:
+    from harness.config import Scenario
+    from harness.stream.emulator.config import EmulatorConfig
+
+FEWEST = 4
+"""Stations at start: VRPN takes no more (docs/is900.md 11.1)."""
+
+
+def add_emulate(verbs: Verbs) -> None:
+    text = "play a scenario as an IS-900 in real time, on a pty or a TCP port; Ctrl-C ends it"
+    verb = add_verb(verbs, "emulate", text, emulate, "seed", "mocap")
+    verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
+    where = verb.add_mutually_exclusive_group(required=True)
+    where.add_argument("--pty", type=Path, metavar="LINK", help="pseudo terminal, reached through a link of this name")
+    where.add_argument("--tcp", metavar="HOST:PORT", help="TCP port; 0 takes a free one")
+    verb.add_argument("--anywhere", action="store_true", help="let a TCP port be reached from other computers")
+    verb.add_argument("--clip", help="a clip to play (default: the scenario's first)")
+    text = f"how many of the scenario's stations, or their names (default: the first {FEWEST})"
+    verb.add_argument("--stations", metavar="N|A,B", help=text)
+    verb.add_argument("--rate", type=float, metavar="HZ", help="records per second of each station")
+    verb.add_argument("--noise", help="clean, noise or default, instead of the scenario's")
+    verb.add_argument(
+        "--items", type=_items, metavar="A,B", help="list that clients will ask for, to see whether the line carries it"
+    )
+    verb.add_argument("--baud", type=positive, help="rate of the line, which paces what is sent (default 115200)")
+    verb.add_argument("--unpaced", action="store_true", help="send at once, as over Ethernet")
+    verb.add_argument("--overload", action="store_true", help="play more than the line carries; records are dropped")
+    text = "pty: garble everything while the client has set another rate"
+    verb.add_argument("--check-baud", action="store_true", help=text)
+    verb.add_argument("--firmware", metavar="VERSION", help="such as 4.1105, which has no item 40 (default 4.2301)")
+    verb.add_argument("--restart", type=float, metavar="S", help="silence after a restart [s] (default 0.25)")
+    verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave out the scenario's faults")
+
+
+def emulate(args: argparse.Namespace) -> Outcome:
+    from harness.rehearsal import rehearse
+    from harness.stream.emulator.capacity import check_capacity
+    from harness.stream.emulator.serve import open_port, play
+
+    rehearsal = rehearse(
+        args.scenario,
+        clip=args.clip,
+        stations=_stations(args),
+        rate_hz=args.rate,
+        noise=args.noise,
+        seed=args.seed,
+        folder=args.mocap,
+    )
+    scenario, tracker = rehearsal.scenario, rehearsal.tracker
+    config = _config(args, scenario)
+    if not (args.unpaced or args.overload):
+        check_capacity(len(scenario.stations), tracker.rate_hz, args.items or tracker.items, config.baud)
+    port = open_port(args.pty, args.tcp, anywhere=args.anywhere, say=_talk)
+    with closing(port), _ended_by_sigterm():
+        samples = rehearsal.samples
+        worn = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
+        pace = f"{config.baud} baud" if config.paced else "unpaced"
+        _talk(f"{rehearsal.setting.part} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
+        _talk(f"an IS-900 at {port.name}{_reach(args)}; Ctrl-C ends it")
+        counts = play(samples, config, port)
+    return say(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
+
+
+def _stations(args: argparse.Namespace) -> int | list[str]:
+    from harness.config import load_scenario
+
+    if not args.stations:
+        return min(FEWEST, len(load_scenario(args.scenario).stations))
+    return int(args.stations) if args.stations.isdigit() else [name.strip() for name in args.stations.split(",")]
+
+
+def _config(args: argparse.Namespace, scenario: "Scenario") -> "EmulatorConfig":
+    from harness.stream.emulator.config import EmulatorConfig
+
+    given = {"firmware": args.firmware, "restart_s": args.restart}
+    return EmulatorConfig(
+        **{name: value for name, value in given.items() if value is not None},
+        baud=args.baud or scenario.tracker.baud,
+        paced=not args.unpaced,
+        queue_records=scenario.tracker.queue_records,
+        check_baud=args.check_baud,
+        faults=scenario.fault if args.faults else (),
+        seed=scenario.seed,
+    )
+
+
+def _reach(args: argparse.Namespace) -> str:
+    if args.pty:
+        return ""
+    return ", reached from anywhere: nothing asks who commands it" if args.anywhere else ", from this computer alone"
+
+
+def _items(text: str) -> tuple[int, ...]:
+    codes = text.split(",")
+    if not all(code.strip().isdigit() for code in codes):
+        raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
+    return tuple(map(int, codes))
+
+
+def _talk(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """Whoever stops the program by SIGTERM means what Ctrl-C says."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
