@@ -25,7 +25,7 @@ def call_each(
     theirs, ours = context.Pipe(duplex=False)
     with ProcessPoolExecutor(workers, context, _start, (theirs,)) as pool:
         try:
-            with _ctrl_c_ignored():  # which processes inherit, so that they never see it, not even while they import
+            with ctrl_c_ignored():  # which processes inherit, so that they never see it, not even while they import
                 running = {pool.submit(function, *task): which for which, task in enumerate(tasks)}
             for future in as_completed(running):
                 yield running.pop(future), future  # kept no longer than the caller keeps it
@@ -47,7 +47,8 @@ def _end_with(alive: Connection) -> None:
 
 
 @contextmanager
-def _ctrl_c_ignored() -> Iterator[None]:
+def ctrl_c_ignored() -> Iterator[None]:
+    """Processes that are started meanwhile never see Ctrl-C."""
     if current_thread() is not main_thread():  # Ctrl-C is the main thread's affair, and signals may be set there alone
         yield
         return

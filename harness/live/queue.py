@@ -34,6 +34,14 @@ class DroppingQueue(Generic[T]):
             self._waiting.put(None)  # for whoever asks again
         return item
 
+    def drop_all(self) -> None:
+        """Let go of all that waits and count it, for the taking thread to start afresh."""
+        for _ in range(len(self)):
+            if self._waiting.get() is None:
+                self.end()
+            else:
+                self.dropped += 1
+
     def end(self) -> None:
         """Nothing comes any more; what waits can still be taken."""
         self._waiting.put(None)

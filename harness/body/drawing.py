@@ -1,0 +1,127 @@
+"""Bodies in three dimensions: a floor with light on it, and figures whose flesh follows their bones.
+
+VTK without a working OpenGL may end the process instead of raising, so whoever imports this file does it in a process
+of its own.
+"""
+
+from typing import Any
+
+import numpy as np
+import pyvista as pv
+
+from harness.body.anatomy import shapes
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+
+_PAPER, _FLOOR, _LINES, _SHADOW = "#f3f5f7", "#e6eaee", "#c9d1d8", "#c3ccd4"
+_GRID_M, _REACH_M = 0.5, 5.0
+_AWAY_M = 4.6
+
+
+class Stage:
+    """One plotter for many pictures: a floor, lights, and a camera that goes along."""
+
+    def __init__(self, size: tuple[int, int], heading_rad: float, *, off_screen: bool = True) -> None:
+        """`size` in pixels; `heading_rad` is where the body faces, to see it from ahead and from the side."""
+        self.plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
+        self.plotter.background_color = pv.Color(_PAPER)
+        self.plotter.enable_anti_aliasing("msaa", multi_samples=8)
+        self._disc = self.plotter.add_mesh(pv.Disc(inner=0.0, outer=40.0, c_res=48), color=_FLOOR, lighting=False)
+        self._grid = self.plotter.add_mesh(_grid(), color=_LINES, lighting=False, line_width=1.0)
+        camera = self.plotter.camera
+        camera.focal_point = (0.0, 0.0, 0.0)
+        camera.position = tuple(_AWAY_M * np.array([np.cos(heading_rad - 0.7), np.sin(heading_rad - 0.7), 0.22]))
+        camera.up = (0.0, 0.0, 1.0)
+        camera.view_angle = 27.0
+        for direction, strength in (((0.4, 0.6, 1.0), 0.85), ((-0.6, -0.5, 0.5), 0.35), ((0.2, -0.8, 0.3), 0.4)):
+            turn = rotations.about_z(heading_rad)
+            light = pv.Light(light_type="scene light", intensity=strength)
+            light.position = tuple(rotations.rotate(turn, np.array(direction)) * 10.0)
+            light.focal_point = (0.0, 0.0, 0.0)
+            light.positional = False
+            self.plotter.add_light(light)
+
+    def follow(self, root_m: Floats) -> None:
+        """Floor and camera go where the body is (3,); from where one looks at it stays."""
+        at = np.array([*root_m[:2], 0.0])
+        self._disc.position = tuple(at)
+        self._grid.position = tuple(np.round(at / _GRID_M) * _GRID_M)
+        middle = np.array([*at[:2], max(0.93, float(root_m[2]) - 0.05)])
+        camera = self.plotter.camera
+        away = np.array(camera.position) - np.array(camera.focal_point)
+        camera.focal_point = tuple(middle)
+        camera.position = tuple(middle + away)
+        self.plotter.reset_camera_clipping_range()
+
+    def picture(self) -> np.ndarray:
+        """(height, width, 3) bytes; RuntimeError when OpenGL is there but draws nothing."""
+        self.plotter.render()
+        picture = np.asarray(self.plotter.screenshot(return_img=True))
+        if picture.std() == 0.0:
+            raise RuntimeError("OpenGL is there but draws nothing")
+        return picture
+
+    def close(self) -> None:
+        self.plotter.close()
+
+
+class Figure:
+    """A body of capsules and ellipsoids, drawn as one mesh whose points follow the bones, and its shadow."""
+
+    def __init__(self, plotter: "pv.Plotter", skeleton: Skeleton, colour: str, girth: float, opacity: float) -> None:
+        self._parts, meshes, first = [], [], 0
+        for shape in shapes(skeleton):
+            mesh = _mesh(shape.kind, shape.size_m, girth)
+            turn = rotations.to_matrix(shape.bone_from_shape)
+            mesh.points = mesh.points @ turn.T + shape.centre_m
+            bone = -1 if shape.bone == "root" else skeleton.index(shape.bone)
+            where = slice(first, first + mesh.n_points)
+            self._parts.append((bone, where, np.asarray(mesh.points, dtype=float), mesh["Normals"] @ turn.T))
+            meshes.append(mesh)
+            first += mesh.n_points
+        self._body = meshes[0].append_polydata(*meshes[1:])
+        self._shadow = self._body.copy()
+        self.look: Any = plotter.add_mesh(self._body, color=colour, opacity=opacity, culling="back").prop
+        self.look.interpolation = "Phong"
+        self.look.ambient, self.look.diffuse, self.look.specular, self.look.specular_power = 0.42, 0.8, 0.25, 12.0
+        plotter.add_mesh(self._shadow, color=_SHADOW, lighting=False)
+
+    def move(self, root_m: Floats, world_from_root: Floats, start_m: Floats, world_from_bone: Floats) -> None:
+        """To where the root (3,), (3, 3) and the joints of the bones (B, 3), (B, 3, 3) are [m]."""
+        points, normals = np.empty((self._body.n_points, 3)), np.empty((self._body.n_points, 3))
+        for bone, where, local, normal in self._parts:
+            turn = world_from_root if bone < 0 else world_from_bone[bone]
+            points[where] = local @ turn.T + (root_m if bone < 0 else start_m[bone])
+            normals[where] = normal @ turn.T
+        self._body.points = points
+        self._body["Normals"] = normals
+        self._body.point_data.active_normals_name = "Normals"
+        self._shadow.points = points * [1.0, 1.0, 0.0] + [0.0, 0.0, 0.004]
+
+
+def _mesh(kind: str, size_m: Floats, girth: float) -> "pv.PolyData":
+    """A capsule along z or an ellipsoid, with normals."""
+    ball = pv.Sphere(radius=1.0, theta_resolution=20, phi_resolution=16)
+    unit = np.asarray(ball.points, dtype=float)
+    mesh = pv.PolyData(ball.points.copy(), ball.faces)
+    if kind == "capsule":
+        radius, half = girth * float(size_m[0]), float(size_m[1])
+        mesh.points = unit * radius + np.where(unit[:, 2:] >= 0.0, half, -half) * [0.0, 0.0, 1.0]
+        mesh["Normals"] = unit
+    else:
+        thin = size_m * [girth, girth, 0.5 + 0.5 * girth]
+        mesh.points = unit * thin
+        outward = unit / thin
+        mesh["Normals"] = outward / np.linalg.norm(outward, axis=1, keepdims=True)
+    return mesh
+
+
+def _grid() -> "pv.PolyData":
+    """Lines every half metre, within a circle."""
+    offsets = np.arange(-_REACH_M + _GRID_M, _REACH_M, _GRID_M)
+    half = np.sqrt(_REACH_M**2 - offsets**2)
+    ends = []
+    for offset, reach in zip(offsets, half, strict=True):
+        ends += [[offset, -reach, 0.002], [offset, reach, 0.002], [-reach, offset, 0.002], [reach, offset, 0.002]]
+    return pv.line_segments_from_points(np.array(ends))

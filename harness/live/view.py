@@ -1,0 +1,138 @@
+"""The body in three dimensions as it moves: in a process of its own, which shows the newest pose when it is ready to.
+
+Nothing here waits for it. A pose lies in memory that both processes share; while the other one looks, the next poses
+go by. OpenGL that is missing or broken may end that process, not this one.
+"""
+
+import os
+import sys
+from dataclasses import dataclass
+from importlib.util import find_spec
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.core.workers import ctrl_c_ignored
+from harness.errors import BadFile, BadInput, MissingExtra
+from harness.live.pose import LivePose
+
+Kind = Literal["window", "frames"]
+READY, CLOSED = "ready", "closed"
+"""What the other process says."""
+_START_S, _END_S = 60.0, 10.0
+_SIZE = 3 + 55
+
+
+@dataclass(frozen=True)
+class Screen:
+    """What the other process is to show, and where."""
+
+    kind: Kind
+    bone_m: Floats
+    """(B, 3) of the body [m]."""
+    out: str
+    """Folder of the frames."""
+    rate_hz: float
+    """Pictures per second at most."""
+
+
+class Shared:
+    """The newest pose, in memory that two processes share: its number, time [s] and status, then `qpos`."""
+
+    def __init__(self, context: Any) -> None:
+        self._lock = context.Lock()
+        self._memory = context.RawArray("d", _SIZE)
+        self._memory[0] = -1.0
+
+    def put(self, pose: LivePose) -> None:
+        """Unless the other process is looking at this very moment."""
+        if self._lock.acquire(block=False):
+            try:
+                self._memory[:3] = [pose.number, pose.measured_s, pose.estimate.status]
+                self._memory[3:] = pose.estimate.qpos
+            finally:
+                self._lock.release()
+
+    def get(self) -> Floats:
+        """(3 + 55,) as above; the number is -1 before the first."""
+        with self._lock:
+            return np.array(self._memory)
+
+
+class View:
+    """An `Output`: a window, or pictures in a folder."""
+
+    def __init__(self, kind: Kind, own: Skeleton, out: Path | None = None, *, force: bool, rate_hz: float) -> None:
+        """Returns when a first picture, of the T-pose, was drawn; BadInput, BadFile, MissingExtra when it cannot be."""
+        self.name = f"--view {kind}"
+        if find_spec("pyvista") is None:
+            raise MissingExtra(self.name, "pyvista", "viz")
+        screenless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+        if kind == "window" and screenless:
+            raise BadInput("--view window: there is no screen (DISPLAY is not set).", "Take --view frames --out DIR.")
+        if kind == "frames":
+            _made(out, force)
+        context = get_context("spawn")
+        self._shared = Shared(context)
+        self._ours, theirs = context.Pipe()
+        screen = Screen(kind, own.bone_m, str(out or ""), rate_hz)
+        self._process = context.Process(target=_show, args=(screen, self._shared, theirs), name="view", daemon=True)
+        with ctrl_c_ignored():  # it ends with us, not beside us
+            self._process.start()
+        theirs.close()
+        try:
+            said = self._ours.recv() if self._ours.poll(_START_S) else "it does not answer"
+        except EOFError:
+            self._process.join(_END_S)
+            said = f"its process ended with {self._process.exitcode}"
+        if said != READY:
+            self.close()
+            raise BadInput(f"{self.name} cannot be drawn: {said}.", "Does this computer have OpenGL? Leave it out.")
+
+    def send(self, pose: LivePose) -> None:
+        """OSError when the process is gone."""
+        if self._ours.poll():
+            try:
+                raise OSError("its window was closed" if self._ours.recv() == CLOSED else "it failed")
+            except EOFError:
+                raise OSError("its process ended") from None
+        self._shared.put(pose)
+
+    def close(self) -> None:
+        self._ours.close()
+        self._process.join(_END_S)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+
+def _made(out: Path | None, force: bool) -> None:
+    """The folder is there, and has no pictures of another session."""
+    if out is None:
+        raise BadInput("--view frames needs a folder.", "Name one with --out DIR.")
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadFile(out, f"it cannot be made ({error.strerror})", "a folder", "Name another.") from error
+    old = sorted(out.glob("*.png"))
+    if old and not force:
+        raise BadFile(out, f"there are {len(old)} pictures in it", "a folder without", "Name another, or say --force.")
+    for picture in old:
+        picture.unlink()
+
+
+def _show(screen: Screen, shared: Shared, told: Any) -> None:
+    """The other process; it takes what the computer has left over."""
+    if hasattr(os, "nice"):
+        os.nice(10)
+    os.environ["LP_NUM_THREADS"] = "1"  # Mesa draws by as many threads as there are cores where there is no GPU
+    try:
+        from harness.live.screen import show
+
+        show(screen, shared, told)
+    except Exception as error:  # whoever started us tells the user
+        told.send(f"{type(error).__name__}: {error}")

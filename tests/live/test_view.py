@@ -1,0 +1,75 @@
+"""The view in its own process: pictures of the newest pose, and clear words where there can be none."""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.body import humanoid
+from harness.body.kinematics import Kinematics
+from harness.errors import BadFile, BadInput
+from harness.live.view import View
+from tests.live.posing import live_pose
+
+pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
+OWN = humanoid.build().skeleton
+
+
+def wait_for(pictures: int, folder: Path) -> list[Path]:
+    until_s = time.monotonic() + 60.0
+    while len(found := sorted(folder.glob("*.png"))) < pictures and time.monotonic() < until_s:
+        time.sleep(0.02)
+    return found
+
+
+def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
+    from matplotlib.image import imread
+
+    shown, kinematics = (
+        View("frames", OWN, tmp_path / "frames", force=False, rate_hz=20.0),
+        Kinematics(humanoid.build()),
+    )
+    try:
+        qpos = np.array(humanoid.tpose(OWN))
+        shown.send(live_pose(qpos, 0))
+        wait_for(1, tmp_path / "frames")
+        qpos[7:] += 0.3
+        began_s = time.monotonic()
+        for number in range(1, 2001):
+            shown.send(live_pose(qpos, number, kinematics=kinematics))
+        assert time.monotonic() - began_s < 10.0  # two thousand pictures take a hundred seconds
+        found = wait_for(2, tmp_path / "frames")
+    finally:
+        shown.close()
+    found = sorted((tmp_path / "frames").glob("*.png"))
+    assert found[0].name == "00000000.png"
+    assert len(found) < 100  # most poses were never drawn
+    first, last = imread(found[0]), imread(found[-1])
+    assert first.shape[:2] == (640, 640)
+    assert np.abs(first - last).mean() > 1e-3
+    with pytest.raises(BadFile, match="pictures in it"):
+        View("frames", OWN, tmp_path / "frames", force=False, rate_hz=20.0)
+
+
+def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
+    shown = View("frames", OWN, tmp_path, force=False, rate_hz=20.0)
+    shown._process.kill()
+    shown._process.join()
+    with pytest.raises(OSError, match="ended"):
+        shown.send(live_pose(humanoid.tpose(OWN)))
+    shown.close()
+
+
+def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(BadInput, match="needs a folder"):
+        View("frames", OWN, force=False, rate_hz=4.0)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(BadInput, match="there is no screen"):
+        View("window", OWN, force=False, rate_hz=4.0)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadFile, match="cannot be made"):
+        View("frames", OWN, tmp_path / "file", force=False, rate_hz=4.0)
