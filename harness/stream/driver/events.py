@@ -13,6 +13,7 @@ Kind = Literal[
     "reset",  # the device has forgotten what it was told
     "wrong list",  # the records are not those that were asked for
     "garbage",  # bytes that belong to nothing
+    "missing",  # a station that was there is not
     "refused",  # what came back cannot be used as it is
 ]
 

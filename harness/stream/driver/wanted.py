@@ -75,6 +75,8 @@ class Timing:
     USB adapters hold bytes back for 0.016 s."""
     answer_s: float = 1.0
     """VRPN allows as much for `S` (docs/is900.md 11.1); InterSense's library 2 s for lists."""
+    back_answer_s: float = 0.5
+    """The same when it is expected back: tried again soon."""
     stalled_s: float = 0.5
     """Nothing, or no record, for so long: the device is asked how it is."""
     silent_s: float = 2.0

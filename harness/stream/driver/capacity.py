@@ -1,0 +1,37 @@
+"""Whether a serial line can carry what is asked for: ten bits a byte (docs/is900.md 10)."""
+
+from harness.errors import BadInput
+from harness.stream.items import size
+
+BITS = 10
+"""Of a byte on an 8N1 line: a start bit, eight of data, a stop bit."""
+SHORT_LIST = (40, 18, 19, 21, 1)
+"""Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes."""
+TRACKING_BYTES = 48
+"""Of an answer to `MP` (docs/is900.md 7)."""
+
+
+def load(stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float = 0.0) -> float:
+    """Bits per second of so many stations, with `MP` asked so often."""
+    return BITS * (stations * size(items) * rate_hz + TRACKING_BYTES * asked_hz)
+
+
+def check_capacity(
+    port: str, baud: int | None, stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float
+) -> None:
+    """BadInput when the stations say more than the line carries; `baud` is None where there is no such limit."""
+    if baud is None or load(stations, items, rate_hz, asked_hz) <= baud:
+        return
+    fitting = max((n for n in range(stations) if load(n, items, rate_hz, asked_hz) <= baud), default=0)
+    ways = [f"{fitting} station{'s' * (fitting > 1)}"] if fitting else []
+    if load(stations, SHORT_LIST, rate_hz, asked_hz) <= baud and size(items) > size(SHORT_LIST):
+        ways.append(f"the {size(SHORT_LIST)}-byte list {','.join(map(str, SHORT_LIST))}")
+    slower = (baud - load(0, items, 0.0, asked_hz)) / load(stations, items, 1.0)
+    ways.append(f"a device that runs at {slower:.0f} Hz or less")
+    if baud < 115200:
+        ways.append("a device set to 115200 baud")
+    raise BadInput(
+        f"Port {port}: {stations} stations x {size(items)} bytes x {BITS} bits x {rate_hz:g} Hz are "
+        f"{load(stations, items, rate_hz, asked_hz):.0f} bit/s, and the line carries {baud}.",
+        f"Try {', or '.join(ways)}.",
+    )

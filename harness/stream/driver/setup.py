@@ -1,0 +1,133 @@
+"""The set-up: tell the device how to report, ask it whether it does. No setter is acknowledged (docs/is900.md 1)."""
+
+import re
+from dataclasses import replace
+
+from harness.errors import BadInput
+from harness.stream import commands
+from harness.stream.driver.capacity import check_capacity
+from harness.stream.driver.line import Line
+from harness.stream.driver.measure import measured_rate_hz
+from harness.stream.driver.stations import Stations
+from harness.stream.driver.wanted import TELL_QUALITY, Wanted
+from harness.stream.reader import WireFormat
+from harness.stream.replies import OutputList, Status, SystemRecord, TrackingStatus
+
+SINCE = {40: 4.13, 76: 4.26}
+"""Firmware that knows an item first (docs/is900.md 5.1)."""
+AGREE = 0.1
+"""Rates that differ by less than this share are one; `MP` rounds to whole numbers."""
+
+
+def items_for(port: str, status: Status, wanted: Wanted) -> tuple[int, ...]:
+    """The output list: without quality where `MP` is to tell it; BadInput when the firmware is too old for it."""
+    if wanted.quality == "mp":
+        return tuple(code for code in wanted.items if code not in TELL_QUALITY)
+    found = re.match(r"\d+\.\d+", status.firmware)
+    version = float(found[0]) if found else float("inf")  # then the device itself says whether it takes the list
+    for code in wanted.items:
+        if version < SINCE.get(code, 0.0):
+            raise BadInput(
+                f"Port {port}: firmware {status.firmware} does not know item {code} (quality), "
+                f"which came with {SINCE[code]}.",
+                "Take quality 'mp', which asks the device once a second instead, or newer firmware.",
+            )
+    return wanted.items
+
+
+class SetUp:
+    """Sets up one device, once. `boresight` is for the first time: later, nobody stands in the pose of reference."""
+
+    def __init__(self, port: str, baud: int | None, line: Line, status: Status, wanted: Wanted) -> None:
+        self._port, self._baud, self._line, self._wanted = port, baud, line, wanted
+        self._items = items_for(port, status, wanted)
+
+    def carry_out(self, stations: Stations, boresight: bool) -> WireFormat:
+        """Tell and ask; BadInput when the device does not do as it is told, or the line is too slow for it."""
+        rate_hz = self._told_rate_hz(len(stations.names))
+        wire = WireFormat(
+            stations.names, rate_hz or 1.0, self._items, self._wanted.settings, stations.characters.encode()
+        )
+        self._line.errors.clear()
+        self._tell(wire)
+        if amiss := self._differences(wire):
+            self._tell(wire)
+            amiss = self._differences(wire)
+        if amiss:
+            raise BadInput(f"Port {self._port}: the device does not do as it is told: {amiss}.", self._advice())
+        self._place(wire, boresight)
+        if rate_hz is None:
+            wire = replace(wire, rate_hz=measured_rate_hz(self._port, self._line, wire))
+            self._check_capacity(len(stations.names), wire.rate_hz)
+        return wire
+
+    def _told_rate_hz(self, stations: int) -> float | None:
+        """As the user or the device says; None when it must be measured."""
+        asked_hz = self._wanted.rate_hz
+        tracking = self._line.ask(commands.TRACKING, TrackingStatus, self._line.timing.answer_s)
+        own_hz = tracking.rate_hz if tracking is not None else 0.0
+        rate_hz = asked_hz or own_hz
+        self._check_capacity(stations, max(rate_hz, own_hz))
+        if asked_hz and own_hz and abs(asked_hz - own_hz) > AGREE * own_hz:
+            raise BadInput(
+                f"Port {self._port}: a rate of {asked_hz:g} Hz is asked for, the device runs at {own_hz:g} Hz.",
+                "Leave the rate out, or set the device's own.",
+            )
+        return rate_hz or None
+
+    def _check_capacity(self, stations: int, rate_hz: float) -> None:
+        asked_hz = 1.0 / self._line.timing.tracking_s if self._wanted.quality == "mp" else 0.0
+        check_capacity(self._port, self._baud, stations, self._items, rate_hz, asked_hz)
+
+    def _tell(self, wire: WireFormat) -> None:
+        wanted = self._wanted
+        self._line.send(commands.BINARY)
+        self._line.send(commands.CENTIMETRES if wanted.centimetres else commands.INCHES)
+        self._line.send(commands.MILLISECONDS if wanted.milliseconds else commands.MICROSECONDS)
+        for station in wire.characters.decode():
+            self._line.send(commands.output_list(station, wire.items))
+            # the answer paces us: the device's own buffer is small (error -5, docs/is900.md 6.4)
+            self._line.ask(commands.read_list(station), OutputList, self._line.timing.answer_s)
+
+    def _differences(self, wire: WireFormat) -> str:
+        """What the device has otherwise than it was told; empty when all is well."""
+        line, answer_s = self._line, self._line.timing.answer_s
+        status = line.ask(commands.STATUS, Status, answer_s)
+        if status is None:
+            return "no answer to S"
+        system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
+        found = [
+            "it reports in ASCII" if not status.binary else "",
+            "it goes on sending" if status.continuous else "",
+            f"it reports in {'centimetres' if status.centimetres else 'inches'}"
+            if status.centimetres != self._wanted.centimetres
+            else "",
+            f"its clock counts {'micro' if system.microseconds else 'milli'}seconds"
+            if system is not None and system.microseconds == self._wanted.milliseconds
+            else "",
+        ]
+        for station in wire.characters.decode():
+            answer = line.ask(commands.read_list(station), OutputList, answer_s)
+            if answer is None:
+                found.append(f"no answer to O{station}")
+            elif answer.station != station or answer.items != wire.items:
+                found.append(f"the list of station {answer.station} is {','.join(map(str, answer.items))}")
+        return ", ".join(filter(None, found))
+
+    def _place(self, wire: WireFormat, boresight: bool) -> None:
+        """The frames that stations report in; BadInput when the device refuses them."""
+        self._line.errors.clear()
+        for station, name in zip(wire.characters.decode(), wire.stations, strict=True):
+            if (frame := self._wanted.alignment_of(name)) is not None:
+                self._line.send(commands.undo_alignment(station))
+                self._line.send(commands.alignment(station, *([100.0 * value for value in point] for point in frame)))
+            if boresight:
+                self._line.send(commands.boresight(station))
+        if boresight or self._wanted.alignment is not None:
+            self._line.ask(commands.STATUS, Status, self._line.timing.answer_s)  # errors come before its answer
+        if self._line.errors:
+            raise BadInput(f"Port {self._port}: the device refuses its frame.", self._advice())
+
+    def _advice(self) -> str:
+        said = "; ".join(f"{error.command}: error {error.code}" for error in self._line.errors[-3:])
+        return f"It said: {said}." if said else "Switch it off and on, and see that no other program talks to it."

@@ -1,0 +1,155 @@
+"""Is all well on the line? Told what comes and when, it finds trouble and says what to do; no input or output.
+
+Trouble is told once, until records have come again. What the device is asked meanwhile it answers between records, so
+that nothing is lost where all was well.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from harness.stream.driver.events import Kind
+from harness.stream.driver.wanted import Timing
+from harness.stream.frame import TrackerFrame
+from harness.stream.reader import FrameReader, WireFormat
+from harness.stream.replies import OutputList, ReplyEvent, Status, parse
+
+Step = Literal["none", "ask", "set up", "reopen"]
+"""Ask how the device is, set it up anew, or open the line anew and then set it up."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something to be told, something to be done, or both."""
+
+    step: Step
+    kind: Kind | None = None
+    text: str = ""
+
+
+class Watchdog:
+    """Looks on while data flow; `pause` and `start` enclose a set-up."""
+
+    def __init__(self, timing: Timing) -> None:
+        self._timing = timing
+        self._told: dict[Kind, float] = {}
+        """Troubles since records came last, and when each was told [s]."""
+        self._wire: WireFormat | None = None
+        """While data flow."""
+        self._began_s = self._sound_s = self._heard_s = self._asked_s = self._spoilt_s = self._clean_until_s = 0.0
+        self._device_s = -np.inf
+        self._garbage, self._resets, self._zeroed = 0, 0, 0
+        self._complaint = ""
+        self._connected = False
+
+    def pause(self) -> None:
+        """Data do not flow."""
+        self._wire = None
+
+    def start(self, wire: WireFormat, now_s: float) -> None:
+        """Data are about to flow."""
+        self._wire = wire
+        self._began_s = self._sound_s = self._heard_s = self._asked_s = now_s
+        self._garbage, self._resets, self._zeroed, self._complaint, self._connected = 0, 0, 0, "", False
+
+    def zeroed(self) -> None:
+        """The device's clock was set to zero on purpose."""
+        self._zeroed += 1
+
+    def tell(self, kind: Kind, text: str, now_s: float, step: Step = "none") -> Finding:
+        """The finding, without its words when it was told before."""
+        if kind in self._told:
+            return Finding(step)
+        self._told[kind] = now_s
+        return Finding(step, kind, text)
+
+    def framed(self, frames: Sequence[TrackerFrame], now_s: float) -> list[Finding]:
+        """Frames came; they are sound when the device's clock goes on."""
+        if self._wire is None or not frames:
+            return []
+        device_s = max(float(np.fmax.reduce(frame.measured_s, initial=-np.inf)) for frame in frames)
+        if 21 in self._wire.items and device_s <= self._device_s:
+            return []
+        away_s = now_s - self._sound_s if self._connected else now_s - min(self._told.values(), default=now_s)
+        news = not self._connected or set(self._told) - {"garbage"}
+        self._device_s, self._sound_s, self._connected = device_s, now_s, True
+        self._told = {kind: told_s for kind, told_s in self._told.items() if kind == "garbage"}
+        if not news:
+            return []
+        again = f" again after {away_s:.1f} s" if away_s > 0.0 else ""
+        stations = f"{len(self._wire.stations)} stations at {self._wire.rate_hz:g} Hz"
+        return [Finding("none", "connected", f"records come{again}: {stations}")]
+
+    def look(self, now_s: float, came: bool, reader: FrameReader) -> list[Finding]:
+        """What is amiss now; `came` tells whether bytes did since the last look."""
+        if self._wire is None:
+            return []
+        if came:
+            self._heard_s = now_s
+        found = self._garbage_found(now_s, reader)
+        found += self._silence_found(now_s)
+        while reader.replies:
+            found += self._answer(self._wire, parse(reader.replies.popleft().line), now_s)
+        if reader.clock_resets > self._resets + self._zeroed:
+            found.append(self._ask(now_s))
+        if reader.clock_resets > self._resets:
+            self._zeroed = max(self._zeroed - 1, 0)
+        self._resets = reader.clock_resets
+        return found
+
+    def _garbage_found(self, now_s: float, reader: FrameReader) -> list[Finding]:
+        more, self._garbage = reader.garbage_bytes - self._garbage, reader.garbage_bytes
+        if not more:
+            if now_s - self._spoilt_s > self._timing.garbage_s:
+                self._told.pop("garbage", None)
+            return []
+        if now_s - self._spoilt_s > self._timing.garbage_s:
+            self._clean_until_s = now_s
+        self._spoilt_s = now_s
+        found = [self.tell("garbage", f"{more} bytes belong to nothing", now_s)]
+        if min(now_s - self._clean_until_s, now_s - self._asked_s) > self._timing.stalled_s:
+            found.append(self._ask(now_s))  # it goes on: is it the list that we expect?
+        return found
+
+    def _silence_found(self, now_s: float) -> list[Finding]:
+        without_s, timing = now_s - self._sound_s, self._timing
+        if without_s > timing.silent_s:
+            if now_s - self._heard_s < timing.stalled_s:
+                return [Finding("set up")]
+            return [self.tell("silent", f"no byte for {now_s - self._heard_s:.1f} s", now_s, "reopen")]
+        if without_s > timing.stalled_s and now_s - self._asked_s > timing.stalled_s:
+            silent = now_s - self._heard_s > timing.stalled_s
+            what = "no byte" if silent else "no record that is news"
+            return [self.tell("stalled", f"{what} for {without_s:.1f} s", now_s), self._ask(now_s)]
+        return []
+
+    def _ask(self, now_s: float) -> Finding:
+        self._asked_s = now_s
+        return Finding("ask")
+
+    def _answer(self, wire: WireFormat, reply: ReplyEvent, now_s: float) -> list[Finding]:
+        """A wrong answer may be a damaged one: it counts when it comes twice."""
+        kind, complaint = complaint_of(wire, reply)
+        if kind is None:
+            return []
+        if complaint != self._complaint:
+            self._complaint = complaint
+            return [self._ask(now_s)]
+        return [self.tell(kind, complaint, now_s, "set up")]
+
+
+def complaint_of(wire: WireFormat, reply: ReplyEvent, streaming: bool = True) -> tuple[Kind | None, str]:
+    """What an answer shows to be otherwise than it was set up, as a kind of trouble and in words."""
+    if isinstance(reply, Status):
+        amiss = [
+            "it reports in ASCII" if not reply.binary else "",
+            "its unit is another" if reply.centimetres != (wire.settings.metres_per_unit == 0.01) else "",
+            "it does not stream" if streaming and not reply.continuous else "",
+        ]
+        if any(amiss):
+            return "reset", "the device was reset: " + ", ".join(filter(None, amiss))
+    if isinstance(reply, OutputList) and reply.station in wire.characters.decode() and reply.items != wire.items:
+        return "wrong list", f"the list of station {reply.station} is {','.join(map(str, reply.items))}"
+    return None, ""
