@@ -1,23 +1,16 @@
 """The verb that plays a tracker."""
 
 import argparse
-import signal
-import sys
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
-from harness.commands.verb import Verbs, add_verb, positive, say
+from harness.commands.verb import FEWEST, Verbs, add_verb, ended_by_sigterm, positive, say, stations_of, talk
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
     from harness.config import Scenario
     from harness.stream.emulator.config import EmulatorConfig
-
-FEWEST = 4
-"""Stations at start: VRPN takes no more (docs/is900.md 11.1)."""
 
 
 def add_emulate(verbs: Verbs) -> None:
@@ -54,7 +47,7 @@ def emulate(args: argparse.Namespace) -> Outcome:
     rehearsal = rehearse(
         args.scenario,
         clip=args.clip,
-        stations=_stations(args),
+        stations=stations_of(args),
         rate_hz=args.rate,
         noise=args.noise,
         seed=args.seed,
@@ -64,23 +57,15 @@ def emulate(args: argparse.Namespace) -> Outcome:
     config = _config(args, scenario)
     if not (args.unpaced or args.overload):
         check_capacity(len(scenario.stations), tracker.rate_hz, args.items or tracker.items, config.baud)
-    port = open_port(args.pty, args.tcp, anywhere=args.anywhere, say=_talk)
-    with closing(port), _ended_by_sigterm():
+    port = open_port(args.pty, args.tcp, anywhere=args.anywhere, say=talk)
+    with closing(port), ended_by_sigterm():
         samples = rehearsal.samples
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
-        _talk(f"{rehearsal.setting.part} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
-        _talk(f"an IS-900 at {port.name}{_reach(args)}; Ctrl-C ends it")
+        talk(f"{rehearsal.setting.part} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
+        talk(f"an IS-900 at {port.name}{_reach(args)}; Ctrl-C ends it")
         counts = play(samples, config, port)
     return say(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
-
-
-def _stations(args: argparse.Namespace) -> int | list[str]:
-    from harness.config import load_scenario
-
-    if not args.stations:
-        return min(FEWEST, len(load_scenario(args.scenario).stations))
-    return int(args.stations) if args.stations.isdigit() else [name.strip() for name in args.stations.split(",")]
 
 
 def _config(args: argparse.Namespace, scenario: "Scenario") -> "EmulatorConfig":
@@ -109,21 +94,3 @@ def _items(text: str) -> tuple[int, ...]:
     if not all(code.strip().isdigit() for code in codes):
         raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
     return tuple(map(int, codes))
-
-
-def _talk(line: str) -> None:
-    print(line, file=sys.stderr, flush=True)
-
-
-@contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """Whoever stops the program by SIGTERM means what Ctrl-C says."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)

@@ -2,13 +2,19 @@
 
 import argparse
 import json
-from collections.abc import Callable, Mapping
+import signal
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
 from harness.errors import Outcome
 
 Verbs = Any  # argparse's subparsers object has no public type
+FEWEST = 4
+"""Stations of a device where nothing is said: VRPN takes no more (docs/is900.md 11.1)."""
 Action = Callable[[argparse.Namespace], Outcome]
 
 
@@ -34,6 +40,34 @@ def positive(text: str) -> int:
     if not text.isdigit() or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no positive whole number")
     return int(text)
+
+
+def stations_of(args: argparse.Namespace) -> int | list[str]:
+    """What `--stations` asks for: how many of the scenario's, or their names; `FEWEST` without."""
+    from harness.config import load_scenario
+
+    if not args.stations:
+        return min(FEWEST, len(load_scenario(args.scenario).stations))
+    return int(args.stations) if args.stations.isdigit() else [name.strip() for name in args.stations.split(",")]
+
+
+def talk(line: str) -> None:
+    """To whoever sits there; stdout is data."""
+    print(line, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def ended_by_sigterm() -> Iterator[None]:
+    """Whoever stops the program by SIGTERM means what Ctrl-C says."""
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def say(args: argparse.Namespace, content: Mapping[str, Any], *lines: str, outcome: Outcome = Outcome.PASS) -> Outcome:
