@@ -1,14 +1,12 @@
 """What kind of IS-900 is played, and on what kind of line."""
 
-import re
 from dataclasses import dataclass
 
 from harness.errors import BadInput
-from harness.stream.emulator.faults import Fault
+from harness.stream.emulator.faults import Fault, check_firmware
 
 RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 """Of the serial line [bit/s] (docs/is900.md 2)."""
-_FIRMWARE = re.compile(r"\d\.\d{2}\d{0,2}")
 
 
 @dataclass(frozen=True)
@@ -37,8 +35,7 @@ class EmulatorConfig:
     """Of the faults' draws."""
 
     def __post_init__(self) -> None:
-        if not _FIRMWARE.fullmatch(self.firmware):
-            raise BadInput(f"firmware {self.firmware!r}.", "Give a version such as 4.2301: one digit, a point, 2 to 4.")
+        check_firmware(self.firmware)
         if not (self.identification.isascii() and self.identification.isprintable() and len(self.identification) < 32):
             raise BadInput(f"identification {self.identification!r}.", "Give up to 31 ASCII characters.")
         if self.status_bytes not in (54, 55):

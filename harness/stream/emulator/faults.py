@@ -4,6 +4,7 @@ Each fault draws from a generator of its own, so that the same seed gives the sa
 one fault more leaves the others as they were.
 """
 
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -21,6 +22,13 @@ Kind = Literal[
 BYTE_KINDS: tuple[str, ...] = get_args(ByteKind)
 SPELL_KINDS: tuple[str, ...] = get_args(SpellKind)
 _INSTANT_KINDS = (*BYTE_KINDS, "reset")
+_FIRMWARE = re.compile(r"\d\.\d{2,4}")
+
+
+def check_firmware(version: str) -> None:
+    """BadInput unless it is a version such as the status record tells."""
+    if not _FIRMWARE.fullmatch(version):
+        raise BadInput(f"firmware {version!r}.", "Give a version such as 4.2301: one digit, a point, two to four.")
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,8 @@ class Fault:
             raise BadInput(f"fault {self.kind!r} does not last.", "Give lasts_s.")
         if not (self.share or self.at_s or self.per_minute or self.firmware):
             raise BadInput(f"fault {self.kind!r} never happens.", "Give share, at_s, per_minute or firmware.")
+        if self.kind == "firmware":
+            check_firmware(self.firmware)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +90,6 @@ class Faults:
     def __init__(self, faults: Iterable[Fault], seed: int, began_s: float) -> None:
         self._byte_faults: list[tuple[Fault, np.random.Generator, _Moments]] = []
         self._spells: list[_Moments] = []
-        self._bursts: list[tuple[Spell, np.random.Generator]] = []
         for number, fault in enumerate(faults):
             moments = _Moments(fault, generator(seed, "fault", number, fault.kind, "when"), began_s)
             draws = generator(seed, "fault", number, fault.kind, "what")

@@ -9,10 +9,14 @@ import tty
 from pathlib import Path
 
 from harness.errors import BadInput
+from harness.stream.emulator.config import RATES
 
 _CHUNK = 4096
 _MOST_WAITING = 4000
 """Bytes that a client may leave unread before records are dropped; the terminal holds 4095."""
+
+
+_RATES = {getattr(termios, f"B{rate}"): rate for rate in RATES}
 
 
 class PtyPort:
@@ -54,8 +58,7 @@ class PtyPort:
         return False
 
     def baud(self) -> int | None:
-        rate = termios.tcgetattr(self._slave)[5]
-        return next((int(name[1:]) for name in dir(termios) if _is_rate(name) and getattr(termios, name) == rate), None)
+        return _RATES.get(termios.tcgetattr(self._slave)[5]) if self._slave >= 0 else None
 
     def plug(self) -> None:
         if self._master >= 0:
@@ -111,7 +114,3 @@ def _refuse_other(link: Path) -> None:
             raise BadInput(f"{link} is there and leads to {target}.", "Name another link, or remove it.")
     elif link.exists():
         raise BadInput(f"{link} is there and is no link of an emulator.", "Name another link; nothing is overwritten.")
-
-
-def _is_rate(name: str) -> bool:
-    return name[0] == "B" and name[1:].isdigit()

@@ -3,6 +3,7 @@
 import contextlib
 import select
 import socket
+import sys
 import threading
 import time
 from collections import deque
@@ -70,11 +71,11 @@ class Server:
         try:
             while not self._stopped:
                 now_s = time.monotonic()
-                self._plug(now_s)
                 if data := self.port.read():
                     self.emulator.receive(self._heard(data), now_s)
                 for sent in self.emulator.advance(now_s):
                     self._write(sent)
+                self._plug(now_s)
                 self._wait()
         finally:
             self.port.close()
@@ -195,7 +196,9 @@ def open_port(pty: Path | str | None, tcp: str | None, *, anywhere: bool = False
     if (pty is None) == (tcp is None):
         raise BadInput("Neither or both of a pty and a TCP port are asked for.", "Name one of them.")
     if pty is not None:
-        from harness.stream.emulator.pty_port import PtyPort  # not on Windows, where TCP serves
+        if sys.platform == "win32":
+            raise BadInput("Windows has no pseudo terminals.", "Use --tcp.")
+        from harness.stream.emulator.pty_port import PtyPort
 
         return PtyPort(pty)
     host, colon, number = (tcp or "").rpartition(":")

@@ -187,3 +187,6 @@ SILENT: dict[str, Setter] = {
     "MLogClose": _fixed(command_log=False),
 }
 """Commands that only ever set."""
+
+BARE = {"MU", "Mg", "MSchAlg", "MConfigLockMode", "MEthIp", "MEthUdp", "MEthUdpPort"}
+"""Those of `SETTERS` that set with their first field already."""

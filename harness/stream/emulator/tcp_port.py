@@ -22,13 +22,9 @@ class TcpPort:
         self._say = say
         self._client: socket.socket | None = None
         self._rest = b""
-        try:
-            family = socket.AF_INET6 if ":" in host else socket.AF_INET
-            self._server: socket.socket | None = socket.create_server((host, port), family=family, backlog=4)
-        except (OSError, OverflowError) as error:
-            raise BadInput(f"tcp://{host}:{port}: {error}.", "Choose another port; 0 takes a free one.") from error
-        self._server.setblocking(False)
-        self._address: tuple[str, int] = (host, self._server.getsockname()[1])
+        self._server: socket.socket | None = None
+        self._address = host, port
+        self.plug()
 
     @property
     def name(self) -> str:
@@ -77,10 +73,16 @@ class TcpPort:
             self._server = None
 
     def plug(self) -> None:
-        if self._server is None:
-            family = socket.AF_INET6 if ":" in self._address[0] else socket.AF_INET
+        if self._server is not None:
+            return
+        host, port = self._address
+        try:
+            family = socket.AF_INET6 if ":" in host else socket.AF_INET
             self._server = socket.create_server(self._address, family=family, backlog=4)
-            self._server.setblocking(False)
+        except (OSError, OverflowError) as error:
+            raise BadInput(f"tcp://{host}:{port}: {error}.", "Choose another port; 0 takes a free one.") from error
+        self._server.setblocking(False)
+        self._address = host, self._server.getsockname()[1]
 
     def close(self) -> None:
         self.unplug()
