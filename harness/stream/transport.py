@@ -27,7 +27,7 @@ else:
     _TROUBLE = (OSError, ValueError, termios.error)
 CHUNK = 65536
 """More than any operating system keeps for a port [bytes]."""
-WRITE_S, CONNECT_S = 2.0, 5.0
+WRITE_S, CONNECT_S = 2.0, 2.0
 """A line that takes no byte for so long is lost; so is a host that does not answer [s]."""
 _NAP_S = 0.002
 """Between two looks at a port that cannot be waited for [s]."""
@@ -216,7 +216,7 @@ class _Tcp(_Waited):
     def __init__(self, name: str, address: tuple[str, int]) -> None:
         try:
             self._socket = socket.create_connection(address, CONNECT_S)
-        except OSError as error:
+        except (OSError, UnicodeError) as error:
             raise no_connection(name, address, error) from error
         super().__init__(name, self._socket.fileno())
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -35,10 +35,10 @@ def tcp_address(port: str) -> tuple[str, int]:
     return host, number
 
 
-def no_connection(port: str, address: tuple[str, int], error: OSError) -> BadInput:
+def no_connection(port: str, address: tuple[str, int], error: Exception) -> BadInput:
     """A host that could not be reached."""
     host, number = address
-    if isinstance(error, socket.gaierror):
+    if isinstance(error, (socket.gaierror, UnicodeError)):
         return BadInput(f"Port {port}: there is no host called {host}.", "Check the name, or give its address.")
     if isinstance(error, TimeoutError):
         return BadInput(f"Port {port}: {host} does not answer.", "Check the address, the cable and any firewall.")

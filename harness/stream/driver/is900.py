@@ -61,7 +61,8 @@ class Is900:
         self._stations = Stations("", (), "")
         try:
             self._stations = choose(port, self._line, self.wanted.stations)
-            restore(port, self._line, self._stations)
+            if self._stations.others:
+                restore(port, self._line, self._stations)
             self._wire = self._set_up(self._status, boresight=self.wanted.boresight)
         except LineLost as lost:
             self.close()

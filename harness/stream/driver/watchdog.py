@@ -39,9 +39,12 @@ class Watchdog:
         self._wire: WireFormat | None = None
         """While data flow."""
         self._began_s = self._sound_s = self._heard_s = self._asked_s = self._spoilt_s = self._clean_until_s = 0.0
+        self._framed_s: float | None = None
+        """When the last sound frame came [s]; None before the first."""
         self._device_s = -np.inf
         self._garbage, self._resets, self._zeroed = 0, 0, 0
-        self._complaint = ""
+        self._complaints: dict[str, float] = {}
+        """What answers showed amiss, and when [s]."""
         self._connected = False
 
     def pause(self) -> None:
@@ -52,7 +55,7 @@ class Watchdog:
         """Data are about to flow."""
         self._wire = wire
         self._began_s = self._sound_s = self._heard_s = self._asked_s = now_s
-        self._garbage, self._resets, self._zeroed, self._complaint, self._connected = 0, 0, 0, "", False
+        self._garbage, self._resets, self._zeroed, self._complaints, self._connected = 0, 0, 0, {}, False
 
     def zeroed(self) -> None:
         """The device's clock was set to zero on purpose."""
@@ -72,13 +75,13 @@ class Watchdog:
         device_s = max(float(np.fmax.reduce(frame.measured_s, initial=-np.inf)) for frame in frames)
         if 21 in self._wire.items and device_s <= self._device_s:
             return []
-        away_s = now_s - self._sound_s if self._connected else now_s - min(self._told.values(), default=now_s)
         news = not self._connected or set(self._told) - {"garbage"}
-        self._device_s, self._sound_s, self._connected = device_s, now_s, True
+        again = "" if self._framed_s is None else f" again after {now_s - self._framed_s:.1f} s"
+        self._device_s, self._connected = device_s, True
+        self._sound_s = self._framed_s = now_s
         self._told = {kind: told_s for kind, told_s in self._told.items() if kind == "garbage"}
         if not news:
             return []
-        again = f" again after {away_s:.1f} s" if away_s > 0.0 else ""
         stations = f"{len(self._wire.stations)} stations at {self._wire.rate_hz:g} Hz"
         return [Finding("none", "connected", f"records come{again}: {stations}")]
 
@@ -130,14 +133,17 @@ class Watchdog:
         return Finding("ask")
 
     def _answer(self, wire: WireFormat, reply: ReplyEvent, now_s: float) -> list[Finding]:
-        """A wrong answer may be a damaged one: it counts when it comes twice."""
+        """A wrong answer may be a damaged one: it counts when it soon comes twice."""
+        recent_s = now_s - self._timing.silent_s
+        self._complaints = {text: said_s for text, said_s in self._complaints.items() if said_s > recent_s}
         kind, complaint = complaint_of(wire, reply)
         if kind is None:
             return []
-        if complaint != self._complaint:
-            self._complaint = complaint
-            return [self._ask(now_s)]
-        return [self.tell(kind, complaint, now_s, "set up")]
+        if complaint in self._complaints:
+            return [self.tell(kind, complaint, now_s, "set up")]
+        first = not self._complaints
+        self._complaints[complaint] = now_s
+        return [self._ask(now_s)] if first else []
 
 
 def complaint_of(wire: WireFormat, reply: ReplyEvent, streaming: bool = True) -> tuple[Kind | None, str]:

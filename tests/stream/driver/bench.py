@@ -1,0 +1,204 @@
+"""A driver and a device on one bench, in a time of their own: hours pass at once, nothing is random, nothing sleeps."""
+
+from collections.abc import Callable, Iterator
+from itertools import takewhile
+from typing import Protocol
+
+import numpy as np
+
+from harness.errors import BadInput
+from harness.stream.driver import Is900, LineEvent, Wanted
+from harness.stream.driver.host import Host
+from harness.stream.driver.wanted import Timing
+from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.emulator import Emulator
+from harness.stream.frame import TrackerFrame
+from harness.stream.reader import WireFormat
+from harness.stream.samples import Samples
+from harness.stream.transport import LineLost, Transport
+
+NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
+LAP_S = 10.0
+
+
+def swaying(stations: int, rate_hz: float = 50.0) -> Samples:
+    """Stations that sway and never are where they were a reading before."""
+    count = round(LAP_S * rate_hz)
+    taken_s = np.arange(count)[:, None] / rate_hz + np.arange(stations) / (4.0 * stations * rate_hz)
+    angle = 2.0 * np.pi * taken_s / LAP_S
+    zero = np.zeros_like(angle)
+    return Samples(
+        stations=NAMES[:stations],
+        rate_hz=rate_hz,
+        first_lap=count,
+        taken_s=taken_s,
+        ready_s=0.002,
+        device_s=taken_s,
+        position_m=np.stack([np.cos(angle), np.sin(angle), zero + 0.1 * np.arange(stations)], axis=-1),
+        tracker_from_station=np.stack([np.cos(0.5 * angle), zero, zero, np.sin(0.5 * angle)], axis=-1),
+        quality=np.ones_like(angle),
+    )
+
+
+class Device(Protocol):
+    """The other end of the line."""
+
+    def receive(self, data: bytes, now_s: float) -> None: ...
+    def due(self, now_s: float) -> bytes: ...
+    @property
+    def next_s(self) -> float: ...
+
+
+class Played:
+    """The emulator as a device."""
+
+    def __init__(self, samples: Samples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
+        self.emulator = Emulator(samples, config, now_s)
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        self.emulator.receive(data, now_s)
+
+    def due(self, now_s: float) -> bytes:
+        return b"".join(sent.data for sent in self.emulator.advance(now_s))
+
+    @property
+    def next_s(self) -> float:
+        return self.emulator.next_s
+
+
+class Scripted:
+    """Says one thing for each thing that it hears, and may chatter besides."""
+
+    def __init__(self, answers: dict[bytes, bytes], chatter: bytes = b"", every_s: float = 0.02) -> None:
+        self._answers, self._chatter, self._every_s = answers, chatter, every_s
+        self._out, self._chattered_s = b"", 0.0
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        self._out += b"".join(answer for heard, answer in self._answers.items() if heard in data)
+
+    def due(self, now_s: float) -> bytes:
+        out, self._out = self._out, b""
+        while self._chatter and self._chattered_s + self._every_s <= now_s:
+            self._chattered_s += self._every_s
+            out += self._chatter
+        return out
+
+    @property
+    def next_s(self) -> float:
+        return self._chattered_s + self._every_s if self._chatter else float("inf")
+
+
+class Bench:
+    """One port, `bench`, with a device at it, or none."""
+
+    def __init__(self, device: Device | None, port: str = "bench") -> None:
+        self.device, self.port = device, port
+        self.now_s = 1000.0
+        self.plugged = True
+        self.opened: list[tuple[str, int]] = []
+        self.open_lines = 0
+        self.sent = bytearray()
+        """By the host."""
+        self.events: list[LineEvent] = []
+        self.host = Host(self.open, lambda: self.now_s, lambda: 1.7e9 + self.now_s, self.sleep)
+        self.spoil: Callable[[bytes], bytes] = lambda data: data
+        """What becomes of bytes on their way to the host."""
+        self._plans: list[tuple[float, Callable[[], None]]] = []
+
+    def open(self, port: str, baud: int) -> Transport:
+        self.opened.append((port, baud))
+        if not self.plugged or port != self.port:
+            raise BadInput(f"Port {port}: there is no such port.", "")
+        return BenchLine(self)
+
+    def driver(self, wanted: Wanted | None = None, timing: Timing | None = None) -> Is900:
+        return Is900(self.port, wanted, on_event=self.events.append, timing=timing, host=self.host)
+
+    def after(self, delay_s: float, action: Callable[[], None]) -> None:
+        """Something that will happen."""
+        self._plans.append((self.now_s + delay_s, action))
+        self._plans.sort(key=lambda plan: plan[0])
+
+    def sleep(self, for_s: float) -> None:
+        until_s = self.now_s + for_s
+        while self.next_plan_s <= until_s:
+            self.now_s, action = self._plans.pop(0)
+            action()
+        self.now_s = until_s
+
+    @property
+    def next_plan_s(self) -> float:
+        return self._plans[0][0] if self._plans else float("inf")
+
+    @property
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.events]
+
+
+class BenchLine:
+    """The host's end."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.name, self._bench, self._closed = bench.port, bench, False
+        bench.open_lines += 1
+
+    def read(self, timeout_s: float) -> bytes:
+        bench, until_s = self._bench, self._bench.now_s + timeout_s
+        while True:
+            self._check()
+            due = bench.device.due(bench.now_s) if bench.device else b""
+            if data := bench.spoil(due):
+                return data
+            next_s = min(bench.device.next_s if bench.device else float("inf"), bench.next_plan_s)
+            if bench.now_s >= until_s:
+                return b""
+            bench.sleep(max(min(next_s, until_s) - bench.now_s, 1e-6))
+
+    def write(self, data: bytes) -> None:
+        self._check()
+        self._bench.sent += data
+        if self._bench.device:
+            self._bench.device.receive(data, self._bench.now_s)
+
+    def discard(self) -> None:
+        self.read(0.0)
+
+    def close(self) -> None:
+        self._bench.open_lines -= not self._closed
+        self._closed = True
+
+    def _check(self) -> None:
+        if self._closed or not self._bench.plugged:
+            raise LineLost(self.name, "closed" if self._closed else "unplugged")
+
+
+def frames_for(stream: Is900, bench: Bench, for_s: float) -> list[TrackerFrame]:
+    """Those of so long a time."""
+    until_s = bench.now_s + for_s
+    frames: Iterator[TrackerFrame] = iter(stream)
+    return list(takewhile(lambda frame: frame.received_s < until_s, frames))
+
+
+class Notes:
+    """A witness that writes everything down."""
+
+    def __init__(self) -> None:
+        self.got, self.said = bytearray(), bytearray()
+        self.formats: list[tuple[int, int, WireFormat]] = []
+        """Bytes received and sent before, and the format."""
+        self.events: list[LineEvent] = []
+        self.times_s: list[float] = []
+
+    def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+        self.got += data
+        self.times_s.append(monotonic_s)
+
+    def sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+        self.said += data
+        self.times_s.append(monotonic_s)
+
+    def configured(self, wire: WireFormat) -> None:
+        self.formats.append((len(self.got), len(self.said), wire))
+
+    def happened(self, event: LineEvent) -> None:
+        self.events.append(event)
