@@ -14,12 +14,12 @@ import os
 import stat
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, is_dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harness.core.fields import build
 from harness.errors import BadFile, HarnessError
@@ -40,6 +40,9 @@ from harness.stream.blocks import (
 )
 from harness.stream.capture import Capture
 from harness.stream.reader import WireFormat
+
+if TYPE_CHECKING:
+    from harness.stream.driver import LineEvent
 
 EXPECTED = "a recording by `harness record`"
 
@@ -85,8 +88,9 @@ class Recording:
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What befell the line."""
-        return [self._json(block) for block in self.blocks() if block.kind == EVENT]
+        """What befell the line: kind, text and when, by the host's clock [s]."""
+        happened = [block for block in self.blocks() if block.kind == EVENT]
+        return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in happened]
 
     def format_of(self, configured: Block) -> WireFormat:
         """The wire format in a block of that kind; BadFile."""
@@ -173,10 +177,8 @@ class RecordingWriter:
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 
-    def happened(self, event: Any) -> None:
-        """An event of the line: a dataclass, or anything that can be said in words."""
-        content = asdict(event) if is_dataclass(event) and not isinstance(event, type) else {"text": str(event)}
-        self._append_json(EVENT, {"event": type(event).__name__, **content})
+    def happened(self, event: "LineEvent") -> None:
+        self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
 
     def close(self) -> None:

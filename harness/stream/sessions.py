@@ -17,7 +17,8 @@ SILENCE = 2.0
 class Sessions:
     """Frames of one session after another: host times strictly increase, device time never steps back.
 
-    The device's clock begins anew when it is set up; device time then goes on by the host's clock.
+    The device's clock begins anew when it is set up; device time then goes on by the host's clock, from the first
+    bytes that come: whoever reads a recording knows that moment as exactly as whoever recorded it.
     """
 
     def __init__(self) -> None:
@@ -26,7 +27,9 @@ class Sessions:
         self._reader: FrameReader | None = None
         self._period_s = 0.0
         self._heard_s = self._framed_s = -np.inf
-        """Host time of the last byte, and of the last frame [s]."""
+        """Host time of the last byte or set-up, and of the last frame [s]."""
+        self._new = False
+        """Nothing has come since it was set up."""
         self._device_s = 0.0
         """Latest device time of any frame [s]."""
         self._before = dict.fromkeys(("sessions", "records", "garbage_bytes", "clock_resets"), 0)
@@ -52,17 +55,18 @@ class Sessions:
     def configured(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
         """What was unfinished; from here on bytes are read with this format, and the device's clock began at zero."""
         frames = self.finish()
-        if self._frames:
-            self.device_zero_s = self._device_s + max(now_s - self._framed_s, 0.0)
-        self._before = {name: n for name, n in self.counts.items() if name != "frames"}
         self._before["sessions"] += 1
         self._reader, self._period_s = FrameReader(wire), 1.0 / wire.rate_hz
+        self._heard_s, self._new = now_s, True
         return frames
 
     def received(self, data: bytes, now_s: float) -> list[TrackerFrame]:
-        """What these bytes complete, after what was due before they came; nothing before the first set-up."""
+        """What these bytes complete, after what was due before they came; nothing unless it is set up."""
         if self._reader is None:
             return []
+        if self._new and self._frames:
+            self.device_zero_s = self._device_s + max(now_s - self._framed_s, 0.0)
+        self._new = False
         frames = self.expire(now_s)
         self._heard_s = now_s
         return frames + self._placed(self._reader.feed(data, now_s))
@@ -72,8 +76,12 @@ class Sessions:
         return [] if self._reader is None else self._placed(self._reader.expire(now_s))
 
     def finish(self) -> list[TrackerFrame]:
-        """What is left at the end."""
-        return [] if self._reader is None else self._placed(self._reader.finish())
+        """What is left at the end of a session."""
+        if self._reader is None:
+            return []
+        frames = self._placed(self._reader.finish())
+        self._before, self._reader = {name: n for name, n in self.counts.items() if name != "frames"}, None
+        return frames
 
     def _placed(self, frames: list[TrackerFrame]) -> list[TrackerFrame]:
         """The frames in the time of the whole stream."""

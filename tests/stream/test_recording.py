@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 
 from harness.errors import BadFile
 from harness.stream.blocks import HEADER, LONGEST, MARKER, RECEIVED, SENT, VERSION, Block, Lost, blocks, encode
+from harness.stream.driver.events import LineEvent
 from harness.stream.reader import WireFormat
 from harness.stream.recording import Recording, RecordingWriter, read_recording
 from harness.stream.records import Settings
@@ -29,11 +29,6 @@ ENTRIES = [
 WHOLE = HEADER + b"".join(map(encode, ENTRIES))
 
 
-@dataclass(frozen=True)
-class Unplugged:
-    after_s: float
-
-
 def entries(data: bytes) -> tuple[list[Block], list[Lost]]:
     found = list(blocks(data, 0 if data[: len(HEADER)] != HEADER else len(HEADER)))
     return [e for e in found if isinstance(e, Block)], [e for e in found if isinstance(e, Lost)]
@@ -46,7 +41,7 @@ def written(path: Path) -> Path:
         writer.configured(FOUR, 1.1, 101.1)
         writer.sent(b"C", 1.2, 101.2)
         writer.received(b"01 ", 1.3, 101.3)
-        writer.happened(Unplugged(1.5))
+        writer.happened(LineEvent("unplugged", 1.35, 101.35, "the port is gone"))
         writer.received(b"02 ", 1.4, 101.4)
     return path
 
@@ -56,7 +51,7 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
     assert recording.lost == ()
     assert recording.note == {"source": "a test"}
     assert recording.formats == (FOUR,)
-    assert recording.events == [{"event": "Unplugged", "after_s": 1.5}]
+    assert recording.events == [{"monotonic_s": 1.35, "kind": "unplugged", "text": "the port is gone"}]
     over_the_line = [b for b in recording.blocks() if b.kind in (SENT, RECEIVED)]
     assert over_the_line == [
         Block(SENT, 1.0, 101.0, b"c"),

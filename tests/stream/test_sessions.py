@@ -1,0 +1,82 @@
+"""Sessions of a line as one stream."""
+
+import numpy as np
+
+from harness.stream.frame import TrackerFrame
+from harness.stream.sessions import Sessions
+from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
+
+ROUNDS = 5
+
+
+def fed(sessions: Sessions, begin_s: float) -> list[TrackerFrame]:
+    """Five rounds of a device whose clock is at 12 s, received record by record from this moment on."""
+    stamp_s = stamps_s(ROUNDS)
+    data, frames = sent(stamp_s), []
+    for i, now_s in enumerate((stamp_s - stamp_s[0] + begin_s).tolist()):
+        frames += sessions.received(data[i * RECORD : (i + 1) * RECORD], now_s)
+    return frames
+
+
+def test_one_session_is_what_its_reader_says() -> None:
+    sessions = Sessions()
+    assert sessions.configured(FOUR, 99.0) == []
+    frames = fed(sessions, 100.005) + sessions.finish()
+    assert all(same(a, b) for a, b in zip(frames, frames_of(received(sent(stamps_s(5)), stamps_s(5))), strict=True))
+    assert sessions.device_zero_s == 0.0
+    expected = {"frames": 5, "sessions": 1, "records": 20, "garbage_bytes": 0, "clock_resets": 0}
+    assert sessions.counts == expected
+
+
+def test_nothing_is_read_before_a_set_up_or_after_the_end() -> None:
+    sessions = Sessions()
+    assert fed(sessions, 1.0) == []
+    sessions.configured(FOUR, 2.0)
+    sessions.finish()
+    assert fed(sessions, 3.0) == sessions.finish() == sessions.expire(9.0) == []
+
+
+def test_device_time_goes_on_by_the_hosts_clock() -> None:
+    sessions = Sessions()
+    sessions.configured(FOUR, 99.0)
+    before = fed(sessions, 100.0)
+    sessions.configured(FOUR, 109.0)
+    after = fed(sessions, 110.0)
+    assert len(before) == len(after) == ROUNDS
+    gap_s = after[0].measured_s[0] - before[-1].measured_s[-1]
+    assert gap_s - 12.0 == np.float64(110.0 - before[-1].received_s)
+    assert sessions.device_zero_s == after[0].measured_s[0] - 12.0
+    assert sessions.counts["sessions"] == 2
+    assert sessions.counts["records"] == 2 * 4 * ROUNDS
+
+
+def test_a_set_up_gives_what_was_unfinished() -> None:
+    sessions = Sessions()
+    sessions.configured(FOUR, 99.0)
+    data = sent(stamps_s(1))
+    assert sessions.received(data[: 2 * RECORD], 100.0) == []
+    (frame,) = sessions.configured(FOUR, 100.01)
+    assert frame.position_valid.tolist() == [True, True, False, False]
+
+
+def test_host_times_rise_from_one_session_to_the_next() -> None:
+    """Even if both are read at one moment."""
+    sessions = Sessions()
+    frames = []
+    for _ in range(3):
+        frames += sessions.configured(FOUR, 100.0)
+        frames += sessions.received(sent(stamps_s(2)), 100.0)
+    received_s = [frame.received_s for frame in frames]
+    assert len(received_s) == 6
+    assert (np.diff(received_s) > 0.0).all()
+    assert (np.diff([frame.measured_s[0] for frame in frames]) > 0.0).all()
+
+
+def test_what_waits_too_long_is_given_before_what_comes_next() -> None:
+    sessions = Sessions()
+    sessions.configured(FOUR, 99.0)
+    data = sent(stamps_s(2))
+    sessions.received(data[:RECORD], 100.0)
+    frames = sessions.received(data[4 * RECORD :], 100.0 + 1.6 / RATE_HZ)
+    assert [frame.position_valid.sum() for frame in frames] == [1, 4]
+    assert sessions.silent_from_s == 100.0 + 3.6 / RATE_HZ
