@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import emulate, motion, runs, trust
+from harness.commands import emulate, motion, record, runs, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -66,6 +66,8 @@ def build_parser() -> argparse.ArgumentParser:
         trust.add_bench,
         trust.add_doctor,
         emulate.add_emulate,
+        record.add_record,
+        record.add_replay,
     ):
         add(verbs)
     return parser

@@ -26,7 +26,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     # the bench measures what the tables do
     "bench": (EVERYTHING | {"config", "setting", "progress"}) - {"study", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
-    "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "rehearsal"},
+    "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "recorded", "rehearsal"},
 }
 TOP = {
     "cli",
@@ -36,6 +36,7 @@ TOP = {
     "errors",
     "experiment",
     "progress",
+    "recorded",
     "rehearsal",
     "setting",
     "__init__",

@@ -10,6 +10,7 @@ the blocks it touches and is named; recording into a file of ours goes on behind
 """
 
 import json
+import math
 import os
 import stat
 import time
@@ -254,17 +255,20 @@ class RecordingWriter:
         return Recording(self.path, data)
 
 
-def record_capture(path: Path | str, wire: WireFormat, capture: Capture, note: Mapping[str, Any]) -> RecordingWriter:
-    """Write what a simulated line carried, chunk by chunk; the simulation's clock stands for both of the host's.
+def record_capture(
+    path: Path | str, wire: WireFormat, capture: Capture, note: Mapping[str, Any], *, seconds: float = math.inf
+) -> RecordingWriter:
+    """Write what a simulated line carried (in its first so many seconds), chunk by chunk.
 
-    Returns the writer, closed, for its counts.
+    The simulation's clock stands for both of the host's. Returns the writer, closed, for its counts.
     """
     ends, received_s = capture.ends.tolist(), capture.received_s.tolist()
     with RecordingWriter(path, note) as writer:
         start_s = received_s[0] if received_s else 0.0
         writer.configured(wire, start_s, start_s)
         for begin, end, now_s in zip([0, *ends], ends, received_s, strict=False):
-            writer.received(capture.data[begin:end], now_s, now_s)
+            if now_s - start_s <= seconds:
+                writer.received(capture.data[begin:end], now_s, now_s)
     return writer
 
 

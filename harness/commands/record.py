@@ -1,0 +1,181 @@
+"""Verbs about recordings of a device's line: make one, play one."""
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Mapping
+from contextlib import redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harness import __version__
+from harness.commands.verb import Verbs, add_verb, ended_by_sigterm, say, talk
+from harness.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from harness.stream.replay import RecordingStream
+
+
+SIMULATED = "sim:"
+"""What a scenario's name follows where the simulator takes the place of a port."""
+
+
+def add_record(verbs: Verbs) -> None:
+    text = "record a device's line, both ways, until Ctrl-C; goes on behind an earlier recording in the same file"
+    verb = add_verb(verbs, "record", text, record, "seed", "mocap")
+    verb.add_argument(
+        "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for what a simulated line carries"
+    )
+    verb.add_argument("file", type=Path, help="the recording to write")
+    text = "names of the device's active stations, the first first; of sim: those stations, or the first so many"
+    verb.add_argument("--stations", metavar="A,B", help=text)
+    verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second, where the device does not tell")
+    verb.add_argument("--seconds", type=float, metavar="N", help="stop by itself after so long")
+    verb.add_argument("--clip", metavar="CLIP", help="of sim: which of its clips (default: the first)")
+    verb.add_argument("--noise", metavar="LEVEL", help="of sim: replaces the scenario's noise")
+
+
+def record(args: argparse.Namespace) -> Outcome:
+    if args.seconds is not None and not 0.0 < args.seconds < math.inf:
+        raise BadInput(f"--seconds {args.seconds:g}.", "It is a positive number.")
+    if args.port.startswith(SIMULATED):
+        return _record_simulation(args, args.port.removeprefix(SIMULATED))
+    for name in ("clip", "noise", "seed"):
+        if getattr(args, name) is not None:
+            raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATED}SCENARIO; a device does what it does.")
+    return _record_port(args)
+
+
+def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
+    from harness.rehearsal import rehearse
+    from harness.stream.recording import RecordingWriter, record_capture
+
+    RecordingWriter(args.file).close()  # refuses what is no place to record into before a long simulation
+    stations = args.stations
+    if stations is not None:
+        stations = int(stations) if stations.isdigit() else stations.split(",")
+    rehearsal = rehearse(
+        scenario,
+        clip=args.clip,
+        stations=stations,
+        rate_hz=args.rate,
+        noise=args.noise,
+        seed=args.seed,
+        folder=args.mocap,
+    )
+    asked, simulation = rehearsal.scenario, rehearsal.simulation
+    note = {
+        "source": "simulation",
+        "scenario": scenario,
+        "clip": str(rehearsal.setting.part),
+        "seed": asked.seed,
+        "noise": asked.noise,
+        "stations": list(asked.stations),
+        "rate_hz": asked.tracker.rate_hz,
+        "harness": __version__,
+    }
+    seconds = math.inf if args.seconds is None else args.seconds
+    written = record_capture(args.file, simulation.wire_format, simulation.wire, note, seconds=seconds)
+    return _recorded(args, written.counts)
+
+
+def _record_port(args: argparse.Namespace) -> Outcome:
+    from harness.stream.driver import Wanted
+    from harness.stream.recorder import record_port
+    from harness.stream.recording import RecordingWriter
+
+    stations = None if args.stations is None else tuple(name.strip() for name in args.stations.split(","))
+    wanted = Wanted(stations=stations, rate_hz=args.rate)
+    note = {"source": "port", "port": args.port, "harness": __version__}
+    with RecordingWriter(args.file, note) as writer, ended_by_sigterm():
+        record_port(args.port, wanted, writer, seconds=args.seconds, say=talk, progress=_progress)
+    return _recorded(args, writer.counts)
+
+
+def _progress(text: str) -> None:
+    """One line that changes, for whoever watches a terminal."""
+    if sys.stderr.isatty():
+        print(f"\r{text}\033[K", end="", file=sys.stderr, flush=True)
+
+
+def _recorded(args: argparse.Namespace, counts: Mapping[str, int]) -> Outcome:
+    content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
+    content |= {"set_up": counts["conf"], "events": counts["evnt"]}
+    text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
+    return say(args, content, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
+
+
+def add_replay(verbs: Verbs) -> None:
+    text = "play a recording to the same decoder; with --methods, to methods, scored where its motion is known"
+    verb = add_verb(verbs, "replay", text, replay, "seed", "mocap")
+    verb.add_argument("file", type=Path, help="written by `harness record`")
+    text = "step (a frame for each Enter), max (default), or so many times as fast as it was: 1, 0.5, 4"
+    verb.add_argument("--speed", default="max", metavar="SPEED", help=text)
+    verb.add_argument("--frames", action="store_true", help="print every station of every frame, as CSV or JSON lines")
+    verb.add_argument("--methods", metavar="A,B", help="names as in scenarios, such as ik,dynamic_map")
+    text = "what it was played from, where the recording does not say so itself"
+    verb.add_argument("--scenario", metavar="NAME", help=text)
+    verb.add_argument("--clip", metavar="CLIP", help="which of its clips (default: the first)")
+    verb.add_argument("--noise", metavar="LEVEL", help="replaces the scenario's noise")
+    verb.add_argument("--rate", type=float, metavar="HZ", help="replaces the scenario's rate")
+
+
+def replay(args: argparse.Namespace) -> Outcome:
+    from harness.stream.replay import RecordingStream, speed_of
+
+    stream = RecordingStream(args.file, speed_of(args.speed))
+    for lost in stream.recording.lost:
+        print(f"lost: {lost}", file=sys.stderr)
+    if any(value is not None for value in (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed)):
+        return _judge(args, stream)
+    return _play(args, stream)
+
+
+def _play(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+    from harness.stream.frame_table import COLUMNS, as_csv, rows
+    from harness.stream.summary import Summary
+
+    summary = Summary(stream.stations)
+    if args.frames and not args.json:
+        print(",".join(COLUMNS))
+    for frame in stream:
+        summary.add(frame)
+        for row in rows(frame, stream.stations, stream.wall_s(frame.received_s)) if args.frames else ():
+            print(json.dumps(row) if args.json else as_csv(row))
+        if args.frames:
+            sys.stdout.flush()
+    recording = stream.recording
+    content = {**summary.as_dict(), **stream.counts, "lost": recording.lost, "events": recording.events}
+    lines = [str(summary), "", _counts(stream), *(f"{e['monotonic_s']:.3f} s: {e['text']}" for e in recording.events)]
+    if args.frames and not args.json:  # the frames are the data
+        print(*lines, sep="\n", file=sys.stderr)
+        return Outcome.PASS
+    return say(args, content, *lines)
+
+
+def _counts(stream: "RecordingStream") -> str:
+    counts = stream.counts
+    return (
+        f"set up {counts['sessions']} times; {counts['records']} records, {counts['garbage_bytes']} bytes that belong "
+        f"to nothing; the device's clock was set anew {counts['clock_resets']} times besides"
+    )
+
+
+def _judge(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
+    from harness import recorded
+    from harness.core.options import alternatives, split
+
+    told = {"scenario": args.scenario, "clip": args.clip, "rate_hz": args.rate, "noise": args.noise, "seed": args.seed}
+    rehearsal = recorded.rehearsal_of(stream, **told, folder=args.mocap)
+    methods = rehearsal.scenario.methods
+    if args.methods is not None:
+        methods = tuple(name for text in split(args.methods, ",") for name in alternatives(text))
+    with redirect_stdout(sys.stderr):  # what a method prints is talk
+        judged = recorded.judge(stream, rehearsal, methods)
+    played = f"{rehearsal.scenario.name}, {rehearsal.setting.part}"
+    content = {"scenario": rehearsal.scenario.name, "clip": str(rehearsal.setting.part), **stream.counts}
+    content |= {"lost": stream.recording.lost, "methods": [one.as_dict() for one in judged]}
+    measured = any(one.metrics["joint_angle_mean_deg"] is not None for one in judged)
+    outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
+    return say(args, content, f"played from {played}", "", recorded.table(judged), outcome=outcome)

@@ -1,0 +1,58 @@
+"""Frames as a table for other programs: a row for every station of every frame."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from harness.stream.frame import TrackerFrame
+
+COLUMNS = (
+    "received_s",
+    "wall_s",
+    "station",
+    "measured_s",
+    "x_m",
+    "y_m",
+    "z_m",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "position_valid",
+    "orientation_valid",
+    "quality",
+    "suspect",
+)
+
+
+def rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> Iterator[dict[str, Any]]:
+    """One for each station, by the names of COLUMNS; None for what did not come or is not valid."""
+    for i, station in enumerate(stations):
+        numbers = (frame.measured_s[i], *frame.position_m[i], *frame.tracker_from_station[i])
+        values = (
+            frame.received_s,
+            wall_s,
+            station,
+            *(None if number != number else float(number) for number in numbers),
+            bool(frame.position_valid[i]),
+            bool(frame.orientation_valid[i]),
+            float(frame.quality[i]),
+            bool(frame.suspect[i]),
+        )
+        yield dict(zip(COLUMNS, values, strict=True))
+
+
+def as_csv(row: dict[str, Any]) -> str:
+    """A line; numbers in full, so that they come back as they were, 1 and 0 for yes and no."""
+    return ",".join(_text(row[name]) for name in COLUMNS)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    return repr(value) if isinstance(value, float) else _quoted(value)
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\n\r') else text
