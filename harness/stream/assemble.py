@@ -1,6 +1,6 @@
 """Records into frames: one row per station, in station order."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -45,13 +45,18 @@ class Assembler:
         self._received_s = _NEVER
         """When the frame that was closed last was complete."""
 
+    @property
+    def unfinished(self) -> bool:
+        """Whether a frame has begun."""
+        return self._open is not None
+
     def add(self, more: Readings) -> list[TrackerFrame]:
         """The frames that these readings complete."""
         if len(more) == 0:
             return []
         given = more if self._open is None else join([self._open, more])
         frame, doubtful = self._cut(given)
-        given = replace(given, doubtful=doubtful)
+        given = given.doubted(doubtful)
         open_from = int(np.searchsorted(frame, frame[-1]))
         if len(given) - open_from == self._stations:
             open_from, self._round = len(given), self._after

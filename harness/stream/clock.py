@@ -39,11 +39,11 @@ class Unwrapper:
         out: Floats = stamp_s + self._epoch_s
         if len(out) == 0:
             return out
-        if self._odd is None:
+        if self._odd is None and len(out) > 1:
             before = self._last or (float(out[0]), float(received_s[0]))
             device, host = np.diff(out, prepend=before[0]), np.diff(received_s, prepend=before[1])
             if bool(np.all((device > -TOLERANCE_S) & (device < host + TOLERANCE_S))):
-                self._before = self._last if len(out) < 2 else (float(out[-2]), float(received_s[-2]))
+                self._before = float(out[-2]), float(received_s[-2])
                 self._last = float(out[-1]), float(received_s[-1])
                 return out
         for i, (stamp, received) in enumerate(zip(stamp_s.tolist(), received_s.tolist(), strict=True)):

@@ -2,11 +2,11 @@
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from harness.core.arrays import Floats, Ints
+from harness.core.arrays import Bools, Floats, Ints
 from harness.errors import BadInput
 from harness.stream.assemble import Assembler
 from harness.stream.capture import Capture
@@ -14,8 +14,10 @@ from harness.stream.clock import Unwrapper
 from harness.stream.decoder import Decoder, Event, Garbage, Records, Reply
 from harness.stream.frame import TrackerFrame
 from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS
-from harness.stream.readings import Readings, readings
-from harness.stream.records import Settings
+from harness.stream.plausible import Motion
+from harness.stream.readings import Readings, readings, tells_quality
+from harness.stream.records import Settings, Table
+from harness.stream.replies import ReplyEvent, TrackingStatus, parse
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,11 @@ class WireFormat:
 
 
 class FrameReader:
-    """Takes bytes as they come, gives frames as they become complete, and counts what else there was."""
+    """Takes bytes as they come, gives frames as they become complete, and counts what else there was.
+
+    Where the list has no quality (items 40 and 76), a station is lost from a reply to `MP` that says so until one that
+    does not.
+    """
 
     def __init__(self, wire: WireFormat) -> None:
         self.wire = wire
@@ -58,8 +64,15 @@ class FrameReader:
         """The latest lines that were no data."""
         self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
         self._clock = Unwrapper()
+        self._motion = Motion(len(wire.stations), 1.0 / wire.rate_hz)
         self._assembler = Assembler(len(wire.stations), 1.0 / wire.rate_hz)
-        self._stamped = 21 in wire.items
+        self._stamped, self._tells_quality = 21 in wire.items, tells_quality(wire.items)
+        self._lost: Bools | None = None
+        """(S,) by the latest reply to `MP`, where records do not tell."""
+        self._aside: list[tuple[Table, Floats]] = []
+        """Records that cannot complete a frame yet, and when they came."""
+        self._row = -1
+        """Of the record that came last; -1 when no frame has begun."""
         self._ends: Ints = np.zeros(0, dtype=np.int64)
         """Where the chunks end that undecided bytes came in, counted from the beginning of the stream."""
         self._ends_s: Floats = np.zeros(0)
@@ -77,46 +90,78 @@ class FrameReader:
 
     def feed(self, data: bytes, received_s: float) -> list[TrackerFrame]:
         """The frames that these bytes, received at this moment, complete."""
-        return self.feed_all(Capture(data, np.array([len(data)]), np.array([received_s])))
+        return self._feed(data, np.array([len(data)]), np.array([received_s]))
 
     def feed_all(self, capture: Capture) -> list[TrackerFrame]:
         """The frames of many chunks at once; the same as chunk by chunk."""
-        self._ends = np.concatenate([self._ends, self._fed + capture.ends])
-        self._ends_s = np.concatenate([self._ends_s, capture.received_s])
-        self._fed += len(capture.data)
-        frames = self._frames(self._decoder.feed(capture.data))
-        decided = int(np.searchsorted(self._ends, self._fed - self._decoder.pending, side="right"))
+        return self._feed(capture.data, capture.ends, capture.received_s)
+
+    def _feed(self, data: bytes, ends: Ints, received_s: Floats) -> list[TrackerFrame]:
+        self._ends = np.concatenate([self._ends, self._fed + ends])
+        self._ends_s = np.concatenate([self._ends_s, received_s])
+        self._fed += len(data)
+        frames = self._frames(self._decoder.feed(data))
+        decided = int(self._ends.searchsorted(self._fed - self._decoder.pending, side="right"))
         self._ends, self._ends_s = self._ends[decided:], self._ends_s[decided:]
         return frames
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
         """The frame that has waited for its last stations for more than 1.5 periods at this moment (host clock)."""
-        return self._assembler.expire(now_s)
+        return [*self._settle(), *self._assembler.expire(now_s)]
 
     def finish(self) -> list[TrackerFrame]:
         """What is left at the end of the stream."""
-        return [*self._frames(self._decoder.finish()), *self._assembler.finish()]
+        return [*self._frames(self._decoder.finish()), *self._settle(), *self._assembler.finish()]
 
     def _frames(self, events: list[Event]) -> list[TrackerFrame]:
         frames: list[TrackerFrame] = []
         for event in events:
             match event:
                 case Records():
-                    frames += self._assembler.add(self._readings(event))
+                    if self._take(event):
+                        frames += self._settle()
                 case Reply():
+                    frames += self._settle()
                     self.replies.append(event)
+                    self._heed(parse(event.line))
                 case Garbage():
                     self.garbage_bytes += event.size
         return frames
 
-    def _readings(self, run: Records) -> Readings:
+    def _take(self, run: Records) -> bool:
+        """Put records aside until they may complete a frame; whether they may."""
         count = len(run.table)
-        self.records += count
         last_byte = run.offset + run.size * np.arange(1, count + 1)
-        received_s = self._ends_s[np.searchsorted(self._ends, last_byte)]
-        raw = readings(run.table, received_s, self.wire.characters, self.wire.settings)
+        self._aside.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
+        self.records += count
+        before, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
+        return count > 1 or self._row <= before or self._row == len(self.wire.stations) - 1
+
+    def _settle(self) -> list[TrackerFrame]:
+        """The frames that the records put aside complete: a round of stations at once costs little more than one."""
+        if not self._aside:
+            return []
+        tables, received_s = zip(*self._aside, strict=True)
+        self._aside.clear()
+        table = tables[0]
+        if len(tables) > 1:
+            table = np.frombuffer(b"".join(one.tobytes() for one in tables), table.dtype)
+        frames = self._assembler.add(self._readings(table, np.concatenate(received_s)))
+        if not self._assembler.unfinished:
+            self._row = -1
+        return frames
+
+    def _heed(self, said: ReplyEvent) -> None:
+        if isinstance(said, TrackingStatus) and not self._tells_quality:
+            self._lost = np.array([character in said.lost for character in self.wire.characters])
+
+    def _readings(self, table: Table, received_s: Floats) -> Readings:
+        raw = readings(table, received_s, self.wire.characters, self.wire.settings)
         measured_s = self._clock.unwrap(raw.measured_s, received_s)
-        return replace(raw, measured_s=measured_s, doubtful=raw.doubtful | (np.isnan(measured_s) & self._stamped))
+        doubtful = raw.doubtful | np.isnan(measured_s) if self._stamped else raw.doubtful
+        quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
+        place_m, turn = raw.position_m, raw.tracker_from_station
+        return self._motion.judge(Readings(raw.station, received_s, measured_s, place_m, turn, quality, doubtful))
 
 
 class CaptureStream:

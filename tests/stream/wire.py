@@ -24,10 +24,10 @@ def stamps_s(rounds: int, stations: int = 4, begin_s: float = 12.0) -> Floats:
 
 
 def sent(stamp_s: Floats, stations: int = 4, seed: int = 1) -> bytes:
-    """Records of stations that sway a little, so that no two records are equal."""
+    """Records of stations that sway a little, each about a place and a turn of its own; no two records are equal."""
     rng = np.random.default_rng(seed)
     number = np.arange(len(stamp_s)) % stations
-    turn = rng.normal(size=(len(stamp_s), 4))
+    turn = np.random.default_rng(seed + 1).normal(size=(12, 4))[number] + 0.05 * rng.normal(size=(len(stamp_s), 4))
     said = Said(
         measured_s=stamp_s,
         position_m=number[:, None] + 0.01 * rng.normal(size=(len(stamp_s), 3)),
