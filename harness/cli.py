@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import emulate, motion, record, runs, trust
+from harness.commands import emulate, live, motion, record, runs, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -66,6 +66,7 @@ def build_parser() -> argparse.ArgumentParser:
         trust.add_bench,
         trust.add_doctor,
         emulate.add_emulate,
+        live.add_live,
         record.add_record,
         record.add_replay,
     ):

@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.verb import FEWEST, Verbs, add_verb, ended_by_sigterm, positive, say, stations_of, talk
+from harness.commands.verb import FEWEST, Verbs, add_verb, ended_by_sigterm, items, positive, say, stations_of, talk
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("--rate", type=float, metavar="HZ", help="records per second of each station")
     verb.add_argument("--noise", help="clean, noise or default, instead of the scenario's")
     verb.add_argument(
-        "--items", type=_items, metavar="A,B", help="list that clients will ask for, to see whether the line carries it"
+        "--items", type=items, metavar="A,B", help="list that clients will ask for, to see whether the line carries it"
     )
     verb.add_argument("--baud", type=positive, help="rate of the line, which paces what is sent (default 115200)")
     verb.add_argument("--unpaced", action="store_true", help="send at once, as over Ethernet")
@@ -87,10 +87,3 @@ def _reach(args: argparse.Namespace) -> str:
     if args.pty:
         return ""
     return ", reached from anywhere: nothing asks who commands it" if args.anywhere else ", from this computer alone"
-
-
-def _items(text: str) -> tuple[int, ...]:
-    codes = text.split(",")
-    if not all(code.strip().isdigit() for code in codes):
-        raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
-    return tuple(map(int, codes))

@@ -42,6 +42,24 @@ def positive(text: str) -> int:
     return int(text)
 
 
+def positive_number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is no positive number")
+    return value
+
+
+def items(text: str) -> tuple[int, ...]:
+    """An output list."""
+    codes = text.split(",")
+    if not all(code.strip().isdigit() for code in codes):
+        raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
+    return tuple(map(int, codes))
+
+
 def stations_of(args: argparse.Namespace) -> int | list[str]:
     """What `--stations` asks for: how many of the scenario's, or their names; `FEWEST` without."""
     from harness.config import load_scenario

@@ -1,6 +1,5 @@
 """Poses into a BVH file as they come: every frame that was written is in the file, however the program ends."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -8,13 +7,12 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.live.files import created
+from harness.live.files import Written
 from harness.live.pose import LivePose
 from harness.mocap.export_bvh import channels, hierarchy, row
 
 _COUNT = "Frames: {:>10}"
 """As wide for any number, since it stands before the frames and grows with them."""
-_SAVE_S = 1.0
 _LONGEST_GAP_S = 10.0
 
 
@@ -27,38 +25,36 @@ class Bvh:
 
     def __init__(self, path: Path, own: Skeleton, rate_hz: float, *, force: bool = False) -> None:
         """BadFile when there is one and it is not to be written over, or when it cannot be written."""
-        self.name = f"--bvh {path}"
+        self.name, self.told = f"--bvh {path}", f"BVH: {path}"
         self._skeleton, self._rate_hz = own, rate_hz
-        self._file = created(path, force)
         head = "\n".join([*hierarchy(own), "MOTION", ""])
         self._count_at = len(head)
-        self._file.write(f"{head}{_COUNT.format(0)}\nFrame Time: {1.0 / rate_hz:.9f}\n".encode())
+        head += f"{_COUNT.format(0)}\nFrame Time: {1.0 / rate_hz:.9f}\n"
+        self._file = Written(path, head.encode(), force=force)
         self._frames = 0
-        self._device_s, self._saved_s = -np.inf, -np.inf
+        self._device_s = -np.inf
         self._numbers: Floats = np.zeros(0)
         self._row = b""
 
     def send(self, pose: LivePose) -> None:
         passed_s = pose.device_s - self._device_s
         missing = max(round(passed_s * self._rate_hz) - 1, 0) if passed_s < _LONGEST_GAP_S else 0
-        self._file.write(self._row * missing)
         numbers = self._channels(pose)
         if self._frames:
             turned = numbers[3:] - self._numbers[3:]
             numbers[3:] -= 360.0 * np.round(turned / 360.0)
-        self._numbers, self._row = numbers, (row(numbers) + "\n").encode()
-        self._file.write(self._row)
-        self._frames += 1 + missing
-        self._device_s = pose.device_s
-        if pose.ready_s - self._saved_s > _SAVE_S:
-            self._saved_s = pose.ready_s
+        before, self._row = self._row, (row(numbers) + "\n").encode()
+        self._numbers, self._device_s = numbers, pose.device_s
+        self._frames += missing + 1
+        if self._file.write(before * missing + self._row, pose.ready_s):
             self._save()
 
     def close(self) -> None:
-        try:
-            self._save()
-        finally:
-            self._file.close()
+        if not self._file.closed:
+            try:
+                self._save()
+            finally:
+                self._file.close()
 
     def _channels(self, pose: LivePose) -> Floats:
         _, world_from_bone = pose.bones
@@ -67,8 +63,4 @@ class Bvh:
         return out
 
     def _save(self) -> None:
-        """What was written so far, and how many frames that are."""
-        self._file.seek(self._count_at)
-        self._file.write(_COUNT.format(self._frames).encode())
-        self._file.seek(0, os.SEEK_END)
-        self._file.flush()
+        self._file.save(_COUNT.format(self._frames).encode(), self._count_at)

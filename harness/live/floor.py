@@ -43,7 +43,7 @@ def main() -> None:
 
 
 class Floor:
-    """Measures from now until `finish`; leaves nothing running behind."""
+    """Measures from now until `finish`; leaves nothing running behind when its block ends."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
@@ -55,13 +55,19 @@ class Floor:
             start_new_session=True,  # Ctrl-C is not for this one
         )
 
+    def __enter__(self) -> "Floor":
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._process.kill()
+        self._process.communicate()
+
     def finish(self) -> dict[str, Any]:
         """`timer` and `handover` in milliseconds, `sleeps` how many times; {} if it could not be measured."""
         try:
             said, _ = self._process.communicate(timeout=10.0)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            said, _ = self._process.communicate()
+            return {}
         return dict(json.loads(said)) if said.strip() else {}
 
 

@@ -38,8 +38,13 @@ class Lsl:
         if not name.strip():
             raise BadInput("--lsl without a name.", "Receivers find the streams by it.")
         self.name = f"--lsl {name}"
-        if not network and not os.environ.get(_CHOSEN):
+        where = f"as {_CHOSEN} says"
+        if network:
+            where = "announced to the network"
+        elif not os.environ.get(_CHOSEN):
+            where = "found on this computer alone, though liblsl's ports are open to the network"
             pylsl.set_config_content(_HERE)  # counts until the first stream is made, and for the whole program
+        self.told = f"LSL: {name}-qpos and {name}-joints, {where}"
         self._late_s = pylsl.local_clock() - time.monotonic()
         root = [(f"root.{axis}", "metres") for axis in "xyz"] + [
             (f"root.q{axis}", "unit quaternion") for axis in "wxyz"

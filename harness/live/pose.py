@@ -75,10 +75,15 @@ class Output(Protocol):
         """As the user asked for it."""
         ...
 
+    @property
+    def told(self) -> str:
+        """Where it goes, in a line for the user."""
+        ...
+
     def send(self, pose: LivePose) -> None:
         """OSError when it cannot: the session goes on without this output."""
         ...
 
     def close(self) -> None:
-        """Finish what was begun; once, also after an error."""
+        """Finish what was begun; also after an error, and as often as one likes."""
         ...

@@ -2,13 +2,9 @@
 
 from pathlib import Path
 
-import numpy as np
-
 from harness.core.skeleton import Skeleton
-from harness.live.files import created
+from harness.live.files import Written
 from harness.live.pose import LivePose
-
-_SAVE_S = 1.0
 
 
 class Table:
@@ -20,22 +16,20 @@ class Table:
 
     def __init__(self, path: Path, own: Skeleton, stations: tuple[str, ...], *, force: bool = False) -> None:
         """BadFile when there is one and it is not to be written over, or when it cannot be written."""
-        self.name = f"--poses {path}"
-        self._file = created(path, force)
+        self.name, self.told = f"--poses {path}", f"table of poses: {path}"
         root = [f"root.{axis}_m" for axis in "xyz"] + [f"root.q{axis}" for axis in "wxyz"]
         hinges = [f"{own.dof_names[d]}_rad" for d in _as_in_qpos(own)]
         times = ["received_s", "taken_s", "ready_s", *(f"device_s.{name}" for name in stations)]
-        self._file.write((",".join(["frame", "status", *times, *root, *hinges]) + "\n").encode())
-        self._saved_s = -np.inf
+        head = ",".join(["frame", "status", *times, *root, *hinges]) + "\n"
+        self._file = Written(path, head.encode(), force=force)
 
     def send(self, pose: LivePose) -> None:
         frame = pose.frame
         times = (frame.received_s, pose.taken_s, pose.ready_s, *frame.measured_s.tolist())
         numbers = map(repr, (*times, *pose.estimate.qpos.tolist()))
-        self._file.write(f"{pose.number},{pose.estimate.status.name.lower()},{','.join(numbers)}\n".encode())
-        if pose.ready_s - self._saved_s > _SAVE_S:
-            self._saved_s = pose.ready_s
-            self._file.flush()
+        line = f"{pose.number},{pose.estimate.status.name.lower()},{','.join(numbers)}\n"
+        if self._file.write(line.encode(), pose.ready_s):
+            self._file.save()
 
     def close(self) -> None:
         self._file.close()

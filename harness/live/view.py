@@ -25,6 +25,8 @@ READY, CLOSED = "ready", "closed"
 """What the other process says."""
 _START_S, _END_S = 60.0, 10.0
 _SIZE = 3 + 55
+_RATE_HZ: dict[Kind, float] = {"window": 30.0, "frames": 4.0}
+"""Pictures per second at most."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,9 @@ class Shared:
 class View:
     """An `Output`: a window, or pictures in a folder."""
 
-    def __init__(self, kind: Kind, own: Skeleton, out: Path | None = None, *, force: bool, rate_hz: float) -> None:
+    def __init__(self, kind: Kind, own: Skeleton, out: Path | None = None, *, force: bool) -> None:
         """Returns when a first picture, of the T-pose, was drawn; BadInput, BadFile, MissingExtra when it cannot be."""
-        self.name = f"--view {kind}"
+        self.name, self.told = f"--view {kind}", f"view: {'a window' if kind == 'window' else f'pictures in {out}'}"
         if find_spec("pyvista") is None:
             raise MissingExtra(self.name, "pyvista", "viz")
         screenless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
@@ -79,7 +81,7 @@ class View:
         context = get_context("spawn")
         self._shared = Shared(context)
         self._ours, theirs = context.Pipe()
-        screen = Screen(kind, own.bone_m, str(out or ""), rate_hz)
+        screen = Screen(kind, own.bone_m, str(out or ""), _RATE_HZ[kind])
         self._process = context.Process(target=_show, args=(screen, self._shared, theirs), name="view", daemon=True)
         with ctrl_c_ignored():  # it ends with us, not beside us
             self._process.start()

@@ -34,7 +34,7 @@ class Vmc:
         if find_spec("pythonosc") is None:
             raise MissingExtra("--vmc", "python-osc", "live")
         host, port = parse_address(address)
-        self.name = f"--vmc {host}:{port}"
+        self.name, self.told = f"--vmc {host}:{port}", f"VMC protocol: to UDP port {port} of {host}"
         self._pose = UnityPose(own)
         self._datagrams = _Datagrams(self._pose.names)
         self._to: Any

@@ -106,14 +106,23 @@ def test_a_table_is_read_back_exactly(tmp_path: Path, rng: np.random.Generator) 
         assert names.index(name) == int(joint.qposadr[0])
 
 
-def test_nothing_is_written_over_unless_told(tmp_path: Path) -> None:
+def test_nothing_is_written_over_unless_told(tmp_path: Path, rng: np.random.Generator) -> None:
     path = tmp_path / "there"
     path.write_text("mine")
     for make in (lambda: Bvh(path, BODY.skeleton, RATE_HZ), lambda: Table(path, BODY.skeleton, ())):
         with pytest.raises(BadFile, match="it exists"):
             make()
     assert path.read_text() == "mine"
-    Table(path, BODY.skeleton, (), force=True).close()
+    output = Table(path, BODY.skeleton, ("a", "b"), force=True)
+    output.send(live_pose(configuration(rng)))
+    output.close()
     assert path.read_text().startswith("frame,status")
     with pytest.raises(BadFile, match="cannot be written"):
         Table(tmp_path / "no" / "folder", BODY.skeleton, ())
+
+
+def test_no_file_is_left_of_no_frame(tmp_path: Path) -> None:
+    for output in (Bvh(tmp_path / "a.bvh", BODY.skeleton, RATE_HZ), Table(tmp_path / "a.csv", BODY.skeleton, ())):
+        output.close()
+        output.close()
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,163 @@
+"""The verb that turns a tracker into moving bodies, as it happens."""
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, redirect_stdout
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from harness.commands.verb import (
+    Verbs,
+    add_verb,
+    ended_by_sigterm,
+    items,
+    positive,
+    positive_number,
+    say,
+    stations_of,
+    talk,
+)
+from harness.errors import BadInput, Outcome
+
+if TYPE_CHECKING:
+    from harness.core.calibration import Calibration
+    from harness.live.calibrate import Calibrator
+    from harness.live.pose import Output
+    from harness.rehearsal import Rehearsal
+    from harness.stream.driver import Is900, LineEvent
+
+_WARM_UP_FRAMES = 200
+_RATE_SLACK = 0.02
+"""How far a device may be off the rate that a method learnt at, as a share [choice]."""
+
+
+def add_live(verbs: Verbs) -> None:
+    text = "reconstruct from a tracker in real time: a view, VMC, LSL, BVH; Ctrl-C ends it"
+    verb = add_verb(verbs, "live", text, live, "seed", "mocap")
+    verb.add_argument(
+        "--port", required=True, help="/dev/ttyUSB0, COM3, the link of an emulator's pty, tcp://HOST:PORT"
+    )
+    text = "names the stations and where they are worn, the body and the examples (see `harness list`)"
+    verb.add_argument("--scenario", required=True, metavar="NAME", help=text)
+    verb.add_argument("--method", default="dynamic_map", metavar="NAME", help="(default dynamic_map)")
+    verb.add_argument("--clip", help="whose body, and what is not learnt from (default: the scenario's first)")
+    text = "how many of the scenario's stations, or their names (default: the first 4)"
+    verb.add_argument("--stations", metavar="N|A,B", help=text)
+    text = "frames per second of the tracker, and of what is learnt (default: the scenario's)"
+    verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
+    verb.add_argument("--items", type=items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)")
+    verb.add_argument("--baud", type=positive, help="of a serial port (default: found out)")
+    text = "exact: worn as the scenario says; tpose: of the first seconds, in which the performer stands in T-pose"
+    verb.add_argument("--calibration", choices=["exact", "tpose"], default="exact", help=text)
+    text = "window: as it moves; frames: PNG files in the folder --out"
+    verb.add_argument("--view", choices=["window", "frames"], help=text)
+    verb.add_argument("--out", type=Path, metavar="DIR", help="folder of --view frames")
+    verb.add_argument("--vmc", metavar="[HOST:]PORT", help="send VMC protocol by UDP; to this computer without HOST")
+    verb.add_argument("--lsl", metavar="NAME", help="streams NAME-qpos and NAME-joints of the Lab Streaming Layer")
+    verb.add_argument("--lsl-network", action="store_true", help="announce them to the network too")
+    verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion")
+    verb.add_argument("--poses", type=Path, metavar="FILE", help="write a table: poses, and the times of each frame")
+    verb.add_argument("--force", action="store_true", help="write over files that exist")
+    verb.add_argument("--seconds", type=positive_number, metavar="S", help="end after so long")
+    text = "from the last byte to the pose (default: a period of the tracker)"
+    verb.add_argument("--deadline", type=positive_number, metavar="MS", help=text)
+
+
+def live(args: argparse.Namespace) -> Outcome:
+    from harness.live import summary
+    from harness.live.floor import Floor
+    from harness.live.perform import Plan, perform, warm_up
+    from harness.reconstruct import registry
+    from harness.rehearsal import rehearse
+
+    told = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
+    rehearsal = rehearse(args.scenario, stations=stations_of(args), **told)
+    method = registry.resolve(args.method)
+    events: list[LineEvent] = []
+    with ended_by_sigterm(), ExitStack() as opened:
+        outputs = _outputs(args, rehearsal, opened)
+        device = opened.enter_context(_device(args, rehearsal, events))
+        rate_hz = rehearsal.tracker.rate_hz
+        talk(f"learning {args.method} from {len(rehearsal.setting.example_names)} clips of {rehearsal.scenario.name}")
+        with redirect_stdout(sys.stderr):  # what a method prints is talk
+            reconstructor = rehearsal.setting.fitted(method, args.method)
+            warm_up(reconstructor, rehearsal.calibration, rehearsal.simulation.frames[:_WARM_UP_FRAMES])
+            floor = opened.enter_context(Floor())
+            talk("Ctrl-C ends it")
+            plan = Plan(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
+            done = perform(device, rehearsal.body, reconstructor, _worn(args, rehearsal), outputs, plan, say=talk)
+        beside = floor.finish()
+        content = {
+            "method": args.method,
+            "scenario": rehearsal.scenario.name,
+            "stations": list(rehearsal.scenario.stations),
+            "rate_hz": rate_hz,
+            **summary.as_dict(done, beside),
+            "line": device.counts,
+            "events": [asdict(event) for event in events],
+        }
+    kinds = Counter(event.kind for event in events)
+    line = [f"{name} {count}" for name, count in (device.counts | kinds).items()]
+    outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
+    return say(args, content, *summary.lines(done, beside), f"line: {', '.join(line)}", outcome=outcome)
+
+
+@contextmanager
+def _device(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[LineEvent]") -> "Iterator[Is900]":
+    """The tracker, set up; BadInput when it is not the one that the scenario has."""
+    from harness.stream.driver import Is900, Wanted
+
+    def happened(event: "LineEvent") -> None:
+        events.append(event)
+        talk(f"line: {event.text}")
+
+    tracker = rehearsal.tracker
+    stations = tuple(rehearsal.scenario.stations)
+    wanted = Wanted(items=args.items or tracker.items, stations=stations, rate_hz=args.rate, baud=args.baud)
+    with Is900(args.port, wanted, on_event=happened) as device:
+        runs_hz = device.wire.rate_hz
+        if abs(runs_hz - tracker.rate_hz) > _RATE_SLACK * tracker.rate_hz:
+            raise BadInput(
+                f"The device sends {runs_hz:.1f} frames per second, {rehearsal.scenario.name} has {tracker.rate_hz:g}.",
+                f"Say --rate {runs_hz:.0f}: a method learns at the tracker's rate.",
+            )
+        worn = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
+        talk(f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz; stations {worn}")
+        yield device
+
+
+def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack) -> "list[Output]":
+    """What is asked for; closed again when something after it is refused."""
+    from harness.live.bvh import Bvh
+    from harness.live.lsl import Lsl
+    from harness.live.table import Table
+    from harness.live.view import View
+    from harness.live.vmc import Vmc
+
+    own, stations, rate_hz = rehearsal.body.skeleton, tuple(rehearsal.scenario.stations), rehearsal.tracker.rate_hz
+    wanted: dict[str, Any] = {
+        "vmc": lambda: Vmc(args.vmc, own),
+        "lsl": lambda: Lsl(args.lsl, own, rate_hz, network=args.lsl_network),
+        "bvh": lambda: Bvh(args.bvh, own, rate_hz, force=args.force),
+        "poses": lambda: Table(args.poses, own, stations, force=args.force),
+        "view": lambda: View(args.view, own, args.out, force=args.force),
+    }
+    outputs: list[Output] = []
+    for name, make in wanted.items():
+        if getattr(args, name) is not None:
+            outputs.append(make())
+            opened.callback(outputs[-1].close)
+            talk(outputs[-1].told)
+    return outputs
+
+
+def _worn(args: argparse.Namespace, rehearsal: "Rehearsal") -> "Calibration | Calibrator":
+    from harness.live.calibrate import StandInTPose
+    from harness.setting import mounts_of
+
+    if args.calibration == "tpose":
+        return StandInTPose(rehearsal.body, mounts_of(rehearsal.scenario))
+    return rehearsal.calibration

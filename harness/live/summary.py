@@ -1,0 +1,54 @@
+"""What a live session came to, for people and for programs."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from harness.live.latency import Durations
+from harness.live.perform import Performed
+
+
+def as_dict(done: Performed, floor: Mapping[str, Any]) -> dict[str, Any]:
+    """Counts; times in milliseconds."""
+    stages = done.stages
+    return {
+        "seconds": done.seconds,
+        "frames": done.captured,
+        "frames_before": done.before,
+        "frames_dropped": done.dropped,
+        "poses": done.poses,
+        "status": done.status,
+        "deadline_ms": 1e3 * stages.deadline_s,
+        "deadline_missed": stages.missed,
+        "latency": {name: durations.as_dict() for name, durations in stages.named().items()},
+        "floor": dict(floor),
+        "outputs_failed": done.failed,
+    }
+
+
+def lines(done: Performed, floor: Mapping[str, Any]) -> list[str]:
+    """A table of the times, with what the computer itself takes below, and the counts."""
+    stages = done.stages
+    rows = [_row(name, durations) for name, durations in stages.named().items()]
+    rows += [_numbers(name, floor[key]) for name, key in _FLOOR.items() if floor.get(key)]
+    states = ", ".join(f"{count} {name}" for name, count in done.status.items())
+    counts = f"{done.poses} poses in {done.seconds:.1f} s ({states}); {done.dropped} frames dropped"
+    if done.before:
+        counts += f", {done.before} before the first"
+    share = stages.missed / done.poses if done.poses else 0.0
+    late = f"{stages.missed} poses ({share:.2%}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
+    failed = [f"{name}: {why}" for name, why in done.failed.items()]
+    return [f"{'milliseconds':<32}{'p50':>8}{'p99':>8}{'max':>8}", *rows, "", counts, late, *failed]
+
+
+_FLOOR = {
+    "the computer: a timer is late": "timer",
+    "the computer: thread to thread": "handover",
+}
+
+
+def _row(name: str, durations: Durations) -> str:
+    return _numbers(name, durations.as_dict())
+
+
+def _numbers(name: str, times: Mapping[str, float | None]) -> str:
+    return f"{name:<32}" + "".join(f"{'-' if ms is None else format(ms, '.2f'):>8}" for ms in times.values())
