@@ -24,7 +24,7 @@ class EmulatorConfig:
     paced: bool = True
     """False sends everything at once, as over Ethernet."""
     queue_records: int = 12
-    """Records that wait for the line before the oldest is dropped (docs/is900.md 14; the size is a choice)."""
+    """Records that wait for the line before the oldest round is dropped (docs/is900.md 14; the size is a choice)."""
     restart_s: float = 0.25
     """Silence after a restart [s]; clients wait 10 to 20 s for a real one (docs/is900.md 4.1)."""
     check_baud: bool = False

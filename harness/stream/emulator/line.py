@@ -6,12 +6,17 @@ from harness.stream.emulator.message import Message
 
 BITS_PER_BYTE = 10
 """8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
+_LAST = "~"
+"""After all stations: the next record begins a round."""
 MOST_REPLIES = 256
 """Replies that wait; a client that asks faster than the line answers loses the oldest."""
 
 
 class Line:
-    """When each message has gone. A record that finds the queue full displaces the oldest one that waits.
+    """When each message has gone. A record that finds the queue full displaces the oldest whole round that waits.
+
+    Were it the oldest record, a steady overload would hit the same stations again and again, since the rhythm of the
+    line and that of the stations lock. A round that has begun to go, and the newest one, are let be.
 
     The schedule is absolute: a message starts when it is ready and the line is free, never when somebody looked.
     """
@@ -25,20 +30,40 @@ class Line:
         self._going: deque[tuple[float, Message]] = deque()
         """Messages that began, and when the last byte of each is due [s]."""
         self._free_s = float("-inf")
+        self._begun = _LAST
+        """Station of the last record that began."""
 
     def add(self, message: Message) -> None:
         """A message after all others; those in order of time."""
         self._begin(message.ready_s, before=True)
         if message.halts:
             self._waiting = deque(waiting for waiting in self._waiting if not waiting.station)
+            self._begun = _LAST
             return
-        full = self._queue_records if message.station else MOST_REPLIES
-        alike = [waiting for waiting in self._waiting if bool(waiting.station) == bool(message.station)]
-        if len(alike) >= full:
-            self._waiting.remove(alike[0])
-            self.dropped += bool(message.station)
-            self.dropped_replies += not message.station
         self._waiting.append(message)
+        alike = [waiting for waiting in self._waiting if bool(waiting.station) == bool(message.station)]
+        if message.station and len(alike) > self._queue_records:
+            self._drop(self._oldest_round(alike))
+        elif not message.station and len(alike) > MOST_REPLIES:
+            self._waiting.remove(alike[0])
+            self.dropped_replies += 1
+
+    def _oldest_round(self, records: list[Message]) -> list[Message]:
+        """Of those that wait; [] where only a begun one and the newest do."""
+        rounds: list[list[Message]] = []
+        before = self._begun
+        for record in records:
+            if not rounds or record.station <= before:
+                rounds.append([])
+            rounds[-1].append(record)
+            before = record.station
+        begun = records[0].station > self._begun
+        return next(iter(rounds[begun:-1]), [])
+
+    def _drop(self, records: list[Message]) -> None:
+        these = set(map(id, records))
+        self._waiting = deque(waiting for waiting in self._waiting if id(waiting) not in these)
+        self.dropped += len(records)
 
     def hold(self, from_s: float, until_s: float) -> None:
         """Nothing begins between these moments."""
@@ -67,6 +92,7 @@ class Line:
             if start_s > now_s or (before and start_s == now_s):
                 return
             message = self._waiting.popleft()
+            self._begun = message.station or self._begun
             self._free_s = self._end_s(message)
             self._going.append((self._free_s, message))
 

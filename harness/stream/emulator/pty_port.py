@@ -89,10 +89,9 @@ class PtyPort:
         self.unplug()
 
     def _shut(self) -> None:
-        os.close(self._slave)
-        os.close(self._master)
-        self._master = self._slave = -1
-        self._rest = b""
+        ends, self._master, self._slave, self._rest = (self._slave, self._master), -1, -1, b""
+        for end in ends:
+            os.close(end)
 
     def _waiting(self) -> int:
         """Bytes that the client has not read."""

@@ -45,7 +45,8 @@ def _text(text: str) -> ReplyEvent:
 
 
 def _states(settings: DeviceSettings, argument: Argument) -> Iterable[ReplyEvent]:
-    if argument.text.strip() == "*":
+    """InterSense's library of 1999 names no station where it asks for all of them (docs/is900.md 14)."""
+    if argument.text.strip() in ("*", ""):
         active = [station.active for station in settings.stations]
         return [StationStates(None, (*active, *[False] * (_FLAGS - len(active))))]
     name = argument.station()

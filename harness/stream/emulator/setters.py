@@ -82,7 +82,7 @@ def _without_emitter(settings: DeviceSettings, argument: Argument) -> DeviceSett
 
 def _address(settings: DeviceSettings, argument: Argument) -> DeviceSettings:
     parts = argument.text.strip(" ,").split(".")
-    if len(parts) != 4 or not all(part.isdigit() and int(part) < 256 for part in parts):
+    if len(parts) != 4 or not all(part.isascii() and part.isdigit() and int(part) < 256 for part in parts):
         raise Refused(OUT_OF_RANGE)
     return replace(settings, address=".".join(parts))
 
