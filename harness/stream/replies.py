@@ -170,7 +170,7 @@ class DeviceError:
     st: int = 0
 
     def line(self) -> bytes:
-        said = re.sub(r"[^ -~]", "?", self.command)[:100]
+        said = re.sub(r"[^ -~]", "?", self.command)[:80]
         return _sent(f"2 E*ERROR*{said}*ERROR* EC {self.code}*PS{self.ps}  *FL{self.fl} *ST{self.st}")
 
     @classmethod

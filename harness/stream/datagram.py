@@ -1,0 +1,53 @@
+"""The packet that an IS-900 sends over UDP, one per station, port 5001 by default (docs/is900.md 9).
+
+Unlike the serial record it has a checksum: a sum, so that a flipped bit is always caught, but not two bytes swapped.
+"""
+
+import struct
+from dataclasses import dataclass
+
+_HEAD, _STATION_DATA = 0xFF, 1
+_FORM = struct.Struct("<4B4B8B3f3f")
+_TIME = struct.Struct("<f")
+
+
+@dataclass(frozen=True)
+class Datagram:
+    """What one station says. Values are kept as they are on the wire, single precision where they have fractions."""
+
+    sequence: int
+    """0 to 255, then again from 0."""
+    model: int
+    """Of the tracker; no source lists the numbers."""
+    station: int
+    """From 1."""
+    quality: int
+    """0 lost to 255, as item 40."""
+    buttons: int
+    """Bits, as item 22."""
+    analogue: tuple[int, ...]
+    """(8,) 0 to 255; the joystick's are the first two."""
+    yaw_pitch_roll_deg: tuple[float, float, float]
+    position_m: tuple[float, float, float]
+    time_s: float | None = None
+    """Device clock [s]; None where it was not asked for."""
+
+    def packet(self) -> bytes:
+        """40 bytes, or 44 with the time."""
+        values = (self.model, self.station, self.quality, self.buttons, *self.analogue)
+        places = (*self.yaw_pitch_roll_deg, *self.position_m)
+        body = _FORM.pack(_HEAD, _STATION_DATA, self.sequence & 0xFF, 0, *values, *places)[4:]
+        body += b"" if self.time_s is None else _TIME.pack(self.time_s)
+        return bytes([_HEAD, _STATION_DATA, self.sequence & 0xFF, sum(body) & 0xFF]) + body
+
+
+def parse(packet: bytes) -> Datagram | None:
+    """What a packet says; None for camera data, a wrong length or a wrong sum."""
+    if len(packet) not in (_FORM.size, _FORM.size + _TIME.size) or packet[:2] != bytes([_HEAD, _STATION_DATA]):
+        return None
+    if sum(packet[4:]) & 0xFF != packet[3]:
+        return None
+    _, _, sequence, _, model, station, quality, buttons, *rest = _FORM.unpack_from(packet)
+    yaw, pitch, roll, x, y, z = rest[8:]
+    time_s = float(_TIME.unpack_from(packet, _FORM.size)[0]) if len(packet) > _FORM.size else None
+    return Datagram(sequence, model, station, quality, buttons, tuple(rest[:8]), (yaw, pitch, roll), (x, y, z), time_s)

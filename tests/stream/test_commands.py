@@ -1,0 +1,88 @@
+"""Commands as bytes and back: the framing of docs/is900.md 3, and what real clients send (11)."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.stream import commands
+from harness.stream.commands import LONGEST_LINE, Command, CommandReader
+
+
+def read(data: bytes) -> list[bytes]:
+    return [command.line for command in CommandReader().feed(data)]
+
+
+@pytest.mark.parametrize(
+    ("data", "lines"),
+    [
+        (b"fCMT\rMZ\r", [b"f", b"C", b"MT", b"MZ"]),
+        (b"cS", [b"c", b"S"]),
+        (b"O1,2,11,0\rO2,2,11,0\r", [b"O1,2,11,0", b"O2,2,11,0"]),
+        (b"x0.2,0.2,0.8,0.8\rv0.2,0.2,0.8,0.8\r", [b"x0.2,0.2,0.8,0.8", b"v0.2,0.2,0.8,0.8"]),
+        (b"c*resetMS\r\n", [b"c", b"*resetMS"]),
+        (b"fuC\x11SMG\r\n", [b"f", b"u", b"C", b"\x11", b"S", b"MG"]),
+        (
+            b"cFUSl*\nMCF\nMP\nO1,40,2,4,1\n\rO1\r",
+            [b"c", b"F", b"U", b"S", b"l*", b"MCF", b"MP", b"O1,40,2,4,1", b"O1"],
+        ),
+        (b"l1,1\r\nR1\r\nb1\r\nMp1,0\r\nMF1,0\r\nMQ1,3\r\n", [b"l1,1", b"R1", b"b1", b"Mp1,0", b"MF1,0", b"MQ1,3"]),
+        (b"tY\x19c", [b"\x19", b"c"]),
+        (b"\r\n\r\n\n", []),
+        (b"M\x13S\r", [b"\x13", b"MS"]),
+        (b"W\x0b", [b"W", b"\x0b"]),
+    ],
+    ids=lambda given: given[:8].decode("latin-1") if isinstance(given, bytes) else "",
+)
+def test_what_real_clients_send(data: bytes, lines: list[bytes]) -> None:
+    assert read(data) == lines
+
+
+@given(
+    st.lists(st.sampled_from([b"c", b"S", b"\x19", b"\x0b", b"O1,2\r", b"MZ\r\n", b"\n", b"M", b"l*", b"\xff"])),
+    st.data(),
+)
+def test_any_pieces_give_the_same_commands(parts: list[bytes], choose: st.DataObject) -> None:
+    data = b"".join(parts)
+    cut = choose.draw(st.integers(0, len(data)))
+    reader = CommandReader()
+    assert reader.feed(data[:cut]) + reader.feed(data[cut:]) == CommandReader().feed(data)
+
+
+def test_an_endless_line_is_cut_and_the_next_is_read() -> None:
+    reader = CommandReader()
+    out: list[Command] = []
+    for _ in range(1000):
+        out += reader.feed(b"x" * 1000)
+    assert out == []
+    assert reader.feed(b"\rMZ\r") == [Command(b"x" * LONGEST_LINE, cut=True), Command(b"MZ")]
+
+
+@pytest.mark.parametrize(
+    ("built", "sent"),
+    [
+        (commands.output_list("1", (40, 2, 11, 21, 1)), b"O1,40,2,11,21,1\r\n"),
+        (commands.read_list("A"), b"OA\r\n"),
+        (commands.switch_station("2", active=False), b"l2,0\r\n"),
+        (commands.boresight("3"), b"B3\r\n"),
+        (commands.undo_boresight("3"), b"b3\r\n"),
+        (
+            commands.alignment("1", (0, 0, 0), (100, 0, 0), (0, 100, 0)),
+            b"A1,0.00,0.00,0.00,100.00,0.00,0.00,0.00,100.00,0.00\r\n",
+        ),
+        (commands.undo_alignment("1"), b"R1\r\n"),
+        (commands.prediction("1", 20), b"Mp1,20\r\n"),
+        (commands.enhancement("1", 2), b"MF1,2\r\n"),
+        (commands.sensitivity("1", 3), b"MQ1,3\r\n"),
+        (commands.serial_line(115200), b"o1152,N,8,0\r\n"),
+    ],
+)
+def test_builders_write_what_the_manuals_say(built: bytes, sent: bytes) -> None:
+    assert built == sent
+    assert read(built) == [sent[:-2]]
+
+
+def test_immediate_commands_need_no_terminator() -> None:
+    for byte in commands.IMMEDIATE + commands.CONTROL:
+        assert CommandReader().feed(bytes([byte])) == [Command(bytes([byte]))]
+        assert Command(bytes([byte])).immediate
+    assert not Command(b"MZ").immediate

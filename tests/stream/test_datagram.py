@@ -1,0 +1,55 @@
+"""The UDP packet of docs/is900.md 9, by its example and under damage."""
+
+import struct
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.stream.datagram import Datagram, parse
+
+EXAMPLE = bytes.fromhex(
+    "ff010703 0401ff05 7fff000000000000 0000b442 000020c1 0000b040 0000803f 000000bf 0000c03f 2b874541"
+)
+SAID = Datagram(
+    sequence=7,
+    model=4,
+    station=1,
+    quality=255,
+    buttons=5,
+    analogue=(127, 255, 0, 0, 0, 0, 0, 0),
+    yaw_pitch_roll_deg=(90.0, -10.0, 5.5),
+    position_m=(1.0, -0.5, 1.5),
+    time_s=struct.unpack("<f", struct.pack("<f", 12.3455))[0],
+)
+
+
+def test_the_example_both_ways() -> None:
+    assert len(EXAMPLE) == 44
+    assert parse(EXAMPLE) == SAID
+    assert SAID.packet() == EXAMPLE
+
+
+def test_the_time_is_there_only_when_asked_for() -> None:
+    without = Datagram(*(getattr(SAID, name) for name in list(Datagram.__dataclass_fields__)[:-1]))
+    assert len(without.packet()) == 40
+    assert parse(without.packet()) == without
+
+
+@pytest.mark.parametrize("at", range(2, 44))
+@pytest.mark.parametrize("bit", range(8))
+def test_a_flipped_bit_is_caught_but_for_the_sequence(at: int, bit: int) -> None:
+    hurt = bytearray(EXAMPLE)
+    hurt[at] ^= 1 << bit
+    assert (parse(bytes(hurt)) is None) == (at != 2), "the sum leaves the sequence number out"
+
+
+@given(st.binary(max_size=60))
+def test_rubbish_is_no_packet_or_is_what_was_read(data: bytes) -> None:
+    said = parse(data)
+    assert said is None or len(said.packet()) == len(data)
+
+
+@pytest.mark.parametrize("damage", [EXAMPLE[:-1], EXAMPLE + b"\0", b"", b"\xff\x02" + EXAMPLE[2:]])
+def test_other_lengths_and_camera_data_are_refused(damage: bytes) -> None:
+    assert parse(damage) is None
