@@ -3,7 +3,7 @@
 A recording only ever grows, by whole blocks. What a crash cut off at the end, or a disk spoilt in the middle, costs
 the blocks it touches and is named; recording into a file of ours goes on behind it. Blocks by kind:
 
-    recv, sent   bytes from and to the device
+    recv, sent   bytes from and to the device; of no bytes: nothing was there, and a frame was given up waiting for
     conf         JSON of the `WireFormat` that the bytes after it are read with; the device's clock starts anew
     evnt         JSON of what befell the line, as the driver reported it
     note         JSON of what made what follows: the port, or the scenario, clip, seed, stations and rate
@@ -200,7 +200,7 @@ class RecordingWriter:
         self.close()
 
     def _append_all(self, kind: str, data: bytes, monotonic_s: float, wall_s: float) -> None:
-        for begin in range(0, len(data), LONGEST):
+        for begin in range(0, max(len(data), 1), LONGEST):
             self._append(Block(kind, monotonic_s, wall_s, data[begin : begin + LONGEST]))
         self.counts[kind] += len(data)
 

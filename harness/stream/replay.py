@@ -1,8 +1,7 @@
 """A recording as a stream: the same decoder on a virtual clock, at any speed.
 
 What a frame says depends on the recorded bytes and times alone, never on the speed. Frames carry the recorded times
-of reception. The virtual clock expires unfinished frames as a driver does: before bytes are read, and when the
-line has been silent.
+of reception. Frames that the driver gave up waiting for are given up at the same moment of the virtual clock.
 """
 
 import math
@@ -117,9 +116,8 @@ class RecordingStream:
                 sessions.configured(wire, block.monotonic_s + shift_s)
                 frames = []
             elif block.kind == RECEIVED:
-                if (due_s := sessions.silent_from_s) < block.monotonic_s + shift_s:
-                    yield from ((due_s, frame) for frame in sessions.expire(due_s))
-                frames = sessions.received(block.payload, block.monotonic_s + shift_s)
+                at_s = block.monotonic_s + shift_s
+                frames = sessions.received(block.payload, at_s) if block.payload else sessions.expire(at_s)
             else:
                 continue
             now_s, wall_s = block.monotonic_s + shift_s, block.wall_s

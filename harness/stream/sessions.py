@@ -61,18 +61,19 @@ class Sessions:
         return frames
 
     def received(self, data: bytes, now_s: float) -> list[TrackerFrame]:
-        """What these bytes complete, after what was due before they came; nothing unless it is set up."""
+        """What these bytes complete; nothing unless it is set up."""
         if self._reader is None:
             return []
         if self._new and self._frames:
             self.device_zero_s = self._device_s + max(now_s - self._framed_s, 0.0)
         self._new = False
-        frames = self.expire(now_s)
         self._heard_s = now_s
-        return frames + self._placed(self._reader.feed(data, now_s))
+        return self._placed(self._reader.feed(data, now_s))
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
-        """The frame that has waited too long at this moment."""
+        """The frame that has waited too long at this moment. To be asked when the line was looked at and nothing was
+        there: bytes that a busy host has not read yet must not cost their frame.
+        """
         return [] if self._reader is None else self._placed(self._reader.expire(now_s))
 
     def finish(self) -> list[TrackerFrame]:

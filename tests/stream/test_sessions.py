@@ -72,11 +72,16 @@ def test_host_times_rise_from_one_session_to_the_next() -> None:
     assert (np.diff([frame.measured_s[0] for frame in frames]) > 0.0).all()
 
 
-def test_what_waits_too_long_is_given_before_what_comes_next() -> None:
+def test_only_who_sees_silence_gives_up_a_frame() -> None:
+    """Bytes that are read late were sent in time: the rest of a frame is still welcome."""
     sessions = Sessions()
     sessions.configured(FOUR, 99.0)
-    data = sent(stamps_s(2))
+    data = sent(stamps_s(3))
     sessions.received(data[:RECORD], 100.0)
-    frames = sessions.received(data[4 * RECORD :], 100.0 + 1.6 / RATE_HZ)
-    assert [frame.position_valid.sum() for frame in frames] == [1, 4]
-    assert sessions.silent_from_s == 100.0 + 3.6 / RATE_HZ
+    (late,) = sessions.received(data[RECORD : 4 * RECORD], 100.0 + 5.0 / RATE_HZ)
+    assert late.position_valid.all()
+    sessions.received(data[4 * RECORD : 5 * RECORD], 101.0)
+    assert sessions.silent_from_s == 101.0 + 2.0 / RATE_HZ
+    assert sessions.expire(101.0 + 1.4 / RATE_HZ) == []
+    (given_up,) = sessions.expire(sessions.silent_from_s)
+    assert given_up.position_valid.tolist() == [True, False, False, False]

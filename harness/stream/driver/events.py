@@ -33,7 +33,10 @@ class LineEvent:
 class Witness(Protocol):
     """Sees all that goes over the line, in order; a recording is one."""
 
-    def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...
+    def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+        """What was read; b"" where nothing was there and a frame was given up waiting for."""
+        ...
+
     def sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...
     def configured(self, wire: WireFormat) -> None:
         """After each successful set-up, before `C`: what follows is in this format, and the clock starts anew."""

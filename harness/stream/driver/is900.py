@@ -161,7 +161,10 @@ class Is900:
                 came = self._line.receive(due_s if due_s > 0.0 else self._timing.poll_s)
                 now_s = self._host.monotonic_s()
                 if not came:
-                    self._framed(self._sessions.expire(now_s), now_s)
+                    late = self._sessions.expire(now_s)
+                    if late:
+                        self._witness.received(b"", now_s, self._host.wall_s())
+                    self._framed(late, now_s)
                 self._keep_up(now_s)
                 if (reader := self._sessions.reader) is not None:
                     for finding in self._watchdog.look(now_s, bool(came), reader):

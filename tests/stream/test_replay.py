@@ -1,0 +1,224 @@
+"""Replay: the frames of a recording, whatever the speed and however the bytes were cut."""
+
+import io
+import threading
+import time
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from harness.errors import BadFile, BadInput
+from harness.stream.blocks import HEADER, RECEIVED
+from harness.stream.capture import Capture
+from harness.stream.frame import TrackerFrame
+from harness.stream.reader import WireFormat
+from harness.stream.recording import Recording, RecordingWriter, read_recording, record_capture
+from harness.stream.replay import RecordingStream, Speed, next_line, speed_of
+from harness.testing.stream_checks import check_stream
+from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
+
+ROUNDS = 24
+STAMPS_S = stamps_s(ROUNDS)
+DATA = sent(STAMPS_S)
+
+
+def alike(one: Sequence[TrackerFrame], other: Sequence[TrackerFrame]) -> bool:
+    return len(one) == len(other) and all(same(a, b) for a, b in zip(one, other, strict=True))
+
+
+def recorded(path: Path, capture: Capture | None = None) -> Path:
+    record_capture(path, FOUR, received(DATA, STAMPS_S) if capture is None else capture, {})
+    return path
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Path:
+    return recorded(tmp_path / "whole.rec")
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> Path:
+    """Silences, lost and damaged records, and a second set-up after a minute."""
+    with RecordingWriter(tmp_path / "broken.rec") as writer:
+        for begin_s in (100.0, 160.0):
+            writer.configured(FOUR, begin_s - 0.1, 1e9)
+            for i, at_s in enumerate((STAMPS_S - STAMPS_S[0] + begin_s).tolist()):
+                record = DATA[i * RECORD : (i + 1) * RECORD]
+                if i % 7 == 3:
+                    continue
+                if i > 30:
+                    at_s += 0.5
+                if i % 11 == 5:
+                    record = record[:9] + b"\xff" + record[10:]
+                writer.received(record, at_s, at_s + 1e9)
+    return tmp_path / "broken.rec"
+
+
+def test_it_is_a_tracker_stream(whole: Path, broken: Path) -> None:
+    assert len(check_stream(lambda: RecordingStream(whole), rate_hz=RATE_HZ)) == ROUNDS
+    assert len(check_stream(lambda: RecordingStream(broken), rate_hz=RATE_HZ)) > ROUNDS
+
+
+def test_frames_are_those_of_the_wire(whole: Path) -> None:
+    assert alike(list(RecordingStream(whole)), frames_of(received(DATA, STAMPS_S)))
+
+
+@settings(max_examples=10, deadline=None)
+@given(chunk=st.integers(1, 300))
+@example(chunk=159)
+def test_how_bytes_were_cut_changes_nothing_but_when_they_came(
+    chunk: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    capture = received(DATA, STAMPS_S, chunk)
+    path = tmp_path_factory.mktemp("cut") / "a.rec"
+    assert alike(list(RecordingStream(recorded(path, capture))), frames_of(capture))
+
+
+@pytest.mark.parametrize("speed", [40.0, 1000.0, "step"])
+def test_frames_are_the_same_at_any_speed(speed: Speed, broken: Path) -> None:
+    assert alike(list(RecordingStream(broken)), list(RecordingStream(broken, 1e6)))
+    whole = recorded(broken.with_name("whole.rec"))
+    assert alike(list(RecordingStream(whole)), list(RecordingStream(whole, speed, step=lambda: True)))
+
+
+def test_at_speed_it_takes_as_long_as_it_took(whole: Path) -> None:
+    """Never shorter, however busy the computer; half a second of motion at half its speed."""
+    began_s = time.monotonic()
+    frames = list(RecordingStream(whole, 0.5))
+    assert time.monotonic() - began_s >= 2.0 * (frames[-1].received_s - frames[0].received_s) - 0.01
+
+
+def test_a_frame_is_given_up_when_the_driver_gave_it_up(tmp_path: Path) -> None:
+    """Not when the line speaks again."""
+    path = tmp_path / "a.rec"
+    with RecordingWriter(path) as writer:
+        writer.configured(FOUR, 99.0, 99.0)
+        writer.received(DATA[: 5 * RECORD], 100.0, 100.0)
+        writer.received(b"", 100.0 + 2.0 / RATE_HZ, 100.0 + 2.0 / RATE_HZ)
+        writer.received(DATA[8 * RECORD :], 3600.0, 3600.0)
+    stream = RecordingStream(path, 1.0)
+    frames = iter(stream)
+    began_s = time.monotonic()
+    assert [int(next(frames).position_valid.sum()) for _ in range(2)] == [4, 1]
+    assert time.monotonic() - began_s < 60.0
+    stream.close()
+    assert list(frames) == []
+
+
+def test_closing_ends_a_wait(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    with RecordingWriter(path) as writer:
+        writer.configured(FOUR, 99.0, 99.0)
+        writer.received(DATA[: 4 * RECORD], 100.0, 100.0)
+        writer.received(DATA[4 * RECORD :], 1e6, 1e6)
+    stream = RecordingStream(path, 1.0)
+    frames = iter(stream)
+    next(frames)
+    threading.Timer(0.05, stream.close).start()
+    assert list(frames) == []
+
+
+def test_a_step_is_a_line_of_input(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
+    assert len(list(RecordingStream(whole, "step", step=next_line))) == 3
+
+
+def test_a_second_set_up_goes_on_where_the_first_ended(broken: Path) -> None:
+    stream = RecordingStream(broken)
+    frames = list(stream)
+    received_s = np.array([frame.received_s for frame in frames])
+    latest_s = np.array([np.nanmax(frame.measured_s) for frame in frames])
+    assert (np.diff(received_s) > 0.0).all()
+    assert (np.diff(latest_s) > 0.0).all()
+    jump = int(np.argmax(np.diff(received_s)))
+    assert np.diff(latest_s)[jump] == pytest.approx(np.diff(received_s)[jump], abs=13.0)
+    assert stream.counts["sessions"] == 2
+    assert stream.device_zero_s > 0.0
+
+
+def test_a_restart_of_the_computer_in_between_is_bridged_by_the_wall_clock(tmp_path: Path) -> None:
+    """The monotonic clock then begins anew."""
+    path = tmp_path / "a.rec"
+    for begin_s, wall_s in ((5000.0, 1e9), (7.0, 1e9 + 300.0)):
+        with RecordingWriter(path) as writer:
+            writer.configured(FOUR, begin_s, wall_s)
+            for i, at_s in enumerate((STAMPS_S - STAMPS_S[0]).tolist()):
+                writer.received(DATA[i * RECORD : (i + 1) * RECORD], begin_s + 0.1 + at_s, wall_s + 0.1 + at_s)
+    stream = RecordingStream(path)
+    walls_s, frames = [], []
+    for frame in stream:
+        frames.append(frame)
+        walls_s.append(stream.wall_s(frame.received_s))
+    assert len(frames) == 2 * ROUNDS
+    gaps_s = [b.received_s - a.received_s for a, b in pairwise(frames)]
+    assert max(gaps_s) == pytest.approx(300.0, abs=1.0)
+    assert min(gaps_s) > 0.0
+    np.testing.assert_allclose(np.diff(walls_s), gaps_s, atol=1e-5)
+    check_stream(lambda: RecordingStream(path), rate_hz=RATE_HZ)
+
+
+def test_a_lost_block_costs_its_records_alone(whole: Path) -> None:
+    data = bytearray(whole.read_bytes())
+    at = data.index(DATA[40 * RECORD : 41 * RECORD])
+    data[at + 5] ^= 0x55
+    whole.write_bytes(data)
+    stream = RecordingStream(whole)
+    frames = list(stream)
+    assert len(stream.recording.lost) == 1
+    clean = frames_of(received(DATA, STAMPS_S))
+    assert [i for i, (a, b) in enumerate(zip(frames, clean, strict=True)) if not same(a, b)] == [10]
+    assert frames[10].position_valid.tolist() == [False, True, True, True]
+
+
+def test_cut_at_any_byte_it_plays_what_is_whole_or_says_why_not(whole: Path) -> None:
+    data = whole.read_bytes()[: 2000 + len(HEADER)]
+    most = 0
+    for cut in range(1, len(data), 7):
+        recording = Recording(whole, data[:cut])
+        if not recording.formats:
+            with pytest.raises(BadFile, match="never set up in it"):
+                RecordingStream(recording)
+            continue
+        frames = list(RecordingStream(recording))
+        blocks = sum(block.kind == RECEIVED for block in recording.blocks())
+        assert len(frames) == -(-blocks // 4)
+        most = max(most, len(frames))
+    assert most > 3
+
+
+def test_without_a_set_up_there_is_nothing_to_play(tmp_path: Path) -> None:
+    with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.received(DATA, 1.0, 2.0)
+    with pytest.raises(BadFile, match="the device was never set up in it"):
+        RecordingStream(tmp_path / "a.rec")
+
+
+def test_stations_never_change(whole: Path, tmp_path: Path) -> None:
+    other = tmp_path / "other.rec"
+    record_capture(other, WireFormat(("head",), RATE_HZ), received(DATA, STAMPS_S), {})
+    both = whole.read_bytes() + other.read_bytes()[len(HEADER) :]
+    with pytest.raises(BadFile, match=r"stations head, .* become head; expected the same stations"):
+        RecordingStream(Recording(whole, both))
+
+
+def test_reading_a_file_while_it_grows_gives_what_was_there(whole: Path) -> None:
+    stream = RecordingStream(read_recording(whole))
+    with RecordingWriter(whole) as writer:
+        writer.configured(FOUR, 1e4, 1e4)
+    assert len(list(stream)) == len(list(stream)) == ROUNDS
+
+
+@pytest.mark.parametrize(("text", "speed"), [("step", "step"), ("max", "max"), ("1", 1.0), ("0.25", 0.25)])
+def test_speeds(text: str, speed: Speed) -> None:
+    assert speed_of(text) == speed
+
+
+@pytest.mark.parametrize("text", ["", "fast", "0", "-1", "nan", "inf"])
+def test_what_is_no_speed_is_refused(text: str) -> None:
+    with pytest.raises(BadInput, match="`step`, `max`, or a positive number"):
+        speed_of(text)
