@@ -24,7 +24,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     # writes BVH as an export does; there is no truth in a live session that its wall would have to hide
     "live": {"stream", "calibrate", "reconstruct", "body", "mocap"},
     # the bench measures what the tables do
-    "bench": (EVERYTHING | {"config", "setting", "progress"}) - {"study", "testing", "commands"},
+    "bench": (EVERYTHING | {"config", "setting", "progress", "rehearsal"}) - {"study", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
     "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "recorded", "rehearsal"},
 }

@@ -8,6 +8,7 @@ from harness.bench.load import bench_load
 from harness.bench.rows import Row
 from harness.bench.startup import bench_startup
 from harness.bench.stream import bench_stream
+from harness.bench.wire import bench_wire
 from harness.errors import MissingExtra, UnknownName
 
 
@@ -34,6 +35,7 @@ BENCHMARKS: dict[str, Callable[[int, bool], list[Row]]] = {
     "startup": lambda seed, large: bench_startup(),
     "load": lambda seed, large: bench_load(seed),
     "stream": lambda seed, large: bench_stream(seed),
+    "wire": lambda seed, large: bench_wire(seed, large=large),
     "ik": _ik,
     "index": lambda seed, large: bench_index(seed),
     "methods": _methods,
@@ -45,7 +47,7 @@ def bench(
 ) -> tuple[list[Row], list[str]]:
     """The rows of the named benchmarks, or of all, and why some of all could not be run; UnknownName, MissingExtra.
 
-    `large` has `methods` learn from a million frames as well, which takes minutes.
+    `large` has `methods` learn from a million frames as well, and `wire` keep each line busy for ten minutes.
     """
     for name in what:
         if name not in BENCHMARKS:

@@ -81,7 +81,11 @@ def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
     """The two-byte form (N, 2k) of values (N, k) within -1 to 1 of full scale (section 5.2)."""
     sixteen = np.clip(np.trunc(np.asarray(values) * 32768.0), -32768, 32767).astype(np.int64)
     fourteen = (sixteen >> 2) & 0x3FFF
-    pairs = np.stack([fourteen & 0x7F, fourteen >> 7], axis=-1).astype(np.uint8).reshape(len(fourteen), 2 * fourteen.shape[1])
+    pairs = (
+        np.stack([fourteen & 0x7F, fourteen >> 7], axis=-1)
+        .astype(np.uint8)
+        .reshape(len(fourteen), 2 * fourteen.shape[1])
+    )
     pairs[:, 0] |= 0x80
     return pairs
 

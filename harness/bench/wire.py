@@ -1,0 +1,154 @@
+"""The wire in real time: an emulator in one process, `harness live` in another, a line between them.
+
+The emulator notes when each record was due and when its last byte was written, the live session when each pose was
+ready; what lies between is the whole way, the system's pipes and both programs' waits included. Beside it stands how
+late this computer wakes a program that only sleeps, at the same time.
+"""
+
+import csv
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.bench.rows import Row
+from harness.bench.wire_case import CASES, CLIP, SCENARIO, Case
+from harness.core.arrays import Bools, Floats
+from harness.rehearsal import rehearse
+from harness.stream import ascii
+from harness.stream.decoder import Decoder
+from harness.stream.items import STATION_CHARACTERS, record_type
+from harness.stream.reader import FrameReader
+from harness.stream.records import Settings
+
+METHOD = "dynamic_map"
+SECONDS, LONG_S = 15.0, 600.0
+"""Of each line; ten minutes of it with --large."""
+_TICK_S = Settings().seconds_per_tick
+
+
+def bench_wire(seed: int = 1, *, large: bool = False, repeats: int = 7) -> list[Row]:
+    """Decoding, then each line for its time."""
+    rows = _decoding(seed, repeats)
+    for case in CASES:
+        with tempfile.TemporaryDirectory(prefix="harness-wire-") as folder:
+            rows += _on_the_line(case, LONG_S if large else SECONDS, seed, Path(folder))
+    return rows
+
+
+def _decoding(seed: int, repeats: int) -> list[Row]:
+    """Records per second of one core: runs of them in both formats, and one at a time as a port gives them."""
+    played = rehearse(SCENARIO, clip=CLIP, seed=seed).simulation
+    wire, items = played.wire_format, played.wire_format.items
+    binary = played.wire.data * 10
+    table = np.frombuffer(binary, record_type(items))
+    text = ascii.write(items, table)
+    one = [played.wire.data[at : at + table.itemsize] for at in range(0, len(played.wire.data), table.itemsize)]
+    lists = dict.fromkeys(wire.characters, items)
+
+    def singly() -> None:
+        reader = FrameReader(wire)
+        for data, received_s in zip(one, played.wire.received_s.tolist(), strict=True):
+            reader.feed(data, received_s)
+
+    contenders: tuple[tuple[Callable[[], object], int], ...] = (
+        (lambda: Decoder(lists).feed(binary), len(table)),
+        (lambda: Decoder(lists, Settings(binary=False)).feed(text), len(table)),
+        (lambda: FrameReader(wire).feed_all(played.wire), len(one)),
+        (singly, len(one)),
+    )
+    seconds = np.array([[_seconds(work) for work, _ in contenders] for _ in range(repeats)])
+    rate = [count / s for (_, count), s in zip(contenders, np.median(seconds, axis=0).tolist(), strict=True)]
+    return [
+        Row("decoding binary records", rate[0], "records/s", "38 bytes, in runs", ">= 200000"),
+        Row("decoding ASCII records", rate[1], "records/s", f"{len(text) // len(table)} bytes, in runs", ">= 200000"),
+        Row("binary records into frames", rate[2], "records/s", "in runs", ""),
+        Row("the same, one record at a time", 1e6 / rate[3], "us/record", "as a port gives them", ""),
+    ]
+
+
+def _seconds(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def _on_the_line(case: Case, seconds: float, seed: int, folder: Path) -> list[Row]:
+    port = str(folder / "tracker") if case.kind == "pty" else "127.0.0.1:0"
+    pace = "paced" if case.kind == "pty" else "unpaced"
+    asked = [str(folder / "sent.npz"), str(seed), str(case.stations), str(case.rate_hz), case.kind, pace, port]
+    device = subprocess.Popen(
+        [sys.executable, "-m", "harness.bench.wire_device", *asked],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        name = device.stdout.readline().strip() if device.stdout else ""
+        said = _live(name, case, seconds, seed, folder / "poses.csv")
+    finally:
+        device.communicate()
+    if device.returncode:
+        raise RuntimeError(f"the emulator ended with {device.returncode}")
+    return _rows(case, seconds, said, np.load(folder / "sent.npz"), folder / "poses.csv")
+
+
+def _live(port: str, case: Case, seconds: float, seed: int, poses: Path) -> dict[str, Any]:
+    command = [sys.executable, "-m", "harness.cli", "live", "--port", port, "--scenario", SCENARIO, "--clip", CLIP]
+    command += ["--stations", str(case.stations), "--rate", str(case.rate_hz), "--method", METHOD]
+    command += ["--items", ",".join(map(str, case.items)), "--seconds", str(seconds), "--seed", str(seed)]
+    done = subprocess.run([*command, "--poses", str(poses), "--json"], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"harness live: {done.stderr.strip()[-2000:]}")
+    return dict(json.loads(done.stdout))
+
+
+def _rows(case: Case, seconds: float, said: dict[str, Any], sent: Any, poses: Path) -> list[Row]:
+    table = np.frombuffer(sent["data"].tobytes(), record_type(case.items))
+    station = np.frombuffer(STATION_CHARACTERS, np.uint8).searchsorted(table["station"])
+    stamp_s = table["time"].astype(float) * _TICK_S
+    posed_s = _posed(poses, case.stations)
+    ready_s = np.array([posed_s[s].get(t, np.nan) for s, t in zip(station.tolist(), stamp_s.tolist(), strict=True)])
+    lost, way_s = _lost_and_way(sent["written_s"], ready_s, case.stations)
+    late_ms = 1e3 * (sent["written_s"] - sent["due_s"])[~np.isnan(sent["written_s"])]
+    floor = said["floor"]
+    beside = f"timer p99 {floor['timer']['p99_ms']:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
+    p50, p99, most = (1e3 * float(np.quantile(way_s, share)) for share in (0.5, 0.99, 1.0))
+    heard = f"of {int(np.sum(~np.isnan(ready_s)))} in {seconds:g} s"
+    return [
+        Row(f"{case.name}: records without a pose", float(lost.sum()), "", heard, "0"),
+        Row(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", beside, ""),
+        Row(f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {beside}", "<= 10"),
+    ]
+
+
+def _posed(poses: Path, stations: int) -> list[dict[float, float]]:
+    """For each station, when the pose was ready [s] that a stamp of the device's went into."""
+    out: list[dict[float, float]] = [{} for _ in range(stations)]
+    with poses.open(newline="") as file:
+        rows = csv.DictReader(file)
+        names = [name for name in rows.fieldnames or () if name.startswith("device_s.")]
+        for row in rows:
+            for station, name in enumerate(names):
+                out[station][float(row[name])] = float(row["ready_s"])
+    return out
+
+
+def _lost_and_way(written_s: Floats, ready_s: Floats, stations: int) -> tuple[Bools, Floats]:
+    """Which records between the first and the last that were posed were not (N,), and from the last byte of each
+    frame to its pose [s]."""
+    posed = np.flatnonzero(~np.isnan(ready_s))
+    if len(posed) == 0:
+        raise RuntimeError("no record of the emulator made a pose")
+    lost = np.isnan(ready_s)
+    lost[: posed[0]] = lost[posed[-1] :] = False
+    frames, of = np.unique(ready_s[posed], return_inverse=True)
+    complete_s = np.full(len(frames), -np.inf)
+    np.maximum.at(complete_s, of, written_s[posed])
+    return lost, frames - complete_s
