@@ -157,7 +157,7 @@ class TrackingStatus:
 
     def line(self) -> bytes:
         ranges = zip(self.states, self.received, self.rejected, strict=True)
-        stations = "".join(f"{state}{min(got, 15):X}{min(dropped, 15):X}" for state, got, dropped in ranges)
+        stations = "".join(f"{state}{min(got, 15):x}{min(dropped, 15):x}" for state, got, dropped in ranges)
         return f"31P{stations}{self.rate_hz:5.0f} {self.genlock}\r\n".encode("latin-1")
 
     @classmethod
