@@ -6,6 +6,7 @@ from functools import cached_property
 from pathlib import Path
 
 from harness.body.humanoid import Body
+from harness.body.mounts import Mount
 from harness.config import Scenario, load_scenario
 from harness.core.calibration import Calibration
 from harness.core.protocol import Part
@@ -37,9 +38,14 @@ class Rehearsal:
         return self.setting.body
 
     @property
+    def mounts(self) -> tuple[Mount, ...]:
+        """Where the stations are worn."""
+        return mounts_of(self.scenario)
+
+    @property
     def calibration(self) -> Calibration:
         """Exact: the nominal mounts and the true frame of the tracker."""
-        return exact_calibration(self.body, mounts_of(self.scenario), self.tracker)
+        return exact_calibration(self.body, self.mounts, self.tracker)
 
     @property
     def simulation(self) -> Simulation:
@@ -50,8 +56,7 @@ class Rehearsal:
     def samples(self) -> Samples:
         """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
         noise = self.scenario.disturbance.added(noise_of(self.scenario), tuple(self.scenario.stations))
-        mounts = mounts_of(self.scenario)
-        return lap(self.body, self.setting.take, mounts, self.tracker, noise, seed=self.scenario.seed)
+        return lap(self.body, self.setting.take, self.mounts, self.tracker, noise, seed=self.scenario.seed)
 
 
 def rehearse(

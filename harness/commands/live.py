@@ -156,8 +156,7 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
 
 def _worn(args: argparse.Namespace, rehearsal: "Rehearsal") -> "Calibration | Calibrator":
     from harness.live.calibrate import StandInTPose
-    from harness.setting import mounts_of
 
     if args.calibration == "tpose":
-        return StandInTPose(rehearsal.body, mounts_of(rehearsal.scenario))
+        return StandInTPose(rehearsal.body, rehearsal.mounts)
     return rehearsal.calibration
