@@ -15,7 +15,7 @@ QUIET = b"O1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfu
 TURN = from_yaw_pitch_roll_deg(np.array([[40.0, -20.0, 10.0]]))[0]
 
 
-def table(data: bytes, items: tuple[int, ...] = (40, 2, 11, 21, 1)) -> np.ndarray:  # type: ignore[type-arg]
+def table(data: bytes, items: tuple[int, ...] = (40, 2, 11, 21, 1)) -> np.ndarray:
     return np.frombuffer(data, record_type(items))
 
 
@@ -82,8 +82,7 @@ def test_the_clock_counts_samples_from_zero() -> None:
 
 def test_laps_follow_each_other_and_the_clock_goes_on() -> None:
     talk, given = Talk(), samples()
-    talk.say(QUIET + b"MZ\rC")
-    heard = table(talk.wait(2.5 * given.lap_s))
+    heard = table(talk.say(QUIET + b"MZ\rC") + talk.wait(2.5 * given.lap_s))
     one = heard[heard["station"] == ord("1")]
     np.testing.assert_array_equal(one["position"][0], one["position"][len(given)])
     assert one["time"][len(given)] == np.float32(1e3 * (given.device_s[0, 0] + given.device_lap_s))
