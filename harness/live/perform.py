@@ -193,6 +193,7 @@ class _Solver:
         found: Calibration | None = None
         while found is None:
             if (captured := self._queue.take()) is None:
+                self._say("calibration: the stream ended before it was done")
                 return None
             self._calibrating += 1
             found = calibrator.add(captured.frame, self._say)

@@ -1,0 +1,39 @@
+"""Trackers for tests."""
+
+import threading
+import time
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from harness.stream.frame import TrackerFrame
+
+
+class Paced:
+    """A `TrackerStream` of these frames, by default stamped as they come; then it waits to be closed, or ends."""
+
+    stations = ("a", "b")
+
+    def __init__(
+        self, frames: Iterable[TrackerFrame], period_s: float = 0.0, *, ends: bool = True, stamped: bool = True
+    ) -> None:
+        self._frames, self._period_s, self._ends, self._stamped = frames, period_s, ends, stamped
+        self.closed = threading.Event()
+
+    def __iter__(self) -> Iterator[TrackerFrame]:
+        for frame in self._frames:
+            if self.closed.wait(self._period_s):
+                return
+            yield replace(frame, received_s=time.monotonic()) if self._stamped else frame
+        if not self._ends:
+            self.closed.wait()
+
+    def close(self) -> None:
+        self.closed.set()
+
+
+class Broken(Paced):
+    """One that raises after its frames."""
+
+    def __iter__(self) -> Iterator[TrackerFrame]:
+        yield from super().__iter__()
+        raise ArithmeticError("the stream broke")

@@ -1,0 +1,61 @@
+"""Times of many frames: quantiles to a hundredth of a millisecond, extremes exactly, deadlines to the letter."""
+
+import numpy as np
+import pytest
+
+from harness.live.clock import HostTime
+from harness.live.latency import Durations, Stages
+from tests.live.posing import frame
+
+
+def test_quantiles_are_those_of_the_values(rng: np.random.Generator) -> None:
+    values_s, durations = rng.exponential(0.004, size=5000), Durations()
+    for value_s in values_s.tolist():
+        durations.add(value_s)
+    for share in (0.5, 0.9, 0.99):
+        exact_s = np.quantile(values_s, share, method="inverted_cdf")
+        assert durations.quantile_s(share) == pytest.approx(exact_s, abs=1e-5)
+    assert durations.longest_s == values_s.max()
+
+
+def test_few_none_and_long_ones() -> None:
+    durations = Durations()
+    assert np.isnan(durations.quantile_s(0.5))
+    assert durations.as_dict() == {"p50_ms": None, "p99_ms": None, "max_ms": None}
+    durations.add(0.00301)
+    assert durations.quantile_s(0.01) == durations.quantile_s(1.0) == pytest.approx(0.00301, abs=1e-5)
+    durations.add(7.5)
+    assert durations.quantile_s(0.99) == 7.5
+    durations.add(-1e-9)  # clocks of two threads
+    assert durations.count == 3
+
+
+def test_stages_add_up_and_only_the_late_are_late() -> None:
+    stages = Stages(deadline_s=0.010)
+    stages.add(1.000, 1.001, 1.004, 1.006)
+    stages.add(2.000, 2.003, 2.0101, 2.011)
+    assert stages.missed == 1
+    maxima_ms = {name: durations.as_dict()["max_ms"] for name, durations in stages.named().items()}
+    wanted_ms = {"last byte to taken": 3.0, "taken to pose": 7.1, "pose to outputs": 2.0, "last byte to pose": 10.1}
+    assert maxima_ms == pytest.approx(wanted_ms, abs=1e-6)
+
+
+def test_the_host_time_of_a_measurement_forgets_late_frames(rng: np.random.Generator) -> None:
+    clock, true_s, delay_s = HostTime(), np.arange(4000) / 75.0, 0.005
+    held_up_s = rng.exponential(0.004, size=4000)
+    drift = 1.0 + 2e-5
+    found_s = [
+        clock.measured_s(frame(1000.0 + t + delay_s + held, 50.0 + drift * t))
+        for t, held in zip(true_s.tolist(), held_up_s.tolist(), strict=True)
+    ]
+    error_s = np.array(found_s) - (1000.0 + true_s + delay_s)
+    assert np.abs(error_s[500:]).max() < 0.002
+    assert np.std(held_up_s) > 0.003
+
+
+def test_a_device_that_sets_its_clock_anew_is_followed() -> None:
+    clock = HostTime()
+    clock.measured_s(frame(100.0, 50.0))
+    assert clock.measured_s(frame(100.1, 50.1)) == pytest.approx(100.1)
+    assert clock.measured_s(frame(100.2, 0.0)) == pytest.approx(100.2)
+    assert clock.measured_s(frame(100.3, float("nan"))) == 100.3

@@ -1,0 +1,227 @@
+"""A live session over streams that a test holds in its hand."""
+
+import _thread
+import gc
+import sys
+import threading
+import time
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from harness.body import humanoid
+from harness.calibrate.still import NotStanding
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate, Status
+from harness.live import summary
+from harness.live.calibrate import Say, StandInTPose
+from harness.live.floor import Floor
+from harness.live.perform import Performed, Plan, perform, warm_up
+from harness.live.pose import LivePose
+from harness.rehearsal import Rehearsal, rehearse
+from harness.setting import mounts_of
+from harness.stream.frame import TrackerFrame, TrackerStream
+from tests.live.posing import frame
+from tests.live.streams import Broken, Paced
+
+BODY = humanoid.build()
+WORN = Calibration(
+    "exact", ("a", "b"), ("head", "lhand"), np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 1)),
+    np.array([1.0, 0, 0, 0]), np.zeros(3),
+)  # fmt: skip
+PLAN = Plan(rate_hz=100.0)
+
+
+class Counting:
+    """A reconstructor and its session: T-pose, after so long; remembers what it saw."""
+
+    def __init__(self, takes_s: float = 0.0, fails_at: int | None = None) -> None:
+        self.takes_s, self.fails_at = takes_s, fails_at
+        self.seen: list[TrackerFrame] = []
+        self.worn: Calibration | None = None
+
+    def begin(self, calibration: Calibration) -> "Counting":
+        self.worn = calibration
+        return self
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        time.sleep(self.takes_s)
+        self.seen.append(frame)
+        if len(self.seen) == self.fails_at:
+            raise ZeroDivisionError("the method failed")
+        return Estimate(humanoid.tpose(BODY.skeleton), Status.SOLVED)
+
+
+class Kept:
+    """An output that keeps poses and fails when told."""
+
+    name = told = "kept"
+
+    def __init__(self, fails_at: int | None = None) -> None:
+        self.fails_at = fails_at
+        self.poses: list[LivePose] = []
+        self.closed = 0
+
+    def send(self, pose: LivePose) -> None:
+        if len(self.poses) == self.fails_at:
+            raise OSError("no room")
+        self.poses.append(pose)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+@pytest.fixture(autouse=True)
+def _nothing_is_left() -> Iterator[None]:
+    threads, interval, enabled = set(threading.enumerate()), sys.getswitchinterval(), gc.isenabled()
+    yield
+    assert set(threading.enumerate()) == threads
+    assert (sys.getswitchinterval(), gc.isenabled(), gc.get_freeze_count()) == (interval, enabled, 0)
+
+
+def performed(stream: TrackerStream, method: Counting, *outputs: Kept, plan: Plan = PLAN) -> Performed:
+    return perform(stream, BODY, method, WORN, outputs, plan)
+
+
+def frames(count: int) -> list[TrackerFrame]:
+    return [frame(n / 100.0) for n in range(count)]
+
+
+def test_every_frame_becomes_a_pose_when_there_is_time() -> None:
+    stream, method, output = Paced(frames(20), 0.005), Counting(), Kept()
+    done = performed(stream, method, output, plan=Plan(100.0, queue_frames=100))
+    assert (done.captured, done.poses, done.dropped, done.before) == (20, 20, 0, 0)
+    assert [float(f.measured_s[0]) for f in method.seen] == [n / 100.0 for n in range(20)]
+    assert [pose.number for pose in output.poses] == list(range(20))
+    assert all(p.frame.received_s <= p.taken_s <= p.ready_s for p in output.poses)
+    assert output.closed == 1
+    assert stream.closed.is_set()
+    assert done.stages.to_pose.count == 20
+
+
+def test_a_slow_method_gets_the_newest_and_capture_never_waits() -> None:
+    method = Counting(takes_s=0.05)
+    began_s = time.monotonic()
+    done = performed(Paced(frames(200), 0.001), method, plan=Plan(1000.0, queue_frames=2))
+    assert done.captured == 200
+    assert done.poses + done.dropped == 200
+    assert done.dropped > 50
+    assert float(method.seen[-1].measured_s[0]) == 1.99
+    assert done.stages.missed == done.poses
+    assert time.monotonic() - began_s < 30.0
+
+
+def test_it_ends_after_its_time() -> None:
+    stream = Paced(frames(3), ends=False)
+    assert performed(stream, Counting(), plan=Plan(100.0, seconds=0.3)).captured == 3
+    assert stream.closed.is_set()
+
+
+def test_ctrl_c_is_a_normal_end() -> None:
+    method, output = Counting(), Kept()
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    timer.start()
+    done = performed(Paced(frames(3), ends=False), method, output)
+    timer.join()
+    assert done.captured == 3
+    assert output.closed == 1
+
+
+def test_what_breaks_is_raised_after_all_is_closed() -> None:
+    output = Kept()
+    with pytest.raises(ArithmeticError, match="the stream broke"):
+        performed(Broken(frames(2)), Counting(), output)
+    with pytest.raises(ZeroDivisionError, match="the method failed"):
+        performed(Paced(frames(5), ends=False), Counting(fails_at=2), output)
+    assert output.closed == 2
+
+
+def test_an_output_that_fails_is_left_out_and_the_others_go_on() -> None:
+    good, bad, said = Kept(), Kept(fails_at=2), list[str]()
+    done = perform(
+        Paced(frames(5), 0.005), BODY, Counting(), WORN, [bad, good], Plan(100.0, queue_frames=9), say=said.append
+    )
+    assert (len(good.poses), len(bad.poses), bad.closed) == (5, 2, 1)
+    assert done.failed == {"kept": "no room"}
+    assert said == ["kept: no room; the session goes on without it"]
+
+
+class AfterTwo:
+    """A calibrator."""
+
+    def __init__(self) -> None:
+        self.frames = 0
+
+    def begin(self, say: Say) -> None:
+        say("stand still")
+
+    def add(self, frame: TrackerFrame, say: Say) -> Calibration | None:
+        self.frames += 1
+        return WORN if self.frames == 2 else None
+
+
+def test_calibration_comes_before_the_first_pose() -> None:
+    said: list[str] = []
+    method = Counting()
+    done = perform(Paced(frames(10), 0.01), BODY, method, AfterTwo(), [], Plan(100.0, queue_frames=99), say=said.append)
+    assert said == ["stand still"]
+    assert method.worn is WORN
+    assert done.before >= 2
+    assert done.before + done.poses == 10
+    assert perform(Paced(frames(1)), BODY, Counting(), AfterTwo(), [], PLAN, say=said.append).poses == 0
+    assert said[-1] == "calibration: the stream ended before it was done"
+
+
+@pytest.fixture(scope="module")
+def worn() -> Rehearsal:
+    return rehearse("demo", clip="boxing_p1_01", noise="clean")
+
+
+def test_nobody_in_t_pose_is_told_so(worn: Rehearsal) -> None:
+    said: list[str] = []
+    boxing = worn.simulation.frames
+    standing = StandInTPose(worn.body, mounts_of(worn.scenario), attempts=2)
+    recorded, plan = Paced(boxing, stamped=False), Plan(40.0, queue_frames=9999, stamped_here=False)
+    with pytest.raises(NotStanding):
+        perform(recorded, worn.body, Counting(), standing, [], plan, say=said.append)
+    assert said[0].startswith("calibration: stand in T-pose")
+    assert "Trying again" in said[1]
+    assert len(said) == 2
+
+
+def test_live_estimates_are_those_of_a_run(worn: Rehearsal) -> None:
+    from harness.reconstruct import registry
+
+    boxing = worn.simulation.frames[:60]
+    reconstructor = worn.setting.fitted(registry.resolve("ik"), "ik")
+    warm_up(reconstructor, worn.calibration, boxing[:3])
+    session = reconstructor.begin(worn.calibration)
+    offline = [session.step(frame) for frame in boxing]
+    output = Kept()
+    perform(Paced(boxing), worn.body, reconstructor, worn.calibration, [output], Plan(40.0, queue_frames=99))
+    assert len(output.poses) == 60
+    for pose, estimate in zip(output.poses, offline, strict=True):
+        np.testing.assert_array_equal(pose.estimate.qpos, estimate.qpos)
+        assert pose.estimate.status is estimate.status
+
+
+def test_a_summary_says_what_happened() -> None:
+    with Floor() as floor:
+        done = performed(Paced(frames(5), 0.01), Counting(), plan=Plan(100.0, queue_frames=9))
+        beside = floor.finish()
+    assert beside["sleeps"] >= 0
+    content = summary.as_dict(done, beside)
+    assert (content["frames"], content["poses"], content["deadline_ms"]) == (5, 5, 10.0)
+    text = "\n".join(summary.lines(done, beside))
+    for words in ("last byte to pose", "5 poses in", "0 frames dropped", "after their deadline, 10.00 ms"):
+        assert words in text
+
+
+def test_the_floor_is_measured_until_asked() -> None:
+    with Floor() as floor:
+        time.sleep(1.0)
+        found = floor.finish()
+    assert found["sleeps"] > 0
+    assert 0.0 <= found["timer"]["p50_ms"] <= found["timer"]["max_ms"]
+    assert found["handover"]["p99_ms"] > 0.0
