@@ -194,9 +194,7 @@ def _judged(name: str, made: _Made, laps: Sequence[_Lap], rehearsal: Rehearsal) 
         first, last = int(lap.index[0]), int(lap.index[-1])
         warm_s = first / rate_hz + WARM_UP_S if number == 0 else 0.0
         qpos, status, step_ms = made.at(lap.rows)
-        scores.append(
-            score(skeleton, rate_hz, truth_qpos, qpos, lap.index, status, step_ms, warm_up_s=warm_s, floor=0.0)
-        )
+        scores.append(score(skeleton, rate_hz, truth_qpos, qpos, lap.index, status, step_ms, warm_up_s=warm_s))
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(one.scored.sum()) for one in scores)
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected

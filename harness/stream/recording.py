@@ -267,7 +267,7 @@ def record_capture(
         start_s = received_s[0] if received_s else 0.0
         writer.configured(wire, start_s, start_s)
         for begin, end, now_s in zip([0, *ends], ends, received_s, strict=False):
-            if now_s - start_s <= seconds:
+            if now_s - start_s < seconds:
                 writer.received(capture.data[begin:end], now_s, now_s)
     return writer
 
