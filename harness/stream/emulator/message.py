@@ -31,3 +31,8 @@ class Sent:
     """When it was written [s]."""
     unread: bool = False
     """Not written: the client left no room for it."""
+
+    @property
+    def sound(self) -> bool:
+        """Whether it went out, and as the device sent it."""
+        return not self.damage and not self.unread
