@@ -31,6 +31,12 @@ class TcpPort:
         host, port = self._address
         return f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
 
+    def readable(self) -> list[int]:
+        return [end.fileno() for end in (self._server, self._client) if end is not None]
+
+    def writable(self) -> list[int]:
+        return [self._client.fileno()] if self._rest and self._client is not None else []
+
     def read(self) -> bytes:
         self._flush()
         data = self._take()
