@@ -37,8 +37,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, Exception) as error:
         if not was_interrupted(error):
             raise
-        outcome = Outcome.INTERRUPTED
-        print("harness: stopped; what was finished is kept, the same command goes on from there", file=sys.stderr)
+        outcome = Outcome.PASS if args.endless else Outcome.INTERRUPTED
+        kept = "" if args.endless else "; what was finished is kept, the same command goes on from there"
+        print(f"harness: stopped{kept}", file=sys.stderr)
         if args.json:
             print(json.dumps({"outcome": outcome.word}))
     if not args.json:

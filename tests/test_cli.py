@@ -91,3 +91,19 @@ def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:
         said = program.stderr.read()
     assert said == ""
     assert program.returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("verb", "expected"), [("emulate demo --pty link", 0), ("live --port none --scenario demo", 0), ("run demo", 130)]
+)
+def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
+    verb: str, expected: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def interrupted(*given: object, **named: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.chdir(tmp_path)
+    for where in ("harness.rehearsal.rehearse", "harness.experiment.run"):
+        monkeypatch.setattr(where, interrupted)
+    assert main(verb.split()) == expected
+    assert "stopped" in capsys.readouterr().err

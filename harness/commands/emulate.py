@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def add_emulate(verbs: Verbs) -> None:
     text = "play a scenario as an IS-900 in real time, on a pty or a TCP port; Ctrl-C ends it"
-    verb = add_verb(verbs, "emulate", text, emulate, "seed", "mocap")
+    verb = add_verb(verbs, "emulate", text, emulate, "seed", "mocap", "endless")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     where = verb.add_mutually_exclusive_group(required=True)
     where.add_argument("--pty", type=Path, metavar="LINK", help="pseudo terminal, reached through a link of this name")

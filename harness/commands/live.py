@@ -36,7 +36,7 @@ _RATE_SLACK = 0.02
 
 def add_live(verbs: Verbs) -> None:
     text = "reconstruct from a tracker in real time: a view, VMC, LSL, BVH; Ctrl-C ends it"
-    verb = add_verb(verbs, "live", text, live, "seed", "mocap")
+    verb = add_verb(verbs, "live", text, live, "seed", "mocap", "endless")
     verb.add_argument(
         "--port", required=True, help="/dev/ttyUSB0, COM3, the link of an emulator's pty, tcp://HOST:PORT"
     )

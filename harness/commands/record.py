@@ -23,7 +23,7 @@ SIMULATED = "sim:"
 
 def add_record(verbs: Verbs) -> None:
     text = "record a device's line, both ways, until Ctrl-C; goes on behind an earlier recording in the same file"
-    verb = add_verb(verbs, "record", text, record, "seed", "mocap")
+    verb = add_verb(verbs, "record", text, record, "seed", "mocap", "endless")
     verb.add_argument(
         "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for what a simulated line carries"
     )

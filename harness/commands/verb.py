@@ -19,9 +19,12 @@ Action = Callable[[argparse.Namespace], Outcome]
 
 
 def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) -> argparse.ArgumentParser:
-    """A verb with the flags it shares with others; they mean the same everywhere."""
+    """A verb with the flags it shares with others; they mean the same everywhere.
+
+    `endless` is no flag: it goes on until Ctrl-C, which is then no interruption.
+    """
     verb: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-    verb.set_defaults(action=action)
+    verb.set_defaults(action=action, endless="endless" in flags)
     verb.add_argument("--json", action="store_true", help="print JSON instead of text")
     if "seed" in flags:
         verb.add_argument("--seed", type=int, help="replaces the scenario's seed")
