@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.stream.items import HEAD, HEADER
+from harness.stream.items import HEAD, HEADER, STATION_CHARACTERS
 from harness.stream.layout import Layout, data_head
 from harness.stream.records import Settings, Table
 
@@ -22,6 +22,7 @@ LONGEST_REPLY = 256
 _REPLY_HEAD = rb"(?:[235][1-9A-Ca-c][A-Za-z]|[235] E)"
 """What the lines of section 6 begin with: a station and a letter, or an error."""
 _STATUS = b" ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+_DATA_PLACES = b"0", STATION_CHARACTERS, _STATUS
 _REPLY_PLACES = (b"235", b"123456789ABCabc", _STATUS[1:]), (b"235", b" ", b"E")
 _UNPRINTABLE = re.compile(rb"[^ -~]")
 
@@ -89,14 +90,13 @@ class Decoder:
     """
 
     def __init__(self, lists: Mapping[int, tuple[int, ...]], settings: Settings | None = None) -> None:
-        """`lists` is the output list of each station, by its character's code."""
-        heads = b"(?:%b|%b)" % (data_head(bytes(lists)), _REPLY_HEAD)
+        """`lists` is the output list of each station, by its character's code. Records of others are garbage."""
+        heads = b"(?:%b|%b)" % (data_head(STATION_CHARACTERS), _REPLY_HEAD)
         self._layouts: dict[int, Layout] = {}
         for items in set(lists.values()):
             stations = bytes(station for station, own in lists.items() if own == items)
             self._layouts |= dict.fromkeys(stations, Layout(items, stations, settings or Settings(), heads))
         self._head = re.compile(heads)
-        self._data_places = b"0", bytes(lists), _STATUS
         self._buffer = b""
         self._offset = 0
         """Bytes of the stream before the buffer."""
@@ -164,7 +164,9 @@ class Decoder:
 
     def _size_of_record(self, buffer: bytes, at: int, ended: bool) -> int | None:
         """Bytes of the record at this place; 0 if it is none, None when it cannot be told yet."""
-        layout = self._layouts[buffer[at + 1]]
+        layout = self._layouts.get(buffer[at + 1])
+        if layout is None:
+            return 0
         after = at + layout.size
         if after > len(buffer):
             return 0 if ended else None
@@ -183,12 +185,12 @@ class Decoder:
             return self._head.match(head) is not None
         return any(
             all(byte in own for byte, own in zip(head, places, strict=False))
-            for places in (self._data_places, *_REPLY_PLACES)
+            for places in (_DATA_PLACES, *_REPLY_PLACES)
         )
 
     def _one_off(self, head: bytes) -> bool:
         """Whether these bytes are a record's head but for one."""
-        amiss = [byte not in own for byte, own in zip(head, self._data_places, strict=False)]
+        amiss = [byte not in own for byte, own in zip(head, _DATA_PLACES, strict=False)]
         return len(head) == HEADER and sum(amiss) == 1
 
     def _next_head(self, buffer: bytes, at: int) -> int:

@@ -7,11 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.stream.capture import Capture
 from harness.stream.frame import TrackerFrame
-from harness.stream.items import STATION_CHARACTERS
+from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS
 from harness.stream.reader import CaptureStream, FrameReader, WireFormat
+from harness.stream.records import Said, Settings, encode, to_bytes
+from harness.stream.replies import TrackingStatus
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, columns, frames_of, received, same, sent, stamps_s
 
 ROUNDS = 12
@@ -217,3 +220,105 @@ def test_a_million_mutations() -> None:
             frames += reader.feed(bytes(data[k : k + 1000]), 100.0 + k / 1000.0 * 0.2)
             assert reader.pending < 300
         require_sound([*frames, *reader.finish()])
+
+
+def rounds_of(wire: WireFormat, rounds: int = ROUNDS) -> list[bytes]:
+    """Records of stations that stand still, in the order of the wire."""
+    count = rounds * len(wire.stations)
+    number = np.arange(count) % len(wire.stations)
+    place_m: Floats = np.full((count, 3), 0.3)
+    place_m *= number[:, None]
+    said = Said(
+        stamps_s(rounds, len(wire.stations)), place_m, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.ones(count)
+    )
+    table = encode(wire.items, np.frombuffer(wire.characters, np.uint8)[number], said, wire.settings)
+    data = to_bytes(wire.items, table, wire.settings)
+    return [data[k : k + len(data) // count] for k in range(0, len(data), len(data) // count)]
+
+
+def fed(wire: WireFormat, chunks: list[bytes]) -> list[TrackerFrame]:
+    """Frames of chunks that come 5 ms apart."""
+    reader, out = FrameReader(wire), []
+    for k, chunk in enumerate(chunks):
+        out += reader.feed(chunk, 100.0 + 0.005 * k)
+    return [*out, *reader.finish()]
+
+
+@pytest.mark.parametrize(
+    "items", [STANDARD_LIST, (40, 18, 19, 21, 1), (2, 4, 21, 1), (5, 6, 7, 2, 21, 76, 1), (2, 11, 21)]
+)
+@pytest.mark.parametrize("binary", [True, False])
+def test_every_format_gives_the_same_frames(items: tuple[int, ...], binary: bool) -> None:
+    wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, items, Settings(binary=binary))
+    frames = fed(wire, rounds_of(wire))
+    assert len(frames) == ROUNDS
+    for number, frame in enumerate(frames):
+        assert frame.position_valid.all()
+        assert frame.orientation_valid.all()
+        assert not frame.suspect.any()
+        np.testing.assert_allclose(frame.position_m, 0.3 * np.arange(3)[:, None] * np.ones(3), atol=1e-3)
+        np.testing.assert_allclose(np.abs(frame.tracker_from_station[:, 0]), 1.0, atol=1e-6)
+        np.testing.assert_allclose(frame.measured_s, stamps_s(ROUNDS, 3).reshape(-1, 3)[number], atol=6e-4)
+
+
+def test_any_stations_of_the_device_may_be_active() -> None:
+    wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=b"25C")
+    chunks = rounds_of(wire)
+    assert [chunk[1:2] for chunk in chunks[:3]] == [b"2", b"5", b"C"]
+    frames = fed(wire, chunks)
+    assert len(frames) == ROUNDS
+    assert all(frame.position_valid.all() and not frame.suspect.any() for frame in frames)
+
+
+def test_stations_that_nobody_asked_for_are_garbage_between_the_others() -> None:
+    chunks = rounds_of(WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=b"25C"))
+    reader = FrameReader(WireFormat(("head", "torso"), RATE_HZ))
+    frames = [*reader.feed(b"".join(chunks), 100.0), *reader.finish()]
+    assert (reader.records, reader.garbage_bytes) == (ROUNDS, 2 * ROUNDS * RECORD)
+    assert all(frame.position_valid.tolist() == [False, True] for frame in frames)
+
+
+@pytest.mark.parametrize("characters", [b"12", b"1234", b"132", b"112", b"1 2", b"12D"])
+def test_stations_that_cannot_be_are_refused(characters: bytes) -> None:
+    with pytest.raises(BadInput, match="ascending"):
+        WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=characters)
+
+
+def tracking(states: str) -> bytes:
+    return TrackingStatus(f"{states:X<12}", (0,) * 12, (0,) * 12, RATE_HZ).line()
+
+
+def test_a_reply_to_mp_says_which_stations_are_lost_where_records_do_not() -> None:
+    wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, (2, 11, 21, 1))
+    chunks = rounds_of(wire, 8)
+    chunks.insert(6, tracking("TLT"))
+    chunks.insert(16, tracking("TTT"))
+    frames = fed(wire, chunks)
+    assert [frame.position_valid.tolist() for frame in frames] == [
+        [True, not 2 <= number < 5, True] for number in range(8)
+    ]
+    assert [frame.quality[1] for frame in frames] == [1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
+    at_once = fed(wire, [b"".join(chunks)])
+    assert all(
+        np.array_equal(a, b, equal_nan=True)
+        for one, other in zip(frames, at_once, strict=True)
+        for a, b in zip(columns(one), columns(other), strict=True)
+    )
+
+
+def test_a_reply_to_mp_does_not_overrule_item_40() -> None:
+    chunks = rounds_of(FOUR)
+    chunks.insert(8, tracking("LLLL"))
+    assert all(frame.position_valid.all() for frame in fed(FOUR, chunks))
+
+
+def test_records_put_aside_come_out_when_a_frame_expires() -> None:
+    """Three of four stations came one by one: the frame is complete enough after 1.5 periods."""
+    reader, chunks = FrameReader(FOUR), rounds_of(FOUR)
+    for k in range(3):
+        assert reader.feed(chunks[k], 100.0 + 0.001 * k) == []
+    assert reader.records == 3
+    assert reader.expire(100.0 + 1.4 / RATE_HZ) == []
+    (frame,) = reader.expire(100.0 + 1.6 / RATE_HZ)
+    assert frame.position_valid.tolist() == [True, True, True, False]
+    assert frame.received_s == 100.002
