@@ -27,6 +27,8 @@ OPTIONAL = {
     "plotly": "the interactive view of the report (extra viz)",
     "imageio_ffmpeg": "movies (extra viz)",
     "ezc3d": "C3D files (extra c3d)",
+    "pythonosc": "live poses by VMC protocol (extra live)",
+    "pylsl": "live poses by the Lab Streaming Layer (extra lsl)",
     "mink": "the reference of `harness bench ik` (extra bench)",
 }
 _STREAM_SLACK_M = 1e-5
