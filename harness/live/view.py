@@ -21,7 +21,7 @@ from harness.errors import BadFile, BadInput, MissingExtra
 from harness.live.pose import LivePose
 
 Kind = Literal["window", "frames"]
-READY, CLOSED = "ready", "closed"
+READY, CLOSED = "ready", "its window was closed"
 """What the other process says."""
 _START_S, _END_S = 60.0, 10.0
 _SIZE = 3 + 55
@@ -99,9 +99,10 @@ class View:
         """OSError when the process is gone."""
         if self._ours.poll():
             try:
-                raise OSError("its window was closed" if self._ours.recv() == CLOSED else "it failed")
+                said = str(self._ours.recv())
             except EOFError:
-                raise OSError("its process ended") from None
+                said = "its process ended"
+            raise OSError(said)
         self._shared.put(pose)
 
     def close(self) -> None:

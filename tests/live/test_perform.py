@@ -6,6 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,13 +15,15 @@ from harness.body import humanoid
 from harness.calibrate.still import NotStanding
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
+from harness.core.motion import Take
 from harness.live import summary
 from harness.live.calibrate import Say, StandInTPose
 from harness.live.floor import Floor
 from harness.live.perform import Performed, Plan, perform, warm_up
 from harness.live.pose import LivePose
 from harness.rehearsal import Rehearsal, rehearse
-from harness.setting import mounts_of
+from harness.setting import mounts_of, noise_of
+from harness.simulate.simulate import simulate
 from harness.stream.frame import TrackerFrame, TrackerStream
 from tests.live.posing import frame
 from tests.live.streams import Broken, Paced
@@ -188,6 +191,39 @@ def test_nobody_in_t_pose_is_told_so(worn: Rehearsal) -> None:
     assert said[0].startswith("calibration: stand in T-pose")
     assert "Trying again" in said[1]
     assert len(said) == 2
+
+
+def test_a_t_pose_is_calibrated_from(worn: Rehearsal) -> None:
+    from harness.reconstruct import registry
+
+    upright = humanoid.tpose(worn.body.skeleton)
+    take = Take("stand", "p1", "test", "", 40.0, np.tile(upright, (200, 1)))
+    noise = noise_of(worn.scenario)
+    standing = simulate(worn.body, take, mounts_of(worn.scenario), worn.tracker, noise, seed=1).frames
+    output, said = Kept(), list[str]()
+
+    def stands() -> Iterator[TrackerFrame]:
+        """Until there are poses: how long it takes to calibrate is the machine's affair."""
+        yield from standing
+        for n in range(1, 100_000):
+            if len(output.poses) > 5:
+                return
+            last = standing[-1]
+            yield replace(last, received_s=last.received_s + n / 40.0, measured_s=last.measured_s + n / 40.0)
+
+    perform(
+        Paced(stands(), 0.005, stamped=False),
+        worn.body,
+        worn.setting.fitted(registry.resolve("ik"), "ik"),
+        StandInTPose(worn.body, mounts_of(worn.scenario)),
+        [output],
+        Plan(40.0, queue_frames=999, stamped_here=False),
+        say=said.append,
+    )
+    assert said[1].startswith("calibration: done")
+    assert output.poses
+    for pose in output.poses:
+        np.testing.assert_allclose(pose.root_m, upright[:3], atol=0.03)
 
 
 def test_live_estimates_are_those_of_a_run(worn: Rehearsal) -> None:
