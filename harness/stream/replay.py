@@ -12,13 +12,18 @@ from pathlib import Path
 from threading import Event
 from typing import Literal
 
+import numpy as np
+
 from harness.errors import BadFile, BadInput
 from harness.stream.blocks import CONFIGURED, RECEIVED
+from harness.stream.capture import Capture
 from harness.stream.frame import TrackerFrame
 from harness.stream.reader import WireFormat
 from harness.stream.recording import EXPECTED, Recording, read_recording
 from harness.stream.sessions import Sessions
 
+AT_ONCE = 1000
+"""Chunks that are decoded together where nobody waits for the clock."""
 Speed = float | Literal["step", "max"]
 """So many times as fast as it was, a frame at a time, or without waiting."""
 
@@ -81,14 +86,14 @@ class RecordingStream:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Of the frames given so far and the bytes that they came from (see `Sessions.counts`)."""
+        """Of what was read so far (see `Sessions.counts`)."""
         return self._played_by.counts
 
     def close(self) -> None:
         self._closed.set()
 
     def wall_s(self, received_s: float) -> float:
-        """Wall clock at a moment of the host's monotonic clock, as recorded last."""
+        """Wall clock at a moment of the host's monotonic clock, as it was when the device was set up last."""
         return received_s + self._wall_ahead_s
 
     def __iter__(self) -> Iterator[TrackerFrame]:
@@ -105,22 +110,39 @@ class RecordingStream:
     def _played(self) -> Iterator[tuple[float, TrackerFrame]]:
         """Every frame, and when it was due by the virtual clock [s]."""
         self._played_by = sessions = Sessions()
+        at_once = 1 if isinstance(self._speed, float) else AT_ONCE
         now_s, wall_s, shift_s = -math.inf, 0.0, 0.0
+        waiting: list[tuple[float, bytes]] = []
         for block in self.recording.blocks():
-            if block.kind == CONFIGURED:
-                yield from ((now_s, frame) for frame in sessions.finish())
+            if block.kind == RECEIVED and block.payload:
+                now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
+                waiting.append((now_s, block.payload))
+                if len(waiting) >= at_once:
+                    yield from _due(now_s, sessions.received_all(_joined(waiting)))
+            elif block.kind == RECEIVED:
+                yield from _due(now_s, sessions.received_all(_joined(waiting)))
+                now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
+                yield from _due(now_s, sessions.expire(now_s))
+            elif block.kind == CONFIGURED:
+                yield from _due(now_s, sessions.received_all(_joined(waiting)))
+                yield from _due(now_s, sessions.finish())
                 wire = self.recording.format_of(block)
                 if block.monotonic_s + shift_s < now_s:  # recorded after a restart of the computer
                     pause_s = max(block.wall_s - wall_s, 1.0 / wire.rate_hz)
                     shift_s = now_s + pause_s - block.monotonic_s
-                sessions.configured(wire, block.monotonic_s + shift_s)
-                frames = []
-            elif block.kind == RECEIVED:
-                at_s = block.monotonic_s + shift_s
-                frames = sessions.received(block.payload, at_s) if block.payload else sessions.expire(at_s)
-            else:
-                continue
-            now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
-            self._wall_ahead_s = wall_s - now_s
-            yield from ((now_s, frame) for frame in frames)
-        yield from ((now_s, frame) for frame in sessions.finish())
+                now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
+                self._wall_ahead_s = wall_s - now_s
+                sessions.configured(wire, now_s)
+        yield from _due(now_s, sessions.received_all(_joined(waiting)))
+        yield from _due(now_s, sessions.finish())
+
+
+def _due(now_s: float, frames: list[TrackerFrame]) -> Iterator[tuple[float, TrackerFrame]]:
+    return ((now_s, frame) for frame in frames)
+
+
+def _joined(waiting: list[tuple[float, bytes]]) -> Capture:
+    """The chunks as one capture; they wait no longer."""
+    received_s, chunks = [now_s for now_s, _ in waiting], [data for _, data in waiting]
+    waiting.clear()
+    return Capture(b"".join(chunks), np.cumsum([len(data) for data in chunks], dtype=np.int64), np.array(received_s))

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.stream.capture import Capture
 from harness.stream.frame import TrackerFrame
 from harness.stream.reader import FrameReader, WireFormat
 
@@ -62,13 +63,17 @@ class Sessions:
 
     def received(self, data: bytes, now_s: float) -> list[TrackerFrame]:
         """What these bytes complete; nothing unless it is set up."""
-        if self._reader is None:
+        return self.received_all(Capture(data, np.array([len(data)]), np.array([now_s])))
+
+    def received_all(self, capture: Capture) -> list[TrackerFrame]:
+        """The same of one chunk or more at once."""
+        if self._reader is None or not len(capture.ends):
             return []
         if self._new and self._frames:
-            self.device_zero_s = self._device_s + max(now_s - self._framed_s, 0.0)
+            self.device_zero_s = self._device_s + max(float(capture.received_s[0]) - self._framed_s, 0.0)
         self._new = False
-        self._heard_s = now_s
-        return self._placed(self._reader.feed(data, now_s))
+        self._heard_s = float(capture.received_s[-1])
+        return self._placed(self._reader.feed_all(capture))
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
         """The frame that has waited too long at this moment. To be asked when the line was looked at and nothing was

@@ -108,6 +108,7 @@ def test_a_frame_is_given_up_when_the_driver_gave_it_up(tmp_path: Path) -> None:
     assert time.monotonic() - began_s < 60.0
     stream.close()
     assert list(frames) == []
+    assert alike(list(RecordingStream(path)), list(RecordingStream(path, 1e9)))
 
 
 def test_closing_ends_a_wait(tmp_path: Path) -> None:
