@@ -23,6 +23,14 @@ class _Round:
     """Its station."""
     before_s: float = _NEVER
     """Stamp of the reading before."""
+    arrived_s: float = _NEVER
+    """Host time of the first reading of this round [s]."""
+    led: int = 0
+    """Its station, where stamps are missing."""
+    heard: int = 0
+    """Stations of the latest frame, a bit each."""
+    heard_before: int = 0
+    """Those of the one before."""
 
 
 class Assembler:
@@ -32,7 +40,8 @@ class Assembler:
     A reading a period or more after the first of its frame, by the device's clock, belongs to the next one (by the
     host's clock 1.5 periods, where stamps are missing). A station number that does not increase in the middle of a
     period, or a stamp that steps back, shows a damaged record: the readings on both sides are suspect, since either
-    may be the wrong one. So is one that is `doubtful` by itself.
+    may be the wrong one. Where stamps are missing the host's clock serves, and a station that is silent round after
+    round is no sign of damage. So is one that is `doubtful` by itself.
     """
 
     def __init__(self, stations: int, period_s: float) -> None:
@@ -77,13 +86,19 @@ class Assembler:
         """The frame of each reading (N,), from 0, and which ones (N,) are doubtful after a look at their neighbours."""
         frame, doubtful = np.zeros(len(given), dtype=np.int64), given.doubtful.copy()
         began_s, first, before_s = self._round.began_s, self._round.first, self._round.before_s
+        led_s, led = self._round.arrived_s, self._round.led
+        heard, heard_before = self._round.heard, self._round.heard_before
         station_before, filled, number, arrived_s = self._stations, self._stations, -1, _NEVER
         rows = zip(given.station.tolist(), given.measured_s.tolist(), given.received_s.tolist(), strict=True)
         for i, (station, stamp_s, received_s) in enumerate(rows):
             elapsed_s = stamp_s - began_s
             untimed = elapsed_s != elapsed_s  # NaN: a stamp is missing
             increases, back = station > station_before, stamp_s < before_s
-            early = not increases and elapsed_s < self._shortest_s(first, station)
+            if untimed:  # the host may read late: only a round of other stations than the one before is amiss
+                amiss = 0 < heard_before != heard < (1 << self._stations) - 1
+                early = not increases and amiss and received_s - led_s < self._shortest_s(led, station)
+            else:
+                early = not increases and elapsed_s < self._shortest_s(first, station)
             if early or back:
                 doubtful[i] = True
                 if filled < self._stations:
@@ -91,15 +106,17 @@ class Assembler:
             late = received_s - arrived_s > PATIENCE * self._period_s if untimed else elapsed_s >= self._period_s
             opens = late or not increases
             if opens:
-                self._round = _Round(began_s, first, before_s)
-                number, filled, arrived_s = number + 1, 0, received_s
+                self._round = _Round(began_s, first, before_s, led_s, led, heard, heard_before)
+                number, filled, arrived_s, heard, heard_before = number + 1, 0, received_s, 0, heard
             if back or began_s != began_s or (opens and not early):
                 began_s, first = stamp_s, station
+            if opens and not early:
+                led_s, led = received_s, station
             if stamp_s == stamp_s:
                 before_s = stamp_s
-            station_before, filled = station, filled + 1
+            station_before, filled, heard = station, filled + 1, heard | 1 << station
             frame[i] = number
-        self._after = _Round(began_s, first, before_s)
+        self._after = _Round(began_s, first, before_s, led_s, led, heard, heard_before)
         return frame, doubtful
 
     def _shortest_s(self, first: int, station: int) -> float:

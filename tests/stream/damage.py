@@ -130,6 +130,16 @@ def fate(name: str, kind: Kind, trial: int) -> Fate:
     return _worst(_clean(name, trial % 64), _rows(given, hurt(given.data, kind, at, rng)))
 
 
+def fate_of_wrong_station(name: str, trial: int) -> Fate:
+    """The same where the station's character became another's."""
+    rng = np.random.default_rng([trial, 9])
+    given = sound(name, trial % 64)
+    data = bytearray(given.data)
+    at = int(rng.integers(2 * STATIONS, len(given.records) - 2 * STATIONS)) * given.size + 1
+    data[at] = int(rng.choice([other for other in STATION_CHARACTERS[:STATIONS] if other != data[at]]))
+    return _worst(_clean(name, trial % 64), _rows(given, bytes(data)))
+
+
 _Row = tuple[int, int, bool, bytes, Floats]
 """Frame, station, suspect, the values as bytes, and the values: stamp, place, quaternion (8,)."""
 

@@ -104,13 +104,14 @@ def test_the_end_gives_what_is_there() -> None:
     assert one.finish() == []
 
 
+@pytest.mark.parametrize("timed", [True, False])
 @pytest.mark.parametrize("seed", range(20))
-def test_pieces_do_not_matter(seed: int) -> None:
-    """With stations missing, doubtful readings and stamps that step back."""
+def test_pieces_do_not_matter(seed: int, timed: bool) -> None:
+    """With stations missing, doubtful readings and stamps that step back, or without stamps."""
     rng = np.random.default_rng(seed)
     given = told(*[pair for pair in rounds(30) if rng.random() < 0.85])
     measured_s = np.where(rng.random(len(given)) < 0.05, rng.uniform(0.0, 0.7, len(given)), given.measured_s)
-    measured_s[rng.random(len(given)) < 0.03] = np.nan
+    measured_s[rng.random(len(given)) < (0.03 if timed else 1.0)] = np.nan
     station = np.where(rng.random(len(given)) < 0.03, rng.integers(0, 4, len(given)), given.station)
     given = changed(given, measured_s=measured_s, station=station, doubtful=rng.random(len(given)) < 0.05)
     whole = frames(given)
@@ -134,13 +135,16 @@ def test_what_is_doubtful_by_itself_is_suspect() -> None:
     assert suspects(frames(changed(given, doubtful=doubtful))) == [(1, 2)]
 
 
+@pytest.mark.parametrize("timed", [True, False])
 @pytest.mark.parametrize("wrong", range(4))
 @pytest.mark.parametrize("right", range(4))
-def test_a_wrong_station_that_order_could_show_is_marked(right: int, wrong: int) -> None:
+def test_a_wrong_station_that_order_could_show_is_marked(right: int, wrong: int, timed: bool) -> None:
     """Every record of round 3 in turn is taken for another station's."""
     if right == wrong:
         return
     given = told(*rounds(8))
+    if not timed:
+        given = changed(given, measured_s=np.full(len(given), np.nan))
     station = given.station.copy()
     station[12 + right] = wrong
     out = frames(changed(given, station=station))
@@ -198,3 +202,13 @@ def test_any_number_of_stations(stations: int) -> None:
     assert came(out) == [list(range(stations))] * 5
     assert suspects(out) == []
     assert frames(given[:0], stations) == []
+
+
+@pytest.mark.parametrize("silent", [[0], [1], [3], [0, 2]])
+@pytest.mark.parametrize("at_once", [True, False])
+def test_without_stamps_a_station_that_stays_silent_is_no_sign_of_damage(silent: list[int], at_once: bool) -> None:
+    given = told(*[(r, s) for r, s in rounds(6) if s not in silent])
+    received_s = np.full(len(given), LATE_S) if at_once else given.received_s
+    out = frames(changed(given, measured_s=np.full(len(given), np.nan), received_s=received_s))
+    assert came(out) == [[s for s in range(4) if s not in silent]] * 6
+    assert suspects(out) == []

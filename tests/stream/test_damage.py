@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.stream.decoder import LONGEST_REPLY, Event, Garbage, Records, joined
-from tests.stream.damage import FATES, KINDS, LISTS, Fate, Kind, cost, fate, found, sound
+from tests.stream.damage import FATES, KINDS, LISTS, Fate, Kind, cost, fate, fate_of_wrong_station, found, sound
 
 
 def _costs(name: str, kind: Kind, trials: int) -> Counter[tuple[int, int]]:
@@ -58,6 +58,13 @@ def test_what_is_caught(name: str) -> None:
             assert fates["large"] <= 1, shares
         else:
             assert passed <= (0.4 if name.startswith("ASCII") else 0.8) * trials, shares
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_a_wrong_station_is_always_marked(name: str) -> None:
+    """A station's character changed into another's, in every list: order and time show it."""
+    for trial in range(30):
+        assert fate_of_wrong_station(name, trial) in ("suspect", "missing"), trial
 
 
 @pytest.mark.slow
