@@ -1,5 +1,7 @@
 """Whether a serial line can carry what is asked for: ten bits a byte (docs/is900.md 10)."""
 
+import math
+
 from harness.errors import BadInput
 from harness.stream.items import size
 
@@ -27,7 +29,7 @@ def check_capacity(
     if load(stations, SHORT_LIST, rate_hz, asked_hz) <= baud and size(items) > size(SHORT_LIST):
         ways.append(f"the {size(SHORT_LIST)}-byte list {','.join(map(str, SHORT_LIST))}")
     slower = (baud - load(0, items, 0.0, asked_hz)) / load(stations, items, 1.0)
-    ways.append(f"a device that runs at {slower:.0f} Hz or less")
+    ways.append(f"a device that runs at {math.floor(slower)} Hz or less")
     if baud < 115200:
         ways.append("a device set to 115200 baud")
     raise BadInput(

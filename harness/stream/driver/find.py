@@ -77,12 +77,13 @@ def _check_kind(port: str, status: Status) -> None:
 
 def _no_answer(port: str, bauds: Sequence[int | None], heard: int) -> NoAnswer:
     rates = " at " + ", ".join(map(str, bauds)) + " baud" if bauds[0] else ""
+    one_rate = "The rate may be wrong: leave it out, and each is tried. " if bauds[0] and len(bauds) == 1 else ""
     if heard == 0:
         return NoAnswer(
             f"Port {port}: nothing answers{rates}.",
-            "Is the device on and has it started (up to 20 s), is the cable a null modem, and is this its port?",
+            f"{one_rate}Is the device on and has it started (up to 20 s), the cable a null modem, and this its port?",
         )
-    what = f"Port {port}: {heard} bytes came{rates}, but no answer of an IS-900."
-    if bauds[0] and len(bauds) == 1:
-        return NoAnswer(what, "The rate may be wrong: leave it out, and every one is tried.")
-    return NoAnswer(what, "Something else may be at this port, or the cable is bad. Name the port of an IS-900.")
+    return NoAnswer(
+        f"Port {port}: {heard} bytes came{rates}, but no answer of an IS-900.",
+        one_rate.strip() or "Something else may be at this port, or the cable is bad. Name the port of an IS-900.",
+    )

@@ -201,6 +201,8 @@ class Is900:
         self._come_back(reopen=True)
 
     def _tell(self, kind: Kind, text: str) -> None:
+        if kind == "reset" and self.wanted.boresight:
+            text += "; boresight is lost, and nobody may stand in the pose for it now"
         event = LineEvent(kind, self._host.monotonic_s(), self._host.wall_s(), text)
         self._witness.happened(event)
         self._on_event(event)
@@ -272,8 +274,7 @@ class Is900:
         now_s, line = self._host.monotonic_s(), self._line
         kind, text = complaint_of(self._wire, status, streaming=False)
         if kind is not None:
-            lost = "; boresight is lost" if self.wanted.boresight else ""
-            self._act(self._watchdog.tell(kind, text + lost, now_s))
+            self._act(self._watchdog.tell(kind, text, now_s))
             return
         for station in self._stations.characters:
             answer = line.ask(commands.read_list(station), OutputList, self._timing.back_answer_s)

@@ -52,7 +52,8 @@ def restore(port: str, line: Line, stations: Stations) -> str:
 
 
 def _active(port: str, line: Line) -> str:
-    states = line.ask(STATION_STATES, StationStates, line.timing.answer_s)
+    answer_s = line.timing.answer_s
+    states = line.ask(STATION_STATES, StationStates, answer_s) or line.ask(STATION_STATES, StationStates, answer_s)
     if states is None:
         raise BadInput(f"Port {port}: the device does not say which stations it has.", "Switch it off and on.")
     return "".join(states.stations)

@@ -19,6 +19,9 @@ from harness.stream.transport import LineLost, Transport
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
 LAP_S = 10.0
+BEGAN_S = 1000.0
+TICK_S = 2e-4
+"""The least step of time on the bench [s]."""
 
 
 def swaying(stations: int, rate_hz: float = 50.0) -> Samples:
@@ -71,7 +74,7 @@ class Scripted:
 
     def __init__(self, answers: dict[bytes, bytes], chatter: bytes = b"", every_s: float = 0.02) -> None:
         self._answers, self._chatter, self._every_s = answers, chatter, every_s
-        self._out, self._chattered_s = b"", 0.0
+        self._out, self._chattered_s = b"", BEGAN_S
 
     def receive(self, data: bytes, now_s: float) -> None:
         self._out += b"".join(answer for heard, answer in self._answers.items() if heard in data)
@@ -93,7 +96,7 @@ class Bench:
 
     def __init__(self, device: Device | None, port: str = "bench") -> None:
         self.device, self.port = device, port
-        self.now_s = 1000.0
+        self.now_s = BEGAN_S
         self.plugged = True
         self.opened: list[tuple[str, int]] = []
         self.open_lines = 0
@@ -152,7 +155,7 @@ class BenchLine:
             next_s = min(bench.device.next_s if bench.device else float("inf"), bench.next_plan_s)
             if bench.now_s >= until_s:
                 return b""
-            bench.sleep(max(min(next_s, until_s) - bench.now_s, 1e-6))
+            bench.sleep(max(min(next_s, until_s) - bench.now_s, TICK_S))
 
     def write(self, data: bytes) -> None:
         self._check()

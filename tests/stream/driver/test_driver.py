@@ -1,0 +1,197 @@
+"""The driver at real ports in real time, against the emulator: a `TrackerStream` that leaves nothing behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from itertools import islice, pairwise
+from pathlib import Path
+
+import pytest
+
+from harness.errors import BadInput
+from harness.stream.driver import Is900, LineEvent, Timing, Wanted
+from harness.stream.emulator import EmulatorConfig, serving
+from harness.stream.emulator.faults import Fault
+from harness.stream.emulator.serve import Serving
+from harness.stream.frame import TrackerFrame
+from harness.testing.stream_checks import check_stream
+from tests.stream.driver.bench import swaying
+
+PATIENT_S = 30.0
+"""A loaded machine gets so long before a test fails."""
+SERVED = ["pty", "tcp"]
+Serve = Callable[..., AbstractContextManager[Serving]]
+
+
+@pytest.fixture(params=SERVED)
+def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Serve:
+    def at(config: EmulatorConfig | None = None) -> AbstractContextManager[Serving]:
+        if request.param == "pty":
+            return serving(swaying(4), config, pty=tmp_path / "is900")
+        return serving(swaying(4), config, tcp="127.0.0.1:0")
+
+    return at
+
+
+def until(stream: Is900, wanted: Callable[[TrackerFrame], bool]) -> list[TrackerFrame]:
+    """Frames until one is as wanted."""
+    frames, ends_s = list[TrackerFrame](), time.monotonic() + PATIENT_S
+    for frame in stream:
+        frames.append(frame)
+        if wanted(frame) or time.monotonic() > ends_s:
+            break
+    return frames
+
+
+def test_it_keeps_the_contract_of_streams(serve: Serve) -> None:
+    with serve() as emulator:
+        opened: list[Is900] = []
+
+        def make() -> Is900:
+            for stream in opened:
+                stream.close()
+            opened.append(Is900(emulator.name))
+            return opened[-1]
+
+        assert len(check_stream(make, rate_hz=50.0, at_most=60)) == 60
+        opened[-1].close()
+        assert not emulator.emulator.device.streaming
+
+
+def test_it_comes_back_when_the_line_was_unplugged(serve: Serve) -> None:
+    events: list[LineEvent] = []
+    with serve(EmulatorConfig(faults=(Fault("disconnect", at_s=(1.5,), lasts_s=1.5),))) as emulator:
+        stream = Is900(emulator.name, on_event=events.append)
+        until(stream, lambda frame: [event.kind for event in events].count("connected") == 2)
+        assert len(list(islice(stream, 20))) == 20
+        stream.close()
+    assert [event.kind for event in events] == ["connected", "unplugged", "connected"]
+    assert events[2].monotonic_s - events[1].monotonic_s < 1.5 + 2.0 + 5.0  # 5 s for a loaded machine
+    assert events[1].wall_s == pytest.approx(stream.wall_s(events[1].monotonic_s), abs=0.1)
+
+
+@pytest.fixture
+def nothing_left() -> Iterator[None]:
+    """No thread and no descriptor more than before."""
+
+    def held() -> tuple[set[threading.Thread], int]:
+        return set(threading.enumerate()), len(os.listdir("/proc/self/fd"))
+
+    if not os.path.isdir("/proc/self/fd"):
+        pytest.skip("this system does not list open descriptors in /proc")
+    before = held()
+    yield
+    assert held() == before
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_nothing_is_left_behind(serve: Serve) -> None:
+    faults = (Fault("disconnect", at_s=(1.0,), lasts_s=0.3), Fault("reset", at_s=(2.5,)))
+    with serve(EmulatorConfig(faults=faults)) as emulator:
+        threads = threading.active_count()
+        with Is900(emulator.name) as stream:
+            until(stream, lambda frame: stream.counts["reconnects"] >= 2)
+            assert stream.counts["reconnects"] >= 2
+            assert threading.active_count() == threads
+        for _ in range(3):
+            Is900(emulator.name).close()
+        with pytest.raises(BadInput):
+            Is900(emulator.name, Wanted(stations=tuple("abcdefgh")))
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_another_thread_may_close_it_at_any_moment(serve: Serve) -> None:
+    with serve() as emulator:
+        stream = Is900(emulator.name)
+        first, ended = threading.Event(), threading.Event()
+
+        def read() -> None:
+            for _ in stream:
+                first.set()
+            ended.set()
+
+        reading = threading.Thread(target=read)
+        reading.start()
+        assert first.wait(PATIENT_S)
+        stream.close()
+        assert ended.wait(PATIENT_S)
+        reading.join()
+        assert not emulator.emulator.device.streaming
+    stream.close()
+    assert list(stream) == []
+
+
+@pytest.mark.usefixtures("nothing_left")
+def test_it_may_be_closed_while_it_waits_for_a_device_that_is_gone(serve: Serve) -> None:
+    events: list[LineEvent] = []
+    gone = threading.Event()
+
+    def told(event: LineEvent) -> None:
+        events.append(event)
+        if event.kind == "unplugged":
+            gone.set()
+
+    with serve() as emulator:
+        stream = Is900(emulator.name, on_event=told)
+        next(iter(stream))
+        reading = threading.Thread(target=lambda: list(stream))
+        reading.start()
+    assert gone.wait(PATIENT_S)
+    began_s = time.monotonic()
+    stream.close()
+    reading.join(PATIENT_S)
+    assert not reading.is_alive()
+    assert time.monotonic() - began_s < 5.0
+
+
+CLIENT = """
+import sys
+from harness.stream.driver import Is900
+try:
+    with Is900(sys.argv[1]) as stream:
+        for frame in stream:
+            print(frame.received_s, flush=True)
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+"""
+
+
+def test_ctrl_c_leaves_the_device_quiet(tmp_path: Path) -> None:
+    with serving(swaying(2), pty=tmp_path / "is900") as emulator:
+        client = subprocess.Popen([sys.executable, "-c", CLIENT, emulator.name], stdout=subprocess.PIPE, text=True)
+        assert client.stdout is not None
+        for _ in range(5):
+            assert float(client.stdout.readline()) > 0.0
+        client.send_signal(signal.SIGINT)
+        said, _ = client.communicate(timeout=PATIENT_S)
+        assert said.splitlines()[-1] == "interrupted"
+        assert client.returncode == 0
+        assert not emulator.emulator.device.streaming
+
+
+def test_a_second_client_is_told_that_the_port_is_taken(serve: Serve) -> None:
+    with serve() as emulator, Is900(emulator.name), pytest.raises(BadInput, match="another program"):
+        Is900(emulator.name)
+
+
+@pytest.mark.parametrize("baud", [9600, 57600])
+def test_the_rate_of_a_real_port_is_found(baud: int, tmp_path: Path) -> None:
+    config = EmulatorConfig(baud=baud, check_baud=True)
+    with serving(swaying(1, rate_hz=10.0), config, pty=tmp_path / "is900") as emulator:
+        with Is900(emulator.name) as stream:
+            assert stream.baud == baud
+            assert len(list(islice(stream, 3))) == 3
+        with pytest.raises(BadInput, match=r"at 19200 baud.*The rate may be wrong"):
+            Is900(emulator.name, Wanted(baud=19200), timing=Timing(answer_s=0.3))
+
+
+def test_stopping_to_iterate_loses_no_frame(tmp_path: Path) -> None:
+    with serving(swaying(2), tcp="127.0.0.1:0") as emulator, Is900(emulator.name) as stream:
+        parts = [frame for _ in range(10) for frame in islice(stream, 3)]
+    periods = [round(50.0 * (b.measured_s[0] - a.measured_s[0])) for a, b in pairwise(parts)]
+    assert set(periods) == {1}

@@ -1,0 +1,341 @@
+"""What befalls a line, told once each and overcome; in virtual time, so that silence costs nothing."""
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.core.seeds import generator
+from harness.stream.commands import output_list
+from harness.stream.driver import Is900, LineEvent, Timing, Wanted
+from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.faults import Fault
+from harness.stream.frame import TrackerFrame
+from harness.stream.sessions import Sessions
+from tests.stream.driver.bench import Bench, Notes, Played, frames_for, swaying
+
+BACK_WITHIN_S = 2.0
+"""Of the device's return."""
+
+
+def bench_of(*faults: Fault, stations: int = 4, rate_hz: float = 50.0, **config: Any) -> Bench:
+    return Bench(Played(swaying(stations, rate_hz), EmulatorConfig(faults=faults, **config), 1000.0))
+
+
+def device_of(bench: Bench) -> Any:
+    assert isinstance(bench.device, Played)
+    return bench.device.emulator.device
+
+
+def assert_in_order(frames: list[TrackerFrame]) -> None:
+    """Host times strictly increase and no station's time steps back, whatever happened between."""
+    assert all(one.received_s < other.received_s for one, other in pairwise(frames))
+    for row in range(len(frames[0].measured_s)):
+        stamps_s = np.array([frame.measured_s[row] for frame in frames if not frame.suspect[row]])
+        stamps_s = stamps_s[np.isfinite(stamps_s)]
+        assert np.all(np.diff(stamps_s) > 0.0)
+
+
+def gaps_s(frames: list[TrackerFrame]) -> list[float]:
+    return [other.received_s - one.received_s for one, other in pairwise(frames)]
+
+
+def test_a_reset_device_is_set_up_again() -> None:
+    bench = bench_of(Fault("reset", at_s=(2.0,)))
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 5.0)
+        assert bench.kinds == ["connected", "stalled", "reset", "connected"]
+        assert "it reports in ASCII" in bench.events[2].text
+        assert stream.counts["reconnects"] == 1
+    assert max(gaps_s(frames)) < 0.25 + BACK_WITHIN_S  # the emulator takes 0.25 s to start
+    assert_in_order(frames)
+    device = device_of(bench)
+    assert device.settings.binary
+    assert not device.streaming
+
+
+def test_device_time_goes_on_by_the_hosts_clock_over_a_reset() -> None:
+    bench = bench_of(Fault("reset", at_s=(2.0,)))
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 5.0)
+    ahead_s = np.array([frame.received_s - frame.measured_s[-1] for frame in frames])
+    assert np.nanmax(ahead_s) - np.nanmin(ahead_s) < 0.1
+
+
+def test_boresight_is_not_set_where_nobody_stands_for_it_and_that_is_told() -> None:
+    bench = bench_of(Fault("reset", at_s=(2.0,)))
+    with bench.driver(Wanted(boresight=True)) as stream:
+        frames_for(stream, bench, 4.0)
+    assert bytes(bench.sent).count(b"B1\r\n") == 1
+    assert any("boresight is lost" in event.text for event in bench.events)
+
+
+def test_an_unplugged_line_is_waited_for() -> None:
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 1.0)
+        bench.plugged = False
+        bench.after(60.0, lambda: setattr(bench, "plugged", True))
+        frames += frames_for(stream, bench, 62.0)
+        assert bench.kinds == ["connected", "unplugged", "connected"]
+        assert {port for port, _ in bench.opened} == {"bench"}
+    assert 60.0 < max(gaps_s(frames)) < 60.0 + BACK_WITHIN_S
+    assert_in_order(frames)
+    assert bench.open_lines == 0
+
+
+def test_another_device_at_the_same_port_is_set_up_too() -> None:
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 1.0)
+        bench.plugged = False
+
+        def swap() -> None:
+            bench.device, bench.plugged = Played(swaying(4), now_s=bench.now_s), True
+
+        bench.after(3.0, swap)
+        frames += frames_for(stream, bench, 5.0)
+        assert bench.kinds == ["connected", "unplugged", "reset", "connected"]
+    assert_in_order(frames)
+
+
+@pytest.mark.parametrize("off_s", [0.7, 3.0, 20.0])
+def test_a_device_that_says_nothing_for_a_while(off_s: float) -> None:
+    """Its power is off and its line stays: what it is told meanwhile is lost."""
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 1.0)
+        bench.device = None
+
+        def power_on() -> None:
+            bench.device = Played(swaying(4), now_s=bench.now_s)
+
+        bench.after(off_s, power_on)
+        frames += frames_for(stream, bench, off_s + 3.0)
+        told = ["connected", "stalled", *(["silent"] if off_s > 2.0 else []), "reset", "connected"]
+        assert bench.kinds == told
+    assert max(gaps_s(frames)) < off_s + BACK_WITHIN_S
+    assert_in_order(frames)
+
+
+def test_a_short_stall_is_told_and_costs_no_record_but_those_not_sent() -> None:
+    bench = bench_of(Fault("stall", at_s=(2.0,), lasts_s=1.2))
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 4.0)
+        assert bench.kinds == ["connected", "stalled", "connected"]
+        assert stream.counts["reconnects"] == 0
+        assert bytes(bench.sent).count(b"C") == 1
+    assert_in_order(frames)
+
+
+def test_a_clock_that_stands_still_is_told() -> None:
+    bench = bench_of()
+    device = device_of(bench)
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        stamps_s = device.rounds.player.stamps_s
+        device.rounds.player.stamps_s = lambda number: np.zeros_like(stamps_s(number)) + 1.0
+        frames_for(stream, bench, 1.0)
+        bench.after(1.0, lambda: delattr(device.rounds.player, "stamps_s"))
+        frames_for(stream, bench, 4.0)
+        assert bench.kinds == ["connected", "stalled", "connected"]
+        assert "no record that is news" in bench.events[1].text
+
+
+@pytest.mark.parametrize("lasts_s", [0.1, 1.0, 4.0])
+def test_a_burst_of_garbage_is_told_once(lasts_s: float) -> None:
+    bench = bench_of(Fault("burst", at_s=(2.0,), lasts_s=lasts_s))
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 4.0 + lasts_s)
+        assert bench.kinds.count("garbage") == 1
+        assert set(bench.kinds) <= {"connected", "garbage", "stalled", "refused"}
+        assert len(bench.kinds) == len(set(bench.kinds)) + (lasts_s > 0.5)
+        assert (stream.counts["reconnects"] > 0) == (lasts_s > 2.0)
+    assert max(gaps_s(frames)) < lasts_s + BACK_WITHIN_S
+    assert_in_order(frames)
+
+
+def test_single_damaged_bytes_cost_no_set_up() -> None:
+    kinds = ("lost", "garbled", "duplicated", "added")
+    bench = bench_of(*(Fault(kind, share=0.01) for kind in kinds))  # type: ignore[arg-type]
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 20.0)
+        assert stream.counts["reconnects"] == 0
+        assert stream.counts["records"] > 0.93 * 20.0 * 50.0 * 4
+    assert_in_order(frames)
+
+
+def somebody_says(said: bytes) -> Callable[[Bench], None]:
+    return lambda bench: device_of(bench).receive(said, bench.now_s)
+
+
+@pytest.mark.parametrize(
+    ("said", "told"),
+    [
+        (b"".join(output_list(station, (2, 4, 1)) for station in "1234"), "wrong list"),
+        (output_list("3", (40, 2, 11, 21, 22, 1)), "wrong list"),
+        (b"F", "reset"),
+        (b"F" + b"".join(output_list(station, (2, 4, 1)) for station in "1234"), "reset"),
+        (b"c", "reset"),
+    ],
+)
+def test_what_another_program_tells_the_device_is_noticed_and_undone(said: bytes, told: str) -> None:
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 1.0)
+        somebody_says(said)(bench)
+        frames += frames_for(stream, bench, 5.0)
+        assert bench.kinds.count(told) == 1
+        assert {"connected", told} <= set(bench.kinds) <= {"connected", "garbage", "stalled", told}
+        assert stream.counts["reconnects"] == 1
+        assert len(frames_for(stream, bench, 1.0)) > 40
+    assert max(gaps_s(frames)) < BACK_WITHIN_S + 0.5
+    assert_in_order(frames)
+
+
+def test_a_device_that_comes_back_useless_is_told_once_and_asked_on() -> None:
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        bench.plugged = False
+
+        def come(firmware: str) -> Callable[[], None]:
+            def plug() -> None:
+                bench.device = Played(swaying(4), EmulatorConfig(firmware=firmware), bench.now_s)
+                bench.plugged = True
+
+            return plug
+
+        bench.after(1.0, come("4.1105"))
+        bench.after(10.0, come("4.2301"))
+        assert len(frames_for(stream, bench, 13.0)) > 50
+        assert bench.kinds == ["connected", "unplugged", "reset", "refused", "connected"]
+        assert "item 40" in bench.events[3].text
+
+
+def test_a_station_that_is_switched_off_is_missing_and_comes_back() -> None:
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        somebody_says(b"l2,0\r\n")(bench)
+        missing = frames_for(stream, bench, 1.0)[-1]
+        assert list(missing.position_valid) == [True, False, True, True]
+        assert np.isnan(missing.measured_s[1])
+        somebody_says(b"\x19")(bench)
+        assert frames_for(stream, bench, 3.0)[-1].position_valid.all()
+
+
+def test_a_lost_station_shows_in_item_40() -> None:
+    bench = bench_of(Fault("lost_station", at_s=(1.0,), lasts_s=1.0, station="torso"))
+    with bench.driver() as stream:
+        frames = frames_for(stream, bench, 3.0)
+    lost = [not frame.position_valid[1] for frame in frames]
+    assert 45 <= sum(lost) <= 55
+    assert all(frame.position_valid[[0, 2, 3]].all() for frame in frames)
+
+
+def test_a_lost_station_shows_by_mp_where_records_do_not_tell() -> None:
+    bench = bench_of(Fault("lost_station", at_s=(3.0,), lasts_s=5.0, station="torso"), firmware="3.1102")
+    with bench.driver(Wanted(quality="mp")) as stream:
+        assert stream.wire.items == (2, 11, 21, 1)
+        frames = frames_for(stream, bench, 12.0)
+    assert 10 <= bytes(bench.sent).count(b"MP\r\n") <= 14
+    lost = [not frame.position_valid[1] for frame in frames]
+    assert 190 <= sum(lost) <= 310
+    assert all(frame.position_valid[[0, 2, 3]].all() for frame in frames)
+    assert bench.kinds == ["connected"]
+
+
+def test_the_clock_is_zeroed_within_hours_and_no_frame_steps_back() -> None:
+    """Two and a half hours of a slow device: the stamps stay exact and device time goes on."""
+    bench = bench_of(stations=2, rate_hz=0.25)
+    with bench.driver(Wanted(rate_hz=0.25), Timing(stalled_s=10.0, silent_s=20.0, poll_s=4.0)) as stream:
+        frames = frames_for(stream, bench, 9000.0)
+        assert bytes(bench.sent).count(b"MZ\r\n") == 1 + 2
+        assert bench.kinds == ["connected"]
+        assert stream.counts["clock_resets"] == 2
+    assert len(frames) > 2200
+    assert_in_order(frames)
+    assert sum(bool(frame.suspect.any()) for frame in frames) <= 4
+    ahead_s = np.array([f.received_s - f.measured_s[-1] for f in frames if not f.suspect.any()])
+    assert np.nanmax(ahead_s) - np.nanmin(ahead_s) < 0.1
+
+
+def test_it_can_be_zeroed_often_at_full_rate() -> None:
+    bench = bench_of(rate_hz=75.0)
+    with bench.driver(timing=Timing(rezero_s=2.0)) as stream:
+        frames = frames_for(stream, bench, 9.0)
+        assert stream.counts["clock_resets"] == 4
+        assert bench.kinds == ["connected"]
+    assert len(frames) > 74 * 9
+    assert_in_order(frames)
+    assert sum(bool(frame.suspect.any()) for frame in frames) <= 8
+
+
+def test_what_a_witness_wrote_down_gives_the_same_frames() -> None:
+    faults = (
+        Fault("reset", at_s=(4.0, 9.0)),
+        Fault("garbled", share=0.005),
+        Fault("burst", at_s=(6.0,), lasts_s=0.7),
+        Fault("stall", at_s=(12.0,), lasts_s=1.0),
+    )
+    bench = bench_of(*faults)
+    sessions, replayed = Sessions(), list[TrackerFrame]()
+
+    class Replaying(Notes):
+        def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+            replayed.extend(sessions.received(data, monotonic_s) if data else sessions.expire(monotonic_s))
+
+        def configured(self, wire: Any) -> None:
+            replayed.extend(sessions.configured(wire, bench.now_s))
+
+    with Is900("bench", witness=Replaying(), host=bench.host) as stream:
+        frames = frames_for(stream, bench, 16.0)
+        assert stream.counts["reconnects"] >= 2
+    assert len(frames) > 600
+    for one, other in zip(frames, replayed, strict=False):
+        assert one.received_s == other.received_s
+        np.testing.assert_array_equal(one.measured_s, other.measured_s)
+        np.testing.assert_array_equal(one.position_m, other.position_m)
+
+
+def test_health_tells_how_it_goes() -> None:
+    bench = bench_of(Fault("garbled", share=0.05))
+    with bench.driver() as stream:
+        frames_for(stream, bench, 4.0)
+        health = stream.health()
+    assert health["rate_hz"] == pytest.approx(50.0, rel=0.05)
+    assert health["records"] > 700
+    assert health["garbage_bytes"] > 0
+    assert health["reconnects"] == 0
+    assert 0.0 <= health["silent_s"] < 0.1
+
+
+@pytest.mark.slow
+def test_a_day_of_random_trouble_is_overcome() -> None:
+    """Hours of unplugging, resets, noise and silence at a slow device: it always comes back, times stay in order."""
+    rng = generator(1, "a day of trouble")
+    bench = bench_of(stations=3, rate_hz=10.0)
+    events: list[LineEvent] = bench.events
+    with bench.driver() as stream:
+        for _ in range(300):
+            match rng.integers(4):
+                case 0:
+                    bench.plugged = False
+                    bench.after(float(rng.exponential(5.0)), lambda: setattr(bench, "plugged", True))
+                case 1:
+                    device_of(bench).receive(b"\x19", bench.now_s)
+                case 2:
+                    noise = rng.bytes(200)
+                    bench.spoil = lambda data, noise=noise: noise[: len(data)]  # type: ignore[misc]
+                    bench.after(float(rng.exponential(2.0)), lambda: setattr(bench, "spoil", lambda data: data))
+                case _:
+                    device_of(bench).receive(rng.bytes(30), bench.now_s)
+            frames = frames_for(stream, bench, 30.0)
+            assert len(frames) > 20
+            assert_in_order(frames)
+            assert frames[-1].received_s > bench.now_s - 1.0
+    assert len(events) > 300
+    assert bench.open_lines == 0
