@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -169,6 +170,27 @@ def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Re
     again = replayed[start : start + 60]
     assert [f.received_s for f in again] == [f.received_s for f in live[1]]
     assert all((a.position_m == b.position_m).all() for a, b in zip(again, live[1], strict=True))
+
+
+def test_a_device_that_was_gone_replays_as_it_was_live(played: Rehearsal, tmp_path: Path) -> None:
+    """Bit by bit, device time and times of reception included, whether decoded at once or chunk by chunk."""
+    link, path, wanted = tmp_path / "link", tmp_path / "a.rec", Wanted(stations=played.samples.stations)
+    with RecordingWriter(path) as writer:
+        with serving(played.samples, pty=link):
+            device = Is900(str(link), wanted, witness=writer)
+            frames = iter(device)
+            live = [next(frames) for _ in range(40)]
+        with device, ThreadPoolExecutor() as beside:
+            rest = beside.submit(lambda: [next(frames) for _ in range(40)])
+            with serving(played.samples, pty=link):
+                live += rest.result(timeout=60.0)
+    assert [event["kind"] for event in read_recording(path).events][:2] == ["connected", "unplugged"]
+    for speed in ("max", 1e9):
+        stream = RecordingStream(path, speed)
+        replayed = list(stream)
+        assert all(same(one, other) for one, other in zip(live, replayed, strict=False))
+        assert len(replayed) >= len(live)
+        assert stream.counts["sessions"] == 2
 
 
 def test_seconds_end_a_recording(port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
