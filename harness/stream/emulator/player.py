@@ -15,7 +15,8 @@ class Player:
     def __init__(self, samples: Samples, now_s: float) -> None:
         self.samples = samples
         self._taken_s: list[list[float]] = samples.taken_s.tolist()
-        self._pace = samples.device_lap_s / samples.lap_s
+        self._lap_s, self._device_lap_s = samples.lap_s, samples.device_lap_s
+        self._pace = self._device_lap_s / self._lap_s
         self.begin(now_s)
 
     def begin(self, now_s: float) -> None:
@@ -27,6 +28,11 @@ class Player:
         self._zero_s = 0.0
         self._zero_s = self.clock_s(now_s)
 
+    @property
+    def epoch(self) -> tuple[float, float]:
+        """Changes whenever stamps change their meaning."""
+        return self._began_s, self._zero_s
+
     def clock_s(self, now_s: float) -> float:
         """What the device's clock says [s]."""
         first_s = float(self.samples.device_s[0, 0]) - self._pace * self._taken_s[0][0]
@@ -35,7 +41,7 @@ class Player:
     def time_s(self, number: int, row: int) -> float:
         """When a reading is taken, by the clock of whoever asks [s]."""
         lap, k = divmod(number, len(self._taken_s))
-        return self._began_s + lap * self.samples.lap_s + self._taken_s[k][row]
+        return self._began_s + lap * self._lap_s + self._taken_s[k][row]
 
     def first_from(self, now_s: float) -> int:
         """The first whole round that is still to come."""
@@ -54,7 +60,7 @@ class Player:
     def stamps_s(self, number: int) -> Floats:
         """(S,) the device's clock at the readings of a round [s]."""
         lap, k = divmod(number, len(self._taken_s))
-        out: Floats = self.samples.device_s[k] + lap * self.samples.device_lap_s - self._zero_s
+        out: Floats = self.samples.device_s[k] + lap * self._device_lap_s - self._zero_s
         return np.maximum(out, 0.0)
 
     def row_of(self, number: int) -> int:

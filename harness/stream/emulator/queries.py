@@ -85,7 +85,7 @@ QUERIES: dict[str, Query] = {
     "MU": _of_device(lambda settings: Digits("1", "U", settings.timeout_ms)),
     "Mg": _of_device(lambda settings: Digits("1", "g", settings.gain)),
     "MCF": _emitters,
-    "MCI": _of_station(lambda name, station: Digits(name, "I", 1 + STATIONS.index(name))),
+    "MCI": _of_station(lambda name, station: Digits(name, "I", 1 + STATIONS.index(name) if station.active else -1)),
     "MLogState": _of_device(lambda settings: _text(f"31LS{int(settings.command_log)}")),
     "MSchAlg": _of_device(lambda settings: _text(f"31SchAlg{settings.scheduling}")),
     "MConfigLockMode": _of_device(lambda settings: _text(f"31CLM{settings.lock}")),

@@ -20,8 +20,8 @@ class Rounds:
     def __init__(self, player: Player) -> None:
         self.player = player
         self._lost: frozenset[str] = frozenset()
-        self._written: tuple[int, DeviceSettings, float, dict[str, bytes]] | None = None
-        """Number of the round, what it was written with, its first stamp, and the records by station."""
+        self._written: tuple[int, DeviceSettings, tuple[float, float], dict[str, bytes]] | None = None
+        """Number of the round, settings and epoch it was written with, and the records by station."""
 
     @property
     def plugged(self) -> str:
@@ -46,14 +46,13 @@ class Rounds:
 
     def records(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
         """Of a round, by station."""
-        stamps_s = self.player.stamps_s(number)
-        known = self._written
-        if known is None or known[0] != number or known[1] is not settings or known[2] != stamps_s[0]:
-            self._written = known = number, settings, float(stamps_s[0]), self._write(number, stamps_s, settings)
+        known, epoch = self._written, self.player.epoch
+        if known is None or known[0] != number or known[1] is not settings or known[2] != epoch:
+            self._written = known = number, settings, epoch, self._write(number, settings)
         return known[3]
 
-    def _write(self, number: int, stamps_s: Floats, settings: DeviceSettings) -> dict[str, bytes]:
-        samples, k = self.player.samples, self.player.row_of(number)
+    def _write(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
+        samples, k, stamps_s = self.player.samples, self.player.row_of(number), self.player.stamps_s(number)
         position_m, turn = samples.position_m[k].copy(), samples.tracker_from_station[k].copy()
         quality = samples.quality[k].copy()
         rows_of: dict[tuple[int, ...], list[int]] = {}

@@ -70,13 +70,13 @@ class Server:
         """Until `stop`, or an exception such as KeyboardInterrupt; the port is closed then."""
         try:
             while not self._stopped:
+                called = self._wait()
                 now_s = time.monotonic()
-                if data := self.port.read():
+                if called and (data := self.port.read()):
                     self.emulator.receive(self._heard(data), now_s)
                 for sent in self.emulator.advance(now_s):
                     self._write(sent)
                 self._plug(now_s)
-                self._wait()
         finally:
             self.port.close()
             self._woken.close()
@@ -90,9 +90,12 @@ class Server:
         except OSError:
             return  # it has ended by itself
 
-    def _wait(self) -> None:
+    def _wait(self) -> bool:
+        """Until something is due or comes; whether the port has something to read, or room for what it kept."""
         wait_s = min(max(self.emulator.next_s - time.monotonic(), 0.0), LONGEST_WAIT_S)
-        select.select([*self.port.readable(), self._woken.fileno()], self.port.writable(), [], wait_s)
+        waking = self._woken.fileno()
+        ready, free, _ = select.select([*self.port.readable(), waking], self.port.writable(), [], wait_s)
+        return bool(free) or any(end != waking for end in ready)
 
     def _plug(self, now_s: float) -> None:
         if self.emulator.unplugged(now_s):
