@@ -57,9 +57,9 @@ def emulate(args: argparse.Namespace) -> Outcome:
     config = _config(args, scenario)
     if not (args.unpaced or args.overload):
         check_capacity(len(scenario.stations), tracker.rate_hz, args.items or tracker.items, config.baud)
+    samples = rehearsal.samples  # before the port, which clients take for a device that answers
     port = open_port(args.pty, args.tcp, anywhere=args.anywhere, say=talk)
     with closing(port), ended_by_sigterm():
-        samples = rehearsal.samples
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
         talk(f"{rehearsal.setting.part} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")

@@ -82,7 +82,7 @@ class Sensitivity:
 @dataclass(frozen=True)
 class Digits:
     """The answer to `MU` (ultrasonic time-out, two digits), `Mg` (ultrasonic sensitivity, one) or `MCI{st}` (the
-    InertiaCube that serves a station, one or two)."""
+    InertiaCube that serves a station, one or two; -1 for none)."""
 
     station: str
     letter: str
@@ -95,7 +95,7 @@ class Digits:
 
     @classmethod
     def parse(cls, text: str) -> "Digits | None":
-        found = re.fullmatch(r"3([1-9A-C])(U(?=..$)|g(?=.$)|I)([ \d]?\d)", text)
+        found = re.fullmatch(r"3([1-9A-C])(U(?=..$)|g(?=.$)|I)(-1|[ \d]?\d)", text)
         return found and cls(found[1], found[2], int(found[3]))
 
 

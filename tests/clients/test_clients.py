@@ -67,7 +67,8 @@ def test_intersense_reads_and_sets_stations_while_data_flow(tmp_path: Path, vers
     with device(tmp_path) as on:
         client = Library(on.port, version)
         assert client.open()
-        assert all(client.read_station(number) for number in range(1, 5))
+        assert all(client.read_station(number) for number in range(1, 9))
+        assert [station.cube for station in client.stations] == [1, 2, 3, 4, -1, -1, -1, -1]
         assert client.set_station(2, 25, 4, 1, "2,4,21,1")
         station = client.stations[1]
         assert (station.prediction_ms, station.sensitivity, station.enhancement) == (25, 4, 1)
