@@ -98,7 +98,10 @@ class Recording:
         content = self._json(configured)
         try:
             content["characters"] = str(content.get("characters", "")).encode()
-            return build(WireFormat, content, "wire format")
+            wire = build(WireFormat, content, "wire format")
+            if wire.rate_hz <= 0.0:
+                raise TypeError(f"wire format.rate_hz: {wire.rate_hz:g} is not positive")
+            return wire
         except (TypeError, HarnessError) as error:
             raise BadFile(self.path, f"a wire format that cannot be used ({error})", EXPECTED, "") from error
 

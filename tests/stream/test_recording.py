@@ -283,3 +283,19 @@ def test_blocks_are_json_where_the_layout_says_so(tmp_path: Path) -> None:
     content = json.loads(configured.payload)
     assert content["stations"] == list(FOUR.stations)
     assert content["items"] == list(FOUR.items)
+
+
+@pytest.mark.parametrize(
+    ("payload", "found"),
+    [
+        (b"no JSON", "a conf block that is no JSON"),
+        (b"[]", "missing stations, rate_hz"),
+        (b'{"stations": ["head"], "rate_hz": 0}', "0 is not positive"),
+        (b'{"stations": ["head"], "rate_hz": 40, "pace": 1}', "no key in wire format called 'pace'"),
+        (b'{"stations": ["head"], "rate_hz": 40, "characters": "Z"}', "One of 123456789ABC for each"),
+    ],
+)
+def test_a_format_that_cannot_be_used_is_refused(payload: bytes, found: str) -> None:
+    data = HEADER + encode(Block("conf", 1.0, 2.0, payload))
+    with pytest.raises(BadFile, match=found):
+        _ = Recording(Path("a.rec"), data).formats
