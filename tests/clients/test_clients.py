@@ -1,12 +1,16 @@
 """InterSense's library, FreeVR, Vrui and VR Juggler at the emulator's pty (docs/is900.md 11.2 and 11.3)."""
 
 import re
+import signal
 import struct
+import subprocess
+import sys
+import threading
 from pathlib import Path
 
 import pytest
 
-from tests.clients.device import QUALITY, angles_of, device, judge
+from tests.clients.device import QUALITY, ROOT, angles_of, device, judge
 from tests.clients.freevr import FreeVr
 from tests.clients.gadgeteer import Early, Late
 from tests.clients.intersense import Library
@@ -225,3 +229,27 @@ def test_vr_juggler_as_it_was(tmp_path: Path, stream: bool) -> None:
         for station, record in enumerate(sample, start=1):
             numbers = struct.unpack_from("<6f", record, 3)
             judge(station, tuple(0.01 * v for v in numbers[:3]), numbers[3:], 1e-4, 0.01)
+
+
+def test_the_verb_itself_is_ready_when_its_link_is_there(tmp_path: Path) -> None:
+    """VRPN gets its first answer within the wait that it allows."""
+    link = tmp_path / "tracker"
+    verb = [sys.executable, "-m", "harness.cli", "emulate", "builtin_walking", "--pty", str(link), "--rate", "60"]
+    process = subprocess.Popen(verb, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    guard = threading.Timer(200.0, process.kill)
+    guard.start()
+    try:
+        assert wait_until(link.exists, 120.0, 0.01)
+        client = Vrpn(str(link), is900_time=True)
+        assert client.serve(lambda: len(client.reports) >= 200, LIMIT_S), client.said
+        client.close()
+        process.send_signal(signal.SIGINT)
+        said, talk = process.communicate()
+    finally:
+        guard.cancel()
+        process.kill()
+    assert process.returncode == 0, talk
+    assert said.splitlines()[-1] == "pass"
+    assert client.said == ["resetting, attempt 1", "gives status", "reset completed"]
+    assert {report.sensor for report in client.reports} == {0, 1, 2, 3}
+    assert not link.is_symlink()
