@@ -5,6 +5,7 @@ Items of the 16-bit format are the same bytes as in binary.
 """
 
 from functools import lru_cache
+from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
@@ -64,10 +65,10 @@ def _places(items: tuple[int, ...], stylus_bytes: int) -> tuple[Floats, Floats, 
     """What a digit in each byte of a record is worth in each of its V values (size, V), in units of the last decimal;
     how many such units make one (V,); and which of the values are each item's."""
     own = fields(items, stylus_bytes)
-    last = np.cumsum([item.count if item.width else 0 for item in own])
-    worth = np.zeros((HEADER + sum(item.ascii_size for item in own), last[-1]))
-    columns = tuple(slice(end - (item.count if item.width else 0), end) for item, end in zip(own, last, strict=True))
-    scale, at = np.ones(last[-1]), HEADER
+    ends = list(accumulate((item.count if item.width else 0 for item in own), initial=0))
+    columns = tuple(slice(begin, end) for begin, end in pairwise(ends))
+    worth = np.zeros((HEADER + sum(item.ascii_size for item in own), ends[-1]))
+    scale, at = np.ones(ends[-1]), HEADER
     for item, column in zip(own, columns, strict=True):
         scale[column] = 10.0**item.decimals
         for k, value in enumerate(range(column.start, column.stop)):

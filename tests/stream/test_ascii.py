@@ -20,7 +20,11 @@ D = b"01   39.37 -19.69  59.06  90.00 -10.00   5.50\r\n"
 E = b"03  214  39.37 -19.69  59.06  90.00 -10.00   5.50         12345   5  127 255\r\n"
 WHOLE = tuple(code for code in items.ITEMS if code not in (0, 1))
 """Every item that says something."""
-ALL = [(code, 1) for code in WHOLE] + [(code,) for code in WHOLE] + [(0, 2, 0, 4, 1), (5, 6, 1), (5, 7), (*WHOLE, 1)]
+ALL = (
+    [(code, 1) for code in WHOLE]
+    + [(code,) for code in WHOLE]
+    + [(), (1,), (0, 2, 0, 4, 1), (5, 6, 1), (5, 7), (*WHOLE, 1)]
+)
 
 
 def said(count: int, seed: int = 1) -> Said:
