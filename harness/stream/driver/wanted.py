@@ -93,7 +93,8 @@ class Timing:
     measure_s: float = 1.0
     """For a rate that the device does not tell."""
     poll_s: float = 0.05
-    """The longest single wait, so that closing is prompt."""
+    """The longest single wait, so that closing is prompt; nothing for so long, and an unfinished frame is given up: USB
+    adapters hold bytes back for 0.016 s, and what is only late shall not be torn."""
 
 
 def _comma(values: tuple[object, ...]) -> str:

@@ -69,6 +69,22 @@ class Played:
         return self.emulator.next_s
 
 
+class Adapter:
+    """Between device and host: hands bytes on every so often, as USB adapters do."""
+
+    def __init__(self, device: Device, every_s: float = 0.016) -> None:
+        self._device, self._every_s, self.next_s = device, every_s, BEGAN_S
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        self._device.receive(data, now_s)
+
+    def due(self, now_s: float) -> bytes:
+        if now_s < self.next_s:
+            return b""
+        self.next_s += self._every_s * (1 + (now_s - self.next_s) // self._every_s)
+        return self._device.due(now_s)
+
+
 class Scripted:
     """Says one thing for each thing that it hears, and may chatter besides."""
 

@@ -10,11 +10,12 @@ import pytest
 from harness.core.seeds import generator
 from harness.stream.commands import output_list
 from harness.stream.driver import Is900, LineEvent, Timing, Wanted
+from harness.stream.driver.capacity import SHORT_LIST
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
 from harness.stream.frame import TrackerFrame
 from harness.stream.sessions import Sessions
-from tests.stream.driver.bench import Bench, Notes, Played, frames_for, swaying
+from tests.stream.driver.bench import Adapter, Bench, Notes, Played, frames_for, swaying
 
 BACK_WITHIN_S = 2.0
 """Of the device's return."""
@@ -77,11 +78,11 @@ def test_an_unplugged_line_is_waited_for() -> None:
     with bench.driver() as stream:
         frames = frames_for(stream, bench, 1.0)
         bench.plugged = False
-        bench.after(60.0, lambda: setattr(bench, "plugged", True))
-        frames += frames_for(stream, bench, 62.0)
+        bench.after(20.0, lambda: setattr(bench, "plugged", True))
+        frames += frames_for(stream, bench, 22.0)
         assert bench.kinds == ["connected", "unplugged", "connected"]
         assert {port for port, _ in bench.opened} == {"bench"}
-    assert 60.0 < max(gaps_s(frames)) < 60.0 + BACK_WITHIN_S
+    assert 20.0 < max(gaps_s(frames)) < 20.0 + BACK_WITHIN_S
     assert_in_order(frames)
     assert bench.open_lines == 0
 
@@ -161,9 +162,9 @@ def test_single_damaged_bytes_cost_no_set_up() -> None:
     kinds = ("lost", "garbled", "duplicated", "added")
     bench = bench_of(*(Fault(kind, share=0.01) for kind in kinds))  # type: ignore[arg-type]
     with bench.driver() as stream:
-        frames = frames_for(stream, bench, 20.0)
+        frames = frames_for(stream, bench, 8.0)
         assert stream.counts["reconnects"] == 0
-        assert stream.counts["records"] > 0.93 * 20.0 * 50.0 * 4
+        assert stream.counts["records"] > 0.93 * 8.0 * 50.0 * 4
     assert_in_order(frames)
 
 
@@ -227,6 +228,28 @@ def test_a_station_that_is_switched_off_is_missing_and_comes_back() -> None:
         assert frames_for(stream, bench, 3.0)[-1].position_valid.all()
 
 
+def test_a_station_that_is_not_there_any_more_is_told_and_the_others_go_on() -> None:
+    bench = bench_of()
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        bench.device = Played(swaying(3), now_s=bench.now_s)
+        frames = frames_for(stream, bench, 4.0)
+        assert bench.kinds == ["connected", "stalled", "reset", "missing", "connected"]
+        assert stream.stations == ("1", "2", "3", "4")
+    assert list(frames[-1].position_valid) == [True, True, True, False]
+    assert_in_order(frames)
+
+
+def test_bytes_that_an_adapter_holds_back_tear_no_frame() -> None:
+    device = Played(swaying(4, 120.0), now_s=1000.0)
+    bench = Bench(Adapter(device))
+    with bench.driver(Wanted(items=SHORT_LIST)) as stream:
+        frames = frames_for(stream, bench, 4.0)
+    assert len(frames) > 4 * 118
+    assert all(frame.position_valid.all() for frame in frames)
+    assert not any(frame.suspect.any() for frame in frames)
+
+
 def test_a_lost_station_shows_in_item_40() -> None:
     bench = bench_of(Fault("lost_station", at_s=(1.0,), lasts_s=1.0, station="torso"))
     with bench.driver() as stream:
@@ -250,13 +273,13 @@ def test_a_lost_station_shows_by_mp_where_records_do_not_tell() -> None:
 
 def test_the_clock_is_zeroed_within_hours_and_no_frame_steps_back() -> None:
     """Two and a half hours of a slow device: the stamps stay exact and device time goes on."""
-    bench = bench_of(stations=2, rate_hz=0.25)
-    with bench.driver(Wanted(rate_hz=0.25), Timing(stalled_s=10.0, silent_s=20.0, poll_s=4.0)) as stream:
+    bench = bench_of(stations=2, rate_hz=0.1)
+    with bench.driver(Wanted(rate_hz=0.1), Timing(stalled_s=30.0, silent_s=60.0, poll_s=10.0)) as stream:
         frames = frames_for(stream, bench, 9000.0)
         assert bytes(bench.sent).count(b"MZ\r\n") == 1 + 2
         assert bench.kinds == ["connected"]
         assert stream.counts["clock_resets"] == 2
-    assert len(frames) > 2200
+    assert len(frames) > 880
     assert_in_order(frames)
     assert sum(bool(frame.suspect.any()) for frame in frames) <= 4
     ahead_s = np.array([f.received_s - f.measured_s[-1] for f in frames if not f.suspect.any()])
@@ -314,13 +337,13 @@ def test_health_tells_how_it_goes() -> None:
 
 
 @pytest.mark.slow
-def test_a_day_of_random_trouble_is_overcome() -> None:
-    """Hours of unplugging, resets, noise and silence at a slow device: it always comes back, times stay in order."""
-    rng = generator(1, "a day of trouble")
+def test_an_hour_of_random_trouble_is_overcome() -> None:
+    """Unplugging, resets, noise and rubbish told to a slow device: it always comes back, times stay in order."""
+    rng = generator(1, "an hour of trouble")
     bench = bench_of(stations=3, rate_hz=10.0)
     events: list[LineEvent] = bench.events
     with bench.driver() as stream:
-        for _ in range(300):
+        for _ in range(120):
             match rng.integers(4):
                 case 0:
                     bench.plugged = False
@@ -337,5 +360,5 @@ def test_a_day_of_random_trouble_is_overcome() -> None:
             assert len(frames) > 20
             assert_in_order(frames)
             assert frames[-1].received_s > bench.now_s - 1.0
-    assert len(events) > 300
+    assert len(events) > 120
     assert bench.open_lines == 0
