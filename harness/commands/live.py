@@ -20,7 +20,7 @@ from harness.commands.verb import (
     stations_of,
     talk,
 )
-from harness.errors import BadInput, Outcome
+from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
     from harness.core.calibration import Calibration
@@ -67,6 +67,16 @@ def add_live(verbs: Verbs) -> None:
 
 
 def live(args: argparse.Namespace) -> Outcome:
+    with ended_by_sigterm():
+        try:
+            return _live(args)
+        except (KeyboardInterrupt, Exception) as error:
+            if not was_interrupted(error):
+                raise
+            return say(args, {"poses": 0}, "stopped before it began")
+
+
+def _live(args: argparse.Namespace) -> Outcome:
     from harness.live import summary
     from harness.live.floor import Floor
     from harness.live.perform import Plan, perform, warm_up
@@ -77,7 +87,7 @@ def live(args: argparse.Namespace) -> Outcome:
     rehearsal = rehearse(args.scenario, stations=stations_of(args), **told)
     method = registry.resolve(args.method)
     events: list[LineEvent] = []
-    with ended_by_sigterm(), ExitStack() as opened:
+    with ExitStack() as opened:
         outputs = _outputs(args, rehearsal, opened)
         device = opened.enter_context(_device(args, rehearsal, events))
         rate_hz = rehearsal.tracker.rate_hz

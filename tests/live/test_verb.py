@@ -82,6 +82,21 @@ def test_ctrl_c_ends_it_well(tmp_path: Path, rehearsal: Rehearsal, ending: signa
         _same_as_a_run(rehearsal, rows)
 
 
+def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Rehearsal) -> None:
+    with (
+        serving(rehearsal.samples, tcp="127.0.0.1:0") as device,
+        live("--port", device.name, "--poses", str(tmp_path / "poses.csv")) as program,
+    ):
+        assert program.stderr is not None
+        while "learning" not in program.stderr.readline():
+            assert program.poll() is None
+        program.send_signal(signal.SIGINT)
+        said, talk = program.communicate(timeout=60.0)
+    assert program.returncode == 0, talk
+    assert said.splitlines()[-1] == "pass"
+    assert "Traceback" not in talk
+
+
 def _same_as_a_run(rehearsal: Rehearsal, rows: list[dict[str, str]]) -> None:
     """Poses of the first lap are those of a run over the simulation."""
     frames = rehearsal.simulation.frames
