@@ -55,9 +55,9 @@ class Assembler:
         """When the frame that was closed last was complete."""
 
     @property
-    def unfinished(self) -> bool:
-        """Whether a frame has begun."""
-        return self._open is not None
+    def since_s(self) -> float | None:
+        """When the first reading of the unfinished frame came (host clock); None where none has begun."""
+        return None if self._open is None else float(self._open.received_s[0])
 
     def add(self, more: Readings) -> list[TrackerFrame]:
         """The frames that these readings complete."""
@@ -74,8 +74,11 @@ class Assembler:
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
         """The unfinished frame, if its first reading came more than 1.5 periods before `now_s` (host clock)."""
-        waited = self._open is not None and now_s - float(self._open.received_s[0]) > PATIENCE * self._period_s
-        return self.finish() if waited else []
+        return self.finish() if self.has_waited(self.since_s, now_s) else []
+
+    def has_waited(self, since_s: float | None, now_s: float) -> bool:
+        """Whether a frame that began then has waited long enough for its last stations."""
+        return since_s is not None and now_s - since_s > PATIENCE * self._period_s
 
     def finish(self) -> list[TrackerFrame]:
         """The unfinished frame."""

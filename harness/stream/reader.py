@@ -107,7 +107,10 @@ class FrameReader:
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
         """The frame that has waited for its last stations for more than 1.5 periods at this moment (host clock)."""
-        return [*self._settle(), *self._assembler.expire(now_s)]
+        began_s = self._assembler.since_s
+        if began_s is None and self._aside:
+            began_s = float(self._aside[0][1][0])
+        return [*self._settle(), *self._assembler.expire(now_s)] if self._assembler.has_waited(began_s, now_s) else []
 
     def finish(self) -> list[TrackerFrame]:
         """What is left at the end of the stream."""
@@ -147,7 +150,7 @@ class FrameReader:
         if len(tables) > 1:
             table = np.frombuffer(b"".join(one.tobytes() for one in tables), table.dtype)
         frames = self._assembler.add(self._readings(table, np.concatenate(received_s)))
-        if not self._assembler.unfinished:
+        if self._assembler.since_s is None:
             self._row = -1
         return frames
 
