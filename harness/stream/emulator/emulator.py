@@ -35,7 +35,6 @@ class Emulator:
         self._until(now_s)
         if not self.unplugged(now_s):
             self.device.receive(data, now_s)
-            self.line.baud = self.device.settings.baud
             self._hand_over(now_s)
 
     def advance(self, now_s: float) -> list[Sent]:
@@ -90,8 +89,10 @@ class Emulator:
         self.device.lose(STATIONS[names.index(name)] for name in out)
 
     def _hand_over(self, now_s: float) -> None:
+        """What the device says until now goes to the line, at the rate that it has set."""
         for message in self.device.messages(now_s):
             self.line.add(message)
+        self.line.baud = self.device.settings.baud
 
     def _on(self, kind: str, at_s: float) -> bool:
         return any(spell.fault.kind == kind and spell.from_s <= at_s < spell.to_s for spell in self._lasting)

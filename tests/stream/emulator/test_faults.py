@@ -136,3 +136,12 @@ def test_a_station_that_nobody_wears_cannot_be_lost() -> None:
     with pytest.raises(UnknownName, match="tail"):
         Emulator(samples(), EmulatorConfig(faults=(lost,)), 0.0)
     assert Emulator(samples(), EmulatorConfig(faults=(replace(lost, station=""),)), 0.0).next_s == 1.0
+
+
+def test_the_rate_of_the_line_is_the_devices_until_a_restart() -> None:
+    emulator = Emulator(samples(), EmulatorConfig(restart_s=0.0), 0.0)
+    emulator.receive(b"o96,N,8,0\rS", 0.0)
+    emulator.receive(b"\x19S", 1.0)
+    slow, fast = emulator.advance(2.0)
+    assert slow.due_s == pytest.approx(550 / 9600)
+    assert fast.due_s == pytest.approx(1.0 + 550 / 115200)
