@@ -1,0 +1,46 @@
+"""What a serial line can carry, by the table of the protocol (docs/is900.md 10)."""
+
+import pytest
+
+from harness.errors import BadInput
+from harness.stream.driver.capacity import SHORT_LIST, check_capacity, load
+from harness.stream.items import STANDARD_LIST, size
+
+BAUD = 115200
+
+
+@pytest.mark.parametrize(
+    ("items", "records"),
+    [((2, 4, 1), 397), ((2, 11, 0), 360), ((2, 11, 1), 349), ((2, 11, 21, 0), 320), ((2, 11, 21, 22, 23, 0), 295)],
+)
+def test_records_per_second_are_those_of_the_protocol(items: tuple[int, ...], records: int) -> None:
+    check_capacity("port", BAUD, 1, items, records, 0.0)
+    with pytest.raises(BadInput, match=f"1 stations x {size(items)} bytes"):
+        check_capacity("port", BAUD, 1, items, records + 1, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("stations", "rate_hz", "items"), [(4, 75, STANDARD_LIST), (6, 50, STANDARD_LIST), (4, 120, SHORT_LIST)]
+)
+def test_what_live_use_needs_fits(stations: int, rate_hz: float, items: tuple[int, ...]) -> None:
+    check_capacity("port", BAUD, stations, items, rate_hz, 0.0)
+    assert load(stations, items, rate_hz) > 0.9 * BAUD
+
+
+def test_asking_for_mp_takes_its_share() -> None:
+    assert load(1, (2, 11, 1), 100.0, asked_hz=1.0) - load(1, (2, 11, 1), 100.0) == 480.0
+
+
+def test_over_tcp_there_is_no_limit() -> None:
+    check_capacity("tcp://a:1", None, 12, STANDARD_LIST, 180.0, 1.0)
+
+
+def test_what_would_fit_is_named_and_does_fit() -> None:
+    with pytest.raises(BadInput) as raised:
+        check_capacity("port", 9600, 2, STANDARD_LIST, 20.0, 0.0)
+    assert "1 station," in raised.value.advice
+    assert "runs at 12 Hz" in raised.value.advice
+    assert "22-byte list 40,18,19,21,1" in raised.value.advice
+    check_capacity("port", 9600, 1, STANDARD_LIST, 20.0, 0.0)
+    check_capacity("port", 9600, 2, STANDARD_LIST, 12.0, 0.0)
+    check_capacity("port", 9600, 2, SHORT_LIST, 20.0, 0.0)
