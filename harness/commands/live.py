@@ -147,6 +147,10 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
     from harness.live.view import View
     from harness.live.vmc import Vmc
 
+    if args.out is not None and args.view != "frames":
+        raise BadInput("--out without --view frames.", "Say both, or neither.")
+    if args.lsl_network and args.lsl is None:
+        raise BadInput("--lsl-network without --lsl.", "Name the streams with --lsl.")
     own, stations, rate_hz = rehearsal.body.skeleton, tuple(rehearsal.scenario.stations), rehearsal.tracker.rate_hz
     wanted: dict[str, Any] = {
         "vmc": lambda: Vmc(args.vmc, own),

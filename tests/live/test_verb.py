@@ -142,6 +142,8 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--view", "frames"], "needs a folder"),
         (["--bvh", "/no/such/folder/x.bvh"], "cannot be written"),
         (["--lsl", ""], "without a name"),
+        (["--out", "there"], "--out without --view frames"),
+        (["--lsl-network"], "--lsl-network without --lsl"),
         (["--seconds", "soon"], "no positive number"),
         (["--items", "40;2"], "no list such as"),
     ],
