@@ -63,7 +63,7 @@ class Is900:
             self._stations = choose(port, self._line, self.wanted.stations)
             if self._stations.others:
                 restore(port, self._line, self._stations)
-            self._wire = self._set_up(self._status, boresight=self.wanted.boresight)
+            self._wire = self._set_up(self._status, known_hz=None)
         except LineLost as lost:
             self.close()
             raise NoAnswer(f"Port {port}: {lost.why}, during the set-up.", "See to the cable, and try again.") from lost
@@ -225,8 +225,10 @@ class Is900:
         for finding in self._watchdog.framed(frames, now_s):
             self._act(finding)
 
-    def _set_up(self, status: Status, boresight: bool) -> WireFormat:
-        return SetUp(self.port, self._baud, self._line, status, self.wanted).carry_out(self._stations, boresight)
+    def _set_up(self, status: Status, known_hz: float | None) -> WireFormat:
+        """Boresight is for the first time, when nothing is known."""
+        set_up = SetUp(self.port, self._baud, self._line, status, self.wanted)
+        return set_up.carry_out(self._stations, self.wanted.boresight and known_hz is None, known_hz)
 
     def _start(self) -> None:
         """The device's clock to zero, then `C`: records that leave between the two would carry the old clock."""
@@ -250,7 +252,7 @@ class Is900:
                     status = self._reopened().status
                 self._diagnose(status)
                 self._restore()
-                self._wire = self._set_up(status, boresight=False)
+                self._wire = self._set_up(status, self._wire.rate_hz)
                 self._start()
                 self._reconnects += 1
                 return

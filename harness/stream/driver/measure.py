@@ -1,8 +1,7 @@
-"""The rate of a device that does not tell it: a short stretch of its records, looked at."""
+"""The rate of a device: a short stretch of its records, looked at."""
 
 import numpy as np
 
-from harness.errors import BadInput
 from harness.stream.commands import STREAM
 from harness.stream.decoder import Decoder, Records
 from harness.stream.driver.line import Line
@@ -12,8 +11,8 @@ FEWEST = 3
 """Records of a station that make a rate."""
 
 
-def measured_rate_hz(port: str, line: Line, wire: WireFormat) -> float:
-    """Rounds per second, by the device's stamps, or by how many come where there are none; BadInput for too few.
+def measured_rate_hz(line: Line, wire: WireFormat) -> float | None:
+    """Rounds per second, by the device's stamps, or by how many come where there are none; None for too few.
 
     The device is set up for this format, and stopped before and after.
     """
@@ -24,11 +23,7 @@ def measured_rate_hz(port: str, line: Line, wire: WireFormat) -> float:
     first = [run.table[run.table["station"] == wire.characters[0]] for run in runs]
     count = sum(map(len, first))
     if count < FEWEST:
-        raise BadInput(
-            f"Port {port}: the device does not tell its rate, and sent {count} records of station "
-            f"{chr(wire.characters[0])} in {line.timing.measure_s:g} s.",
-            "See that this station is plugged in, or give the rate.",
-        )
+        return None
     table = np.concatenate(first)
     if "time" in (table.dtype.names or ()):
         period_s = float(np.median(np.diff(table["time"].astype(float)))) * wire.settings.seconds_per_tick

@@ -42,11 +42,16 @@ class SetUp:
         self._port, self._baud, self._line, self._wanted = port, baud, line, wanted
         self._items = items_for(port, status, wanted)
 
-    def carry_out(self, stations: Stations, boresight: bool) -> WireFormat:
-        """Tell and ask; BadInput when the device does not do as it is told, or the line is too slow for it."""
-        rate_hz = self._told_rate_hz(len(stations.names))
+    def carry_out(self, stations: Stations, boresight: bool, known_hz: float | None = None) -> WireFormat:
+        """Tell and ask; BadInput when the device does not do as it is told, or the line is too slow for it.
+
+        `known_hz` is the rate that an earlier set-up found; without it the device is believed what it says of its rate
+        only where its records say the same.
+        """
+        told_hz = known_hz or self._told_rate_hz()
+        self._check_capacity(len(stations.names), known_hz or self._wanted.rate_hz or told_hz)
         wire = WireFormat(
-            stations.names, rate_hz or 1.0, self._items, self._wanted.settings, stations.characters.encode()
+            stations.names, told_hz or 1.0, self._items, self._wanted.settings, stations.characters.encode()
         )
         self._line.errors.clear()
         self._tell(wire)
@@ -56,26 +61,38 @@ class SetUp:
         if amiss:
             raise BadInput(f"Port {self._port}: the device does not do as it is told: {amiss}.", self._advice())
         self._place(wire, boresight)
-        if rate_hz is None:
-            wire = replace(wire, rate_hz=measured_rate_hz(self._port, self._line, wire))
+        if known_hz is None:
+            wire = replace(wire, rate_hz=self._rate_hz(wire, told_hz))
             self._check_capacity(len(stations.names), wire.rate_hz)
         return wire
 
-    def _told_rate_hz(self, stations: int) -> float | None:
-        """As the user or the device says; None when it must be measured."""
-        asked_hz = self._wanted.rate_hz
+    def _told_rate_hz(self) -> float:
+        """As the device says; 0 when it does not."""
         tracking = self._line.ask(commands.TRACKING, TrackingStatus, self._line.timing.answer_s)
-        own_hz = tracking.rate_hz if tracking is not None else 0.0
-        rate_hz = asked_hz or own_hz
-        self._check_capacity(stations, max(rate_hz, own_hz))
-        if asked_hz and own_hz and abs(asked_hz - own_hz) > AGREE * own_hz:
+        return tracking.rate_hz if tracking is not None else 0.0
+
+    def _rate_hz(self, wire: WireFormat, told_hz: float) -> float:
+        """As asked for, as told, or as measured, where the records do not say otherwise; BadInput."""
+        asked_hz, measured_hz = self._wanted.rate_hz, measured_rate_hz(self._line, wire)
+        own_hz = measured_hz or told_hz
+        if asked_hz and own_hz and not _near(asked_hz, own_hz):
             raise BadInput(
-                f"Port {self._port}: a rate of {asked_hz:g} Hz is asked for, the device runs at {own_hz:g} Hz.",
+                f"Port {self._port}: a rate of {asked_hz:g} Hz is asked for, the device runs at {own_hz:.4g} Hz.",
                 "Leave the rate out, or set the device's own.",
             )
-        return rate_hz or None
+        for rate_hz in (asked_hz, told_hz):
+            if rate_hz and (measured_hz is None or _near(rate_hz, measured_hz)):
+                return rate_hz
+        if measured_hz is None:
+            raise BadInput(
+                f"Port {self._port}: the device does not tell its rate, and sent next to no records of station "
+                f"{chr(wire.characters[0])} in {self._line.timing.measure_s:g} s.",
+                "See that this station is plugged in, or give the rate.",
+            )
+        return measured_hz
 
     def _check_capacity(self, stations: int, rate_hz: float) -> None:
+        """BadInput when the line cannot carry it."""
         asked_hz = 1.0 / self._line.timing.tracking_s if self._wanted.quality == "mp" else 0.0
         check_capacity(self._port, self._baud, stations, self._items, rate_hz, asked_hz)
 
@@ -131,3 +148,7 @@ class SetUp:
     def _advice(self) -> str:
         said = "; ".join(f"{error.command}: error {error.code}" for error in self._line.errors[-3:])
         return f"It said: {said}." if said else "Switch it off and on, and see that no other program talks to it."
+
+
+def _near(one_hz: float, other_hz: float) -> bool:
+    return abs(one_hz - other_hz) <= AGREE * other_hz

@@ -65,7 +65,7 @@ def test_it_keeps_the_contract_of_streams(serve: Serve) -> None:
 
 def test_it_comes_back_when_the_line_was_unplugged(serve: Serve) -> None:
     events: list[LineEvent] = []
-    with serve(EmulatorConfig(faults=(Fault("disconnect", at_s=(1.5,), lasts_s=1.5),))) as emulator:
+    with serve(EmulatorConfig(faults=(Fault("disconnect", at_s=(4.0,), lasts_s=1.5),))) as emulator:
         stream = Is900(emulator.name, on_event=events.append)
         until(stream, lambda frame: [event.kind for event in events].count("connected") == 2)
         assert len(list(islice(stream, 20))) == 20
@@ -91,7 +91,7 @@ def nothing_left() -> Iterator[None]:
 
 @pytest.mark.usefixtures("nothing_left")
 def test_nothing_is_left_behind(serve: Serve) -> None:
-    faults = (Fault("disconnect", at_s=(1.0,), lasts_s=0.3), Fault("reset", at_s=(2.5,)))
+    faults = (Fault("disconnect", at_s=(4.0,), lasts_s=0.3), Fault("reset", at_s=(6.0,)))
     with serve(EmulatorConfig(faults=faults)) as emulator:
         threads = threading.active_count()
         with Is900(emulator.name) as stream:

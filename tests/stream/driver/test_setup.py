@@ -32,6 +32,7 @@ def test_it_says_what_it_must_in_order() -> None:
         b"\r\x11cSl*\r\nMP\r\nfuMT\r\n"
         b"O1,40,2,11,21,1\r\nO1\r\nO2,40,2,11,21,1\r\nO2\r\n"  # told, with the answer to pace it
         b"SMS\r\nO1\r\nO2\r\n"  # and asked
+        b"Cc"  # and measured
     )
     bench.sent.clear()
     assert len(frames_for(stream, bench, 1.0)) > 40
@@ -172,6 +173,20 @@ def test_the_rate_is_the_devices_the_users_or_measured() -> None:
         bench.spoil = lambda data: data.replace(b"31P", b"31@")  # an answer that no source describes
         rate_hz = bench.driver(Wanted(items=items)).wire.rate_hz
         assert abs(rate_hz - 37.5) < (0.01 if 21 in items else 1.0)
+
+
+def test_records_are_believed_where_they_say_another_rate_than_the_device() -> None:
+    """`MP` tells how often the device updates; that it reports as often is documented nowhere."""
+
+    def boasting() -> Bench:
+        bench = bench_of(2, rate_hz=40.0)
+        bench.spoil = lambda data: data.replace(b"   40  ", b"  120  ")
+        return bench
+
+    assert boasting().driver().wire.rate_hz == pytest.approx(40.0, rel=1e-3)
+    assert boasting().driver(Wanted(rate_hz=40.0)).wire.rate_hz == 40.0
+    with pytest.raises(BadInput, match="120 Hz is asked for, the device runs at 40 Hz"):
+        boasting().driver(Wanted(rate_hz=120.0))
 
 
 OTHER = Status(identification="FASTRAK", firmware="2.10").line()
