@@ -14,11 +14,14 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def compiled(function: F) -> F:
-    """The same function, fast; IEEE arithmetic in the order written, so that the bytes stay the same."""
+    """The same function, fast; IEEE arithmetic in the order written, so that the bytes stay the same.
+
+    Other threads go on meanwhile: one that reads a tracker need not wait for one that solves.
+    """
     try:
-        return cast(F, numba.njit(cache=True, error_model="numpy")(function))
+        return cast(F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
     except RuntimeError:  # nowhere to keep it: neither beside its file nor in a cache of the user's
-        return cast(F, numba.njit(error_model="numpy")(function))
+        return cast(F, numba.njit(error_model="numpy", nogil=True)(function))
 
 
 def bound(function: F, *arguments: Any) -> F:

@@ -24,8 +24,9 @@ from harness.live.quiet import tidy, undisturbed
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.stream.frame import TrackerFrame, TrackerStream
 
-QUEUE_FRAMES = 4
-"""What waits for a pose that takes long; more would be older than anyone wants to see [choice]."""
+QUEUE_FRAMES = 32
+"""What waits for a pose that takes long: a quarter of a second at 120 Hz. Solving is several times faster than frames
+come, so that it has soon caught up, and methods do not like gaps [choice]."""
 _TIDY_S = 1.0
 _LOOK_S = 0.1
 

@@ -5,7 +5,7 @@ trust in the past, at the start, after a loss, when most readings jump at once, 
 contradicting the pose; the cheaper of the two wins.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,6 +29,11 @@ _FAR = 2.0
 _MANY = 0.25
 """When this share of the readings does so, the pose is sought anew at once; else once it has lasted `PATIENCE_S`."""
 _WIDENINGS = (10.0, 3.0, 1.0)
+_FIRST_LOOK, _HOPE = 6, 3.0
+"""A start is looked at for so many steps, and left when it is so many times as dear as the best one by then: most
+have all but arrived, and those that stand upside down never do."""
+_ALIKE = 1e-6
+"""Configurations that differ nowhere by more are one [m, rad]."""
 """How much farther the Lorentzian reaches while a cold start closes in."""
 
 
@@ -74,6 +79,8 @@ class Pursuit:
         self.residuals = Residuals(body, calibration, manner.loss)
         self.limits = HingeLimits(body, keep=manner.limits)
         self.solver = Solver(self.residuals, self.limits, manner.stopping)
+        few = min(_FIRST_LOOK, manner.stopping.most_steps)
+        self._first_look = Solver(self.residuals, self.limits, replace(manner.stopping, most_steps=few))
         self.qpos = postures(body)[0]
         """(55,) the last answer."""
         self._leaning = leaning
@@ -134,15 +141,19 @@ class Pursuit:
 
     def _sought(self) -> Solution:
         """The cheapest pose found from the last one and from the starting postures, stood where the readings are."""
+        postures_here = (self.qpos, *self._starts)
+        starts = _different([start for posture in postures_here for start in placed(self.residuals, posture)])
+        self.residuals.widen(_WIDENINGS[0])
+        looked = [self._first_look.solve(start, self._leaning.prior(self.limits, start)) for start in starts]
+        dearest = _HOPE * min(solution.cost for solution in looked)
         found = []
-        for posture in (self.qpos, *self._starts):
-            for start in placed(self.residuals, posture):
-                qpos = start
-                for factor in _WIDENINGS:
-                    self.residuals.widen(factor)
-                    solution = self.leaning(qpos, start)
-                    qpos = solution.qpos
-                found.append(solution)
+        for start, solution in zip(starts, looked, strict=True):
+            if solution.cost > dearest:
+                continue
+            for factor in _WIDENINGS:
+                self.residuals.widen(factor)
+                solution = self.leaning(solution.qpos, start)
+            found.append(solution)
         return min(found, key=lambda solution: solution.cost)
 
     def _tidy(self, qpos: Floats) -> Floats:
@@ -150,3 +161,12 @@ class Pursuit:
         if self.limits.past_gimbal(qpos[7:]):
             qpos = np.concatenate([qpos[:7], self.limits.principal(qpos[7:])])
         return qpos
+
+
+def _different(poses: list[Floats]) -> list[Floats]:
+    """Those configurations (55,) that none before them is all but equal to."""
+    out: list[Floats] = []
+    for qpos in poses:
+        if all(np.abs(qpos - other).max() > _ALIKE for other in out):
+            out.append(qpos)
+    return out
