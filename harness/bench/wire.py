@@ -111,12 +111,14 @@ def _live(port: str, case: Case, seconds: float, seed: int, poses: Path) -> dict
 
 def _rows(case: Case, seconds: float, said: dict[str, Any], sent: Any, poses: Path) -> list[Row]:
     table = np.frombuffer(sent["data"].tobytes(), record_type(case.items))
+    begin = _last_zero(table["time"])  # before it the driver measured the device's rate
+    table, due_s, written_s = table[begin:], sent["due_s"][begin:], sent["written_s"][begin:]
     station = np.frombuffer(STATION_CHARACTERS, np.uint8).searchsorted(table["station"])
     stamp_s = table["time"].astype(float) * _TICK_S
     posed_s = _posed(poses, case.stations)
     ready_s = np.array([posed_s[s].get(t, np.nan) for s, t in zip(station.tolist(), stamp_s.tolist(), strict=True)])
-    lost, way_s = _lost_and_way(sent["written_s"], ready_s, case.stations)
-    late_ms = 1e3 * (sent["written_s"] - sent["due_s"])[~np.isnan(sent["written_s"])]
+    lost, way_s = _lost_and_way(written_s, ready_s)
+    late_ms = 1e3 * (written_s - due_s)[~np.isnan(written_s)]
     floor = said["floor"]
     beside = f"timer p99 {floor['timer']['p99_ms']:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
     p50, p99, most = (1e3 * float(np.quantile(way_s, share)) for share in (0.5, 0.99, 1.0))
@@ -126,6 +128,12 @@ def _rows(case: Case, seconds: float, said: dict[str, Any], sent: Any, poses: Pa
         Row(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", beside, ""),
         Row(f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {beside}", "<= 10"),
     ]
+
+
+def _last_zero(time: Floats) -> int:
+    """The first record after the device's clock was set to zero last."""
+    back = np.flatnonzero(np.diff(time) < 0.0)
+    return int(back[-1]) + 1 if len(back) else 0
 
 
 def _posed(poses: Path, stations: int) -> list[dict[float, float]]:
@@ -140,7 +148,7 @@ def _posed(poses: Path, stations: int) -> list[dict[float, float]]:
     return out
 
 
-def _lost_and_way(written_s: Floats, ready_s: Floats, stations: int) -> tuple[Bools, Floats]:
+def _lost_and_way(written_s: Floats, ready_s: Floats) -> tuple[Bools, Floats]:
     """Which records between the first and the last that were posed were not (N,), and from the last byte of each
     frame to its pose [s]."""
     posed = np.flatnonzero(~np.isnan(ready_s))
