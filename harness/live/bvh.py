@@ -50,11 +50,11 @@ class Bvh:
             self._save()
 
     def close(self) -> None:
-        if not self._file.closed:
-            try:
+        try:
+            if not self._file.closed:
                 self._save()
-            finally:
-                self._file.close()
+        finally:
+            self._file.close()
 
     def _channels(self, pose: LivePose) -> Floats:
         _, world_from_bone = pose.bones

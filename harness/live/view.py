@@ -21,6 +21,8 @@ from harness.errors import BadFile, BadInput, MissingExtra
 from harness.live.pose import LivePose
 
 Kind = Literal["window", "frames"]
+_PICTURES = "[0-9]" * 8 + ".png"
+"""As `screen` names them; whatever else a folder holds is not ours."""
 READY, CLOSED = "ready", "its window was closed"
 """What the other process says."""
 _START_S, _END_S = 60.0, 10.0
@@ -121,7 +123,7 @@ def _made(out: Path | None, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadFile(out, f"it cannot be made ({error.strerror})", "a folder", "Name another.") from error
-    old = sorted(out.glob("*.png"))
+    old = sorted(out.glob(_PICTURES))
     if old and not force:
         raise BadFile(out, f"there are {len(old)} pictures in it", "a folder without", "Name another, or say --force.")
     for picture in old:

@@ -121,6 +121,51 @@ def test_nothing_is_written_over_unless_told(tmp_path: Path, rng: np.random.Gene
         Table(tmp_path / "no" / "folder", BODY.skeleton, ())
 
 
+def test_a_file_is_written_over_by_the_first_pose_not_before(tmp_path: Path, rng: np.random.Generator) -> None:
+    path, link = tmp_path / "there", tmp_path / "link"
+    link.symlink_to(path)
+    for make in (
+        lambda: Bvh(link, BODY.skeleton, RATE_HZ, force=True),
+        lambda: Table(path, BODY.skeleton, ("a", "b"), force=True),
+    ):
+        path.write_text("mine")
+        output = make()
+        assert path.read_text() == "mine"
+        output.close()
+        assert path.read_text() == "mine"
+        output = make()
+        output.send(live_pose(configuration(rng)))
+        first = path.read_text()
+        assert len(first) > 500  # there already, however the program ends
+        output.send(live_pose(configuration(rng), 1, 0.025))
+        output.close()
+        assert path.read_text().count("\n") == first.count("\n") + 1
+        assert sorted(tmp_path.iterdir()) == [link, path]
+    assert link.is_symlink()
+
+
+def test_what_cannot_take_its_place_leaves_the_old_file(
+    tmp_path: Path, rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(*paths: Path) -> None:
+        raise PermissionError("not here")
+
+    path = tmp_path / "there"
+    path.write_text("mine")
+    monkeypatch.setattr("os.replace", refused)
+    for output in (
+        Bvh(path, BODY.skeleton, RATE_HZ, force=True),
+        Table(path, BODY.skeleton, ("a", "b"), force=True),
+    ):
+        with pytest.raises(PermissionError):
+            output.send(live_pose(configuration(rng)))
+        output.close()
+        assert path.read_text() == "mine"
+        assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(BadFile, match="it is no file"):
+        Table(tmp_path, BODY.skeleton, (), force=True)
+
+
 def test_no_file_is_left_of_no_frame(tmp_path: Path) -> None:
     for output in (Bvh(tmp_path / "a.bvh", BODY.skeleton, RATE_HZ), Table(tmp_path / "a.csv", BODY.skeleton, ())):
         output.close()

@@ -10,7 +10,7 @@ import pytest
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.errors import BadFile, BadInput
-from harness.live.view import View
+from harness.live.view import View, _made
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
@@ -51,6 +51,18 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
     assert np.abs(first - last).mean() > 1e-3
     with pytest.raises(BadFile, match="pictures in it"):
         View("frames", OWN, tmp_path / "frames", force=False)
+
+
+def test_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
+    mine = [tmp_path / name for name in ("holiday.png", "1234567.png", "00000000.jpg")]
+    ours = [tmp_path / name for name in ("00000000.png", "00000012.png")]
+    for path in (*mine, *ours):
+        path.write_text("")
+    with pytest.raises(BadFile, match="there are 2 pictures in it"):
+        _made(tmp_path, force=False)
+    _made(tmp_path, force=True)
+    assert sorted(tmp_path.iterdir()) == sorted(mine)
+    _made(tmp_path, force=False)
 
 
 def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
