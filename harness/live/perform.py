@@ -174,8 +174,8 @@ class _Solver:
     def _close(self, output: Output) -> None:
         try:
             output.close()
-        except OSError as error:
-            self._failed[output.name] = str(error)
+        except Exception as error:  # whatever it is, the others are closed too
+            self._failed.setdefault(output.name, _words(error))
 
     def performed(self, captured: int) -> Performed:
         return Performed(
@@ -227,8 +227,13 @@ class _Solver:
         for output in list(self._outputs):
             try:
                 output.send(pose)
-            except OSError as error:
-                self._failed[output.name] = str(error)
+            except Exception as error:  # a library's own too: no output ends the session
+                self._failed[output.name] = _words(error)
                 self._outputs.remove(output)
-                self._say(f"{output.name}: {error}; the session goes on without it")
+                self._say(f"{output.name}: {_words(error)}; the session goes on without it")
                 self._close(output)
+
+
+def _words(error: Exception) -> str:
+    """An OSError speaks for itself; of others the kind has to be said."""
+    return str(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"

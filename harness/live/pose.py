@@ -81,7 +81,7 @@ class Output(Protocol):
         ...
 
     def send(self, pose: LivePose) -> None:
-        """OSError when it cannot: the session goes on without this output."""
+        """OSError, or what a library raises, when it cannot: the session goes on without this output."""
         ...
 
     def close(self) -> None:

@@ -61,14 +61,14 @@ class Kept:
 
     name = told = "kept"
 
-    def __init__(self, fails_at: int | None = None) -> None:
-        self.fails_at = fails_at
+    def __init__(self, fails_at: int | None = None, error: BaseException | None = None) -> None:
+        self.fails_at, self.error = fails_at, error or OSError("no room")
         self.poses: list[LivePose] = []
         self.closed = 0
 
     def send(self, pose: LivePose) -> None:
         if len(self.poses) == self.fails_at:
-            raise OSError("no room")
+            raise self.error
         self.poses.append(pose)
 
     def close(self) -> None:
@@ -148,6 +148,25 @@ def test_an_output_that_fails_is_left_out_and_the_others_go_on() -> None:
     assert (len(good.poses), len(bad.poses), bad.closed) == (5, 2, 1)
     assert done.failed == {"kept": "no room"}
     assert said == ["kept: no room; the session goes on without it"]
+
+
+def test_any_error_of_an_output_leaves_it_out() -> None:
+    class Unclosable(Kept):
+        name = told = "unclosable"
+
+        def close(self) -> None:
+            super().close()
+            raise RuntimeError("stuck")
+
+    good, bad, stuck, said = Kept(), Kept(2, ValueError("the library failed")), Unclosable(), list[str]()
+    outputs = [good, bad, stuck]
+    done = perform(
+        Paced(frames(5), 0.005), BODY, Counting(), WORN, outputs, Plan(100.0, queue_frames=9), say=said.append
+    )
+    assert (len(good.poses), len(bad.poses), len(stuck.poses)) == (5, 2, 5)
+    assert (good.closed, bad.closed, stuck.closed) == (1, 1, 1)
+    assert done.failed == {"kept": "ValueError: the library failed", "unclosable": "RuntimeError: stuck"}
+    assert said == ["kept: ValueError: the library failed; the session goes on without it"]
 
 
 class AfterTwo:
@@ -243,15 +262,17 @@ def test_live_estimates_are_those_of_a_run(worn: Rehearsal) -> None:
 
 
 def test_a_summary_says_what_happened() -> None:
-    with Floor() as floor:
-        done = performed(Paced(frames(5), 0.01), Counting(), plan=Plan(100.0, queue_frames=9))
-        beside = floor.finish()
-    assert beside["sleeps"] >= 0
+    done = performed(Paced(frames(5), 0.01), Counting(), plan=Plan(100.0, queue_frames=9))
+    times = {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 7.5}
+    beside = {"timer": times, "handover": times, "sleeps": 7}
     content = summary.as_dict(done, beside)
     assert (content["frames"], content["poses"], content["deadline_ms"]) == (5, 5, 10.0)
+    assert content["floor"] == beside
     text = "\n".join(summary.lines(done, beside))
     for words in ("last byte to pose", "5 poses in", "0 frames dropped", "after their deadline, 10.00 ms"):
         assert words in text
+    (late,) = [line for line in text.split("\n") if line.startswith("the computer: a timer is late")]
+    assert late.split()[-3:] == ["0.10", "0.25", "7.50"]
 
 
 def test_the_floor_is_measured_until_asked() -> None:
