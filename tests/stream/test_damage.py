@@ -1,6 +1,6 @@
 """Damaged bytes, over all formats: what they cost, what is marked, and that nothing is ever kept or made up.
 
-`make test-slow` tries a million; the table of docs/is900.md 8 is what `test_what_is_caught` prints then.
+`make test-slow` tries a million; the table of docs/is900.md 5.6 is what `test_what_is_caught` prints then.
 """
 
 from collections import Counter
@@ -134,11 +134,15 @@ def test_rubbish_is_never_kept(name: str, rng: np.random.Generator) -> None:
     assert sum((found([*one.feed(given.data), *one.finish()], given) & Counter(given.records)).values()) >= 30
 
 
-@pytest.mark.slow
-def test_a_million_mutations_of_every_format() -> None:
-    """Bytes lost, added, changed and repeated all over: no crash, nothing kept, most of what is intact arrives."""
+@pytest.mark.parametrize("wanted", [20_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+def test_mutations_of_every_format(wanted: int) -> None:
+    """Bytes lost, added, changed and repeated all over: no crash, nothing kept, most of what is intact arrives.
+
+    A mutation costs one record further at most, and where they lie close together hardly more than a few in a hundred.
+    """
     rng, mutations = np.random.default_rng(1), 0
-    while mutations < 1_000_000:
+    intact, arrived = Counter[str](), Counter[str]()
+    while mutations < wanted:
         for name in LISTS:
             given = sound(name, mutations % 7, 60)
             data, count = bytearray(given.data), int(rng.integers(1, 400))
@@ -157,5 +161,9 @@ def test_a_million_mutations_of_every_format() -> None:
             for start in range(0, len(data), 1000):
                 events += one.feed(bytes(data[start : start + 1000]))
                 assert one.pending <= max(LONGEST_REPLY, given.size + 3)
-            out = found([*events, *one.finish()], given)
-            assert sum((out & Counter(given.records)).values()) >= len(given.records) - 3 * count
+            came = sum((found([*events, *one.finish()], given) & Counter(given.records)).values())
+            whole = sum(record in data for record in given.records)
+            assert came >= max(whole - count, whole // 2), (name, count, whole, came)
+            intact[name] += whole
+            arrived[name] += came
+    assert {name: share for name in LISTS if (share := arrived[name] / intact[name]) < 0.9} == {}
