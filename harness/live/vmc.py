@@ -109,6 +109,6 @@ def _bundle(messages: Sequence[bytes]) -> tuple[NDArray[np.uint8], NDArray[np.in
 def parse_address(text: str) -> tuple[str, int]:
     """HOST:PORT, or a port alone for this computer; BadInput."""
     host, _, port = text.rpartition(":")
-    if not port.isdigit() or not 0 < int(port) < 65536:
+    if not (port.isascii() and port.isdecimal()) or not 0 < int(port) < 65536:
         raise BadInput(f"--vmc {text}: no address.", "Give HOST:PORT, such as 127.0.0.1:39539, where receivers listen.")
     return host.strip("[]") or "127.0.0.1", int(port)

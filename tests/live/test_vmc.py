@@ -125,7 +125,9 @@ def test_a_raised_forearm_turns_as_in_unity() -> None:
     assert w == pytest.approx(np.sqrt(0.5))
 
 
-@pytest.mark.parametrize("text", ["", "here", "localhost:", "localhost:0", "127.0.0.1:99999", ":x"])
+@pytest.mark.parametrize(
+    "text", ["", "here", "localhost:", "localhost:0", "127.0.0.1:99999", ":x", "127.0.0.1:²", "٣٩"]
+)
 def test_no_address(text: str) -> None:
     with pytest.raises(BadInput, match="no address"):
         parse_address(text)

@@ -205,6 +205,6 @@ def open_port(pty: Path | str | None, tcp: str | None, *, anywhere: bool = False
 
         return PtyPort(pty)
     host, colon, number = (tcp or "").rpartition(":")
-    if not colon or not number.isdigit() or int(number) > 65535:
+    if not colon or not (number.isascii() and number.isdecimal()) or int(number) > 65535:
         raise BadInput(f"{tcp!r} is no HOST:PORT.", "For example 127.0.0.1:5005; port 0 takes a free one.")
     return TcpPort(host.strip("[]"), int(number), anywhere=anywhere, say=say)
