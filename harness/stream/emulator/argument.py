@@ -7,6 +7,8 @@ from harness.stream.emulator.settings import STATIONS
 
 MISSING, NOT_A_NUMBER, OUT_OF_RANGE, UNKNOWN = -1, -2, -3, -99
 """Error codes (docs/is900.md 6.4)."""
+_LARGEST = 1e6
+"""No place, angle or rate that a device could mean is larger [choice]."""
 
 
 class Refused(Exception):
@@ -42,18 +44,26 @@ class Argument:
             raise Refused(OUT_OF_RANGE)
         return name
 
-    def numbers(self, count: int | None = None, after: int = 1) -> list[float]:
-        """The fields after so many others, as many as `count`."""
+    def numbers(self, count: int | None = None, after: int = 1, largest: float = _LARGEST) -> list[float]:
+        """The fields after so many others, as many as `count`; none is larger in size."""
         texts = self.fields[after:]
         if count is not None and len(texts) > count:
             raise Refused(OUT_OF_RANGE, after + count + 1)
         if count is not None and len(texts) < count:
             raise Refused(MISSING, after + len(texts) + 1)
-        return [_number(text, after + k + 1) for k, text in enumerate(texts)]
+        return [_number(text, after + k + 1, largest) for k, text in enumerate(texts)]
+
+    def codes(self) -> list[int]:
+        """The fields after the first: whole numbers."""
+        values = self.numbers()
+        for place, value in enumerate(values):
+            if value != int(value):
+                raise Refused(OUT_OF_RANGE, place + 2)
+        return [int(value) for value in values]
 
     def whole(self, low: int, high: int, after: int = 1) -> int:
         """The one field after so many others: a whole number within these."""
-        (value,) = self.numbers(1, after)
+        (value,) = self.numbers(1, after, largest=high)
         if value != int(value) or not low <= value <= high:
             raise Refused(OUT_OF_RANGE, after + 1)
         return int(value)
@@ -64,7 +74,7 @@ class Argument:
             raise Refused(UNKNOWN)
 
 
-def _number(text: str, field: int) -> float:
+def _number(text: str, field: int, largest: float) -> float:
     if not text:
         raise Refused(MISSING, field)
     try:
@@ -73,4 +83,6 @@ def _number(text: str, field: int) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise Refused(NOT_A_NUMBER, field)
+    if abs(value) > largest:
+        raise Refused(OUT_OF_RANGE, field)
     return value

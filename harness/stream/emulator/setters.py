@@ -26,7 +26,7 @@ def _station(settings: DeviceSettings, argument: Argument, **values: Any) -> Dev
 
 
 def _list(settings: DeviceSettings, argument: Argument) -> DeviceSettings:
-    items = tuple(int(code) for code in argument.numbers())
+    items = tuple(argument.codes())
     try:
         record_type(items)
         encode(items, np.zeros(0, np.uint8), _NOTHING_SAID, Settings())
