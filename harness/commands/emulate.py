@@ -5,8 +5,19 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.verb import FEWEST, Verbs, add_verb, ended_by_sigterm, items, positive, say, stations_of, talk
-from harness.errors import Outcome
+from harness.commands.verb import (
+    FEWEST,
+    Verbs,
+    add_verb,
+    ended_by_sigterm,
+    items,
+    positive,
+    positive_number,
+    say,
+    stations_of,
+    talk,
+)
+from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
     from harness.config import Scenario
@@ -24,7 +35,7 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("--clip", help="a clip to play (default: the scenario's first)")
     text = f"how many of the scenario's stations, or their names (default: the first {FEWEST})"
     verb.add_argument("--stations", metavar="N|A,B", help=text)
-    verb.add_argument("--rate", type=float, metavar="HZ", help="records per second of each station")
+    verb.add_argument("--rate", type=positive_number, metavar="HZ", help="records per second of each station")
     verb.add_argument("--noise", help="clean, noise or default, instead of the scenario's")
     verb.add_argument(
         "--items", type=items, metavar="A,B", help="list that clients will ask for, to see whether the line carries it"
@@ -44,6 +55,10 @@ def emulate(args: argparse.Namespace) -> Outcome:
     from harness.stream.emulator.capacity import check_capacity
     from harness.stream.emulator.serve import open_port, play
 
+    if args.pty and args.anywhere:
+        raise BadInput("--anywhere with --pty.", "It is for --tcp: leave it out.")
+    if args.tcp and args.check_baud:
+        raise BadInput("--check-baud with --tcp.", "A connection has no rate, it is for --pty: leave it out.")
     rehearsal = rehearse(
         args.scenario,
         clip=args.clip,

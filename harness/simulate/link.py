@@ -33,10 +33,14 @@ class TrackerConfig:
     """Origin of the tracker's frame in the world [m]: a constellation under the ceiling."""
 
     def __post_init__(self) -> None:
-        if not (
-            0.0 < self.rate_hz < 1e5 and self.baud > 0 and 0.0 <= self.latency_s < 60.0 and self.queue_records >= 1
+        for key, good, wanted in (
+            ("rate_hz", 0.0 < self.rate_hz < 1e5, "a number above 0 and below 100000"),
+            ("latency_s", 0.0 <= self.latency_s < 60.0, "a number from 0, below 60"),
+            ("baud", self.baud >= 1, "a number from 1"),
+            ("queue_records", self.queue_records >= 1, "a number from 1"),
         ):
-            raise BadInput(f"Not a tracker: {self}.", "Rate and baud are positive, latency is not negative.")
+            if not good:
+                raise BadInput(f"A tracker's {key} = {getattr(self, key):g}.", f"Give {wanted}.")
         if 21 not in self.items:
             raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")
 

@@ -1,6 +1,7 @@
 """The set-ups of the papers, and configurations that cannot be."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -120,8 +121,16 @@ def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
     thirteen = [Mount(f"s{k}", "head", 1.0) for k in range(13)]
     with pytest.raises(BadInput, match="1 to 12"):
         simulate(*boxer, thirteen, TrackerConfig(), Noise(), seed=1)
-    with pytest.raises(BadInput, match="Not a tracker"):
-        TrackerConfig(rate_hz=float("inf"))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("rate_hz", float("inf")), ("rate_hz", float("nan")), ("rate_hz", 0.0), ("latency_s", -5.0), ("baud", 0),
+     ("queue_records", 0)],
+)  # fmt: skip
+def test_a_tracker_that_cannot_be_is_told_by_its_key(key: str, value: Any) -> None:
+    with pytest.raises(BadInput, match=f"^A tracker's {key} = {value:g}. Give a number"):
+        TrackerConfig(**{key: value})
 
 
 @pytest.mark.parametrize("noise", [Noise(lost=(LostStation("haed"),)), Noise(slip=(MountSlip("haed"),))])

@@ -42,5 +42,7 @@ class EmulatorConfig:
             raise BadInput(f"status records of {self.status_bytes} bytes.", "They have 55 or 54.")
         if self.baud not in RATES:
             raise BadInput(f"{self.baud} baud.", f"An IS-900 knows {', '.join(map(str, RATES))}.")
-        if self.queue_records < 1 or self.restart_s < 0.0:
-            raise BadInput(f"Not an emulator: {self}.", "It queues a record at least, and no time is negative.")
+        if self.queue_records < 1:
+            raise BadInput(f"queue_records = {self.queue_records}.", "Give 1 at least.")
+        if not 0.0 <= self.restart_s <= 3600.0:
+            raise BadInput(f"restart_s = {self.restart_s:g}.", "Give a number from 0 to 3600.")

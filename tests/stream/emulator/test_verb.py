@@ -66,7 +66,10 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
         (["no_such_scenario"], "no scenario called"),
         (["builtin_walking", "--firmware", "new"], "such as 4.2301"),
         (["builtin_walking", "--baud", "115201"], "An IS-900 knows 300"),
-        (["builtin_walking", "--restart", "-1"], "negative"),
+        (["builtin_walking", "--restart", "-1"], "restart_s = -1. Give a number from 0 to 3600."),
+        (["builtin_walking", "--restart", "nan"], "restart_s = nan"),
+        (["builtin_walking", "--rate", "1000000"], "rate_hz = 1e+06. Give a number above 0 and below 100000."),
+        (["builtin_walking", "--anywhere"], "--anywhere with --pty"),
         (["builtin_walking", "--noise", "loud"], "loud"),
         (["walking"], "HARNESS_MOCAP"),
     ],
@@ -92,6 +95,17 @@ def test_a_place_that_is_taken_or_open_to_all_is_refused(tmp_path: Path, capsys:
     assert "no link of an emulator" in capsys.readouterr().err
     assert main(["emulate", "builtin_walking", "--tcp", "0.0.0.0:0"]) == 2
     assert "--anywhere" in capsys.readouterr().err
+    assert main(["emulate", "builtin_walking", "--tcp", "127.0.0.1:²"]) == 2
+    assert "is no HOST:PORT" in capsys.readouterr().err
+    assert main(["emulate", "builtin_walking", "--tcp", "127.0.0.1:0", "--check-baud"]) == 2
+    assert "--check-baud with --tcp" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("rate", ["-5", "0", "nan", "inf", "fast"])
+def test_no_rate(rate: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["emulate", "builtin_walking", "--tcp", "127.0.0.1:0", "--rate", rate])
+    assert f"{rate!r} is no positive number" in capsys.readouterr().err
 
 
 def test_the_shipped_scenario_shows_every_fault() -> None:
