@@ -2,11 +2,9 @@
 
 from dataclasses import dataclass
 
-from harness.stream.items import STANDARD_LIST, size
+from harness.stream.items import SHORT_LIST, STANDARD_LIST, size
 
 SCENARIO, CLIP = "demo", "boxing_p1_01"
-SHORT_LIST = (40, 18, 19, 21, 1)
-"""Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,12 @@ HEADER = 3
 STATION_CHARACTERS = b"123456789ABC"
 STANDARD_LIST = (40, 2, 11, 21, 1)
 """Quality, position, quaternion, time, CR LF: 38 bytes."""
+SHORT_LIST = (40, 18, 19, 21, 1)
+"""Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes."""
+SINCE_FIRMWARE = {40: 4.13, 76: 4.26}
+"""Firmware from which on an item is known (docs/is900.md 5.1)."""
+BITS_PER_BYTE = 10
+"""8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
 
 
 @dataclass(frozen=True)

@@ -3,19 +3,15 @@
 import math
 
 from harness.errors import BadInput
-from harness.stream.items import size
+from harness.stream.items import BITS_PER_BYTE, SHORT_LIST, size
 
-BITS = 10
-"""Of a byte on an 8N1 line: a start bit, eight of data, a stop bit."""
-SHORT_LIST = (40, 18, 19, 21, 1)
-"""Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes."""
 TRACKING_BYTES = 48
 """Of an answer to `MP` (docs/is900.md 7)."""
 
 
 def load(stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float = 0.0) -> float:
     """Bits per second of so many stations, with `MP` asked so often."""
-    return BITS * (stations * size(items) * rate_hz + TRACKING_BYTES * asked_hz)
+    return BITS_PER_BYTE * (stations * size(items) * rate_hz + TRACKING_BYTES * asked_hz)
 
 
 def check_capacity(
@@ -33,7 +29,7 @@ def check_capacity(
     if baud < 115200:
         ways.append("a device set to 115200 baud")
     raise BadInput(
-        f"Port {port}: {stations} stations x {size(items)} bytes x {BITS} bits x {rate_hz:g} Hz are "
+        f"Port {port}: {stations} stations x {size(items)} bytes x {BITS_PER_BYTE} bits x {rate_hz:g} Hz are "
         f"{load(stations, items, rate_hz, asked_hz):.0f} bit/s, and the line carries {baud}.",
         f"Try {', or '.join(ways)}.",
     )

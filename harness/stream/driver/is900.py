@@ -266,7 +266,7 @@ class Is900:
 
     def _reopened(self) -> Found:
         self._line.transport.close()
-        found = find(self.port, (self._baud,), self._connect, self._timing.back_answer_s)
+        found = find(self.port, (self._baud,), self._connect, self._timing.answer_s)
         self._line, self._status = found.line, found.status
         return found
 
@@ -278,7 +278,7 @@ class Is900:
             self._act(self._watchdog.tell(kind, text, now_s))
             return
         for station in self._stations.characters:
-            answer = line.ask(commands.read_list(station), OutputList, self._timing.back_answer_s)
+            answer = line.ask(commands.read_list(station), OutputList, self._timing.answer_s)
             if answer is not None:
                 kind, text = complaint_of(self._wire, answer)
                 if kind is not None:

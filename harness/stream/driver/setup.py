@@ -5,16 +5,17 @@ from dataclasses import replace
 
 from harness.errors import BadInput
 from harness.stream import commands
-from harness.stream.driver.capacity import check_capacity
+from harness.stream.driver.capacity import check_capacity, load
 from harness.stream.driver.line import Line
 from harness.stream.driver.measure import measured_rate_hz
 from harness.stream.driver.stations import Stations
 from harness.stream.driver.wanted import TELL_QUALITY, Wanted
+from harness.stream.items import SINCE_FIRMWARE
 from harness.stream.reader import WireFormat
 from harness.stream.replies import OutputList, Status, SystemRecord, TrackingStatus
 
-SINCE = {40: 4.13, 76: 4.26}
-"""Firmware that knows an item first (docs/is900.md 5.1)."""
+FULL = 0.95
+"""A line that carries this share of what it can may have left records out [choice]."""
 AGREE = 0.1
 """Rates that differ by less than this share are one; `MP` rounds to whole numbers."""
 
@@ -26,11 +27,11 @@ def items_for(port: str, status: Status, wanted: Wanted) -> tuple[int, ...]:
     found = re.match(r"\d+\.\d+", status.firmware)
     version = float(found[0]) if found else float("inf")  # then the device itself says whether it takes the list
     for code in wanted.items:
-        if version < SINCE.get(code, 0.0):
+        if version < SINCE_FIRMWARE.get(code, 0.0):
             raise BadInput(
                 f"Port {port}: firmware {status.firmware} does not know item {code} (quality), "
-                f"which came with {SINCE[code]}.",
-                "Take quality 'mp', which asks the device once a second instead, or newer firmware.",
+                f"which came with {SINCE_FIRMWARE[code]}.",
+                "Take quality 'mp' (--quality mp), which asks the device once a second instead, or newer firmware.",
             )
     return wanted.items
 
@@ -49,7 +50,8 @@ class SetUp:
         only where its records say the same.
         """
         told_hz = known_hz or self._told_rate_hz()
-        self._check_capacity(len(stations.names), known_hz or self._wanted.rate_hz or told_hz)
+        if sure_hz := known_hz or self._wanted.rate_hz:
+            self._check_capacity(len(stations.names), sure_hz)
         wire = WireFormat(
             stations.names, told_hz or 1.0, self._items, self._wanted.settings, stations.characters.encode()
         )
@@ -72,7 +74,10 @@ class SetUp:
         return tracking.rate_hz if tracking is not None else 0.0
 
     def _rate_hz(self, wire: WireFormat, told_hz: float) -> float:
-        """As asked for, as told, or as measured, where the records do not say otherwise; BadInput."""
+        """As asked for, as told, or as measured, where the records do not say otherwise; BadInput.
+
+        Records that fill the line say nothing against a higher rate: the others have found no room.
+        """
         asked_hz, measured_hz = self._wanted.rate_hz, measured_rate_hz(self._line, wire)
         own_hz = measured_hz or told_hz
         if asked_hz and own_hz and not _near(asked_hz, own_hz):
@@ -83,6 +88,8 @@ class SetUp:
         for rate_hz in (asked_hz, told_hz):
             if rate_hz and (measured_hz is None or _near(rate_hz, measured_hz)):
                 return rate_hz
+        if measured_hz is not None and told_hz > measured_hz and self._filled(len(wire.stations), measured_hz):
+            return told_hz
         if measured_hz is None:
             raise BadInput(
                 f"Port {self._port}: the device does not tell its rate, and sent next to no records of station "
@@ -93,8 +100,16 @@ class SetUp:
 
     def _check_capacity(self, stations: int, rate_hz: float) -> None:
         """BadInput when the line cannot carry it."""
-        asked_hz = 1.0 / self._line.timing.tracking_s if self._wanted.quality == "mp" else 0.0
-        check_capacity(self._port, self._baud, stations, self._items, rate_hz, asked_hz)
+        check_capacity(self._port, self._baud, stations, self._items, rate_hz, self._asked_hz)
+
+    def _filled(self, stations: int, rate_hz: float) -> bool:
+        """Whether the line has next to no room left at this rate."""
+        return self._baud is not None and load(stations, self._items, rate_hz, self._asked_hz) >= FULL * self._baud
+
+    @property
+    def _asked_hz(self) -> float:
+        """How often `MP` is asked for."""
+        return 1.0 / self._line.timing.tracking_s if self._wanted.quality == "mp" else 0.0
 
     def _tell(self, wire: WireFormat) -> None:
         wanted = self._wanted

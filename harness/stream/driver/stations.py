@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 from harness.errors import BadInput
-from harness.stream.commands import STATION_STATES, switch_station
+from harness.stream.commands import STATION_STATES, TRACKING, switch_station
 from harness.stream.driver.line import Line
-from harness.stream.replies import StationStates
+from harness.stream.items import STATION_CHARACTERS
+from harness.stream.replies import StationStates, TrackingStatus
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,11 @@ class Stations:
 
 
 def choose(port: str, line: Line, names: tuple[str, ...] | None) -> Stations:
-    """The first so many active stations; BadInput when the device has fewer."""
-    active = _active(port, line)
+    """The first so many active stations; BadInput when the device has fewer.
+
+    A device that does not say which it has is believed to have those that are named.
+    """
+    active = _active(port, line, STATION_CHARACTERS.decode()[: len(names or ())])
     if not active:
         raise BadInput(f"Port {port}: no station of the device is active.", "Plug one in, or switch it on: l1,1.")
     names = tuple(active) if names is None else names
@@ -37,7 +41,7 @@ def choose(port: str, line: Line, names: tuple[str, ...] | None) -> Stations:
 
 def restore(port: str, line: Line, stations: Stations) -> str:
     """Switch on what is read and off what is not, as far as it is otherwise; the stations that stay missing."""
-    active = _active(port, line)
+    active = _active(port, line, stations.characters)
     wrong = [name for name in stations.characters if name not in active] + [
         name for name in stations.others if name in active
     ]
@@ -45,15 +49,26 @@ def restore(port: str, line: Line, stations: Stations) -> str:
         return ""
     for name in wrong:
         line.send(switch_station(name, name in stations.characters))
-    active = _active(port, line)
+    active = _active(port, line, stations.characters)
     if stay := [name for name in stations.others if name in active]:
         raise BadInput(f"Port {port}: station {', '.join(stay)} cannot be switched off.", "Unplug it, or name it.")
     return "".join(name for name in stations.characters if name not in active)
 
 
-def _active(port: str, line: Line) -> str:
+def _active(port: str, line: Line, silent: str) -> str:
+    """By `l*`, or by `MP`, which old firmware may know alone; `silent` when the device answers neither. BadInput."""
     answer_s = line.timing.answer_s
     states = line.ask(STATION_STATES, StationStates, answer_s) or line.ask(STATION_STATES, StationStates, answer_s)
-    if states is None:
-        raise BadInput(f"Port {port}: the device does not say which stations it has.", "Switch it off and on.")
-    return "".join(states.stations)
+    if states is not None:
+        return "".join(states.stations)
+    tracking = line.ask(TRACKING, TrackingStatus, answer_s)
+    if tracking is not None:
+        return "".join(
+            name for name, state in zip(STATION_CHARACTERS.decode(), tracking.states, strict=True) if state in "TL"
+        )
+    if not silent:
+        raise BadInput(
+            f"Port {port}: the device does not answer l* nor MP, so which stations it has is not known.",
+            "Name the stations that are plugged in, from the first on, or switch it off and on.",
+        )
+    return silent

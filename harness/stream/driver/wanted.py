@@ -47,7 +47,7 @@ class Wanted:
         if self.quality == "record" and not set(TELL_QUALITY) & set(self.items):
             raise BadInput(
                 f"The output list {_comma(self.items)} has no item 40, so a lost station would not show.",
-                "Add 40 to it, or take quality 'mp'.",
+                "Add 40 to it, or take quality 'mp' (--quality mp).",
             )
         if self.rate_hz is not None and not 0.0 < self.rate_hz <= 1000.0:
             raise BadInput(f"A rate of {self.rate_hz} Hz.", "An IS-900 runs at up to 180 Hz.")
@@ -75,8 +75,6 @@ class Timing:
     USB adapters hold bytes back for 0.016 s."""
     answer_s: float = 1.0
     """VRPN allows as much for `S` (docs/is900.md 11.1); InterSense's library 2 s for lists."""
-    back_answer_s: float = 0.5
-    """The same when it is expected back: tried again soon."""
     stalled_s: float = 0.5
     """Nothing, or no record, for so long: the device is asked how it is."""
     silent_s: float = 2.0

@@ -1,8 +1,7 @@
 """Whether a line can carry what a scenario asks of it, before anybody waits for records that never come."""
 
 from harness.errors import BadInput
-from harness.stream.emulator.line import BITS_PER_BYTE
-from harness.stream.items import size
+from harness.stream.items import BITS_PER_BYTE, SHORT_LIST, size
 
 
 def check_capacity(stations: int, rate_hz: float, items: tuple[int, ...], baud: int) -> None:
@@ -16,7 +15,7 @@ def check_capacity(stations: int, rate_hz: float, items: tuple[int, ...], baud: 
     ways = [
         *([f"--stations {fewer}"] if fewer else []),
         *([f"--rate {slower_hz}"] if slower_hz else []),
-        "shorter records such as --items 40,18,19,21,1 (22 bytes)",
+        f"shorter records such as --items {','.join(map(str, SHORT_LIST))} ({size(SHORT_LIST)} bytes)",
         "--unpaced",
         "--overload to see records dropped",
     ]

@@ -18,14 +18,13 @@ from harness.stream.emulator.queries import QUERIES
 from harness.stream.emulator.rounds import Rounds
 from harness.stream.emulator.setters import BARE, SETTERS, SILENT
 from harness.stream.emulator.settings import STATIONS, DeviceSettings, StationSettings
+from harness.stream.items import SINCE_FIRMWARE
 from harness.stream.replies import DeviceError, ReplyEvent
 from harness.stream.samples import Samples
 
 _BUFFER_FULL = -5
 _KEPT = 100
 """Entries of a log."""
-_SINCE = {40: 4.13, 76: 4.26}
-"""Firmware from which on an item is known (docs/is900.md 5.1)."""
 _NAMES = sorted({*ORDERS, *SILENT, *SETTERS, *QUERIES}, key=len, reverse=True)
 """Longest first, since some begin with others."""
 
@@ -188,5 +187,5 @@ class Device:
     def _check_items(self, argument: Argument) -> None:
         """Items that this firmware does not have yet."""
         for place, code in enumerate(argument.numbers()):
-            if float(self.firmware[:4]) < _SINCE.get(int(code), 0.0):
+            if float(self.firmware[:4]) < SINCE_FIRMWARE.get(int(code), 0.0):
                 raise Refused(OUT_OF_RANGE, place + 2)

@@ -3,9 +3,8 @@
 from collections import deque
 
 from harness.stream.emulator.message import Message
+from harness.stream.items import BITS_PER_BYTE
 
-BITS_PER_BYTE = 10
-"""8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
 _LAST = "~"
 """After all stations: the next record begins a round."""
 MOST_REPLIES = 256

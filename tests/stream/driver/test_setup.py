@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
 from harness.stream.driver import Is900, Timing, Wanted
-from harness.stream.driver.capacity import SHORT_LIST
+from harness.stream.driver.measure import rate_of_stamps
 from harness.stream.driver.wanted import BAUDS
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.items import STANDARD_LIST, size
+from harness.stream.items import SHORT_LIST, STANDARD_LIST, size
 from harness.stream.replies import Status
 from tests.stream.driver.bench import NAMES, Bench, Device, Notes, Played, Scripted, frames_for, swaying
 
@@ -29,7 +30,7 @@ def test_it_says_what_it_must_in_order() -> None:
     bench = bench_of(2)
     stream = bench.driver()
     assert bytes(bench.sent) == (
-        b"\r\x11cSl*\r\nMP\r\nfuMT\r\n"
+        b"\x11\rcSl*\r\nMP\r\nfuMT\r\n"
         b"O1,40,2,11,21,1\r\nO1\r\nO2,40,2,11,21,1\r\nO2\r\n"  # told, with the answer to pace it
         b"SMS\r\nO1\r\nO2\r\n"  # and asked
         b"Cc"  # and measured
@@ -88,6 +89,45 @@ def test_a_device_left_streaming_suspended_or_amid_a_line_is_brought_to_order() 
         bench.sleep(0.5)
         with bench.driver() as stream:
             assert len(frames_for(stream, bench, 0.5)) > 20, left
+
+
+def deaf(bench: Bench, *unheard: bytes) -> Bench:
+    """A device that takes these for bytes without a meaning."""
+    device = bench.device
+    assert device is not None
+    receive = device.receive
+
+    def told(data: bytes, now_s: float) -> None:
+        for word in unheard:
+            data = data.replace(word, b"?" * len(word.rstrip()) + word[len(word.rstrip()) :])
+        receive(data, now_s)
+
+    device.receive = told  # type: ignore[method-assign]
+    return bench
+
+
+def test_a_device_that_does_not_know_11_is_stopped_all_the_same() -> None:
+    bench = deaf(bench_of(), b"\x11")
+    emulated(bench).receive(b"fC", bench.now_s)
+    with bench.driver() as stream:
+        assert len(frames_for(stream, bench, 0.5)) > 20
+
+
+def test_stations_are_those_of_mp_or_those_named_where_the_device_does_not_answer() -> None:
+    bench = deaf(bench_of(3), b"l*\r\n")
+    with bench.driver() as stream:
+        assert stream.stations == ("1", "2", "3")
+        assert len(frames_for(stream, bench, 0.5)) > 20
+    bench = deaf(bench_of(2), b"l*\r\n", b"MP\r\n")
+    with pytest.raises(BadInput, match=r"does not answer l\* nor MP.*Name the stations"):
+        bench.driver()
+    with bench.driver(Wanted(stations=("head", "hand"))) as stream:
+        assert stream.wire.characters == b"12"
+        assert len(frames_for(stream, bench, 0.5)) > 20
+        bench.plugged = False
+        bench.after(1.0, lambda: setattr(bench, "plugged", True))
+        assert len(frames_for(stream, bench, 8.0)) > 20
+        assert bench.kinds == ["connected", "unplugged", "connected"]
 
 
 def test_nobody_is_spoken_to_who_was_not_named() -> None:
@@ -189,6 +229,39 @@ def test_records_are_believed_where_they_say_another_rate_than_the_device() -> N
         boasting().driver(Wanted(rate_hz=120.0))
 
 
+def test_a_rate_that_only_mp_tells_fills_no_line() -> None:
+    """Four stations of 38 bytes at 120 Hz would not fit; they come at 50 Hz, which does."""
+    bench = bench_of(4, rate_hz=50.0)
+    bench.spoil = lambda data: data.replace(b"   50  ", b"  120  ")
+    assert bench.driver().wire.rate_hz == pytest.approx(50.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("stations", [4, 6])
+def test_a_line_that_is_too_full_shows_though_mp_tells_nothing(stations: int) -> None:
+    bench = bench_of(stations, rate_hz=120.0)
+    bench.spoil = lambda data: data.replace(b"31P", b"31@")
+    with pytest.raises(BadInput, match="and the line carries 115200"):
+        bench.driver()
+
+
+@pytest.mark.parametrize(("missing", "jitter"), [(0.0, 0.2), (0.3, 0.1), (0.5, 0.1)])
+def test_the_rate_of_stamps_that_jitter_while_rounds_are_missing(missing: float, jitter: float) -> None:
+    rng = generator(1, "jittered stamps")
+    for rate_hz in (40.0, 59.94, 180.0):
+        stamps_s = (np.arange(200) + rng.uniform(-jitter, jitter, 200)) / rate_hz
+        kept = rng.uniform(size=200) >= missing
+        kept[[0, -1]] = True
+        assert rate_of_stamps(stamps_s[kept]) == pytest.approx(rate_hz, rel=3e-3)
+
+
+def test_spoilt_stamps_make_no_other_rate() -> None:
+    stamps_s = np.arange(50) / 50.0
+    stamps_s[[10, 30]] = 1e9, 0.0
+    assert rate_of_stamps(stamps_s) == pytest.approx(50.0, rel=1e-6)
+    assert rate_of_stamps(np.array([0.0, 1.0])) is None
+    assert rate_of_stamps(np.zeros(50)) is None
+
+
 OTHER = Status(identification="FASTRAK", firmware="2.10").line()
 
 
@@ -237,7 +310,7 @@ def test_what_a_device_cannot_do_is_refused_with_what_to_try(
         (lambda: Scripted({}, chatter=b"$GPGGA,123519,4807.038,N\r\n"), "no answer of an IS-900"),
         (lambda: Scripted({}, chatter=bytes(range(256))), "no answer of an IS-900"),
         (lambda: Scripted({b"S": OTHER}), "'FASTRAK', firmware 2.10, answers, which is no IS-900"),
-        (lambda: Scripted({b"S": Status().line()}), "does not say which stations it has"),
+        (lambda: Scripted({b"S": Status().line()}), r"does not answer l\* nor MP"),
         (
             lambda: Scripted({b"S": Status().line(), b"l*": b"21l" + b"0" * 32 + b"\r\n"}),
             "no station of the device is active",

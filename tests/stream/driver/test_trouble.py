@@ -10,12 +10,12 @@ import pytest
 from harness.core.seeds import generator
 from harness.stream.commands import output_list
 from harness.stream.driver import Is900, LineEvent, Timing, Wanted
-from harness.stream.driver.capacity import SHORT_LIST
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
 from harness.stream.frame import TrackerFrame
+from harness.stream.items import SHORT_LIST
 from harness.stream.sessions import Sessions
-from tests.stream.driver.bench import Adapter, Bench, Notes, Played, frames_for, swaying
+from tests.stream.driver.bench import Adapter, Bench, Device, Notes, Played, frames_for, swaying
 
 BACK_WITHIN_S = 2.0
 """Of the device's return."""
@@ -100,6 +100,39 @@ def test_another_device_at_the_same_port_is_set_up_too() -> None:
         frames += frames_for(stream, bench, 5.0)
         assert bench.kinds == ["connected", "unplugged", "reset", "connected"]
     assert_in_order(frames)
+
+
+class Slow:
+    """Thinks so long before it says anything."""
+
+    def __init__(self, device: Device, for_s: float) -> None:
+        self._device, self._for_s = device, for_s
+        self._said: list[tuple[float, bytes]] = []
+
+    def receive(self, data: bytes, now_s: float) -> None:
+        self._device.receive(data, now_s)
+
+    def due(self, now_s: float) -> bytes:
+        if said := self._device.due(now_s):
+            self._said.append((now_s + self._for_s, said))
+        out = b"".join(said for due_s, said in self._said if due_s <= now_s)
+        self._said = [(due_s, said) for due_s, said in self._said if due_s > now_s]
+        return out
+
+    @property
+    def next_s(self) -> float:
+        return min([self._device.next_s, *(due_s for due_s, _ in self._said)])
+
+
+def test_a_device_that_takes_its_time_to_answer_comes_back_too() -> None:
+    bench = Bench(Slow(Played(swaying(2), now_s=1000.0), 0.8))
+    with bench.driver() as stream:
+        frames_for(stream, bench, 1.0)
+        bench.plugged = False
+        bench.after(3.0, lambda: setattr(bench, "plugged", True))
+        frames = frames_for(stream, bench, 20.0)
+        assert stream.counts["reconnects"] == 1
+        assert frames[-1].received_s > bench.now_s - 0.5
 
 
 @pytest.mark.parametrize("off_s", [0.7, 3.0, 20.0])
