@@ -16,9 +16,9 @@ import pytest
 
 from harness.cli import main
 from harness.rehearsal import Rehearsal, rehearse
-from harness.stream.blocks import HEADER, RECEIVED
+from harness.stream.blocks import CONFIGURED, HEADER, RECEIVED
 from harness.stream.driver import Is900, Wanted
-from harness.stream.emulator import serving
+from harness.stream.emulator import EmulatorConfig, serving
 from harness.stream.frame_table import COLUMNS
 from harness.stream.recording import RecordingWriter, read_recording
 from harness.stream.replay import RecordingStream
@@ -146,6 +146,12 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
         (["record", "/dev/nothing", str(tmp_path / "b.rec")], "there is no such port"),
         (["record", str(tmp_path / "b.rec"), "/dev/null"], "The port comes first"),
         (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--seed", "3"], "--seed with tcp://127.0.0.1:1"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--baud", "9600"], "--baud with tcp://127.0.0.1:1"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--stations", ""], "names no station"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--items", "2,11,21,1"], "(--quality mp)"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "a,,b"], "names no station"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "²"], "no station called '²'"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--quality", "mp"], "--quality with sim:demo"),
     ):
         assert expected in refused(words, capsys), words
     assert not (tmp_path / "b.rec").exists()
@@ -204,13 +210,41 @@ def test_seconds_end_a_recording(port: str, tmp_path: Path, capsys: pytest.Captu
     assert len(list(stream)) > 5
 
 
+def test_old_firmware_is_recorded_by_mp_and_refused_without(
+    played: Rehearsal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.rec"
+    with serving(played.samples, EmulatorConfig(firmware="4.1105"), tcp="127.0.0.1:0") as device:
+        assert "--quality mp" in refused(["record", device.name, str(path), "--seconds", "0.5"], capsys)
+        assert not path.exists()
+        assert main(["record", device.name, str(path), "--seconds", "0.5", "--quality", "mp"]) == 0
+    (wire,) = read_recording(path).formats
+    assert wire.items == (2, 11, 21, 1)
+
+
+def test_a_list_may_be_named(port: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    assert main(["record", port, str(path), "--seconds", "0.5", "--items", "40,18,19,21,1"]) == 0
+    (wire,) = read_recording(path).formats
+    assert wire.items == (40, 18, 19, 21, 1)
+
+
+@pytest.mark.parametrize(
+    "flag", [["--items", "40,²"], ["--baud", "²"], ["--rate", "-1"], ["--rate", "nan"], ["--quality", "best"]]
+)
+def test_a_flag_that_makes_no_sense_is_refused(flag: list[str], tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as raised:
+        main(["record", "tcp://127.0.0.1:1", str(tmp_path / "a.rec"), *flag])
+    assert raised.value.code == 2
+
+
 def recording(port: str, path: Path, begun: int = 2000) -> subprocess.Popen[str]:
-    """`harness record` in its own process, once it has written so many bytes."""
+    """`harness record` in its own process, once it has set the device up and written so many bytes since."""
     process = subprocess.Popen(
         [*HARNESS, "record", port, str(path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
     until_s = time.monotonic() + 60.0
-    while not path.exists() or path.stat().st_size < begun:
+    while not path.exists() or len(path.read_bytes().partition(CONFIGURED.encode())[2]) < begun:
         assert time.monotonic() < until_s
         assert process.poll() is None
         time.sleep(0.02)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from harness.commands.verb import (
     Verbs,
+    add_line,
     add_verb,
     ended_by_sigterm,
-    items,
-    positive,
+    line_wanted,
     positive_number,
     say,
     stations_of,
@@ -48,8 +48,7 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--stations", metavar="N|A,B", help=text)
     text = "frames per second of the tracker, and of what is learnt (default: the scenario's)"
     verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
-    verb.add_argument("--items", type=items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)")
-    verb.add_argument("--baud", type=positive, help="of a serial port (default: found out)")
+    add_line(verb)
     text = "exact: worn as the scenario says; tpose: of the first seconds, in which the performer stands in T-pose"
     verb.add_argument("--calibration", choices=["exact", "tpose"], default="exact", help=text)
     text = "window: as it moves; frames: PNG files in the folder --out"
@@ -126,7 +125,7 @@ def _device(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[Line
 
     tracker = rehearsal.tracker
     stations = tuple(rehearsal.scenario.stations)
-    wanted = Wanted(items=args.items or tracker.items, stations=stations, rate_hz=args.rate, baud=args.baud)
+    wanted = Wanted(**{"items": tracker.items, **line_wanted(args)}, stations=stations, rate_hz=args.rate)
     with Is900(args.port, wanted, on_event=happened) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_SLACK * tracker.rate_hz:

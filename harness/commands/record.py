@@ -10,7 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness import __version__
-from harness.commands.verb import Verbs, add_verb, ended_by_sigterm, say, talk
+from harness.commands.verb import (
+    Verbs,
+    add_line,
+    add_verb,
+    ended_by_sigterm,
+    line_wanted,
+    names_of,
+    positive_number,
+    say,
+    talk,
+    whole,
+)
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -30,7 +41,9 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("file", type=Path, help="the recording to write")
     text = "names of the device's active stations, the first first; of sim: those stations, or the first so many"
     verb.add_argument("--stations", metavar="A,B", help=text)
-    verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second, where the device does not tell")
+    text = "frames per second, where the device does not tell"
+    verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
+    add_line(verb)
     verb.add_argument("--seconds", type=float, metavar="N", help="stop by itself after so long")
     verb.add_argument("--clip", metavar="CLIP", help="of sim: which of its clips (default: the first)")
     verb.add_argument("--noise", metavar="LEVEL", help="of sim: replaces the scenario's noise")
@@ -40,6 +53,11 @@ def record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "It is a positive number.")
     if args.port.startswith(SIMULATED):
+        for name in ("items", "baud", "quality"):
+            if getattr(args, name) is not None:
+                raise BadInput(
+                    f"--{name} with {args.port}.", "It is for a device; the scenario says what is simulated."
+                )
         return _record_simulation(args, args.port.removeprefix(SIMULATED))
     for name in ("clip", "noise", "seed"):
         if getattr(args, name) is not None:
@@ -54,7 +72,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     RecordingWriter(args.file).close()  # refuses what is no place to record into before a long simulation
     stations = args.stations
     if stations is not None:
-        stations = int(stations) if stations.isdigit() else stations.split(",")
+        stations = int(stations) if whole(stations) else names_of(stations)
     rehearsal = rehearse(
         scenario,
         clip=args.clip,
@@ -85,8 +103,8 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     from harness.stream.recorder import record_port
     from harness.stream.recording import RecordingWriter
 
-    stations = None if args.stations is None else tuple(name.strip() for name in args.stations.split(","))
-    wanted = Wanted(stations=stations, rate_hz=args.rate)
+    stations = None if args.stations is None else tuple(names_of(args.stations))
+    wanted = Wanted(stations=stations, rate_hz=args.rate, **line_wanted(args))
     note = {"source": "port", "port": args.port, "harness": __version__}
     with RecordingWriter(args.file, note) as writer, ended_by_sigterm():
         record_port(args.port, wanted, writer, seconds=args.seconds, say=talk, progress=_progress)
@@ -103,6 +121,8 @@ def _recorded(args: argparse.Namespace, counts: Mapping[str, int]) -> Outcome:
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
     content |= {"set_up": counts["conf"], "events": counts["evnt"]}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
+    if not args.file.exists():
+        text = f"{args.file}: ended before the device was set up; nothing is kept"
     return say(args, content, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
 
 Verbs = Any  # argparse's subparsers object has no public type
 FEWEST = 4
@@ -39,8 +39,28 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
     return verb
 
 
+def add_line(verb: argparse.ArgumentParser) -> None:
+    """The flags of a verb that opens a device's line; `line_wanted` reads them."""
+    verb.add_argument("--items", type=items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)")
+    verb.add_argument("--baud", type=positive, help="of a serial port (default: found out)")
+    text = "where lost stations show: in the records (item 40), or in answers to MP, for firmware before 4.13"
+    verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
+
+
+def line_wanted(args: argparse.Namespace) -> dict[str, Any]:
+    """What those flags ask of the driver, the rest left out; BadInput."""
+    if args.baud is not None and "://" in args.port:
+        raise BadInput(f"--baud with {args.port}.", "It is for a serial port; leave it out.")
+    return {name: getattr(args, name) for name in ("items", "baud", "quality") if getattr(args, name) is not None}
+
+
+def whole(text: str) -> bool:
+    """Whether these are digits 0 to 9 and nothing else; `isdigit` alone takes `²` too."""
+    return text.isascii() and text.isdecimal()
+
+
 def positive(text: str) -> int:
-    if not text.isdigit() or int(text) < 1:
+    if not whole(text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no positive whole number")
     return int(text)
 
@@ -58,18 +78,26 @@ def positive_number(text: str) -> float:
 def items(text: str) -> tuple[int, ...]:
     """An output list."""
     codes = text.split(",")
-    if not all(code.strip().isdigit() for code in codes):
+    if not all(whole(code.strip()) for code in codes):
         raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
     return tuple(map(int, codes))
 
 
 def stations_of(args: argparse.Namespace) -> int | list[str]:
-    """What `--stations` asks for: how many of the scenario's, or their names; `FEWEST` without."""
+    """What `--stations` asks for: how many of the scenario's, or their names; `FEWEST` without. BadInput."""
     from harness.config import load_scenario
 
-    if not args.stations:
+    if args.stations is None:
         return min(FEWEST, len(load_scenario(args.scenario).stations))
-    return int(args.stations) if args.stations.isdigit() else [name.strip() for name in args.stations.split(",")]
+    return int(args.stations) if whole(args.stations) else names_of(args.stations)
+
+
+def names_of(text: str) -> list[str]:
+    """Stations by name, as `--stations` has them; BadInput for an empty one."""
+    names = [name.strip() for name in text.split(",")]
+    if not all(names):
+        raise BadInput(f"--stations {text!r} names no station.", "Write names with commas between them: head,torso.")
+    return names
 
 
 def talk(line: str) -> None:

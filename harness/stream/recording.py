@@ -186,13 +186,16 @@ class RecordingWriter:
         self.counts[EVENT] += 1
 
     def close(self) -> None:
-        """Have it all on the disk; may be done twice."""
+        """Have it all on the disk; may be done twice. A new file in which no device was ever set up is removed: nothing
+        could be made of it."""
         with self._lock:
             self._closed = True
             if self._file is not None:
                 os.fsync(self._file)
                 os.close(self._file)
                 self._file = None
+                if self._new and not self.counts[CONFIGURED]:
+                    self.path.unlink(missing_ok=True)
 
     def __enter__(self) -> "RecordingWriter":
         return self

@@ -146,6 +146,10 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--lsl-network"], "--lsl-network without --lsl"),
         (["--seconds", "soon"], "no positive number"),
         (["--items", "40;2"], "no list such as"),
+        (["--items", "2,11,21,1"], "(--quality mp)"),
+        (["--quality", "best"], "invalid choice"),
+        (["--port", "tcp://127.0.0.1:1", "--baud", "9600"], "--baud with tcp://127.0.0.1:1"),
+        (["--stations", ""], "names no station"),
     ],
 )
 def test_refusals(changed: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:

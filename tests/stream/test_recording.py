@@ -78,6 +78,7 @@ def test_a_format_says_all_that_a_reader_needs(tmp_path: Path) -> None:
 def test_more_than_a_block_holds_is_cut_in_two(tmp_path: Path) -> None:
     data = os.urandom(LONGEST + 5)
     with RecordingWriter(tmp_path / "a.rec") as writer:
+        writer.configured(FOUR, 1.0, 2.0)
         writer.received(data, 1.0, 2.0)
     read = [b for b in read_recording(tmp_path / "a.rec").blocks() if b.kind == RECEIVED]
     assert [len(b.payload) for b in read] == [LONGEST, 5]
@@ -234,10 +235,22 @@ def test_other_stations_are_refused(tmp_path: Path) -> None:
 def test_two_cannot_record_into_one_file(tmp_path: Path) -> None:
     pytest.importorskip("fcntl", reason="only where the system has flock")
     with RecordingWriter(tmp_path / "a.rec") as first:
-        first.sent(b"c", 1.0, 2.0)
+        first.configured(FOUR, 1.0, 2.0)
         with RecordingWriter(tmp_path / "a.rec") as second, pytest.raises(BadFile, match="Another process"):
             second.sent(b"c", 1.0, 2.0)
     assert len(list(read_recording(tmp_path / "a.rec").blocks())) == 2
+
+
+def test_a_new_file_in_which_no_device_was_set_up_is_removed(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    with RecordingWriter(path) as writer:
+        writer.sent(b"S", 1.0, 2.0)
+        assert path.exists()
+    assert not path.exists()
+    before = written(path).read_bytes()
+    with RecordingWriter(path) as writer:
+        writer.sent(b"S", 1.0, 2.0)
+    assert path.read_bytes().startswith(before)
 
 
 def test_a_full_disk_is_said() -> None:

@@ -23,7 +23,7 @@ def check_capacity(
     fitting = max((n for n in range(stations) if load(n, items, rate_hz, asked_hz) <= baud), default=0)
     ways = [f"{fitting} station{'s' * (fitting > 1)}"] if fitting else []
     if load(stations, SHORT_LIST, rate_hz, asked_hz) <= baud and size(items) > size(SHORT_LIST):
-        ways.append(f"the {size(SHORT_LIST)}-byte list {','.join(map(str, SHORT_LIST))}")
+        ways.append(f"the {size(SHORT_LIST)}-byte list (--items {','.join(map(str, SHORT_LIST))})")
     slower = (baud - load(0, items, 0.0, asked_hz)) / load(stations, items, 1.0)
     ways.append(f"a device that runs at {math.floor(slower)} Hz or less")
     if baud < 115200:

@@ -40,7 +40,7 @@ def test_what_would_fit_is_named_and_does_fit() -> None:
         check_capacity("port", 9600, 2, STANDARD_LIST, 20.0, 0.0)
     assert "1 station," in raised.value.advice
     assert "runs at 12 Hz" in raised.value.advice
-    assert "22-byte list 40,18,19,21,1" in raised.value.advice
+    assert "22-byte list (--items 40,18,19,21,1)" in raised.value.advice
     check_capacity("port", 9600, 1, STANDARD_LIST, 20.0, 0.0)
     check_capacity("port", 9600, 2, STANDARD_LIST, 12.0, 0.0)
     check_capacity("port", 9600, 2, SHORT_LIST, 20.0, 0.0)

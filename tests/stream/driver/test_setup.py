@@ -273,7 +273,11 @@ OTHER = Status(identification="FASTRAK", firmware="2.10").line()
             {"stations": 4},
             r"6 stations wanted \(head, .*\), the device has 4 active \(1, 2, 3, 4\)",
         ),
-        (Wanted(), {"firmware": "4.1105"}, r"firmware 4\.1105 does not know item 40.*Take quality 'mp'"),
+        (
+            Wanted(),
+            {"firmware": "4.1105"},
+            r"firmware 4\.1105 does not know item 40.*Take quality 'mp' \(--quality mp\)",
+        ),
         (Wanted(items=(76, 2, 11, 21, 1)), {"firmware": "4.2301"}, r"firmware 4\.2301 does not know item 76"),
         (Wanted(rate_hz=75.0), {}, r"75 Hz is asked for, the device runs at 50 Hz"),
         (
@@ -284,7 +288,7 @@ OTHER = Status(identification="FASTRAK", firmware="2.10").line()
         (
             Wanted(),
             {"stations": 4, "rate_hz": 120.0},
-            r"Try 2 stations, or the 22-byte list 40,18,19,21,1, or a device .* 75",
+            r"Try 2 stations, or the 22-byte list \(--items 40,18,19,21,1\), or a device .* 75",
         ),
         (Wanted(baud=9600), {"baud": 9600}, r"the line carries 9600\. Try .*or a device set to 115200 baud"),
     ],
