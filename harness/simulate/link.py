@@ -7,10 +7,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadInput
-from harness.stream.items import STANDARD_LIST, size
-
-BITS_PER_BYTE = 10
-"""8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
+from harness.stream.items import BITS_PER_BYTE, STANDARD_LIST, size
 
 
 @dataclass(frozen=True)

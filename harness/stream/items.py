@@ -27,6 +27,8 @@ SINCE_FIRMWARE = {40: 4.13, 76: 4.26}
 """Firmware from which on an item is known (docs/is900.md 5.1)."""
 BITS_PER_BYTE = 10
 """8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
+BAUDS = (115200, 57600, 38400, 19200, 9600)
+"""In the order in which InterSense's own library looks for a tracker (docs/is900.md 2) [bit/s]."""
 
 
 @dataclass(frozen=True)

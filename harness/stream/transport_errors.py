@@ -8,9 +8,10 @@ from urllib.parse import urlsplit
 from serial.tools import list_ports
 
 from harness.errors import BadInput
+from harness.stream.items import BAUDS
 
 _BUSY = (errno.EBUSY, errno.EAGAIN)
-_SETTINGS = "115200, 57600, 38400, 19200 and 9600"
+_SETTINGS = f"{', '.join(map(str, BAUDS[:-1]))} and {BAUDS[-1]}"
 
 
 def no_scheme(port: str) -> BadInput:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from harness.errors import BadInput
 from harness.stream.commands import STATUS
 from harness.stream.driver.line import WAKE_UP, Line
-from harness.stream.driver.wanted import BAUDS, Wanted
+from harness.stream.driver.wanted import Wanted
+from harness.stream.items import BAUDS
 from harness.stream.replies import Status
 from harness.stream.transport import LineLost
 

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from harness.errors import BadInput
-from harness.stream.items import STANDARD_LIST, record_type
+from harness.stream.items import BAUDS, STANDARD_LIST, record_type
 from harness.stream.records import Settings
 
-BAUDS = (115200, 57600, 38400, 19200, 9600)
-"""In the order in which InterSense's own library looks for a tracker (docs/is900.md 2) [bit/s]."""
 TELL_QUALITY = (40, 76)
 """Items that say how well a station is tracked (docs/is900.md 7)."""
 

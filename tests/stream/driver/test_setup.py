@@ -10,9 +10,8 @@ from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
 from harness.stream.driver import Is900, Timing, Wanted
 from harness.stream.driver.measure import rate_of_stamps
-from harness.stream.driver.wanted import BAUDS
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.items import SHORT_LIST, STANDARD_LIST, size
+from harness.stream.items import BAUDS, SHORT_LIST, STANDARD_LIST, size
 from harness.stream.replies import Status
 from tests.stream.driver.bench import NAMES, Bench, Device, Notes, Played, Scripted, frames_for, swaying
 
