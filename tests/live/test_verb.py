@@ -9,7 +9,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -165,9 +164,10 @@ def test_refusals(changed: list[str], words: str, capsys: pytest.CaptureFixture[
     assert words in complaint
 
 
-def test_another_rate_than_the_scenarios(rehearsal: Rehearsal, capsys: pytest.CaptureFixture[str]) -> None:
-    with serving(replace(rehearsal.samples, rate_hz=50.0), tcp="127.0.0.1:0") as device:
-        assert main(["live", "--port", device.name, *WHAT]) == 2
+def test_another_rate_than_the_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
+    faster = rehearse("demo", clip="boxing_p1_01", stations=4, rate_hz=50.0)
+    with serving(faster.samples, tcp="127.0.0.1:0") as device:
+        assert main(["live", "--port", device.name, *WHAT, "--seconds", "1"]) == 2
     assert "Say --rate 50" in capsys.readouterr().err
 
 
@@ -176,3 +176,12 @@ def test_what_it_writes_is_gone_when_the_tracker_is_refused(tmp_path: Path, caps
     assert main(["live", "--port", "/dev/no_such_port", *WHAT, *files]) == 2
     assert "no such port" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+
+
+def test_a_file_survives_a_tracker_that_is_not_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    old = tmp_path / "a.bvh"
+    old.write_text("mine")
+    assert main(["live", "--port", "/dev/no_such_port", *WHAT, "--bvh", str(old), "--force"]) == 2
+    assert "no such port" in capsys.readouterr().err
+    assert old.read_text() == "mine"
+    assert list(tmp_path.iterdir()) == [old]
