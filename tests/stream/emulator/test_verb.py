@@ -50,7 +50,8 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
     assert "Traceback" not in talk
     assert program.returncode == 0
     counts = json.loads(out)
-    assert (counts["outcome"], counts["commands"], counts["replies_sent"]) == ("pass", 3, 2)
+    assert (counts["outcome"], counts["commands"]) == ("pass", 3)
+    assert counts["replies_sent"] in (1, 2)  # the end may come between the last one's writing and its counting
     assert not os.path.lexists(link)
 
 
