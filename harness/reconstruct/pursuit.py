@@ -32,7 +32,7 @@ _WIDENINGS = (10.0, 3.0, 1.0)
 _FIRST_LOOK, _HOPE = 6, 3.0
 """A start is looked at for so many steps, and left when it is so many times as dear as the best one by then: most
 have all but arrived, and those that stand upside down never do."""
-_ALIKE = 1e-6
+_ALIKE = 1e-3
 """Configurations that differ nowhere by more are one [m, rad]."""
 """How much farther the Lorentzian reaches while a cold start closes in."""
 
@@ -146,10 +146,12 @@ class Pursuit:
         self.residuals.widen(_WIDENINGS[0])
         looked = [self._first_look.solve(start, self._leaning.prior(self.limits, start)) for start in starts]
         dearest = _HOPE * min(solution.cost for solution in looked)
-        found = []
+        found: list[Solution] = []
+        arrived: list[Floats] = []
         for start, solution in zip(starts, looked, strict=True):
-            if solution.cost > dearest:
+            if solution.cost > dearest or not _is_new(solution.qpos, arrived):
                 continue
+            arrived.append(solution.qpos)
             for factor in _WIDENINGS:
                 self.residuals.widen(factor)
                 solution = self.leaning(solution.qpos, start)
@@ -167,6 +169,10 @@ def _different(poses: list[Floats]) -> list[Floats]:
     """Those configurations (55,) that none before them is all but equal to."""
     out: list[Floats] = []
     for qpos in poses:
-        if all(np.abs(qpos - other).max() > _ALIKE for other in out):
+        if _is_new(qpos, out):
             out.append(qpos)
     return out
+
+
+def _is_new(qpos: Floats, known: list[Floats]) -> bool:
+    return all(np.abs(qpos - other).max() > _ALIKE for other in known)
