@@ -27,6 +27,7 @@ from harness.score.files import TEMPORARY
 from harness.score.orders import Order
 from harness.score.results import read_cells, read_summary
 from harness.stream.frame import TrackerFrame
+from tests.interrupts import heeding_interrupts
 
 SMALL = Scenario(
     name="small",
@@ -291,11 +292,6 @@ def test_a_killed_run_leaves_whole_cells_and_resumes(tmp_path: Path) -> None:
     assert experiment.run(scenario, out) is Outcome.PASS
     assert finished <= {str(row["key"]) for row in rows(out)}
     assert len(rows(out)) == len(scenario.methods) * len(scenario.motion.test)
-
-
-def heeding_interrupts() -> None:
-    """As from a terminal: what a shell starts in the background ignores them, and so would its children."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from harness.stream.emulator import EmulatorConfig, serving
 from harness.stream.frame_table import COLUMNS
 from harness.stream.recording import RecordingWriter, read_recording
 from harness.stream.replay import RecordingStream
+from tests.interrupts import heeding_interrupts
 from tests.stream.test_recording import newer
 from tests.stream.wire import same
 
@@ -241,7 +242,11 @@ def test_a_flag_that_makes_no_sense_is_refused(flag: list[str], tmp_path: Path) 
 def recording(port: str, path: Path, begun: int = 2000) -> subprocess.Popen[str]:
     """`harness record` in its own process, once it has set the device up and written so many bytes since."""
     process = subprocess.Popen(
-        [*HARNESS, "record", port, str(path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [*HARNESS, "record", port, str(path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=heeding_interrupts,
     )
     until_s = time.monotonic() + 60.0
     while not path.exists() or len(path.read_bytes().partition(CONFIGURED.encode())[2]) < begun:
@@ -281,6 +286,7 @@ def test_ctrl_c_ends_a_replay_without_a_word_too_many(simulated: Path) -> None:
         stderr=subprocess.PIPE,
         text=True,
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        preexec_fn=heeding_interrupts,
     ) as process:
         assert process.stdout is not None
         assert process.stdout.readline().startswith("received_s,")

@@ -18,6 +18,7 @@ from tests.clients.tty import Tty, raw, wait_until
 from tests.clients.vrpn import Vrpn
 from tests.clients.vrui import Vrui
 from tests.clients.wire import cut
+from tests.interrupts import heeding_interrupts
 
 LIMIT_S = 60.0
 INCH_M = 0.0254
@@ -235,7 +236,9 @@ def test_the_verb_itself_is_ready_when_its_link_is_there(tmp_path: Path) -> None
     """VRPN gets its first answer within the wait that it allows."""
     link = tmp_path / "tracker"
     verb = [sys.executable, "-m", "harness.cli", "emulate", "builtin_walking", "--pty", str(link), "--rate", "60"]
-    process = subprocess.Popen(verb, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        verb, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts
+    )
     guard = threading.Timer(200.0, process.kill)
     guard.start()
     try:

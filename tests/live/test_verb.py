@@ -18,6 +18,7 @@ from harness.cli import main
 from harness.reconstruct import registry
 from harness.rehearsal import Rehearsal, rehearse
 from harness.stream.emulator.serve import serving
+from tests.interrupts import heeding_interrupts
 
 WHAT = ["--scenario", "demo", "--clip", "boxing_p1_01", "--method", "ik"]
 
@@ -38,11 +39,6 @@ def live(*arguments: str) -> Iterator["subprocess.Popen[str]"]:
             yield program
         finally:
             program.kill()
-
-
-def heeding_interrupts() -> None:
-    """As from a terminal: what a shell starts in the background ignores them, and so would its children."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def wait_for_rows(path: Path, count: int, program: "subprocess.Popen[str]") -> None:

@@ -152,6 +152,7 @@ def test_it_may_be_closed_while_it_waits_for_a_device_that_is_gone(serve: Serve)
 CLIENT = """
 import sys
 from harness.stream.driver import Is900
+from tests.interrupts import heeding_interrupts
 try:
     with Is900(sys.argv[1]) as stream:
         for frame in stream:
@@ -163,7 +164,12 @@ except KeyboardInterrupt:
 
 def test_ctrl_c_leaves_the_device_quiet(tmp_path: Path) -> None:
     with serving(swaying(2), pty=tmp_path / "is900") as emulator:
-        client = subprocess.Popen([sys.executable, "-c", CLIENT, emulator.name], stdout=subprocess.PIPE, text=True)
+        client = subprocess.Popen(
+            [sys.executable, "-c", CLIENT, emulator.name],
+            stdout=subprocess.PIPE,
+            text=True,
+            preexec_fn=heeding_interrupts,
+        )
         assert client.stdout is not None
         for _ in range(5):
             assert float(client.stdout.readline()) > 0.0

@@ -20,11 +20,7 @@ from harness.reconstruct.ik import PREVIOUS
 from harness.setting import Setting
 from harness.stream.emulator.faults import Kind
 from harness.stream.transport import open_transport
-
-
-def heeding_interrupts() -> None:
-    """As from a terminal: what a shell starts in the background ignores them."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+from tests.interrupts import heeding_interrupts
 
 
 @pytest.mark.parametrize("end", [signal.SIGINT, signal.SIGTERM])
