@@ -20,6 +20,7 @@ from harness.stream.emulator.faults import Fault
 from harness.stream.emulator.serve import Serving
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
+from tests.interrupts import heeding_interrupts
 from tests.stream.driver.bench import swaying
 
 PATIENT_S = 30.0
@@ -152,7 +153,6 @@ def test_it_may_be_closed_while_it_waits_for_a_device_that_is_gone(serve: Serve)
 CLIENT = """
 import sys
 from harness.stream.driver import Is900
-from tests.interrupts import heeding_interrupts
 try:
     with Is900(sys.argv[1]) as stream:
         for frame in stream:
