@@ -106,4 +106,5 @@ def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
     for where in ("harness.rehearsal.rehearse", "harness.experiment.run"):
         monkeypatch.setattr(where, interrupted)
     assert main(verb.split()) == expected
-    assert "stopped" in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "stopped" in said.out + said.err

@@ -75,7 +75,7 @@ def test_a_minimal_scenario_takes_its_name_from_the_file(tmp_path: Path) -> None
         ('["walking"]', '["walking", "boxing"]', "behaviours"),
         ('["walking_p1_01"]', "[]", "no test clips"),
         ("[stations]", "[tracker]\nrate_hz = 2000.0\n[stations]", "1 to 1000"),
-        ("[stations]", "[tracker]\nrate_hz = 0.0\n[stations]", "positive"),
+        ("[stations]", "[tracker]\nrate_hz = 0.0\n[stations]", "above 0"),
         ("[motion]", "[motion", "not TOML"),
         ('methods = ["ik"]', 'methods = ["ik"]\ninputs = []', "no inputs"),
         ('methods = ["ik"]', 'methods = ["ik"]\ninputs = ["pos", "pos"]', "twice"),

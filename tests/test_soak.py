@@ -78,9 +78,10 @@ def soak(seconds: float, folder: Path, seed: int) -> Soak:
 def judge(seen: Soak) -> dict[str, int]:
     """Counts; `missing` are undamaged readings of a working line that never came."""
     kind = record_type(STANDARD_LIST)
+    first_s = next(event.monotonic_s for event in seen.events if event.kind == "connected")
     last_s = seen.sent[-1].written_s
     counts = dict.fromkeys(("records", "damaged", "undamaged", "while away", "missing", "beside damage"), 0)
-    records = [sent for sent in seen.sent if sent.message.station and not sent.unread]
+    records = [sent for sent in seen.sent if sent.message.station and not sent.unread and sent.written_s > first_s]
     hurt_s = np.array([sent.written_s for sent in seen.sent if sent.damage] or [np.inf])
     for sent in records:
         counts["records"] += 1

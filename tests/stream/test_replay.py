@@ -195,8 +195,8 @@ def test_cut_at_any_byte_it_plays_what_is_whole_or_says_why_not(whole: Path) -> 
 def test_without_a_set_up_there_is_nothing_to_play(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.rec") as writer:
         writer.received(DATA, 1.0, 2.0)
-    with pytest.raises(BadFile, match="the device was never set up in it"):
-        RecordingStream(tmp_path / "a.rec")
+        with pytest.raises(BadFile, match="the device was never set up in it"):
+            RecordingStream(tmp_path / "a.rec")
 
 
 def test_stations_never_change(whole: Path, tmp_path: Path) -> None:
