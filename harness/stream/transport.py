@@ -12,6 +12,7 @@ import socket
 import sys
 import threading
 import time
+from abc import ABC, abstractmethod
 from typing import Protocol
 
 import serial
@@ -60,10 +61,6 @@ class Transport(Protocol):
         """Send all of it; LineLost when the line does not take it."""
         ...
 
-    def discard(self) -> None:
-        """Throw away what was received and not read."""
-        ...
-
     def close(self) -> None:
         """May be done twice, and while another thread reads: its read ends with LineLost."""
         ...
@@ -86,7 +83,7 @@ def open_transport(port: str, baud: int = 115200) -> Transport:
     return PolledPort(port, opened) if sys.platform == "win32" else WaitedPort(port, opened)
 
 
-class _Line:
+class _Line(ABC):
     """What the kinds of lines share: one reader at a time, and a close that a reader notices."""
 
     def __init__(self, name: str) -> None:
@@ -110,11 +107,6 @@ class _Line:
         except _TROUBLE as error:
             raise LineLost(self.name, self._reason(error)) from error
 
-    def discard(self) -> None:
-        until_s = time.monotonic() + 0.1  # of a device that sends without a pause there is always more
-        while self.read(0.0) and time.monotonic() < until_s:
-            pass
-
     def close(self) -> None:
         self._closed.set()
         self._wake()
@@ -124,17 +116,18 @@ class _Line:
     def _reason(self, error: Exception) -> str:
         return "closed" if self._closed.is_set() else f"the line is gone ({error})"
 
+    @abstractmethod
     def _receive(self, timeout_s: float) -> bytes:
-        raise NotImplementedError
+        """What is there after a wait of at most so long."""
 
-    def _send(self, data: bytes) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _send(self, data: bytes) -> None: ...
 
-    def _wake(self) -> None:
+    def _wake(self) -> None:  # noqa: B027  # where nothing waits for long there is nothing to end
         """End the wait of another thread."""
 
-    def _shut(self) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _shut(self) -> None: ...
 
 
 class _Waited(_Line):
@@ -152,10 +145,11 @@ class _Waited(_Line):
         self._look()
         return b""
 
+    @abstractmethod
     def _take(self) -> bytes:
-        raise NotImplementedError
+        """What is there, now that something is."""
 
-    def _look(self) -> None:
+    def _look(self) -> None:  # a socket tells by itself
         """Nothing came: OSError when nothing can."""
 
     def _wake(self) -> None:

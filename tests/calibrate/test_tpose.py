@@ -1,6 +1,6 @@
 """Calibration from someone who stands in T-pose, against the truth of the simulation."""
 
-import pickle
+import pickle  # of our own, as a worker process sends it
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -216,7 +216,7 @@ def test_a_tracker_that_slid_along_its_limb_is_found_there() -> None:
 def refusal(session: Session, frames: Sequence[TrackerFrame]) -> str:
     with pytest.raises(NotStanding) as caught:
         calibrate_tpose(frames, session.body, session.mounts)
-    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)  # noqa: S301
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)  # noqa: S301  # our own
     return str(caught.value)
 
 

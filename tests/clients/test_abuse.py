@@ -111,7 +111,7 @@ def test_a_client_that_never_reads(tmp_path: Path) -> None:
 
 
 def rubbish() -> Iterable[tuple[str, bytes]]:
-    draw = random.Random(1)  # noqa: S311 (nothing secret)
+    draw = random.Random(1)  # noqa: S311  # rubbish, nothing secret
     yield "no end of line", b"x" * 1_000_000
     yield "lines of nothing", b"\r\n" * 20_000
     yield "binary", bytes(draw.randrange(256) for _ in range(50_000))
@@ -214,7 +214,7 @@ def test_unknown_commands_get_an_error_record_and_change_nothing(port: str) -> N
 
 def asked_while_data_flow(port: str, binary: bool, seconds: float) -> None:
     """All questions, glued, split and at odd moments; nothing but whole records and whole answers comes."""
-    draw = random.Random(2)  # noqa: S311 (nothing secret)
+    draw = random.Random(2)  # noqa: S311  # odd moments, nothing secret
     lists = (b"2,4,1", b"40,2,11,21,1", b"2,11,0", b"2,4,22,23,1")
     sizes = (29, 38, 32, 32) if binary else (47, 72, 53, 60)
     terminal = Terminal(port)

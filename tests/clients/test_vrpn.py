@@ -79,7 +79,7 @@ def test_a_device_that_streams_already(tmp_path: Path) -> None:
     with device(tmp_path, status_bytes=54) as on:
         for _ in range(2):
             client = Vrpn(on.port, wands=(2,))
-            assert client.serve(lambda: len(client.reports) >= 40, LIMIT_S), client.said  # noqa: B023
+            assert client.serve(lambda: len(client.reports) >= 40, LIMIT_S), client.said  # noqa: B023  # asked within the turn
             assert client.said[0] == "resetting, attempt 1"
             assert client.said[-2:] == ["gives status", "reset completed"]
             good(client.reports)

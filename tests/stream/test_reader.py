@@ -196,6 +196,19 @@ def test_many_damaged_bytes_make_no_frame_unsound(share: float) -> None:
         assert sum(int(f.position_valid.sum()) for f in frames) >= 0.9 * intact
 
 
+@pytest.mark.parametrize("trials", [500, pytest.param(100_000, marks=pytest.mark.slow)])
+def test_a_record_under_another_stations_name_is_never_passed_on_unmarked(trials: int) -> None:
+    """Amid sound records, order or time shows it; every station stands at its own number, so a wrong one is seen."""
+    rng, stamp_s = np.random.default_rng(5), stamps_s(12)
+    for trial in range(trials):
+        data, record = bytearray(sent(stamp_s, seed=trial % 50)), int(rng.integers(4, 44))
+        at = record * RECORD + 1
+        data[at] = int(rng.choice([station for station in b"1234" if station != data[at]]))
+        for frame in frames_of(received(bytes(data), stamp_s)):
+            for row in np.flatnonzero(frame.position_valid & ~frame.suspect):
+                assert np.abs(frame.position_m[row] - row).max() < 0.3, (trial, record, row)
+
+
 @pytest.mark.slow
 def test_a_million_mutations() -> None:
     """Bytes lost, added, changed, swapped and repeated all over long captures: no crash, nothing kept, frames sound."""

@@ -122,15 +122,6 @@ def test_a_read_waits_no_longer_than_it_may_and_takes_what_is_there(line: tuple[
     assert ours.read(0.0) == b""
 
 
-def test_discarded_bytes_are_gone_and_later_ones_are_not(line: tuple[Transport, End]) -> None:
-    ours, end = line
-    end.send(b"old" * 100)
-    time.sleep(0.05)
-    ours.discard()
-    end.send(b"new")
-    assert all_of(ours, 3) == b"new"
-
-
 def test_an_end_that_goes_away_is_a_line_lost_after_all_was_read(line: tuple[Transport, End]) -> None:
     ours, end = line
     end.send(b"the last words")

@@ -179,9 +179,6 @@ class BenchLine:
         if self._bench.device:
             self._bench.device.receive(data, self._bench.now_s)
 
-    def discard(self) -> None:
-        self.read(0.0)
-
     def close(self) -> None:
         self._bench.open_lines -= not self._closed
         self._closed = True

@@ -101,7 +101,7 @@ def deaf(bench: Bench, *unheard: bytes) -> Bench:
             data = data.replace(word, b"?" * len(word.rstrip()) + word[len(word.rstrip()) :])
         receive(data, now_s)
 
-    device.receive = told  # type: ignore[method-assign]
+    device.receive = told  # type: ignore[method-assign]  # a wire that eats words
     return bench
 
 
@@ -149,7 +149,7 @@ def test_the_rate_of_the_line_is_found(baud: int) -> None:
     device = bench.device
     assert device is not None
     receive = device.receive
-    device.receive = lambda data, now_s: receive(heard(data), now_s)  # type: ignore[method-assign]
+    device.receive = lambda data, now_s: receive(heard(data), now_s)  # type: ignore[method-assign]  # the wire
     bench.spoil = heard
     with bench.driver() as stream:
         assert stream.baud == baud
@@ -337,7 +337,7 @@ def test_what_is_no_is900_is_refused(device: Callable[[], Device | None], says: 
         (lambda: Wanted(stations=("head", "head")), "a name twice"),
         (lambda: Wanted(rate_hz=-1.0), "180 Hz"),
         (lambda: Wanted(baud=0), "0 baud"),
-        (lambda: Wanted(quality="best"), "Take 'record' or 'mp'"),  # type: ignore[arg-type]
+        (lambda: Wanted(quality="best"), "Take 'record' or 'mp'"),  # type: ignore[arg-type]  # that is it
     ],
 )
 def test_a_wish_that_contradicts_itself_is_refused_at_once(make: Callable[[], Wanted], says: str) -> None:
