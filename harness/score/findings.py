@@ -5,13 +5,12 @@ tables, and figures as the numbers that they are drawn from, so that a page can 
 """
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.fields import build
-from harness.errors import BadFile
+from harness.errors import BadFile, UnknownName
 from harness.score.files import plain, read_json, write_json
 
 SCHEMA = 1
@@ -58,11 +57,11 @@ class Bars:
     title: str
     unit: str
     groups: tuple[str, ...]
-    series: Mapping[str, tuple[float | None, ...]]
+    series: dict[str, tuple[float | None, ...]]
     """Name -> a value for each group."""
-    low: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
-    high: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
-    spread: Mapping[str, tuple[float | None, ...]] = field(default_factory=dict)
+    low: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    high: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    spread: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     """Standard deviations over clips, where the paper shows them."""
     horizontal: bool = False
     kind: Literal["bars"] = "bars"
@@ -76,7 +75,7 @@ class Lines:
     x_label: str
     y_label: str
     x: tuple[float, ...]
-    series: Mapping[str, tuple[float | None, ...]]
+    series: dict[str, tuple[float | None, ...]]
     kind: Literal["lines"] = "lines"
 
 
@@ -113,7 +112,7 @@ class Findings:
     command: str
     seed: int
     experiments: tuple[Experiment, ...]
-    circumstances: Mapping[str, Any]
+    circumstances: dict[str, Any]
     """See `manifest.here`."""
     schema: int = SCHEMA
 
@@ -127,13 +126,6 @@ def read_findings(path: Path) -> Findings:
     expected = "the findings of a paper's study"
     content = read_json(path, expected)
     try:
-        experiments = [_experiment(one) for one in content.pop("experiments")]
-        return Findings(**content, experiments=tuple(experiments))
-    except (KeyError, TypeError, ValueError) as error:
+        return build(Findings, content, "findings")
+    except (TypeError, UnknownName) as error:
         raise BadFile(path, str(error), expected, "Give the command of the study again.") from error
-
-
-def _experiment(content: dict[str, Any]) -> Experiment:
-    figures = [build({"bars": Bars, "lines": Lines}[one["kind"]], one, "figure") for one in content.pop("figures")]
-    made: Experiment = build(Experiment, content, "experiment")
-    return dataclasses.replace(made, figures=tuple(figures))
