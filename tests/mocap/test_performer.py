@@ -2,6 +2,7 @@
 
 import time
 from functools import cache
+from hashlib import blake2b
 
 import numpy as np
 import pytest
@@ -108,6 +109,33 @@ def test_performers_differ_in_proportions_as_people_do() -> None:
         for bone in ("femur", "tibia", "humerus", "hipjoint", "clavicle"):
             left, right = (s.bone_m[s.index(side + bone)] for side in "lr")
             np.testing.assert_allclose(left, right * [1.0, -1.0, 1.0], atol=1e-12)
+
+
+def test_a_population_is_other_people_of_the_same_spread() -> None:
+    many = performer.population(400, seed=3)
+    lengths = np.array([person.length_m for person in many])
+    own = np.array([performer.skeleton(who).length_m for who in performer.performers()])
+    nearest = np.abs(lengths[:, None] - own).max(axis=-1).min()
+    assert nearest > 1e-3, "a performer among them"
+    standard = humanoid24.standard_skeleton()
+    np.testing.assert_allclose(lengths.mean(axis=0), standard.length_m, rtol=0.02)
+    spread_m = dict(zip(standard.names, lengths.std(axis=0), strict=True))
+    for bone, published_m in (("lfemur", 0.027), ("ltibia", 0.018), ("lhumerus", 0.014), ("head", 0.006)):
+        assert 0.5 * published_m < spread_m[bone] < 1.2 * published_m
+
+
+def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
+    few, many, other = (performer.population(count, seed) for count, seed in ((3, 5), (9, 5), (3, 6)))
+    for one, same in zip(few, many, strict=False):
+        np.testing.assert_array_equal(one.bone_m, same.bone_m)
+    lengths = np.array([person.length_m for person in (*many, *other)])
+    assert len(np.unique(lengths.round(9), axis=0)) == 12
+
+
+def test_the_performers_are_the_ones_that_results_were_measured_on() -> None:
+    """Rounded: the last bit of a sine is the machine's."""
+    bones_m = np.round([performer.skeleton(who).bone_m for who in performer.performers()], 9) + 0.0
+    assert blake2b(bones_m.tobytes(), digest_size=8).hexdigest() == "b81940f776d8d094"
 
 
 @on_every_take

@@ -71,7 +71,16 @@ def performers() -> tuple[str, ...]:
 @cache
 def skeleton(performer: str) -> Skeleton:
     """The performer's skeleton; UnknownName."""
-    rng = _rng(performer, "skeleton")
+    return _skeleton(_rng(performer, "skeleton"))
+
+
+def population(count: int, seed: int) -> tuple[Skeleton, ...]:
+    """Skeletons of so many other people of the same spread; none is a performer's, and more leave the first as are."""
+    return tuple(_skeleton(generator(seed, "population", which)) for which in range(count))
+
+
+def _skeleton(rng: np.random.Generator) -> Skeleton:
+    """A draw from the spread."""
     standard = humanoid24.standard_skeleton()
     stature = 1.0 + _STATURE * float(np.clip(rng.normal(), -1.5, 1.5))
     scale, tilt = {}, {}
