@@ -36,7 +36,7 @@ def _line(name: str) -> str:
     motion = scenario.motion
     return (
         f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
-        f"{len(scenario.stations)} stations, {_errors(scenario)}; {len(scenario.methods)} methods"
+        f"{len(scenario.wearing)} stations, {_errors(scenario)}; {len(scenario.methods)} methods"
     )
 
 

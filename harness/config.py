@@ -75,6 +75,9 @@ class Scenario:
     schema: int = SCHEMA
     seed: int = 1
     inputs: tuple[str, ...] = ("pos+ori",)
+    worn: tuple[str, ...] = ()
+    """Which of the stations are worn, all of them if none is named: vary "worn" to compare sets of trackers. The stream
+    has no others, so that one that is not worn is not a lost one."""
     calibration: Literal["exact"] = "exact"
     mount: str = "tibia"
     """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
@@ -94,6 +97,11 @@ class Scenario:
     """What a paper expects of the errors (see `harness.score.orders`)."""
     fault: tuple[Fault, ...] = ()
     """What goes wrong where an emulator plays the scenario (see `harness.stream.emulator`); runs know nothing of it."""
+
+    @property
+    def wearing(self) -> dict[str, Station]:
+        """The stations that are worn, in the order of the table."""
+        return {name: self.stations[name] for name in self.stations if not self.worn or name in self.worn}
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -200,9 +208,13 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         ("motion.test", scenario.motion.test),
         ("methods", scenario.methods),
         ("inputs", scenario.inputs),
+        ("worn", scenario.worn),
     ):
         if len(set(repeated)) < len(repeated):
             refuse(f"{what} names something twice", "each name once", "Remove the second.")
+    for name in scenario.worn:
+        if name not in scenario.stations:
+            refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
     if not 1.0 <= scenario.tracker.rate_hz <= 1000.0:
         refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
     for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):

@@ -156,11 +156,11 @@ def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> 
     for name in scenario.methods:
         registry.resolve(name)
     for name in scenario.inputs:
-        combination(name, tuple(scenario.stations))
-    WireFormat(tuple(scenario.stations), scenario.tracker.rate_hz, scenario.tracker.items)
+        combination(name, tuple(scenario.wearing))
+    WireFormat(tuple(scenario.wearing), scenario.tracker.rate_hz, scenario.tracker.items)
     for mount in mounts_of(scenario):
         place(standard_skeleton(), mount)
-    scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
+    scenario.disturbance.added(noise_of(scenario), tuple(scenario.wearing))
 
 
 def _in_order(todo: list[Job]) -> list[str]:

@@ -74,6 +74,7 @@ def rehearse(
     What is not given is as the scenario has it. UnknownName, BadFile and BadInput as for a run of the scenario.
     """
     asked = load_scenario(scenario)
+    asked = replace(asked, stations=asked.wearing, worn=())
     if stations is not None:
         asked = replace(asked, stations={name: asked.stations[name] for name in _chosen(asked, stations)})
     if rate_hz is not None:

@@ -32,7 +32,7 @@ def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
     """Where the stations are worn."""
     return tuple(
         Mount(name, s.bone, s.along, float(np.deg2rad(s.around_deg)), s.stand_off_m)
-        for name, s in scenario.stations.items()
+        for name, s in scenario.wearing.items()
     )
 
 
@@ -63,13 +63,15 @@ class Setting:
         self._sources: dict[str, str] = {}
 
     def under(self, scenario: Scenario) -> "Setting | None":
-        """The same under other errors of the tracker, sharing motion and what was learnt; None if more differs."""
-        errors = {name: getattr(scenario, name) for name in ("noise", "profile", "components", "disturbance")}
-        if replace(self.scenario, **errors) != scenario:
+        """The same under other errors of the tracker, or with others of its stations worn, sharing motion and what was
+        learnt, which knows of neither; None if more differs."""
+        free = ("noise", "profile", "components", "disturbance", "worn")
+        if replace(self.scenario, **{name: getattr(scenario, name) for name in free}) != scenario:
             return None
         other = copy.copy(self)
         other.scenario = scenario
-        other.__dict__.pop("simulation", None)
+        for own in ("simulation", "_worn"):
+            other.__dict__.pop(own, None)
         return other
 
     def fitted(self, method: Method, name: str) -> Reconstructor:
@@ -102,7 +104,7 @@ class Setting:
     @cached_property
     def simulation(self) -> Simulation:
         scenario = self.scenario
-        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
+        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.wearing))
         tracker = tracker_of(scenario)
         seen = simulate(self.body, self.take, mounts_of(scenario), tracker, noise, seed=scenario.seed)
         if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
@@ -161,8 +163,9 @@ class Setting:
         """
         scenario = self.scenario
         content = asdict(scenario)
-        for many in ("methods", "inputs", "name", "components", "vary", "order", "fault"):
+        for many in ("methods", "inputs", "name", "components", "vary", "order", "fault", "worn"):
             del content[many]
+        content["stations"] = {name: asdict(station) for name, station in scenario.wearing.items()}
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
         del content["motion"]["withheld"]
         learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}

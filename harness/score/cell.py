@@ -193,11 +193,13 @@ def as_row(cell: Cell) -> dict[str, Any]:
 
 
 def varied_text(varied: Mapping[str, Any]) -> str:
-    """As tables have it: "components.echo.share=0.02 noise=clean"; empty when nothing is varied."""
+    """As tables have it: "noise=clean worn=head+torso"; empty when nothing is varied."""
     return " ".join(f"{key}={_short(value)}" for key, value in varied.items())
 
 
 def _short(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
+    if isinstance(value, list | tuple) and value and all(isinstance(name, str) for name in value):
+        return "+".join(value)
     return value if isinstance(value, str) else json.dumps(plain(value), separators=(",", ":"))
