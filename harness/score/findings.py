@@ -63,7 +63,11 @@ class Bars:
     high: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     spread: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     """Standard deviations over clips, where the paper shows them."""
+    published: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    """The paper's own figures, where it prints them; of series that are drawn."""
     horizontal: bool = False
+    caption: str = ""
+    """What the reader should look for, and over what it was measured."""
     kind: Literal["bars"] = "bars"
 
 
@@ -76,6 +80,7 @@ class Lines:
     y_label: str
     x: tuple[float, ...]
     series: dict[str, tuple[float | None, ...]]
+    caption: str = ""
     kind: Literal["lines"] = "lines"
 
 
@@ -114,6 +119,8 @@ class Findings:
     experiments: tuple[Experiment, ...]
     circumstances: dict[str, Any]
     """See `manifest.here`."""
+    tables: tuple[Table, ...] = ()
+    """Of the whole study: databases, clips, what was left out and why, tuned constants and what they were chosen on."""
     schema: int = SCHEMA
 
 
