@@ -9,6 +9,7 @@ from harness.config import Station, load_scenario, shipped_scenarios, variants
 from harness.core.fields import changed
 from harness.core.protocol import Part
 from harness.errors import BadFile, HarnessError, UnknownName
+from harness.score.cell import varied_text
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.noise import level
@@ -84,6 +85,8 @@ def test_a_minimal_scenario_takes_its_name_from_the_file(tmp_path: Path) -> None
         ("[motion]", "[motion]\nlongest_s = nan", "finite"),
         ('bone = "head"', 'bone = "head", around_deg = inf', "finite"),
         ('bone = "head"', 'bone = "head", stand_off_m = -0.1', "0 or more"),
+        ('methods = ["ik"]', 'methods = ["ik"]\nworn = ["haed"]', "'haed'"),
+        ('methods = ["ik"]', 'methods = ["ik"]\nworn = ["head", "head"]', "twice"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -201,6 +204,13 @@ def test_every_combination_of_varied_values_is_a_scenario(tmp_path: Path) -> Non
     assert variants(last) == [({}, last)]
 
 
+def test_what_is_worn_is_taken_from_the_stations_in_their_order(tmp_path: Path) -> None:
+    two = MINIMAL + 'torso = { bone = "thorax" }\n'
+    scenario = load_scenario(written(tmp_path, two + "[vary]\nworn = [[], ['torso'], ['torso', 'head']]\n"))
+    found = {varied_text(varied): tuple(made.wearing) for varied, made in variants(scenario)}
+    assert found == {"worn=[]": ("head", "torso"), "worn=torso": ("torso",), "worn=torso+head": ("head", "torso")}
+
+
 def test_a_component_can_be_varied_away(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL + '[vary]\n"components.echo" = ["none", { share = 0.1 }]\n'))
     without, with_it = (changed(level("default"), made.components, "components") for _, made in variants(scenario))
@@ -221,6 +231,8 @@ def test_a_component_can_be_varied_away(tmp_path: Path) -> None:
         ("motion.test = [['a']]", "cannot be varied"),
         ("methods = [['ik'], ['mean_pose']]", "cannot be varied"),
         ("noise = ['clean', 'loud']", "loud"),
+        ("worn = [['head'], ['torso']]", "'torso' with worn=torso"),
+        ("worn = ['head']", "expected a list"),
     ],
 )
 def test_what_cannot_be_varied_is_refused(tmp_path: Path, line: str, message: str) -> None:

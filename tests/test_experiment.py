@@ -215,6 +215,24 @@ def test_what_is_varied_shares_motion_and_learning_with_the_same_result_as_alone
     assert made == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "varied" / "cells").iterdir()}
 
 
+def test_a_stream_has_the_stations_that_are_worn_and_no_others(tmp_path: Path) -> None:
+    """What is not worn is not lost: one tracker is solved, at one worker or two, as if it were the scenario's only."""
+    worn = replace(SMALL, noise="clean", vary={"worn": [["pelvis"], ["left_hand", "pelvis"]]}, methods=("kernel_cca",))
+    hung = {"pelvis": Station("lhipjoint", along=0.0, around_deg=165.0), **SMALL.stations}
+    experiment.run(replace(worn, stations=hung), tmp_path / "one")
+    experiment.run(replace(worn, stations=hung), tmp_path / "two", jobs=2)
+    experiment.run(replace(worn, stations={"pelvis": hung["pelvis"]}, vary={}), tmp_path / "alone")
+    one, two, alone = (list(read_cells(tmp_path / name)) for name in ("one", "two", "alone"))
+    assert [cell.stations for cell in one] == 2 * [("pelvis",)] + 2 * [("pelvis", "left_hand")]
+    assert [cell.key for cell in one] == [cell.key for cell in two]
+    for cell, other in zip(one, two, strict=True):
+        np.testing.assert_array_equal(cell.estimate_qpos, other.estimate_qpos)
+    for cell, other in zip(one[:2], alone, strict=True):
+        np.testing.assert_array_equal(cell.estimate_qpos, other.estimate_qpos)
+        assert cell.defined_by == other.defined_by
+        assert cell.metrics["frames_held"] == cell.metrics["frames_lost"] == 0
+
+
 def test_a_value_that_changes_nothing_for_a_method_has_a_row_of_its_own(tmp_path: Path) -> None:
     vary = {"motion.examples": [["walking_p1_02"], ["walking_p2_02"]]}
     one = replace(VARIED.motion, test=("walking_p1_01",))

@@ -1,7 +1,10 @@
 """A clip of a scenario made ready to be worn outside a run."""
 
+from pathlib import Path
+
 import pytest
 
+from harness.config import find_scenario
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.rehearsal import rehearse
 
@@ -21,6 +24,16 @@ def test_clip_stations_rate_and_noise_are_put_in() -> None:
     assert made.tracker.slot_s == 0.0
     assert made.setting.behaviour == "boxing"
     assert rehearse("demo", stations=["head", "torso"]).calibration.stations == ("head", "torso")
+
+
+def test_only_what_the_scenario_wears_is_worn(tmp_path: Path) -> None:
+    shipped = find_scenario("demo").read_text(encoding="utf-8")
+    file = tmp_path / "two.toml"
+    file.write_text(shipped.replace("schema = 1", 'schema = 1\nworn = ["torso", "left_hand"]'), encoding="utf-8")
+    made = rehearse(file)
+    assert made.samples.stations == made.calibration.stations == tuple(made.scenario.stations) == ("left_hand", "torso")
+    with pytest.raises(UnknownName, match="Known: left_hand, torso"):
+        rehearse(file, stations=["head"])
 
 
 @pytest.mark.parametrize(

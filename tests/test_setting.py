@@ -103,6 +103,13 @@ def test_equal_scenarios_have_equal_inputs() -> None:
     assert inputs() == inputs(replace(SCENARIO, name="other", methods=("ik:gaussian",)))
 
 
+def test_what_is_not_worn_defines_nothing() -> None:
+    alone = replace(SCENARIO, stations={"torso": Station("thorax")})
+    assert inputs(replace(SCENARIO, worn=("torso",))) == inputs(alone) != inputs()
+    assert inputs(replace(SCENARIO, worn=("torso", "head"))) == inputs()
+    assert "worn" not in inputs()
+
+
 @pytest.mark.parametrize(
     ("changed", "key"),
     [
