@@ -9,7 +9,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.run import Run, Trace, file_name
-from harness.report.style import COLOURS, FAINT, GRID, INK, PAPER, SETTINGS, Chart, bare, line_style, to_svg
+from harness.report.style import COLOURS, FAINT, GRID, INK, PAPER, SETTINGS, Chart, bare, line_style, to_png, to_svg
 from harness.score.pair import hinged_bones, joint_names
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def over_time(run: Run, behaviour: str) -> Chart:
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
         for trace in (trace for trace in shown if trace.series in run.lines):
             values = np.where(trace.scored, trace.errors[ANGLE], np.nan)
-            time_s, values = _thinned(*_with_gaps(trace.time_s, values))
+            time_s, values = thinned(*_with_gaps(trace.time_s, values))
             error.plot(time_s, values, label=trace.series, **line_style(run.lines.index(trace.series)))
         _logarithmic(error, "y")
         error.set_ylabel(UNITS[ANGLE])
@@ -135,15 +135,24 @@ def left_out(run: Run) -> str:
     return f" Shown are the {lines} of {series} with the least error." if lines < series else ""
 
 
-def drawn(name: str, title: str, caption: str, alt: str, draw: Callable[["Figure"], None], height_in: float) -> Chart:
-    """What `draw` puts on a figure as wide as the page."""
+def drawn(
+    name: str,
+    title: str,
+    caption: str,
+    alt: str,
+    draw: Callable[["Figure"], None],
+    height_in: float,
+    *,
+    raster: bool = False,
+) -> Chart:
+    """What `draw` puts on a figure as wide as the page; with `raster` as a PNG too."""
     import matplotlib
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(SETTINGS):
         figure = Figure(figsize=(_WIDTH_IN, height_in), layout="constrained")
         draw(figure)
-        return Chart(name, title, caption, alt, to_svg(figure, name))
+        return Chart(name, title, caption, alt, to_svg(figure, name), to_png(figure) if raster else b"")
 
 
 def _quality(axes: "Axes", trace: Trace) -> None:
@@ -225,7 +234,7 @@ def _with_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     return np.insert(time_s, holes, time_s[holes - 1]), np.insert(values, holes, np.nan)
 
 
-def _thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+def thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Every n-th point of a long line."""
     every = max(1, len(time_s) // _MOST_POINTS)
     return time_s[::every], values[::every]

@@ -1,6 +1,5 @@
-"""The page: one offline HTML file that asks nothing of anyone."""
+"""The page of a run: its verdict, tables and pictures in order."""
 
-import base64
 import json
 import shlex
 from collections.abc import Mapping, Sequence
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.report import orders, recovery, tables, varied
+from harness.report.document import Section, document, embedded, pictured
 from harness.report.markup import Markup, folded, joined, scrolling, table, tag
 from harness.report.run import Run
 from harness.report.style import Chart
@@ -17,10 +17,6 @@ from harness.report.worst import Window
 from harness.score.files import plain
 from harness.score.metrics import DEFINITIONS
 
-_POLICY = (
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
-    "base-uri 'none'; form-action 'none'"
-)
 _WHERE = "Run it where the scenario file and, for recorded motion, the library lie."
 
 
@@ -58,48 +54,29 @@ class Content:
 def page(content: Content) -> str:
     """The whole file."""
     run = content.run
-    style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", f"{run.name}: harness report"),
-        tag("style", Markup(style)),
+    return document(
+        title=f"{run.name}: harness report",
+        kicker=f"harness report · {run.name}",
+        heading=content.verdict.sentence,
+        facts=content.verdict.facts,
+        missing=content.missing,
+        sections=_sections(content),
     )
-    sections = [(title, name, body) for title, name, body in _sections(content) if body]
-    links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in sections))
-    facts = [joined(tag("dt", title), tag("dd", text)) for title, text in content.verdict.facts.items()]
-    if content.missing:
-        gaps = [tag("span", text, tag("br")) for text in content.missing]
-        facts.append(joined(tag("dt", "Missing here"), tag("dd", *gaps, class_="missing")))
-    body = tag(
-        "body",
-        tag(
-            "header",
-            tag("p", f"harness report · {run.name}", class_="kicker"),
-            tag("h1", content.verdict.sentence),
-            tag("dl", *facts, class_="facts"),
-            tag("nav", links, aria_label="sections"),
-        ),
-        tag("main", *(tag("section", tag("h2", title), text, id_=name) for title, name, text in sections)),
-    )
-    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
 
 
-def _sections(content: Content) -> list[tuple[str, str, Markup]]:
+def _sections(content: Content) -> list[Section]:
     run = content.run
     measured = bool(run.cells)
     nothing = Markup()
     return [
-        ("Varied", "varied", joined(*(_chart(chart, 3) for chart in content.varied), varied.tables(run))),
+        ("Varied", "varied", joined(*(pictured(chart, 3) for chart in content.varied), varied.tables(run))),
         ("Expected orders", "orders", orders.section(run.whole)),
         ("Results", "results", tables.results(run) if measured else nothing),
         ("Recovery", "recovery", recovery.section(run.summary)),
         ("Coverage", "coverage", tables.coverage(run)),
-        ("Error over time", "time", joined(*(_chart(chart, 3) for chart in content.over_time))),
-        ("Each joint", "joints", _chart(content.per_joint) if content.per_joint else nothing),
-        ("Error distribution", "cdf", _chart(content.distribution) if content.distribution else nothing),
+        ("Error over time", "time", joined(*(pictured(chart, 3) for chart in content.over_time))),
+        ("Each joint", "joints", pictured(content.per_joint) if content.per_joint else nothing),
+        ("Error distribution", "cdf", pictured(content.distribution) if content.distribution else nothing),
         ("Stream health", "health", tables.health(run) if measured else nothing),
         ("Worst two seconds", "worst", _worst(content) if content.windows else nothing),
         ("In 3-D", "look", _look(content)),
@@ -111,13 +88,6 @@ def _sections(content: Content) -> list[tuple[str, str, Markup]]:
         ("Manifest", "manifest", _manifest(run)),
         ("Reproduce", "reproduce", _reproduce(run)),
     ]
-
-
-def _chart(chart: Chart, level: int = 0) -> Markup:
-    image = tag("img", src=_data(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
-    title = tag(f"h{level}", chart.title) if level else None
-    caption = chart.caption if level else joined(tag("b", f"{chart.title}. "), chart.caption)
-    return joined(title, tag("figure", scrolling(image, chart.title), tag("figcaption", caption), class_="chart"))
 
 
 def _worst(content: Content) -> Markup:
@@ -147,7 +117,7 @@ def _worst(content: Content) -> Markup:
 def _strip(strip: Strip) -> Markup:
     alt = f"Truth and estimate at {len(strip.instants_s)} instants of {strip.title}"
     times = tag("div", *(tag("span", f"{t:.2f} s") for t in strip.instants_s), class_="times")
-    image = tag("img", src=_data(strip.picture.read_bytes(), "image/png"), alt=alt)
+    image = tag("img", src=embedded(strip.picture.read_bytes(), "image/png"), alt=alt)
     means = [f"{window.metric} {_mean(window)} ({_span(window)})" for window in strip.windows]
     caption = joined(tag("b", f"{strip.title}. "), f"Means: {', '.join(means)}.")
     return tag("figure", scrolling(joined(image, times), strip.title), tag("figcaption", caption), class_="strip")
@@ -191,7 +161,3 @@ def _mean(window: Window) -> str:
 
 def _span(window: Window) -> str:
     return f"{window.start_s:.1f}–{window.end_s:.1f} s"
-
-
-def _data(content: bytes, kind: str) -> str:
-    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

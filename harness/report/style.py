@@ -59,10 +59,14 @@ class Chart:
     alt: str
     """What it shows, for those who cannot see it."""
     svg: str
+    png: bytes = b""
+    """The same on white, where one was asked for."""
 
     def write(self, folder: Path) -> None:
-        """As an SVG that any program opens, on white."""
+        """As an SVG that any program opens, and the PNG if there is one."""
         (folder / f"{self.name}.svg").write_text(self.svg, encoding="utf-8")
+        if self.png:
+            (folder / f"{self.name}.png").write_bytes(self.png)
 
     def for_screen(self) -> str:
         """The SVG with ink and grid that follow the reader's light or dark screen."""
@@ -83,6 +87,13 @@ def to_svg(figure: "Figure", name: str) -> str:
     file = io.StringIO()
     with matplotlib.rc_context({**SETTINGS, "svg.hashsalt": name}):
         figure.savefig(file, format="svg", metadata={"Date": None, "Creator": None})
+    return file.getvalue()
+
+
+def to_png(figure: "Figure") -> bytes:
+    """The drawing as a picture on white; the same figure gives the same bytes."""
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=130, facecolor="white", metadata={"Software": None})
     return file.getvalue()
 
 
