@@ -37,6 +37,10 @@ class Mount:
     """Angle around the bone [rad]."""
     stand_off_m: float = 0.01
     """Distance of the tracker's origin from the skin [m]."""
+    beside_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How far from that place it really sits, along its axes there [m]."""
+    turned_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How far it is really turned from those axes, a rotation vector in them [rad]: straps are put on anyhow."""
 
 
 def _mount(station: str, bone: str, along: float, around_deg: float) -> Mount:
@@ -84,8 +88,10 @@ def place(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
             f"Station {mount.station!r} misses its bone: nothing of {mount.bone} is at {mount.along:.2f} along it.",
             "Choose another place along the bone or another angle around it.",
         )
-    turn = np.stack([along, np.cross(outward, along), outward], axis=1)
-    return axis_m + (skin_m + mount.stand_off_m) * outward, rotations.from_matrix(turn)
+    nominal = rotations.from_matrix(np.stack([along, np.cross(outward, along), outward], axis=1))
+    beside_m = rotations.rotate(nominal, np.array(mount.beside_m))
+    turned = rotations.multiply(nominal, rotations.exp(np.array(mount.turned_rad)))
+    return axis_m + (skin_m + mount.stand_off_m) * outward + beside_m, turned
 
 
 def _facing(along: Floats) -> Floats:

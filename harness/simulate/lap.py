@@ -13,6 +13,7 @@ from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import Take
+from harness.simulate.holding import between
 from harness.simulate.noise import Noise
 from harness.simulate.simulate import TrackerConfig, sampling_times_s, sense
 from harness.simulate.trajectory import Trajectory
@@ -63,9 +64,5 @@ def _back(take: Take, last: Floats, first: Floats, duration_s: float) -> Take:
     """From the last configuration to the first, where it stays for what is left of the time."""
     rate_hz = max(_BLEND_HZ, take.rate_hz)
     time_s = np.arange(int(np.ceil(duration_s * rate_hz)) + 1) / rate_hz
-    t = np.clip(time_s / duration_s, 0.0, 1.0)[:, None]
-    course = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
-    turn = rotations.log(rotations.multiply(rotations.inverse(last[3:7]), first[3:7]))
-    qpos = last + course * (first - last)
-    qpos[:, 3:7] = rotations.multiply(last[3:7], rotations.exp(course * turn))
+    qpos = between(last, first, np.clip(time_s / duration_s, 0.0, 1.0))
     return Take(f"{take.name} and back", take.subject, take.source, take.behaviour, rate_hz, qpos)

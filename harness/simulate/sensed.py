@@ -36,10 +36,17 @@ class Sensed:
     """(N, S) what the device's clock says [s]."""
     hits: dict[str, Bools] = field(default_factory=dict)
     """(N, S) readings that a component of this name was at work on, for the record."""
+    session: str = ""
+    """Name of the session, which may have more takes than this one: what lasts for a session is the same in all of
+    them. Without one the take is its own session."""
 
     def draw(self, component: str, station: str) -> np.random.Generator:
         """The generator of one component at one station in one take, independent of all others."""
         return generator(self.seed, "noise", self.take, component, station)
+
+    def draw_of_session(self, component: str, station: str) -> np.random.Generator:
+        """The generator of what a component does to a station for a whole session."""
+        return generator(self.seed, "noise", self.session or self.take, component, station)
 
     def during(self, stations: Collection[str], from_s: float, to_s: float) -> Bools:
         """(N, S) readings of these stations, () for all of them, within a stretch of time; UnknownName."""

@@ -62,17 +62,25 @@ class Simulation:
 
 
 def simulate(
-    body: Body, take: Take, mounts: Sequence[Mount], tracker: TrackerConfig, noise: Noise, *, seed: int
+    body: Body,
+    take: Take,
+    mounts: Sequence[Mount],
+    tracker: TrackerConfig,
+    noise: Noise,
+    *,
+    seed: int,
+    session: str = "",
 ) -> Simulation:
-    """Wear trackers through a take. The calibration is `exact`: the nominal mounts and the true frame of the tracker.
+    """Wear trackers through a take. The calibration is `exact`: the mounts as they are and the tracker's true frame.
 
-    BadInput when the take is shorter than one period.
+    Takes of one `session` share the errors that last for one; without a name the take is its own session. BadInput when
+    the take is shorter than one period.
     """
     wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
     trajectory = Trajectory(body, take)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     calibration = exact_calibration(body, mounts, tracker)
-    sensed = sense(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name)
+    sensed = sense(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
     sent, wire = _transmitted(sensed, wire_format, tracker)
     reader = FrameReader(wire_format)
     frames = (*reader.feed_all(wire), *reader.finish())
@@ -99,7 +107,7 @@ def sampling_times_s(duration_s: float, tracker: TrackerConfig, stations: int) -
 
 
 def exact_calibration(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calibration:
-    """The nominal mounts and the true frame of the tracker."""
+    """The mounts as they are and the true frame of the tracker."""
     places = [place(body.skeleton, mount) for mount in mounts]
     return Calibration(
         kind="exact",
@@ -122,6 +130,7 @@ def sense(
     seed: int,
     take: str,
     begins_s: float = 0.0,
+    session: str = "",
 ) -> Sensed:
     """What the tracker believes at the moments `time_s` (E, S) of a trajectory, before it goes over the line.
 
@@ -144,6 +153,7 @@ def sense(
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
         quality=np.ones(time_s.shape),
         device_s=time_s + begins_s,
+        session=session,
     )
     noise.spoil(sensed)
     return sensed

@@ -25,7 +25,7 @@ class MountOffset:
 
     def spoil(self, sensed: Sensed) -> None:
         for row, station in enumerate(sensed.stations):
-            draw = sensed.draw("mount", station).normal(size=6)
+            draw = sensed.draw_of_session("mount", station).normal(size=6)
             sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], self.position_m * draw[:3])
             turn = rotations.exp(self.orientation_rad * draw[3:])
             sensed.turn[:, row] = rotations.multiply(sensed.turn[:, row], turn)

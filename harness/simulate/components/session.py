@@ -24,6 +24,6 @@ class Session:
 
     def spoil(self, sensed: Sensed) -> None:
         for row, station in enumerate(sensed.stations):
-            offset_m = self.station_offset_m * sensed.draw("session", station).normal(size=3)
+            offset_m = self.station_offset_m * sensed.draw_of_session("session", station).normal(size=3)
             sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], offset_m)
-        sensed.position_m *= 1.0 + self.scale * sensed.draw("session", "").normal()
+        sensed.position_m *= 1.0 + self.scale * sensed.draw_of_session("session", "").normal()
