@@ -42,8 +42,8 @@ def holding(
             beside_m, turned_rad = beside_m + rng.normal(0.0, STEP_M, 2), turned_rad + float(rng.normal(0.0, STEP_RAD))
         held.append(_standing(body, _missed(meant, miss_rad, rng), beside_m, turned_rad))
     time_s = np.arange(round(rate_hz * (len(held) * (hold_s + move_s) - move_s)) + 1) / rate_hz
-    number, since_s = np.divmod(time_s, hold_s + move_s)
-    which = np.minimum(number.astype(int), len(held) - 1)
+    cycle, since_s = np.divmod(time_s, hold_s + move_s)
+    which = np.minimum(cycle.astype(int), len(held) - 1)
     share = np.clip((since_s - hold_s) / max(move_s, 1e-9), 0.0, 1.0)
     poses = np.array([*held, held[-1]])
     qpos = between(poses[which], poses[which + 1], np.where(which == len(held) - 1, 0.0, share))
