@@ -18,7 +18,7 @@ from harness.simulate.link import TrackerConfig
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
-_FIXED = ("schema", "name", "methods", "inputs", "vary", "order", "fault")
+_FIXED = ("schema", "name", "methods", "inputs", "vary", "order", "left_out", "fault")
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,8 @@ class Scenario:
     or with each combination of them when there are several keys."""
     order: tuple[Order, ...] = ()
     """What a paper expects of the errors (see `harness.score.orders`)."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    """Clips, behaviours or experiments that are not here though one would expect them, and why: for the record."""
     fault: tuple[Fault, ...] = ()
     """What goes wrong where an emulator plays the scenario (see `harness.stream.emulator`); runs know nothing of it."""
 

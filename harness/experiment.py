@@ -117,7 +117,9 @@ def run(
         check_names(made, source, parts)
     content = asdict(scenario)
     del content["fault"]  # of an emulator alone: a run is the same with and without
-    results.open_run(out, manifest.of_run(content, motion_source=source.title, command=command))
+    constants = {name: repr(registry.resolve(name)) for name in scenario.methods}
+    described = manifest.of_run(content, motion_source=source.title, command=command, constants=constants)
+    results.open_run(out, described)
     planned = _in_order(todo)
     ended: dict[str, Ended] = {}
     try:

@@ -163,7 +163,7 @@ class Setting:
         """
         scenario = self.scenario
         content = asdict(scenario)
-        for many in ("methods", "inputs", "name", "components", "vary", "order", "fault", "worn"):
+        for many in ("methods", "inputs", "name", "components", "vary", "order", "left_out", "fault", "worn"):
             del content[many]
         content["stations"] = {name: asdict(station) for name, station in scenario.wearing.items()}
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]

@@ -54,13 +54,24 @@ class Manifest:
         return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
 
 
-def of_run(scenario: Mapping[str, Any], *, motion_source: str, command: str) -> Manifest:
-    """The manifest of running a scenario here and now; methods and orders are circumstances, all else is input."""
-    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "order")}
+def of_run(
+    scenario: Mapping[str, Any], *, motion_source: str, command: str, constants: Mapping[str, str] | None = None
+) -> Manifest:
+    """The manifest of running a scenario here and now.
+
+    Methods, their `constants`, orders and what was left out are circumstances, all else is input.
+    """
+    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "order", "left_out")}
     return Manifest(
         inputs={**inputs, "motion_source": motion_source},
         metric_versions=VERSIONS,
-        circumstances={"methods": scenario.get("methods", ()), "command": command, **here()},
+        circumstances={
+            "methods": scenario.get("methods", ()),
+            "constants": constants or {},
+            "left_out": scenario.get("left_out", {}),
+            "command": command,
+            **here(),
+        },
     )
 
 
