@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import emulate, live, motion, record, runs, trust
+from harness.commands import emulate, live, motion, paper, record, runs, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -70,6 +70,7 @@ def build_parser() -> argparse.ArgumentParser:
         live.add_live,
         record.add_record,
         record.add_replay,
+        paper.add_paper,
     ):
         add(verbs)
     return parser

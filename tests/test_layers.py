@@ -25,6 +25,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "live": {"stream", "calibrate", "reconstruct", "body", "mocap"},
     # the bench measures what the tables do
     "bench": (EVERYTHING | {"config", "setting", "progress", "rehearsal"}) - {"study", "testing", "commands"},
+    # many runs and what they come to
+    "study": (EVERYTHING | {"config", "setting", "experiment", "progress"}) - {"bench", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
     "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "recorded", "rehearsal"},
 }

@@ -1,0 +1,45 @@
+"""The verb that reruns a paper's experiments."""
+
+import argparse
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+
+from harness.commands.runs import this_command
+from harness.commands.verb import Verbs, add_verb, positive, say
+from harness.errors import Outcome
+from harness.progress import ProgressBar
+
+
+def add_paper(verbs: Verbs) -> None:
+    text = "rerun every experiment of a paper beside its published figures; resumes what was interrupted"
+    verb = add_verb(verbs, "paper", text, rerun_paper, "out")
+    verb.add_argument("paper", choices=["liu2011", "kim2012"], help="Liu et al. 2011, or Kim, Seol and Lee 2012")
+    text = "on the real motion in this library (default: on the built-in performer)"
+    verb.add_argument("--mocap", type=Path, metavar="DIR", help=text)
+    verb.add_argument("--seed", type=int, default=1, help="of all runs (default 1)")
+    verb.add_argument("--jobs", type=positive, default=2, metavar="N", help="clips at the same time (default 2)")
+
+
+def rerun_paper(args: argparse.Namespace) -> Outcome:
+    from dataclasses import asdict
+
+    from harness.report.paper import text_tables, write_paper
+    from harness.score.files import plain
+    from harness.study.paper import paper, rerun
+
+    out = args.out or Path("results") / (args.paper + ("_cmu" if args.mocap else ""))
+    with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+        findings, outcome = rerun(
+            paper(args.paper),
+            out,
+            library=args.mocap,
+            seed=args.seed,
+            jobs=args.jobs,
+            command=this_command(),
+            progress=bar,
+        )
+    page = write_paper(out)
+    content = {**plain(asdict(findings)), "out": str(out), "report": str(page)}
+    lines = (text_tables(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")
+    return say(args, content, *lines, outcome=outcome)

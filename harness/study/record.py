@@ -1,0 +1,66 @@
+"""What a study rests on, as tables: runs, databases and test clips, what was left out and why, and every constant."""
+
+from collections.abc import Iterator, Sequence
+from itertools import chain
+
+from harness.config import Scenario
+from harness.core.protocol import Part
+from harness.experiment import source_of
+from harness.reconstruct import registry
+from harness.score.cell import varied_text
+from harness.score.findings import Table
+from harness.study.study import Study
+
+CHOSEN = "scenarios/tune_*.toml and validate_*.toml, on real clips that no test clip here is taken from"
+
+
+def record(study: Study) -> tuple[Table, ...]:
+    """Of the whole study."""
+    return (
+        Table("Runs", ("run", "setting", "methods", "inputs", "varied"), tuple(map(_run, study.runs.values()))),
+        Table(
+            "Clips: judged, and learnt from",
+            ("run", "behaviour", "judged", "learnt from, the judged clip left out", "frames learnt from, at most"),
+            tuple(chain.from_iterable(_databases(study, scenario) for scenario in study.runs.values())),
+        ),
+        Table("Left out", ("run", "what", "why"), tuple(chain.from_iterable(map(_left_out, study.runs.values())))),
+        Table(f"Constants of the methods (chosen by {CHOSEN})", ("method", "constants"), _constants(study)),
+    )
+
+
+def _run(scenario: Scenario) -> tuple[str, ...]:
+    motion = scenario.motion
+    setting = (
+        f"{motion.source}, protocol {motion.protocol}, body {motion.body}, calibration {scenario.calibration}, "
+        f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
+        f"stations {', '.join(scenario.stations)}"
+    )
+    varied = varied_text(scenario.vary) or "nothing"
+    return scenario.name, setting, ", ".join(scenario.methods), ", ".join(scenario.inputs), varied
+
+
+def _databases(study: Study, scenario: Scenario) -> Iterator[tuple[str, ...]]:
+    motion = scenario.motion
+    shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
+    source = source_of(motion, study.library, scenario.seed)
+    for behaviour in dict.fromkeys(shown):
+        judged = [clip for clip, what in zip(motion.test, shown, strict=True) if what == behaviour]
+        own = motion.database == "behaviour"
+        learnt = [name for name in motion.examples if not own or source.behaviour(name) == behaviour]
+        frames = (round(_seconds(study, scenario, name) * scenario.tracker.rate_hz) for name in learnt)
+        count = motion.thin_to or sum(frames)
+        yield scenario.name, behaviour, ", ".join(judged), f"{len(learnt)}: {', '.join(learnt)}", f"{count:,}"
+
+
+def _seconds(study: Study, scenario: Scenario, name: str) -> float:
+    clip = source_of(scenario.motion, study.library, scenario.seed).load(Part.parse(name).clip)
+    return len(clip) / clip.rate_hz
+
+
+def _left_out(scenario: Scenario) -> list[tuple[str, ...]]:
+    return [(scenario.name, what, why) for what, why in scenario.left_out.items()]
+
+
+def _constants(study: Study) -> tuple[tuple[str, ...], ...]:
+    names: Sequence[str] = list(dict.fromkeys(chain.from_iterable(s.methods for s in study.runs.values())))
+    return tuple((name, repr(registry.resolve(name))) for name in names)
