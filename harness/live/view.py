@@ -15,6 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton
 from harness.core.workers import ctrl_c_ignored
 from harness.errors import BadFile, BadInput, MissingExtra
@@ -56,10 +57,18 @@ class Shared:
         """Unless the other process is looking at this very moment."""
         if self._lock.acquire(block=False):
             try:
-                self._memory[:3] = [pose.number, pose.measured_s, pose.estimate.status]
-                self._memory[3:] = pose.estimate.qpos
+                self._fill(pose.number, pose.measured_s, pose.estimate.status, pose.estimate.qpos)
             finally:
                 self._lock.release()
+
+    def set(self, number: int, qpos: Floats) -> None:
+        """A pose of no time, as soon as nobody is looking."""
+        with self._lock:
+            self._fill(number, 0.0, Status.SOLVED, qpos)
+
+    def _fill(self, number: int, at_s: float, status: Status, qpos: Floats) -> None:
+        self._memory[:3] = [number, at_s, status]
+        self._memory[3:] = qpos
 
     def get(self) -> Floats:
         """(3 + 55,) as above; the number is -1 before the first."""
@@ -99,13 +108,21 @@ class View:
 
     def send(self, pose: LivePose) -> None:
         """OSError when the process is gone."""
+        self._require_process()
+        self._shared.put(pose)
+
+    def show(self, number: int, qpos: Floats) -> None:
+        """A configuration (55,) to look at until the next one; OSError as `send`."""
+        self._require_process()
+        self._shared.set(number, qpos)
+
+    def _require_process(self) -> None:
         if self._ours.poll():
             try:
                 said = str(self._ours.recv())
             except EOFError:
                 said = "its process ended"
             raise OSError(said)
-        self._shared.put(pose)
 
     def close(self) -> None:
         self._ours.close()

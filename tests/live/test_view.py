@@ -85,3 +85,15 @@ def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     (tmp_path / "file").write_text("")
     with pytest.raises(BadFile, match="cannot be made"):
         View("frames", OWN, tmp_path / "file", force=False)
+
+
+def test_a_pose_is_shown_until_the_next(tmp_path: Path) -> None:
+    shown = View("frames", OWN, tmp_path / "frames", force=False)
+    try:
+        for number in (1, 2):
+            shown.show(number, np.array(humanoid.tpose(OWN)))
+            assert [path.name for path in wait_for(number, tmp_path / "frames")] == [
+                f"{n:08d}.png" for n in range(1, number + 1)
+            ]
+    finally:
+        shown.close()
