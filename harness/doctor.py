@@ -74,10 +74,10 @@ def _optional() -> list[Check]:
 
 def _picture() -> str:
     """Why no picture can be rendered here, "" if one was."""
-    standing = humanoid.tpose(standard_skeleton())[None]
+    standing, bone_m = humanoid.tpose(standard_skeleton())[None], standard_skeleton().bone_m
     with TemporaryDirectory(prefix="harness-doctor-") as folder:
         file = Path(folder) / "picture.png"
-        return Rendering([Job(file, standard_skeleton().bone_m, standing, standing)]).finish()
+        return Rendering([Job(file, bone_m, bone_m, standing, standing)]).finish()
 
 
 def _library(folder: Path | None) -> Check:

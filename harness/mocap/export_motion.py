@@ -28,6 +28,8 @@ class Exportable(Protocol):
     @property
     def bone_m(self) -> Floats: ...
     @property
+    def estimate_bone_m(self) -> Floats: ...
+    @property
     def time_s(self) -> Floats: ...
     @property
     def frame_index(self) -> Ints: ...
@@ -72,13 +74,13 @@ class Motion:
 
 
 def truth_and_estimate(cell: Exportable) -> dict[str, Motion]:
-    """Both motions of a cell, at the frames whose estimate is finite."""
+    """Both motions of a cell, each on its own skeleton, at the frames whose estimate is finite."""
     known = np.isfinite(cell.estimate_qpos).all(axis=1)
-    skeleton = standard_skeleton().with_bones(cell.bone_m)
     extra = {"status": cell.status[known].astype(float)} | {name: e[known] for name, e in cell.errors.items()}
     time_s, frame_index = cell.time_s[known], cell.frame_index[known]
 
-    def motion(qpos: Floats, extra: Mapping[str, Floats]) -> Motion:
+    def motion(qpos: Floats, bone_m: Floats, extra: Mapping[str, Floats]) -> Motion:
+        skeleton = standard_skeleton().with_bones(bone_m)
         root_m, quaternion, angles_rad = unpack(qpos[known])
         world_from_root = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
         pose = forward(skeleton, root_m, world_from_root, angles_rad)
@@ -88,4 +90,7 @@ def truth_and_estimate(cell: Exportable) -> dict[str, Motion]:
             angles_rad, joints_m, pose.world_from_bone, extra,
         )  # fmt: skip
 
-    return {"truth": motion(cell.truth_qpos, {}), "estimate": motion(cell.estimate_qpos, extra)}
+    return {
+        "truth": motion(cell.truth_qpos, cell.bone_m, {}),
+        "estimate": motion(cell.estimate_qpos, cell.estimate_bone_m, extra),
+    }

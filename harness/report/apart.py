@@ -30,7 +30,9 @@ class Job:
 
     output: Path
     bone_m: Floats
-    """(B, 3) of the body [m]."""
+    """(B, 3) of the true body [m]."""
+    estimate_bone_m: Floats
+    """(B, 3) of the estimated one [m]."""
     truth_qpos: Floats
     """(K, 55)."""
     estimate_qpos: Floats
@@ -94,6 +96,7 @@ class Rendering:
             np.savez(
                 files[-1],
                 bone_m=job.bone_m,
+                estimate_bone_m=job.estimate_bone_m,
                 truth_qpos=job.truth_qpos,
                 estimate_qpos=job.estimate_qpos,
                 fps=np.array(job.fps),

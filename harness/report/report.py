@@ -12,13 +12,12 @@ from harness.report import figures, varied
 from harness.report.apart import Job, Progress, Rendering
 from harness.report.markup import Markup
 from harness.report.page import Content, Strip, page
-from harness.report.run import WORST_METRICS, Run, file_name, read_run
+from harness.report.run import WORST_METRICS, Run, both_posed, file_name, read_run
 from harness.report.scrubber import Shot, scrubber
 from harness.report.verdict import HEADLINE, verdict
 from harness.report.worst import Window, together, worst_of, worst_window
 from harness.score.cell import Cell
 from harness.score.files import write_text
-from harness.score.pair import posed
 
 _INSTANTS = 5
 """Pictures in a strip."""
@@ -117,7 +116,12 @@ def _strip(run: Run, windows: Sequence[Window], plots: Path) -> Strip:
 
 def _strip_job(cell: Cell, run: Run, strip: Strip) -> Job:
     rows = _instants(run, strip.windows[0])
-    return Job(strip.picture, cell.bone_m, cell.truth_qpos[rows], cell.estimate_qpos[rows])
+    return _job(strip.picture, cell, rows)
+
+
+def _job(output: Path, cell: Cell, rows: Ints, fps: float = 0.0, title: str = "") -> Job:
+    shown = cell.truth_qpos[rows], cell.estimate_qpos[rows]
+    return Job(output, cell.bone_m, cell.estimate_bone_m, *shown, fps, title)
 
 
 def _scrubber(
@@ -133,11 +137,9 @@ def _scrubber(
 
 def _shot(run: Run, series: str, windows: Sequence[Window], cell: Cell) -> Shot:
     rows = _rows(run, windows[0])
-    skeleton = standard_skeleton().with_bones(cell.bone_m)
-    truth, estimate = (posed(skeleton, qpos[rows]) for qpos in (cell.truth_qpos, cell.estimate_qpos))
     metrics = ", ".join(window.metric for window in windows)
     title = f"{series} on {cell.clip}, {windows[0].start_s:.1f}–{windows[0].end_s:.1f} s: {metrics}"
-    return Shot(title, cell.time_s[rows].tolist(), truth, estimate)
+    return Shot(title, cell.time_s[rows].tolist(), *both_posed(cell, rows))
 
 
 def _movies(run: Run, reader: Callable[[str], Cell], progress: Progress) -> tuple[list[Path], str]:
@@ -164,7 +166,7 @@ def _movie_job(cell: Cell, series: str, out: Path) -> Job:
     shown_s = np.arange(time_s[0], time_s[-1] + 1e-9, 1.0 / fps)
     rows = known[np.searchsorted(time_s, shown_s + 1e-6, side="right") - 1]
     path = out / f"movie_{file_name(series)}_{file_name(cell.clip)}_{cell.key[:8]}.mp4"
-    return Job(path, cell.bone_m, cell.truth_qpos[rows], cell.estimate_qpos[rows], fps, f"{series} on {cell.clip}")
+    return _job(path, cell, rows, fps, f"{series} on {cell.clip}")
 
 
 def movie_fps(rate_hz: float) -> float:

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.arrays import Bools, Floats
+from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.style import STYLES
 from harness.score.angles import local_errors_deg
 from harness.score.cell import Cell, cell_folder, varied_text
 from harness.score.manifest import Manifest
-from harness.score.pair import Pair, posed
+from harness.score.pair import Pair, Posed, posed
 from harness.score.positions import joint_errors_mm
 from harness.score.results import read_cell, read_summary
 from harness.score.summary import GROUP
@@ -165,10 +165,14 @@ def _trace(run: Run, cell: Cell) -> Trace:
 
 def pair_of(cell: Cell) -> Pair:
     """Truth and estimate of the scored frames."""
-    skeleton = standard_skeleton().with_bones(cell.bone_m)
     rows = cell.scores.scored
-    truth, estimate = (posed(skeleton, qpos[rows]) for qpos in (cell.truth_qpos, cell.estimate_qpos))
-    return Pair(truth, estimate, cell.frame_index[rows], cell.rate_hz)
+    return Pair(*both_posed(cell, rows), cell.frame_index[rows], cell.rate_hz)
+
+
+def both_posed(cell: Cell, rows: Bools | Ints) -> tuple[Posed, Posed]:
+    """Truth and estimate at some of its frames, each on its own skeleton."""
+    true, believed = (standard_skeleton().with_bones(bone_m) for bone_m in (cell.bone_m, cell.estimate_bone_m))
+    return posed(true, cell.truth_qpos[rows]), posed(believed, cell.estimate_qpos[rows])
 
 
 def file_name(text: str) -> str:

@@ -19,11 +19,11 @@ TRUTH, ESTIMATE = "#5b87ad", "#e8850c"
 class Scene:
     """One stage for many pictures of two bodies."""
 
-    def __init__(self, skeleton: Skeleton, size: tuple[int, int], heading_rad: float) -> None:
+    def __init__(self, true: Skeleton, estimated: Skeleton, size: tuple[int, int], heading_rad: float) -> None:
         """`size` in pixels; `heading_rad` is where the body faces, to see it from ahead and from the side."""
         self._stage = Stage(size, heading_rad)
-        self._truth = Figure(self._stage.plotter, skeleton, TRUTH, girth=1.0, opacity=0.3)
-        self._estimate = Figure(self._stage.plotter, skeleton, ESTIMATE, girth=0.5, opacity=1.0)
+        self._truth = Figure(self._stage.plotter, true, TRUTH, girth=1.0, opacity=0.3)
+        self._estimate = Figure(self._stage.plotter, estimated, ESTIMATE, girth=0.5, opacity=1.0)
 
     def picture(self, truth: Posed, estimate: Posed, frame: int) -> np.ndarray:
         """(height, width, 3) bytes of one frame of both motions."""

@@ -23,8 +23,8 @@ STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
 def main(jobs: Sequence[str]) -> None:
     for job in jobs:
         with np.load(job, allow_pickle=False) as content:
-            skeleton = standard_skeleton().with_bones(content["bone_m"])
-            truth, estimate = posed(skeleton, content["truth_qpos"]), posed(skeleton, content["estimate_qpos"])
+            true, believed = (standard_skeleton().with_bones(content[name]) for name in ("bone_m", "estimate_bone_m"))
+            truth, estimate = posed(true, content["truth_qpos"]), posed(believed, content["estimate_qpos"])
             output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
         beside = output.with_name(f".unfinished-{output.name}")
         if fps:
@@ -73,7 +73,7 @@ def _captioned(picture: Floats, title: str, time_s: float) -> bytes:
 
 def _pictures(truth: Posed, estimate: Posed, size: tuple[int, int]) -> Iterator[Floats]:
     """(height, width, 3) bytes of every frame."""
-    scene = Scene(truth.skeleton, size, heading_rad(truth))
+    scene = Scene(truth.skeleton, estimate.skeleton, size, heading_rad(truth))
     try:
         for frame in range(len(truth.root_m)):
             yield scene.picture(truth, estimate, frame)

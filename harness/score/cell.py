@@ -39,7 +39,10 @@ IDENTITY = (
 """What a row of the summary says about its cell first, in this order."""
 FURTHER = ("performer", "varied")
 """What it says besides."""
-_TEXTS = (*IDENTITY, *FURTHER, "key", "defined_by", "health", "bone_m", "source_hash", "reproduce", "notes")
+_TEXTS = (
+    *(*IDENTITY, *FURTHER, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
+    *("source_hash", "reproduce", "notes"),
+)
 _FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "quality")
 _INTS = ("frame_index", "status")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
@@ -70,7 +73,7 @@ class Cell:
     health: Mapping[str, Any]
     """Counts of what the stream lost, repeated or doubted."""
     bone_m: Floats
-    """(B, 3) bone vectors of the body, so that poses can be drawn again [m]."""
+    """(B, 3) bone vectors of the true body, so that poses can be drawn again [m]."""
     source_hash: str
     """Of the package that computed it."""
     reproduce: str
@@ -101,10 +104,17 @@ class Cell:
     when there are no examples at all."""
     varied: Mapping[str, Any] = field(default_factory=dict)
     """Scenario key -> value, of the keys that the scenario varies."""
+    calibration_errors: Mapping[str, float] = field(default_factory=dict)
+    """How far what calibration found is from the truth, by name (see `harness.calibrated`); empty where it is exact."""
+    estimate_bone_m: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    """(B, 3) bone vectors of the body that the method believed in [m]; by default those of the true one."""
 
     def __post_init__(self) -> None:
         frames, stations = len(self.time_s), len(self.stations)
-        freeze(self, bone_m=("B", 3), time_s=(frames,), step_ms=(frames,), quality=(frames, stations))
+        if not len(self.estimate_bone_m):
+            object.__setattr__(self, "estimate_bone_m", self.bone_m)
+        freeze(self, bone_m=("B", 3), estimate_bone_m=("B", 3))
+        freeze(self, time_s=(frames,), step_ms=(frames,), quality=(frames, stations))
         freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
         freeze(self, np.int64, frame_index=(frames,), status=(frames,))
         freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))
@@ -189,6 +199,7 @@ def as_row(cell: Cell) -> dict[str, Any]:
     """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
     row, further = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, FURTHER))
     rest = {"key": cell.key, "source_hash": cell.source_hash, "health": plain(cell.health)}
+    rest["calibration_errors"] = plain(cell.calibration_errors)
     return {**row, **cell.metrics, **further, **rest}
 
 

@@ -79,7 +79,8 @@ def bones_named(skeleton: Skeleton, names: Sequence[str]) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Pair:
-    """F frames of which both truth and estimate are known."""
+    """F frames of which both truth and estimate are known, each posed on a skeleton of its own: they differ when bone
+    lengths had to be found by calibration. Bones and hinges are the same ones."""
 
     truth: Posed
     estimate: Posed

@@ -42,11 +42,13 @@ def score(
     status: Ints,
     step_ms: Floats,
     *,
+    estimate_skeleton: Skeleton | None = None,
     warm_up_s: float = WARM_UP_S,
     floor: float = COVERAGE_FLOOR,
 ) -> Scores:
     """Judge F estimates of E true frames at an even rate.
 
+    The truth stands on `skeleton`, the estimate on the one that its method believed in: the same by default.
     `truth_qpos` (E, 55), `estimate_qpos` (F, 55), `frame_index` (F,) the true frame that each estimate is of,
     strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed. Raises ShapeError and BadInput.
     """
@@ -61,7 +63,8 @@ def score(
     truth = posed(skeleton, truth_qpos)
     ground_m = contact.ground_m(truth) if len(truth_qpos) else 0.0
     known = frame_index[finite]
-    pair = Pair(truth.at(known), posed(skeleton, estimate_qpos[finite]), known, rate_hz, ground_m)
+    estimate = posed(estimate_skeleton or skeleton, estimate_qpos[finite])
+    pair = Pair(truth.at(known), estimate, known, rate_hz, ground_m)
     per_frame = {name: np.full(len(frame_index), np.nan) for name in FRAME_METRICS}
     for name, function in FRAME_METRICS.items():
         if len(known):

@@ -11,7 +11,7 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
-from harness.core.skeleton import forward
+from harness.core.skeleton import Skeleton, forward
 from harness.errors import BadInput, UnknownName
 from harness.mocap.bvh import read_bvh
 from harness.mocap.export import FORMATS, export
@@ -23,6 +23,8 @@ from harness.score.positions import root_position_mm
 
 FRAMES, RATE_HZ = 50, 40.0
 SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)
+BELIEVED = standard_skeleton().with_bones(standard_skeleton().bone_m * 0.9)
+"""What the estimate stands on, as after a calibration that erred."""
 NAMES = ("root", *SKELETON.names)
 
 
@@ -38,6 +40,7 @@ class Written:
     inputs: str = "pos+ori"
     rate_hz: float = RATE_HZ
     bone_m: Floats = field(default_factory=lambda: SKELETON.bone_m)
+    estimate_bone_m: Floats = field(default_factory=lambda: BELIEVED.bone_m)
     frame_index: Ints = field(default_factory=lambda: np.arange(FRAMES))
     status: Ints = field(default_factory=lambda: np.zeros(FRAMES, dtype=np.int64))
     errors: Mapping[str, Floats] = field(default_factory=lambda: {"mpjpe_mm": np.full(FRAMES, 12.5)})
@@ -58,9 +61,9 @@ def cell(rng: np.random.Generator) -> Written:
     return Written(motion(), motion())
 
 
-def joints_m(qpos: Floats) -> Floats:
+def joints_m(qpos: Floats, skeleton: Skeleton) -> Floats:
     root_m, quaternion, angles_rad = unpack(qpos)
-    pose = forward(SKELETON, root_m, quaternion, angles_rad)
+    pose = forward(skeleton, root_m, quaternion, angles_rad)
     return np.concatenate([root_m[:, None], pose.end_m], axis=1)
 
 
@@ -68,14 +71,15 @@ def test_pymotion_reads_the_same_joint_centres_from_bvh(cell: Written, tmp_path:
     from pymotion.io.bvh import BVH
     from pymotion.ops.skeleton import fk
 
-    for file, qpos in zip(export([cell], "bvh", tmp_path), (cell.truth_qpos, cell.estimate_qpos), strict=True):
+    motions = (cell.truth_qpos, SKELETON), (cell.estimate_qpos, BELIEVED)
+    for file, motion in zip(export([cell], "bvh", tmp_path), motions, strict=True):
         bvh = BVH()
         bvh.load(str(file))
         turned, position, parents, offsets, ends, end_parents = bvh.get_data()
         assert bvh.data["frame_time"] == pytest.approx(1 / RATE_HZ)
         assert list(bvh.data["names"]) == list(NAMES)
         place_cm, rotation = fk(turned, position[:, 0], offsets, parents)
-        expected_cm = 100.0 * joints_m(qpos)[..., [1, 2, 0]]  # x left, y up, z forward
+        expected_cm = 100.0 * joints_m(*motion)[..., [1, 2, 0]]  # x left, y up, z forward
         np.testing.assert_allclose(place_cm[:, 0], expected_cm[:, 0], atol=1e-3)
         for bone, parent in enumerate(SKELETON.parents):
             np.testing.assert_allclose(place_cm[:, 1 + bone], expected_cm[:, 1 + parent], atol=1e-3)
@@ -117,7 +121,7 @@ def test_trc_has_the_joint_centres_y_up_and_mot_the_angles(cell: Written, tmp_pa
     np.testing.assert_array_equal(table[:, 0], np.arange(1, FRAMES + 1))
     np.testing.assert_allclose(table[:, 1], cell.time_s, atol=1e-6)
     place = table[:, 2:].reshape(FRAMES, 25, 3)
-    expected = 1e3 * joints_m(cell.estimate_qpos)
+    expected = 1e3 * joints_m(cell.estimate_qpos, BELIEVED)
     np.testing.assert_allclose(place[..., 0], expected[..., 0], atol=1e-3)
     np.testing.assert_allclose(place[..., 1], expected[..., 2], atol=1e-3)
     np.testing.assert_allclose(place[..., 2], -expected[..., 1], atol=1e-3)
@@ -136,7 +140,9 @@ def test_csv_has_a_row_a_frame_with_units_in_its_columns(cell: Written, tmp_path
     with estimate.open() as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == FRAMES
-    assert float(rows[7]["lhand_z_m"]) == pytest.approx(joints_m(cell.estimate_qpos)[7, NAMES.index("lhand"), 2])
+    assert float(rows[7]["lhand_z_m"]) == pytest.approx(
+        joints_m(cell.estimate_qpos, BELIEVED)[7, NAMES.index("lhand"), 2]
+    )
     dof = SKELETON.dof_names.index("lradius.rx")
     assert float(rows[7]["lradius.rx_deg"]) == pytest.approx(np.rad2deg(unpack(cell.estimate_qpos)[2][7, dof]))
     assert (rows[7]["frame"], rows[7]["status"], rows[7]["mpjpe_mm"], rows[3]["mpjpe_mm"]) == ("7", "0", "12.5", "")
@@ -149,7 +155,9 @@ def test_tum_has_a_trajectory_a_point(cell: Written, tmp_path: Path) -> None:
     for point in ("root", "rfoot"):
         table = np.loadtxt(next(f for f in files if f.name.endswith(f"estimate.{point}.tum")))
         np.testing.assert_allclose(table[:, 0], cell.time_s)
-        np.testing.assert_allclose(table[:, 1:4], joints_m(cell.estimate_qpos)[:, NAMES.index(point)], atol=1e-8)
+        np.testing.assert_allclose(
+            table[:, 1:4], joints_m(cell.estimate_qpos, BELIEVED)[:, NAMES.index(point)], atol=1e-8
+        )
         pose = posed(SKELETON, cell.estimate_qpos)
         bone = rotations.from_matrix(pose.world_from_bone[:, SKELETON.index("rfoot")])
         expected = cell.estimate_qpos[:, 3:7] if point == "root" else bone

@@ -35,7 +35,7 @@ def truth_qpos(rng: np.random.Generator) -> Floats:
 def judge(truth_qpos: Floats) -> Judge:
     """Scores of an estimate (F, 55) of the true motion, by default of every frame and without warm-up."""
 
-    def judged(estimate_qpos: Floats, frame_index: Ints | None = None, **options: float) -> Scores:
+    def judged(estimate_qpos: Floats, frame_index: Ints | None = None, **options: Any) -> Scores:
         index = np.arange(len(estimate_qpos)) if frame_index is None else frame_index
         status = np.full(len(index), Status.SOLVED)
         step_ms = np.full(len(index), 2.0)

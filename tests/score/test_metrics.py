@@ -38,6 +38,29 @@ def test_the_tables_agree() -> None:
         assert name.endswith(endings.get(definition.unit, "")), name
 
 
+def test_a_larger_body_in_the_right_pose_is_off_by_as_much_as_it_is_larger(judge: Judge, truth_qpos: Floats) -> None:
+    """Angles know nothing of lengths; each joint is off by a tenth of its distance from the root."""
+    larger = SKELETON.with_bones(1.1 * SKELETON.bone_m)
+    scores = judge(truth_qpos, estimate_skeleton=larger)
+    for name in ("joint_angle_mean_deg", "mpjre_deg", "root_position_mm", "root_angle_deg"):
+        assert scores.metrics[name] == 0.0, name
+    reach_m = np.linalg.norm(posed(SKELETON, truth_qpos).joints_m - truth_qpos[:, None, :3], axis=2)
+    np.testing.assert_allclose(scores.per_frame["mpjpe_mm"], 100.0 * reach_m.mean(axis=1), rtol=1e-9)
+    np.testing.assert_allclose(scores.per_frame["mpjpe_root_mm"], 100.0 * reach_m.mean(axis=1), rtol=1e-9)
+
+
+def test_one_bone_too_long_moves_what_it_carries(judge: Judge, truth_qpos: Floats) -> None:
+    """A right forearm 20 mm too long takes wrist, hand's joint and fingertips along: three joints of 25."""
+    bone_m = np.array(SKELETON.bone_m)
+    forearm = SKELETON.index("rradius")
+    bone_m[forearm] *= 1.0 + 0.02 / SKELETON.length_m[forearm]
+    scores = judge(truth_qpos, estimate_skeleton=SKELETON.with_bones(bone_m))
+    assert scores.metrics["mpjpe_mm"] == pytest.approx(20.0 * 3 / 25, rel=1e-9)
+    off = {name: value for name, value in scores.per_joint["mpjpe_mm"].items() if value > 1e-9}
+    assert off == pytest.approx({"rradius": 20.0, "rwrist": 20.0, "rhand": 20.0}, rel=1e-9)
+    assert scores.metrics["joint_angle_mean_deg"] == 0.0
+
+
 def test_the_truth_scores_zero(judge: Judge, truth_qpos: Floats) -> None:
     found = judge(truth_qpos).metrics
     beside = {
