@@ -24,16 +24,20 @@ MAY_IMPORT: dict[str, set[str]] = {
     # writes BVH as an export does; there is no truth in a live session that its wall would have to hide
     "live": {"stream", "calibrate", "reconstruct", "body", "mocap"},
     # the bench measures what the tables do
-    "bench": (EVERYTHING | {"config", "setting", "progress", "rehearsal"}) - {"study", "testing", "commands"},
+    "bench": (EVERYTHING | {"config", "contest", "setting", "progress", "rehearsal", "trials"})
+    - {"study", "testing", "commands"},
     # many runs and what they come to
-    "study": (EVERYTHING | {"config", "setting", "experiment", "progress"}) - {"bench", "testing", "commands"},
+    "study": (EVERYTHING | {"config", "contest", "experiment", "progress", "setting", "trials"})
+    - {"bench", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
     "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "recorded", "rehearsal"},
 }
 TOP = {
+    "calibrated",
     "cli",
     "catalogue",
     "config",
+    "contest",
     "doctor",
     "errors",
     "experiment",
@@ -41,6 +45,7 @@ TOP = {
     "recorded",
     "rehearsal",
     "setting",
+    "trials",
     "__init__",
     "__main__",
 }

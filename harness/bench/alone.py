@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from scipy.linalg import solve
 
-from harness.bench import trials
+from harness import trials
 from harness.core.seeds import generator
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Reconstructor
@@ -41,7 +41,7 @@ def alone(name: str, folder: Path, seed: int) -> int:
     _follow(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), shown)
     if name != NOTHING:
         database = MotionDatabase.open(folder)
-        _follow(trials.fitted(registry.resolve(name), body, database, generator(seed, "method", name)), shown)
+        _follow(trials.learner(name, database, seed), shown)
     return peak_bytes()
 
 

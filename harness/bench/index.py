@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from harness import trials
 from harness.bench.rows import Row
 from harness.body import humanoid, mounts
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Ints, Singles
 from harness.core.calibration import Calibration
-from harness.core.humanoid24 import pack
 from harness.core.motion import Take
 from harness.core.seeds import generator
 from harness.mocap import performer
@@ -33,7 +33,7 @@ from harness.reconstruct.local_examples import LocalExamples, Weights
 from harness.reconstruct.local_pca import LocalPca
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
-RATE_HZ, TAKE_S, SIZES = 40.0, 20.0, (6_600, 66_000)
+SIZES = (6_600, 66_000)
 TURN, TURNS = 40, 2
 """Queries in a row, and how often, in each of five held-out takes."""
 POSES, EXAMPLES, NEIGHBOURS = 2, 100, 8
@@ -55,26 +55,15 @@ class Search:
 
 
 def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[Row]:
-    """Medians over the queries, for sets of about so many frames of every kind."""
+    """Medians over the queries, for sets of so many frames of every kind."""
     body = humanoid.build()
-    held_out = [built_in(which, seed + 1_000_000) for which in range(len(performer.BEHAVIOURS))]
+    held_out = trials.held_out(len(performer.BEHAVIOURS), seed, trials.TAKE_S)
     rows: list[Row] = []
     for size in sizes:
-        takes = (built_in(which, seed) for which in range(-(-size // round(TAKE_S * RATE_HZ))))
-        database = MotionDatabase.build(body, takes)
+        database = MotionDatabase.build(body, trials.makers(size, seed))
         for kind in KINDS:
             rows += _compared(kind(body, database, held_out))
     return rows
-
-
-def built_in(which: int, seed: int) -> Take:
-    """One of endlessly many takes: behaviours and performers in turn, then a new seed; the angles as they are."""
-    behaviours, people = performer.BEHAVIOURS, performer.performers()
-    again, which = divmod(which, len(behaviours) * len(people))
-    behaviour, who = behaviours[which % len(behaviours)], people[which // len(behaviours)]
-    clip = performer.generate(behaviour, who, 1, seed=seed + again, duration_s=TAKE_S, rate_hz=RATE_HZ)
-    qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)
-    return Take(f"{clip.name}_{seed + again}", clip.subject, clip.source, clip.behaviour, RATE_HZ, qpos)
 
 
 def poses(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:

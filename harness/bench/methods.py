@@ -7,27 +7,26 @@ all alike. What memory and a larger database cost is measured in processes of th
 
 import hashlib
 import tempfile
-import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from harness.bench import index, trials
+from harness import trials
+from harness.bench import index
 from harness.bench.alone import NOTHING, run_alone
 from harness.bench.rows import Row
-from harness.bench.trials import Progress, Trial
 from harness.body import humanoid
 from harness.config import load_scenario
+from harness.contest import Follower, Progress, Tally, contest, following
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.seeds import generator
 from harness.mocap import performer
 from harness.progress import ProgressBar
 from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Reconstructor, Session
+from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.database.ground import POSTURE
 from harness.reconstruct.dynamic_map import DynamicMap
@@ -36,30 +35,17 @@ from harness.reconstruct.index.choose import AUTO
 from harness.reconstruct.local_pca import LocalPca
 from harness.setting import mounts_of
 from harness.stream.frame import TrackerFrame
+from harness.trials import Trial
 
 HELD_TO = {"dynamic_map": 1000, "local_pca": 1000, "kernel_cca": 2000, "weighted_blend": 2000}
 """Frames a second on one core, final inverse kinematics included where the method ends with it."""
 BESIDE = ("kernel_ridge", "ik")
 FRAMES, LARGE = 66_000, 1_000_000
-SECONDS, TURN = 9.0, 40
-"""Of every held-out take; frames of one contender in a row."""
+SECONDS = 9.0
+"""Of every held-out take."""
 REFERENCE, MINK = "ik", "mink"
 WORKERS = 2
 RATIO_P99, RATIO_MEMORY, RATIO_LARGE = 3.0, 1.3, 1.5
-
-
-@dataclass
-class Tally:
-    """One contender's turns."""
-
-    turn_s: list[float] = field(default_factory=list)
-    step_ms: list[float] = field(default_factory=list)
-    error_deg: list[float] = field(default_factory=list)
-
-    @property
-    def fps(self) -> float:
-        """The median turn's."""
-        return TURN / float(np.median(self.turn_s))
 
 
 def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
@@ -69,9 +55,9 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
     with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
         small, vast = Path(folder) / "small", Path(folder) / "large"
         with ProgressBar("takes") as bar:
-            learnt = trials.database(small, FRAMES, seed, WORKERS, bar)
+            learnt = database(small, FRAMES, seed, bar)
         with ProgressBar("turns") as bar:
-            tallies = contest({name: learner(name, learnt, seed) for name in others}, seed, bar)
+            tallies = beside_mink({name: trials.learner(name, learnt, seed) for name in others}, seed, bar)
         nothing = run_alone(NOTHING, small, seed)
         with ProgressBar("methods") as bar:
             for done, name in enumerate(HELD_TO):
@@ -79,7 +65,7 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
                 others[name].append(memory_row(name, nothing, run_alone(name, small, seed), len(learnt)))
         if large:
             with ProgressBar("takes") as bar:
-                many = trials.database(vast, LARGE, seed, WORKERS, bar)
+                many = database(vast, LARGE, seed, bar)
             for name in HELD_TO:
                 with ProgressBar(name) as bar:
                     others[name].append(slower_row(name, learnt, many, seed, bar))
@@ -89,9 +75,10 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
     return [*rows, *recalls]
 
 
-def learner(name: str, learnt: MotionDatabase, seed: int) -> Reconstructor:
-    """A method that has learnt from a database."""
-    return trials.fitted(registry.resolve(name), trials.body(), learnt, generator(seed, "method", name))
+def database(folder: Path, frames: int, seed: int, progress: Progress) -> MotionDatabase:
+    """So many frames of built-in takes, on disk and memory-mapped."""
+    takes = trials.makers(frames, seed)
+    return MotionDatabase.build(trials.body(), takes, workers=WORKERS, progress=progress, folder=folder)
 
 
 def rows_of(name: str, tallies: dict[str, Tally], others: Sequence[Row]) -> list[Row]:
@@ -130,7 +117,8 @@ def memory_row(name: str, nothing_bytes: int, peak_bytes: int, frames: int) -> R
 
 def slower_row(name: str, few: MotionDatabase, many: MotionDatabase, seed: int, progress: Progress) -> Row:
     """What a larger database costs: both take turns."""
-    tallies = contest({"few": learner(name, few, seed), "many": learner(name, many, seed)}, seed, progress, mink=False)
+    both = {which: following(trials.learner(name, known, seed)) for which, known in (("few", few), ("many", many))}
+    tallies = contest(both, trials.trials(seed, SECONDS), progress)
     few_ms, many_ms = (float(np.median(tallies[which].step_ms)) for which in ("few", "many"))
     text = f"{many_ms:.3f} against {few_ms:.3f} ms a step, {len(many):,} against {len(few):,} frames"
     ratio = _ratio(tallies["many"], tallies["few"])
@@ -139,7 +127,7 @@ def slower_row(name: str, few: MotionDatabase, many: MotionDatabase, seed: int, 
 
 def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
     """The share of the true neighbours that each method's index finds, for every so manyth query."""
-    held_out = [index.built_in(which, seed + trials.HELD_OUT) for which in range(len(performer.BEHAVIOURS))]
+    held_out = trials.held_out(len(performer.BEHAVIOURS), seed, trials.TAKE_S)
     rows = []
     for kind in (index.readings, index.both, index.evidence):
         search = kind(trials.body(), learnt, held_out)
@@ -174,48 +162,10 @@ def _ratio(other: Tally, own: Tally) -> float:
     return float(np.median(np.array(other.turn_s) / np.array(own.turn_s)))
 
 
-Follower = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
-"""Takes a frame and the true pose of the one before to a configuration (55,) and the seconds that it took."""
-
-
-def contest(
-    fitted: Mapping[str, Reconstructor], seed: int, progress: Progress, *, mink: bool = True
-) -> dict[str, Tally]:
-    """All contenders on all held-out takes, in turns; the first second of a take is not counted."""
-    shown = trials.trials(seed, SECONDS)
-    tallies = {name: Tally() for name in (*fitted, *([MINK] if mink else []))}
-    planned = sum(len(trial.simulation.frames) // TURN for trial in shown)
-    done = 0
-    for trial in shown:
-        worn = trial.simulation.calibration
-        followers = {name: _following(learner.begin(worn)) for name, learner in fitted.items()}
-        if mink:
-            followers[MINK] = _mink(trial)
-        count = len(trial.simulation.frames)
-        for start in range(0, count - TURN + 1, TURN):
-            progress(trial.take, done, planned)
-            done += 1
-            for name, follow in followers.items():
-                turn = [
-                    follow(trial.simulation.frames[t], trial.truth[max(t - 1, 0)]) for t in range(start, start + TURN)
-                ]
-                if start >= trials.WARM_UP:
-                    found, seconds = np.array([qpos for qpos, _ in turn]), [spent for _, spent in turn]
-                    tallies[name].turn_s.append(sum(seconds))
-                    tallies[name].step_ms += [1e3 * spent for spent in seconds]
-                    tallies[name].error_deg.append(trials.error_deg(found, trial.truth[start : start + TURN]))
-    return tallies
-
-
-def _following(session: Session) -> Follower:
-    step = session.step
-
-    def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
-        begin = time.perf_counter()
-        qpos = step(frame).qpos
-        return qpos, time.perf_counter() - begin
-
-    return follow
+def beside_mink(fitted: Mapping[str, Reconstructor], seed: int, progress: Progress) -> dict[str, Tally]:
+    """The contest of these and mink on the first seconds of a held-out take of each behaviour."""
+    contenders = {name: following(learnt) for name, learnt in fitted.items()}
+    return contest({**contenders, MINK: _mink}, trials.trials(seed, SECONDS), progress)
 
 
 def _mink(trial: Trial) -> Follower:

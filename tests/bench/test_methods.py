@@ -8,41 +8,26 @@ import pytest
 
 pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 
-from harness.bench import alone, methods, trials
+from harness import trials
+from harness.bench import alone, methods
 from harness.bench.alone import NOTHING
-from harness.core.seeds import generator
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two takes of each behaviour, one of them of the performer who is followed."""
+    """Ten takes, two of each behaviour, one of them of the performer who is followed."""
     where = tmp_path_factory.mktemp("bench") / "database"
-    trials.database(where, 8_000, 1, 1)
+    MotionDatabase.build(trials.body(), trials.makers(8_000, 1), folder=where)
     return where
-
-
-def test_a_database_of_takes_with_distinct_seeds(folder: Path) -> None:
-    learnt = MotionDatabase.open(folder)
-    assert len(learnt) >= 8_000
-    assert len({run.take for run in learnt.runs}) == len(learnt.runs)
-    assert len({run.behaviour for run in learnt.runs}) == 5
-    assert not {run.take for run in learnt.runs} & {trial.take for trial in trials.trials(1, 2.0)}
-
-
-def test_takes_of_a_database_are_its_motion(folder: Path) -> None:
-    learnt = MotionDatabase.open(folder)
-    again = MotionDatabase.build(trials.body(), trials.takes(learnt)[:2])
-    np.testing.assert_allclose(again.posture, learnt.posture[: len(again)], atol=1e-5)
-    np.testing.assert_allclose(again.step, learnt.step[: len(again)], atol=1e-4)
 
 
 def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(methods, "SECONDS", 2.0)
     learnt = MotionDatabase.open(folder)
-    fitted = {name: methods.learner(name, learnt, 1) for name in ("weighted_blend", "ik")}
-    tallies = methods.contest(fitted, 1, lambda *_: None)
+    fitted = {name: trials.learner(name, learnt, 1) for name in ("weighted_blend", "ik")}
+    tallies = methods.beside_mink(fitted, 1, lambda *_: None)
     assert set(tallies) == {"weighted_blend", "ik", "mink"}
     assert {len(tally.turn_s) for tally in tallies.values()} == {5}
     memory = methods.memory_row("weighted_blend", 0, 1_000_000, 1_000)
@@ -77,14 +62,6 @@ def test_memory_is_that_of_the_process_alone(folder: Path) -> None:
     assert nothing > 50e6
     if sys.platform == "linux":
         assert nothing < alone.peak_bytes()
-
-
-def test_a_method_takes_what_it_is_given(folder: Path) -> None:
-    learner = trials.fitted(registry.resolve("ik"), trials.body(), MotionDatabase.open(folder), generator(1, "test"))
-    trial = trials.trials(1, 1.0)[0]
-    session = learner.begin(trial.simulation.calibration)
-    found = np.array([session.step(frame).qpos for frame in trial.simulation.frames])
-    assert trials.error_deg(found, trial.truth) < 8.0
 
 
 def test_recall_is_judged_by_exact_search(folder: Path) -> None:

@@ -1,0 +1,67 @@
+"""A contest: all contenders meet the same frames in turns, and warm-up counts for nothing but itself."""
+
+import numpy as np
+import pytest
+
+from harness import trials
+from harness.contest import TURN, Follower, contest, following
+from harness.core.arrays import Floats
+from harness.reconstruct.database import MotionDatabase
+from harness.stream.frame import TrackerFrame
+from harness.trials import WARM_UP, Trial
+
+
+@pytest.fixture(scope="module")
+def shown() -> list[Trial]:
+    return trials.trials_of(trials.held_out(2, 1, 4.1), 1, trials.scenario())
+
+
+def test_contenders_take_turns_and_meet_every_frame_once(shown: list[Trial]) -> None:
+    met: list[tuple[str, float]] = []
+    tallies = contest({name: Begin(name, met) for name in ("one", "other")}, shown, lambda *_: None)
+    turns = [met[at : at + TURN] for at in range(0, len(met), TURN)]
+    assert all(len({name for name, _ in turn}) == 1 for turn in turns)
+    assert [turn[0][0] for turn in turns] == ["one", "other"] * (len(turns) // 2)
+    times = {name: [t for who, t in met if who == name] for name in tallies}
+    assert times["one"] == times["other"]
+    expected = [f.received_s for s in shown for f in s.simulation.frames[: len(s.simulation.frames) // TURN * TURN]]
+    assert times["one"] == expected
+
+
+def test_the_first_second_counts_for_nothing_and_the_first_frame_for_itself(shown: list[Trial]) -> None:
+    tally = contest({"one": Begin("one", [])}, shown, lambda *_: None)["one"]
+    turns = sum(len(s.simulation.frames) // TURN - WARM_UP // TURN for s in shown)
+    assert len(tally.turn_s) == len(tally.error_deg) == turns
+    assert len(tally.step_ms) == turns * TURN
+    assert tally.first_ms == pytest.approx([5_000.0] * len(shown))
+    assert tally.step_ms == pytest.approx([2.0] * len(tally.step_ms))
+    assert tally.fps == pytest.approx(500.0)
+    assert tally.error_deg == pytest.approx([0.0] * turns)
+
+
+def test_what_follows_learns_nothing_of_the_truth(shown: list[Trial]) -> None:
+    learnt = MotionDatabase.build(trials.body(), trials.makers(801, 1))
+    follow = following(trials.learner("ik", learnt, 1))
+    frames = shown[0].simulation.frames[:5]
+    paths = []
+    for before in (shown[0].truth[0], np.zeros(55)):
+        step = follow(shown[0])
+        paths.append([step(frame, before)[0] for frame in frames])
+    np.testing.assert_array_equal(paths[0], paths[1])
+
+
+class Begin:
+    """Answers the truth, and says that the first frame took 5 s and any other 2 ms."""
+
+    def __init__(self, name: str, met: list[tuple[str, float]]) -> None:
+        self.name, self.met = name, met
+
+    def __call__(self, trial: Trial) -> Follower:
+        truth = iter(trial.truth)
+        first = trial.simulation.frames[0].received_s
+
+        def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
+            self.met.append((self.name, frame.received_s))
+            return next(truth), 5.0 if frame.received_s == first else 2e-3
+
+        return follow
