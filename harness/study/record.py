@@ -2,9 +2,10 @@
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
+from typing import Any
 
 from harness.config import Scenario
-from harness.core.protocol import Part
+from harness.core.protocol import Part, allowed_frames
 from harness.experiment import source_of
 from harness.reconstruct import registry
 from harness.score.cell import varied_text
@@ -33,10 +34,16 @@ def _run(scenario: Scenario) -> tuple[str, ...]:
     setting = (
         f"{motion.source}, protocol {motion.protocol}, body {motion.body}, calibration {scenario.calibration}, "
         f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
-        f"stations {', '.join(scenario.stations)}"
+        f"stations {', '.join(scenario.wearing)}"
     )
-    varied = varied_text(scenario.vary) or "nothing"
-    return scenario.name, setting, ", ".join(scenario.methods), ", ".join(scenario.inputs), varied
+    varied = [f"{key}: {', '.join(_text(key, value) for value in values)}" for key, values in scenario.vary.items()]
+    methods, inputs = ", ".join(scenario.methods), ", ".join(scenario.inputs)
+    return scenario.name, setting, methods, inputs, "; ".join(varied) or "nothing"
+
+
+def _text(key: str, value: Any) -> str:
+    """A varied value alone, as tables have it."""
+    return varied_text({key: value}).removeprefix(f"{key}=")
 
 
 def _databases(study: Study, scenario: Scenario) -> Iterator[tuple[str, ...]]:
@@ -53,8 +60,10 @@ def _databases(study: Study, scenario: Scenario) -> Iterator[tuple[str, ...]]:
 
 
 def _seconds(study: Study, scenario: Scenario, name: str) -> float:
+    """Of an example, without what is withheld."""
     clip = source_of(scenario.motion, study.library, scenario.seed).load(Part.parse(name).clip)
-    return len(clip) / clip.rate_hz
+    withheld = map(Part.parse, scenario.motion.withheld)
+    return sum(map(len, allowed_frames(withheld, clip.name, len(clip), clip.rate_hz))) / clip.rate_hz
 
 
 def _left_out(scenario: Scenario) -> list[tuple[str, ...]]:

@@ -46,6 +46,14 @@ def best_of_its_size(behaviour: str, suited: str, sets: Sets) -> Claim:
     return errs_less(claim, sets.get(suited, {}), others.get(rival, {}), published="called suitable")
 
 
+def better_than_average(behaviour: str, suited: str, sets: Sets) -> Claim:
+    """The same held against what the other sets of as many come to on average."""
+    others = {name: errors for name, errors in sets.items() if size(name) == size(suited) and name != suited}
+    average = averaged(others).get(size(suited), {})
+    text = f"{behaviour}: {suited} errs less than the other sets of {size(suited)} trackers on average"
+    return errs_less(text, sets.get(suited, {}), average, published="called suitable")
+
+
 def falls_with_each(behaviour: str, sets: Sets) -> Claim:
     """That the error, averaged over all sets of so many trackers, falls with each tracker more.
 
@@ -128,10 +136,14 @@ def set_table(title: str, angles: Sets, positions: Sets, whole: str) -> Table:
     """Every set with both its errors, and how many times that of the `whole` set it errs."""
     base = _mean(angles.get(whole, {}))
     rows = [
-        (name, mean_text(errors), mean_text(positions.get(name, {}), 0), f"{_mean(errors) / base:.2f}")
+        (name, mean_text(errors), mean_text(positions.get(name, {}), 0), _times(_mean(errors) / base))
         for name, errors in sorted(angles.items(), key=lambda each: (size(each[0]), _mean(each[1])))
     ]
     return Table(title, ("trackers", "joint angles [deg]", "joint centres [mm]", "times all five"), tuple(rows))
+
+
+def _times(ratio: float) -> str:
+    return f"{ratio:.2f}" if np.isfinite(ratio) else "not measured"
 
 
 def _mean(errors: Errors) -> float:
