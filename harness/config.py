@@ -14,6 +14,7 @@ from harness.errors import BadFile, BadInput, UnknownName
 from harness.score.cell import varied_text
 from harness.score.orders import Order
 from harness.simulate.disturbance import Disturbance
+from harness.simulate.limits import require
 from harness.simulate.link import TrackerConfig
 from harness.stream.emulator.faults import Fault
 
@@ -64,6 +65,24 @@ class Station:
 
 
 @dataclass(frozen=True)
+class Calibrating:
+    """How a performer stands model for a calibration, and how the trackers then really sit."""
+
+    miss_deg: float = 2.5
+    """How far each hinge, and the lean of the body, misses each pose, standard deviation [deg]."""
+    hold_s: float = 3.0
+    """How long each pose is held [s]."""
+    beside_m: float = 0.0
+    """How far trackers sit from their nominal mounts, standard deviation along each of their axes [m]. Part of the
+    simulated world, for every kind of calibration: `exact` knows it, the others have to find it."""
+    turned_deg: float = 0.0
+    """How far they are turned there, standard deviation about each of their axes [deg]; 180 is practically anyhow."""
+
+    def __post_init__(self) -> None:
+        require(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
+
+
+@dataclass(frozen=True)
 class Scenario:
     """One experiment: every test clip, with every method and every choice of inputs."""
 
@@ -78,7 +97,11 @@ class Scenario:
     worn: tuple[str, ...] = ()
     """Which of the stations are worn, all of them if none is named: vary "worn" to compare sets of trackers. The stream
     has no others, so that one that is not worn is not a lost one."""
-    calibration: Literal["exact"] = "exact"
+    calibration: Literal["exact", "tpose"] = "exact"
+    """What methods are told of trackers, room and body: the truth; or what a T-pose tells of trackers and room
+    (bone lengths are known). Vary it to see what calibrating costs."""
+    calibrating: Calibrating = field(default_factory=Calibrating)
+    """How that is done."""
     mount: str = "tibia"
     """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)

@@ -19,6 +19,7 @@ import numpy as np
 from harness.body.mounts import place
 from harness.config import Motion, Scenario, variants
 from harness.core.arrays import Floats, Ints
+from harness.core.calibration import Calibration
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.protocol import Part
 from harness.core.workers import call_each
@@ -216,7 +217,8 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
     """Fit, run causally over the stream, score."""
     scenario, simulation = setting.scenario, setting.simulation
     seen = combination(planned.inputs, simulation.stations)
-    qpos, status, step_ms = reconstruct(setting.fitted(method, planned.method), simulation, seen)
+    known, fitted = setting.calibrated, setting.fitted(method, planned.method)
+    qpos, status, step_ms = reconstruct(fitted, known.calibration, simulation, seen)
     scores = score(
         setting.body.skeleton,
         scenario.tracker.rate_hz,
@@ -225,6 +227,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         simulation.frame_index,
         status,
         step_ms,
+        estimate_skeleton=known.body.skeleton,
     )
     frames = simulation.frames
     return results.Cell(
@@ -238,7 +241,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         rate_hz=scenario.tracker.rate_hz,
         inputs=planned.inputs,
         protocol=scenario.motion.protocol if method.needs_examples else "none",
-        calibration=simulation.calibration.kind,
+        calibration=known.calibration.kind,
         noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,
         performer=setting.performer,
@@ -246,7 +249,9 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         defined_by=setting.inputs_of(method, planned.inputs),
         scores=scores,
         health=simulation.health,
+        calibration_errors=known.errors,
         bone_m=setting.body.skeleton.bone_m,
+        estimate_bone_m=known.body.skeleton.bone_m,
         source_hash=manifest.source_hash(),
         reproduce=command,
         notes=setting.notes(method),
@@ -263,9 +268,11 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
     )
 
 
-def reconstruct(reconstructor: Reconstructor, simulation: Simulation, inputs: Inputs) -> tuple[Floats, Ints, Floats]:
+def reconstruct(
+    reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
+) -> tuple[Floats, Ints, Floats]:
     """Estimates (F, 55), status (F,) and wall time of each step [ms] (F,); the truth stays on this side."""
-    session = reconstructor.begin(simulation.calibration)
+    session = reconstructor.begin(calibration)
     qpos, status, step_ms = [], [], []
     for frame in simulation.frames:
         shown = inputs.masked(frame)

@@ -14,7 +14,7 @@ from harness.errors import BadInput, UnknownName
 from harness.experiment import check_names, source_of
 from harness.setting import Setting, mounts_of, noise_of, tracker_of
 from harness.simulate.lap import lap
-from harness.simulate.simulate import Simulation, TrackerConfig, exact_calibration
+from harness.simulate.simulate import Simulation, TrackerConfig
 from harness.stream.samples import Samples
 
 
@@ -39,13 +39,13 @@ class Rehearsal:
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
-        """Where the stations are worn."""
+        """Where the stations are said to be worn."""
         return mounts_of(self.scenario)
 
     @property
     def calibration(self) -> Calibration:
-        """Exact: the nominal mounts and the true frame of the tracker."""
-        return exact_calibration(self.body, self.mounts, self.tracker)
+        """Exact: the mounts as they are and the true frame of the tracker."""
+        return self.setting.session.exact
 
     @property
     def simulation(self) -> Simulation:
@@ -56,7 +56,8 @@ class Rehearsal:
     def samples(self) -> Samples:
         """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
         noise = self.scenario.disturbance.added(noise_of(self.scenario), tuple(self.scenario.stations))
-        return lap(self.body, self.setting.take, self.mounts, self.tracker, noise, seed=self.scenario.seed)
+        worn = self.setting.session.strapped
+        return lap(self.body, self.setting.take, worn, self.tracker, noise, seed=self.scenario.seed)
 
 
 def rehearse(
@@ -71,7 +72,8 @@ def rehearse(
 ) -> Rehearsal:
     """A clip of a scenario (its first by default), with the first so many of its stations or those that are named.
 
-    What is not given is as the scenario has it. UnknownName, BadFile and BadInput as for a run of the scenario.
+    What is not given is as the scenario has it, but for the calibration: `exact`, until somebody calibrates.
+    UnknownName, BadFile and BadInput as for a run of the scenario.
     """
     asked = load_scenario(scenario)
     asked = replace(asked, stations=asked.wearing, worn=())
@@ -83,7 +85,7 @@ def rehearse(
         asked = replace(asked, noise=noise)  # type: ignore[arg-type]  # `noise_of` refuses other names
     if seed is not None:
         asked = replace(asked, seed=seed)
-    asked = replace(asked, vary={}, inputs=("pos+ori",))
+    asked = replace(asked, vary={}, inputs=("pos+ori",), calibration="exact")
     part = Part.parse(clip or asked.motion.test[0])
     source = source_of(asked.motion, folder, asked.seed)
     check_names(asked, source, [part])

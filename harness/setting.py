@@ -9,6 +9,7 @@ import numpy as np
 
 from harness.body import humanoid, retarget
 from harness.body.mounts import Mount, place
+from harness.calibrated import Calibrated, TrackerSession, by_tpose, exactly
 from harness.config import Scenario
 from harness.core.fields import changed
 from harness.core.humanoid24 import BONES, standard_skeleton
@@ -25,11 +26,12 @@ from harness.score.score import WARM_UP_S
 from harness.simulate import noise as noises
 from harness.simulate.noise import Noise
 from harness.simulate.simulate import Simulation, TrackerConfig, simulate
+from harness.simulate.strapped import strapped
 from harness.simulate.trajectory import Trajectory
 
 
 def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
-    """Where the stations are worn."""
+    """Where the stations are said to be worn."""
     return tuple(
         Mount(name, s.bone, s.along, float(np.deg2rad(s.around_deg)), s.stand_off_m)
         for name, s in scenario.wearing.items()
@@ -63,14 +65,14 @@ class Setting:
         self._sources: dict[str, str] = {}
 
     def under(self, scenario: Scenario) -> "Setting | None":
-        """The same under other errors of the tracker, or with others of its stations worn, sharing motion and what was
-        learnt, which knows of neither; None if more differs."""
-        free = ("noise", "profile", "components", "disturbance", "worn")
+        """The same under other errors of the tracker, with others of its stations worn or calibrated otherwise, sharing
+        motion and what was learnt, which knows of none of these; None if more differs."""
+        free = ("noise", "profile", "components", "disturbance", "worn", "calibration", "calibrating")
         if replace(self.scenario, **{name: getattr(scenario, name) for name in free}) != scenario:
             return None
         other = copy.copy(self)
         other.scenario = scenario
-        for own in ("simulation", "_worn"):
+        for own in ("session", "calibrated", "simulation", "_worn"):
             other.__dict__.pop(own, None)
         return other
 
@@ -78,11 +80,33 @@ class Setting:
         """The method of that name, trained once on what the protocol lets it see."""
         if name not in self._fitted:
             rng = generator(self.scenario.seed, "method", registry.without_options(name))
-            self._fitted[name] = method.fit(self.body, self.examples if method.needs_examples else [], rng)
+            examples = self.examples if method.needs_examples else []
+            self._fitted[name] = method.fit(self.calibrated.body, examples, rng)
         return self._fitted[name]
 
     @cached_property
+    def session(self) -> TrackerSession:
+        """What is true while the trackers are worn."""
+        scenario, how, nominal = self.scenario, self.scenario.calibrating, mounts_of(self.scenario)
+        turned_rad, name = float(np.deg2rad(how.turned_deg)), str(self.part)
+        worn = strapped(nominal, beside_m=how.beside_m, turned_rad=turned_rad, seed=scenario.seed, session=name)
+        tracker, noise = tracker_of(scenario), noise_of(scenario)
+        return TrackerSession(name, scenario.seed, self.body, nominal, worn, tracker, noise)
+
+    @cached_property
+    def calibrated(self) -> Calibrated:
+        """What methods go by; NotStanding when the performer's model cannot be calibrated from."""
+        how = self.scenario.calibrating
+        model = {"miss_rad": float(np.deg2rad(how.miss_deg)), "hold_s": how.hold_s}
+        match self.scenario.calibration:
+            case "exact":
+                return exactly(self.session)
+            case "tpose":
+                return by_tpose(self.session, **model)
+
+    @cached_property
     def body(self) -> humanoid.Body:
+        """The performer's, in truth."""
         if self.scenario.motion.body == "own":
             return humanoid.build(self.clip.skeleton.subset(BONES)[0])
         return humanoid.build(standard_skeleton())
@@ -103,10 +127,9 @@ class Setting:
 
     @cached_property
     def simulation(self) -> Simulation:
-        scenario = self.scenario
-        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.wearing))
-        tracker = tracker_of(scenario)
-        seen = simulate(self.body, self.take, mounts_of(scenario), tracker, noise, seed=scenario.seed)
+        scenario, tracker = self.scenario, self.session.tracker
+        noise = scenario.disturbance.added(self.session.noise, tuple(scenario.wearing))
+        seen = simulate(self.body, self.take, self.session.strapped, tracker, noise, seed=scenario.seed)
         if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
             found = f"{self.part} is judged for {len(seen.truth_s) / tracker.rate_hz:.2f} s"
             raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
@@ -168,6 +191,8 @@ class Setting:
         content["stations"] = {name: asdict(station) for name, station in scenario.wearing.items()}
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
         del content["motion"]["withheld"]
+        if scenario.calibration == "exact":
+            del content["calibrating"]  # nobody stands model, and where trackers sit is in the digest of the mounts
         learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}
         return {
             **content,
@@ -185,18 +210,19 @@ class Setting:
 
     @cached_property
     def _worn(self) -> dict[str, str]:
-        """Digests of the body and of where the stations sit on it."""
+        """Digests of the body and of where the stations really sit on it."""
         skeleton = self.body.skeleton
-        worn = [array for mount in mounts_of(self.scenario) for array in place(skeleton, mount)]
+        worn = [array for mount in self.session.strapped for array in place(skeleton, mount)]
         body = results.digest(skeleton.bone_m, skeleton.axes, self.body.limits_rad)
         return {"body_digest": body, "mounts_digest": results.digest(*worn)}
 
     def notes(self, method: Method) -> tuple[str, ...]:
-        """What a reader should know of the motion: notes of the clip, and what retargeting to another body cost."""
+        """What a reader should know: notes of the clip, what was calibrated, what retargeting to another body cost."""
         used = [self.clip, *(self.example_clips if method.needs_examples else [])]
         reports = [self._retargeted[clip.name] for clip in used if clip.name in self._retargeted]
+        told = (*self.clip.notes, *self.calibrated.notes)
         if not reports:
-            return self.clip.notes
+            return told
         deviation_mm = np.mean([report.deviation_mm for report in reports])
         worst = max(reports, key=lambda report: report.deviation_mm)
         soles_mm = [x for report in reports for x in (report.float_mm, report.sink_mm) if np.isfinite(x)]
@@ -206,7 +232,7 @@ class Setting:
             f"centres {deviation_mm:.0f} mm off on average, {worst.deviation_mm:.0f} mm in {worst.clip}"
         )
         soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
-        return (*self.clip.notes, note + soles)
+        return (*told, note + soles)
 
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
         """Of a cell; the varied values count even where they change nothing for the method."""

@@ -87,7 +87,9 @@ def test_a_recording_scores_as_the_simulation_does(played: Rehearsal, simulated:
     simulation = played.simulation
     for one in judged:
         fitted = played.setting.fitted(registry.resolve(one.method), one.method)
-        qpos, status, step_ms = reconstruct(fitted, simulation, combination("pos+ori", simulation.stations))
+        qpos, status, step_ms = reconstruct(
+            fitted, simulation.calibration, simulation, combination("pos+ori", simulation.stations)
+        )
         assert not (status == Status.LOST).all()
         truth = simulation.truth_qpos, qpos, simulation.frame_index, status, step_ms
         scores = score(played.body.skeleton, played.tracker.rate_hz, *truth)
