@@ -15,17 +15,12 @@ from harness.core.humanoid24 import BONES
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.mocap import performer
-from harness.mocap.skeletons import skeletons
 from harness.score.findings import Bars, Claim, Experiment, Lines, Table
-from harness.study.study import Study
 
 MODES, PUBLISHED = 5, 0.99
 """The paper keeps five modes, and about 99 % of the variation with them."""
 _ROUND = 0.005
 """What "about 99 %" may have been rounded from."""
-PEOPLE = 20
-"""Of the built-in population: as many as the CMU skeletons that its spread was taken from."""
 _SHOWN = 12
 """Modes on the curve."""
 _DRAWS = 200
@@ -95,14 +90,6 @@ def kept_by_count(length_m: Floats, counts: range, seed: int) -> Floats:
             shares[row, draw] = eigenmodes(length_m[chosen]).kept[MODES - 1]
     out: Floats = np.quantile(shares, [0.0, 0.5, 1.0], axis=1).T
     return out
-
-
-def experiment(study: Study) -> Experiment:
-    """Of the people whose ASF files the library has; without a library, of a population drawn from their spread."""
-    if study.library is not None:
-        return bone_modes(skeletons(study.library), "the ASF files of the library", measured=True, seed=study.seed)
-    drawn = {str(which): person for which, person in enumerate(performer.population(PEOPLE, study.seed))}
-    return bone_modes(drawn, "people drawn from the spread of 20 CMU skeletons", measured=False, seed=study.seed)
 
 
 def bone_modes(people: Mapping[str, Skeleton], source: str, *, measured: bool, seed: int) -> Experiment:

@@ -13,7 +13,6 @@ from harness.mocap.skeletons import skeletons
 from harness.score.findings import Bars, Lines
 from harness.study import eigenmodes
 from harness.study.eigenmodes import MODES, by_tibia, kept_by_count, left_out_m, mirrored
-from harness.study.study import Study
 
 
 def _lengths_m(people: int, seed: int = 1) -> Floats:
@@ -73,9 +72,10 @@ def test_fewer_people_leave_less_to_lose() -> None:
     np.testing.assert_allclose(shares[-1], eigenmodes.eigenmodes(length_m).kept[MODES - 1], atol=1e-9)
 
 
-def test_the_experiment_on_drawn_people_is_not_comparable(tmp_path: Path) -> None:
-    told = eigenmodes.experiment(Study(tmp_path, "builtin", 1, {}))
-    assert told == eigenmodes.experiment(Study(tmp_path, "builtin", 1, {}))
+def test_the_experiment_on_drawn_people_is_not_comparable() -> None:
+    drawn = {str(which): person for which, person in enumerate(performer.population(20, 1))}
+    told = eigenmodes.bone_modes(drawn, "drawn", measured=False, seed=1)
+    assert told == eigenmodes.bone_modes(drawn, "drawn", measured=False, seed=1)
     (claim,) = told.claims
     assert claim.verdict == "not comparable"
     assert "Drawn" in claim.why
@@ -99,11 +99,12 @@ def test_six_people_are_too_few() -> None:
 
 
 def test_twenty_real_skeletons_lose_eight_times_what_the_paper_says(mocap: Path) -> None:
-    length_m = np.array([person.length_m for person in skeletons(mocap).values()])
+    people = skeletons(mocap)
+    length_m = np.array([person.length_m for person in people.values()])
     assert len(length_m) == 20
     assert 0.90 < eigenmodes.eigenmodes(length_m).kept[MODES - 1] < 0.92
     assert 0.90 < eigenmodes.eigenmodes(by_tibia(length_m)).kept[MODES - 1] < 0.925
-    (claim,) = eigenmodes.experiment(Study(mocap, "cmu", 1, {}, library=mocap)).claims
+    (claim,) = eigenmodes.bone_modes(people, "CMU's", measured=True, seed=1).claims
     assert claim.verdict == "not reproduced"
     assert "is lost" in claim.why
     rms_mm = [1e3 * np.sqrt(np.mean(left_out_m(length_m, modes) ** 2)) for modes in (0, MODES)]
