@@ -8,7 +8,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from harness.commands.verb import Verbs, add_verb, say
-from harness.errors import Outcome
+from harness.errors import BadInput, Outcome
 from harness.progress import ProgressBar
 
 
@@ -64,17 +64,43 @@ def this_command() -> str:
 
 
 def add_report(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "report", "write the page and plots of a finished run again", report_run)
-    verb.add_argument("run", type=Path, help="folder written by `harness run`")
-    verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
+    verb = add_verb(verbs, "report", "write the page and plots of a finished run or paper again", report_run)
+    verb.add_argument("run", type=Path, help="folder written by `harness run` or `harness paper`")
+    verb.add_argument(
+        "--movie", action="store_true", help="also write an mp4 of the worst cell of each method of a run"
+    )
+    text = "also put the tables of a paper into this page, such as results/README.md, for those that stand there"
+    verb.add_argument("--readme", type=Path, metavar="FILE", help=text)
 
 
 def report_run(args: argparse.Namespace) -> Outcome:
+    from harness.report.paper import FINDINGS
+
+    if (args.run / FINDINGS).is_file():
+        return _report_paper(args)
+    if args.readme:
+        raise BadInput(
+            f"--readme with {args.run}, where no {FINDINGS} is.", "Name the folder that `harness paper` wrote."
+        )
     from harness.report.report import write_report
 
     with ProgressBar("movies") as bar:
         page = write_report(args.run, movie=args.movie, progress=bar)
     return say(args, {"report": str(page)}, f"report: {page}")
+
+
+def _report_paper(args: argparse.Namespace) -> Outcome:
+    from harness.report.paper import FINDINGS, write_paper
+    from harness.report.paper_readme import show_in_readme
+    from harness.score.findings import read_findings
+
+    if args.movie:
+        raise BadInput("--movie with a paper's folder.", "Movies are made of its runs: name the folder of one.")
+    page = write_paper(args.run)
+    if args.readme:
+        show_in_readme(args.readme, read_findings(args.run / FINDINGS))
+    lines = [f"report: {page}", *([f"tables: {args.readme}"] if args.readme else [])]
+    return say(args, {"report": str(page), "readme": args.readme and str(args.readme)}, *lines)
 
 
 def add_export(verbs: Verbs) -> None:

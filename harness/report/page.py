@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.report import orders, recovery, tables, varied
+from harness.report import calibrating, orders, recovery, tables, varied
 from harness.report.document import Section, document, embedded, pictured
 from harness.report.markup import Markup, folded, joined, scrolling, table, tag
 from harness.report.run import Run
@@ -71,6 +71,7 @@ def _sections(content: Content) -> list[Section]:
     return [
         ("Varied", "varied", joined(*(pictured(chart, 3) for chart in content.varied), varied.tables(run))),
         ("Expected orders", "orders", orders.section(run.whole)),
+        ("Calibration", "calibration", calibrating.section(run.whole["cells"])),
         ("Results", "results", tables.results(run) if measured else nothing),
         ("Recovery", "recovery", recovery.section(run.summary)),
         ("Coverage", "coverage", tables.coverage(run)),

@@ -15,12 +15,12 @@ FURTHER = ("joint_angle_rms_deg", "mpjre_deg", "mpjpe_root_mm", "mpjpe_pa_mm", "
 _NO_RANK = ("jitter_m_s3", "lag_ms")
 """Where the lowest is not the best: truth has jitter of its own, and a lag has a sign."""
 NOT_MEASURED = tag("span", "not measured", class_="none")
-_DECIMALS = {"deg": 2, "mm": 1, "mm/s": 1, "m/s³": 1, "ms": 2, "frames/s": 0}
+_DECIMALS = {"deg": 2, "mm": 1, "mm/s": 1, "m/s³": 1, "ms": 2, "frames/s": 0, "%": 1}
 
 
-def number(value: float, unit: str) -> str:
-    """With the decimals that suit the unit."""
-    return f"{value:,.{_DECIMALS.get(unit, 2)}f}"
+def number(value: float, unit: str, *, decimals: int = 0) -> str:
+    """With the decimals that suit the unit, `decimals` of them at least."""
+    return f"{value:,.{max(decimals, _DECIMALS.get(unit, 2))}f}"
 
 
 def statistics(found: Mapping[str, Any] | None, unit: str, *, n: int | None = None) -> Markup:

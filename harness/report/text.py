@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from harness.report import orders, recovery
+from harness.report import calibrating, orders, recovery
 from harness.score.cell import varied_text
 
 COLUMNS = (
@@ -37,6 +37,7 @@ def table(summary: Mapping[str, Any]) -> str:
             "",
             *_aligned(lines, text_columns=2 + len(_varying(cells))),
             "",
+            *calibrating.text(summary),
             *recovery.text(summary),
             *orders.text(summary),
             finished,
@@ -47,11 +48,12 @@ def table(summary: Mapping[str, Any]) -> str:
 
 def _setting(cells: Sequence[Mapping[str, Any]]) -> str:
     """What all cells share, in two lines."""
-    one, noise = cells[0], ", ".join(dict.fromkeys(str(cell["noise"]) for cell in cells))
+    one = cells[0]
+    noise, known = (", ".join(dict.fromkeys(str(cell[name]) for cell in cells)) for name in ("noise", "calibration"))
     return (
         f"motion: {one['motion_source']}; {len(one['stations'])} stations ({', '.join(one['stations'])}), "
         f"ankles on the {one['mount']}\n"
-        f"{one['rate_hz']:g} Hz, noise {noise}, calibration {one['calibration']}, seed {one['seed']}; "
+        f"{one['rate_hz']:g} Hz, noise {noise}, calibration {known}, seed {one['seed']}; "
         "mean over sequences ± standard deviation, nothing aligned"
     )
 
