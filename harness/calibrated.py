@@ -12,11 +12,12 @@ from harness.calibrate.tpose import calibrate_tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
+from harness.core.motion import Take
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.simulate.holding import holding
 from harness.simulate.noise import Noise
-from harness.simulate.simulate import TrackerConfig, exact_calibration, simulate
+from harness.simulate.simulate import Simulation, TrackerConfig, exact_calibration, simulate
 from harness.stream.frame import TrackerFrame
 
 
@@ -42,19 +43,29 @@ class TrackerSession:
         """The truth."""
         return exact_calibration(self.body, self.strapped, self.tracker)
 
-    def standing_model(
-        self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float
-    ) -> tuple[TrackerFrame, ...]:
-        """The stream while the performer holds configurations (55,), at the world's origin and facing x to begin with.
+    @property
+    def lasting(self) -> Noise:
+        """What goes wrong while calibrating too."""
+        return replace(self.noise, slip=(), displaced=(), turned=(), lost=())
+
+    def model(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> Take:
+        """The performer holding configurations (55,), at the world's origin and facing x to begin with.
 
         How the n-th is missed does not depend on those after it.
         """
         rng = generator(self.seed, "standing model", self.name)
         take = holding(self.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=hold_s)
-        lasting = replace(self.noise, slip=(), displaced=(), turned=(), lost=())
-        take = replace(take, name=f"{self.name} calibration")
-        seen = simulate(self.body, take, self.strapped, self.tracker, lasting, seed=self.seed, session=self.name)
-        return seen.frames
+        return replace(take, name=f"{self.name} calibration")
+
+    def seen(self, take: Take) -> Simulation:
+        """A take for calibration as the tracker sees it."""
+        return simulate(self.body, take, self.strapped, self.tracker, self.lasting, seed=self.seed, session=self.name)
+
+    def standing_model(
+        self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float
+    ) -> tuple[TrackerFrame, ...]:
+        """The stream of `model`."""
+        return self.seen(self.model(configurations, miss_rad=miss_rad, hold_s=hold_s)).frames
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,20 @@ SHORTEST_BACK_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
 _BLEND_HZ = 120.0
 
 
-def lap(body: Body, take: Take, mounts: Sequence[Mount], tracker: TrackerConfig, noise: Noise, *, seed: int) -> Samples:
-    """The readings of a take and of the way back; BadInput when the take is shorter than one period."""
+def lap(
+    body: Body,
+    take: Take,
+    mounts: Sequence[Mount],
+    tracker: TrackerConfig,
+    noise: Noise,
+    *,
+    seed: int,
+    session: str = "",
+) -> Samples:
+    """The readings of a take and of the way back; BadInput when the take is shorter than one period.
+
+    `session` is as in `simulate`.
+    """
     there = Trajectory(body, take)
     time_s = sampling_times_s(there.duration_s, tracker, len(mounts))
     first = len(time_s)
@@ -35,9 +47,17 @@ def lap(body: Body, take: Take, mounts: Sequence[Mount], tracker: TrackerConfig,
     back = _back(take, ends[0], ends[1], periods / tracker.rate_hz + float(turns_s[-1]))
     back_s = np.arange(1, periods)[:, None] / tracker.rate_hz + turns_s
     seen = [
-        sense(there, mounts, tracker, noise, time_s, seed=seed, take=take.name),
+        sense(there, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session),
         sense(
-            Trajectory(body, back), mounts, tracker, noise, back_s, seed=seed, take=back.name, begins_s=time_s[-1, 0]
+            Trajectory(body, back),
+            mounts,
+            tracker,
+            noise,
+            back_s,
+            seed=seed,
+            take=back.name,
+            begins_s=time_s[-1, 0],
+            session=session,
         ),
     ]
     return Samples(
