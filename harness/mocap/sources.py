@@ -1,15 +1,20 @@
 """Where a scenario's motion comes from: the built-in performer, or a library of files that the user names."""
 
 import os
+from functools import cache
 from pathlib import Path
 from typing import Protocol
 
 from harness.core.motion import Clip
+from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
 from harness.mocap import performer
 from harness.mocap.library import MotionLibrary
+from harness.mocap.skeletons import skeletons
 
 VARIABLE = "HARNESS_MOCAP"
+PEOPLE = 100
+"""So many others there are beside the built-in performers: modes and spreads are then known to a tenth [choice]."""
 
 
 class MotionSource(Protocol):
@@ -32,6 +37,10 @@ class MotionSource(Protocol):
 
     def load(self, name: str) -> Clip:
         """The same object each time."""
+        ...
+
+    def people(self, without: str) -> dict[str, Skeleton]:
+        """Skeletons by subject, to learn from what people's bones are like: of all whom the source knows but one."""
         ...
 
 
@@ -72,6 +81,15 @@ class BuiltIn:
             self._made[name] = performer.generate(behaviour, who, take, seed=self._seed)
         return self._made[name]
 
+    def people(self, without: str) -> dict[str, Skeleton]:
+        """Drawn from the performers' spread, whatever the seed; no performer is among them."""
+        return _others()
+
+
+@cache
+def _others() -> dict[str, Skeleton]:
+    return {f"other {number}": skeleton for number, skeleton in enumerate(performer.population(PEOPLE, seed=0), 1)}
+
 
 def _parts(name: str) -> tuple[str, str, int]:
     """Behaviour, performer and number of a built-in take such as "table_tennis_p1_03"."""
@@ -87,6 +105,7 @@ class MotionFiles:
     def __init__(self, library: MotionLibrary) -> None:
         self._library = library
         self._read: dict[str, Clip] = {}
+        self._people: dict[str, Skeleton] | None = None
 
     def names(self) -> tuple[str, ...]:
         return self._library.names()
@@ -104,6 +123,12 @@ class MotionFiles:
         if name not in self._read:
             self._read[name] = self._library.load(name)
         return self._read[name]
+
+    def people(self, without: str) -> dict[str, Skeleton]:
+        """The library's ASF skeletons; BadInput when there is none."""
+        if self._people is None:
+            self._people = skeletons(self._library.folder)
+        return {subject: skeleton for subject, skeleton in self._people.items() if subject != without}
 
 
 def library_folder(folder: Path | None) -> Path:
