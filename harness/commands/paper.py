@@ -24,7 +24,8 @@ def add_paper(verbs: Verbs) -> None:
 def rerun_paper(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.report.paper import text_tables, write_paper
+    from harness.report.paper import write_paper
+    from harness.report.paper_text import text_tables
     from harness.score.files import plain
     from harness.study.paper import paper, rerun
 

@@ -28,8 +28,6 @@ _BAR_IN, _GROUP_IN, _FRAME_IN, _STANDING_IN = 0.15, 0.09, 0.75, 3.4
 """Height of a lying bar, of the space between groups, of what is around them, and of standing bars."""
 _GROUP = 0.82
 """Of the distance between groups, filled by bars."""
-_CAP = 0.16
-"""Longest half of a whisker's cap, in bars; on a wide bar it stays this share of a seventh."""
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ _NAME_HEIGHT = 0.06
 """Of a name at the end of a line, as a share of the axes' height."""
 _MOST_NAMED, _LETTERS = 10, 40
 """Lines that have their names at their ends, more have a legend; letters of such a name."""
+_DOTTED = 25
+"""Points of a line that are few enough to be seen one by one."""
 
 
 def draw_lines(canvas: "Figure", lines: Lines, places: Mapping[str, int]) -> None:
@@ -28,14 +30,15 @@ def draw_lines(canvas: "Figure", lines: Lines, places: Mapping[str, int]) -> Non
     for name in lines.series:
         style = line_style(places[name])
         x, values = thinned(np.array(lines.x, dtype=float), known(lines.series, name, len(lines.x)))
-        axes.plot(x, values, label=name, **style)
+        axes.plot(x, values, "o" if len(x) <= _DOTTED else "", markersize=3.5, label=name, **style)
         finite = values[np.isfinite(values)]
         if len(finite):
             ends.append((float(finite[-1]), name, style["color"]))
     axes.set_xlabel(lines.x_label)
     axes.set_ylabel(lines.y_label)
     axes.margins(x=0.0)
-    if not any(value is not None and value < 0.0 for values in lines.series.values() for value in values):
+    heights = [value for values in lines.series.values() for value in values if value is not None]
+    if heights and 0.0 <= min(heights) < 0.5 * max(heights):
         axes.set_ylim(bottom=0.0)
     if len(ends) <= _MOST_NAMED:
         _name_ends(axes, ends)

@@ -87,7 +87,10 @@ def _claims(findings: Findings) -> Markup:
             groups.append(tag("tbody", tag("tr", title, class_="group", role="row"), *rows, role="rowgroup"))
     if not groups:
         return Markup()
-    text = "Difference: mean of the paired differences over clips, and its 95 % interval. Why: under the statement."
+    text = (
+        "Difference: the mean of paired differences over clips and its 95 % interval, positive on the published side. "
+        "Under a statement: why its verdict is what it is."
+    )
     whole = tag(
         "table", tag("thead", top, role="rowgroup"), *groups, class_="claims", role="table", aria_label="claims"
     )

@@ -49,10 +49,11 @@ def sentence(found: list[Claim]) -> str:
 
 
 def difference(claim: Claim) -> str:
-    """The mean difference with its unit, "" where there is none."""
+    """The mean difference with its unit, "" where there is none or `ours` is this very figure."""
     if claim.difference is None:
         return ""
-    return f"{_figure(claim.difference, claim)} {claim.unit}".rstrip()
+    text = f"{_figure(claim.difference, claim)} {claim.unit}".rstrip()
+    return "" if claim.low is None and claim.ours.startswith(text) else text
 
 
 def interval(claim: Claim) -> str:
