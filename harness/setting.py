@@ -76,6 +76,14 @@ class Setting:
             other.__dict__.pop(own, None)
         return other
 
+    def going_by(self, calibrated: Calibrated) -> "Setting":
+        """The same with methods told this of trackers, room and body; what was learnt on another body is not shared."""
+        other = copy.copy(self)
+        other.__dict__.pop("examples", None)
+        other.__dict__["calibrated"] = calibrated
+        other._fitted, other._retargeted = {}, {}
+        return other
+
     def fitted(self, method: Method, name: str) -> Reconstructor:
         """The method of that name, trained once on what the protocol lets it see."""
         if name not in self._fitted:
