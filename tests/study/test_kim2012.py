@@ -1,0 +1,108 @@
+"""The experiments of Kim et al. 2012: their scenarios are what they say, and claims that nothing ran for say so."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from harness.config import load_scenario, variants
+from harness.core.protocol import Part, allowed_frames
+from harness.core.share import share_folder
+from harness.experiment import check_names, source_of
+from harness.score.findings import Findings, read_findings, write_findings
+from harness.setting import Setting
+from harness.study.kim2012 import ARM_AND_SPINE, PAPER
+from harness.study.study import Study, open_study, run_experiments
+from harness.study.tables import GROUPS
+from harness.study.tracker_sets import named
+
+FILES = sorted((share_folder("scenarios") / "papers" / "kim2012").glob("*.toml"))
+BUILT_IN = [path for path in FILES if path.stem.startswith("builtin_")]
+CMU = [path for path in FILES if path.stem.startswith("cmu_")]
+DATABASE = {"boxing": 7_233, "table_tennis": 4_271, "walking": 1_317}
+SPARSE = {"table_tennis": 31, "walking": 43}
+
+
+def test_both_motions_have_runs() -> None:
+    names = {path.stem.removeprefix("builtin_") for path in BUILT_IN}
+    assert len(names) == 9
+    assert {path.stem.removeprefix("cmu_") for path in CMU} == {
+        name for name in names if "table_tennis" not in name and name != "extrapolation"
+    }
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_what_is_judged_is_never_learnt_from_and_enough(path: Path) -> None:
+    scenario = load_scenario(path)
+    motion = scenario.motion
+    assert len(motion.test) >= 8
+    assert scenario.noise == "clean"
+    assert motion.body == "common"
+    if motion.protocol == "sequence":
+        assert not set(motion.test) & set(motion.examples)
+    if path.stem.partition("_")[2].startswith("sensors"):
+        assert len({named(made.wearing) for _, made in variants(scenario)}) == len(variants(scenario)) == 31
+
+
+@pytest.mark.parametrize("path", BUILT_IN, ids=lambda path: path.stem)
+def test_built_in_databases_have_the_papers_size_and_know_the_performer(path: Path) -> None:
+    """A take has 2,401 frames at 120 Hz; a run of n of them has 1 + (n - 1) // 3 at the tracker's 40."""
+    motion = load_scenario(path).motion
+    (behaviour,) = motion.behaviours
+    withheld = [Part.parse(text) for text in motion.withheld]
+    runs = [run for name in motion.examples for run in allowed_frames(withheld, name, 2401, 120.0)]
+    assert sum(1 + (len(run) - 1) // 3 for run in runs) == pytest.approx(DATABASE[behaviour], rel=0.01)
+    sparse = path.stem.startswith(("builtin_sparse", "builtin_extrapolation"))
+    assert motion.thin_to == (SPARSE[behaviour] if sparse else 0)
+    subjects = [{name.split("_")[-2] for name in names} for names in (motion.test, motion.examples)]
+    assert len(subjects[0]) == 8
+    assert subjects[0] == subjects[1]
+
+
+@pytest.mark.parametrize("path", CMU, ids=lambda path: path.stem)
+def test_every_clip_of_real_motion_is_there(path: Path, mocap: Path) -> None:
+    scenario = load_scenario(path)
+    source = source_of(scenario.motion, mocap, 1)
+    parts = [Part.parse(text) for text in scenario.motion.test]
+    check_names(scenario, source, parts)
+    settings = [Setting(scenario, source, part, scenario.motion.behaviours[0]) for part in parts]
+    assert [setting.performer for setting in settings] == ["known"] * 8 + ["new"] * (len(parts) - 8)
+
+
+def test_joint_groups_are_of_different_bones_and_all_of_them() -> None:
+    for groups in (ARM_AND_SPINE, GROUPS):
+        bones = [bone for group in groups.values() for bone in group]
+        assert len(bones) == len(set(bones)) == 22
+
+
+def test_what_did_not_run_is_said_not_to_have_run(tmp_path: Path) -> None:
+    study = Study(tmp_path, "cmu", 1, PAPER.plan("cmu", 1), tmp_path)
+    for ask in PAPER.experiments.values():
+        experiment = ask(study)
+        assert {claim.verdict for claim in experiment.claims} <= {"not run"}
+        assert len(experiment.question) > 100
+        assert set(experiment.runs) <= set(study.runs)
+    told = [claim for claim in PAPER.experiments["sparse"](study).claims if "table tennis" in claim.text]
+    assert told
+    assert all("built-in performer only" in claim.why for claim in told)
+
+
+@pytest.mark.slow
+def test_experiments_are_judged_from_what_ran(tmp_path: Path) -> None:
+    """One short clip of each run: figures come out, and one clip tells nothing."""
+    runs = {}
+    for name, scenario in PAPER.plan("builtin", 1).items():
+        motion = scenario.motion
+        short = replace(motion, test=motion.test[:1], examples=motion.examples[:1], longest_s=2.2)
+        vary = {key: values[::10] for key, values in scenario.vary.items()} if name.startswith("sensors") else None
+        runs[name] = replace(scenario, motion=short, vary=scenario.vary if vary is None else vary)
+    open_study(tmp_path / "study", {"paper": "kim2012"})
+    assert run_experiments(runs, tmp_path / "study") == {}
+    study = Study(tmp_path / "study", "builtin", 1, runs)
+    found = tuple(ask(study) for ask in PAPER.experiments.values())
+    assert {claim.verdict for experiment in found for claim in experiment.claims} <= {"cannot tell", "not run"}
+    assert all(experiment.tables for experiment in found)
+    assert all(experiment.runs for experiment in found)
+    whole = Findings("kim2012", PAPER.reference, "built-in performer", "", 1, found, {})
+    write_findings(tmp_path / "findings.json", whole)
+    assert read_findings(tmp_path / "findings.json") == whole
