@@ -16,6 +16,7 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip, Take
 from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
 from harness.core.seeds import generator
+from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
@@ -121,8 +122,8 @@ class Setting:
 
     @cached_property
     def whole(self) -> Take:
-        """The test clip on the body."""
-        return self._on_body(self.clip)
+        """The test clip on the performer's body."""
+        return self._on_body(self.clip, self.body)
 
     @cached_property
     def take(self) -> Take:
@@ -177,13 +178,13 @@ class Setting:
 
     @cached_property
     def examples(self) -> list[Take]:
-        """What the protocol lets a method learn from, on this body and at the tracker's rate."""
-        takes = []
+        """What the protocol lets a method learn from, on the body that it goes by and at the tracker's rate."""
+        takes, body = [], self.calibrated.body
         for clip in self.example_clips:
             runs = allowed_frames(self.closed, clip.name, len(clip), clip.rate_hz)
             refuse_leak(self.closed, clip.name, runs, len(clip), clip.rate_hz)
-            whole = self._on_body(clip)
-            takes += [_at_rate(self.body, _cut(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
+            whole = self._on_body(clip, body)
+            takes += [_at_rate(body, _cut(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
         return thinned(takes, self.scenario.motion.thin_to)
 
     def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
@@ -250,12 +251,12 @@ class Setting:
         content = {**self.inputs_of(method, inputs), "varied": varied}
         return results.cell_key(content, described, manifest.source_hash())
 
-    def _on_body(self, clip: Clip) -> Take:
+    def _on_body(self, clip: Clip, body: humanoid.Body) -> Take:
         kind = self.scenario.motion.body
-        if clip.name == self.clip.name and kind == "own":
+        if clip.name == self.clip.name and kind == "own" and body is self.body:
             return retarget.to_own_body(clip)[1]
-        if kind == "own":
-            take, report = retarget.to_common_body(clip, self.body.skeleton)
+        if kind == "own" or body is not self.body:
+            take, report = _onto(clip, kind, body.skeleton)
         else:
             take, report = _onto_standard(clip, kind)
         self._retargeted[clip.name] = report
@@ -265,8 +266,12 @@ class Setting:
 @lru_cache(maxsize=256)
 def _onto_standard(clip: Clip, kind: str) -> tuple[Take, retarget.RetargetReport]:
     """The same for every test clip: once in a process."""
+    return _onto(clip, kind, standard_skeleton())
+
+
+def _onto(clip: Clip, kind: str, skeleton: Skeleton) -> tuple[Take, retarget.RetargetReport]:
     onto = retarget.with_angles_kept if kind == "common" else retarget.to_common_body
-    return onto(clip, standard_skeleton())
+    return onto(clip, skeleton)
 
 
 @lru_cache(maxsize=256)
