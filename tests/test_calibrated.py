@@ -1,0 +1,207 @@
+"""What a method is told comes from a stream; what it is judged on is the same whatever it was told."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness import experiment
+from harness.calibrated import TrackerSession, by_tpose, errors_of
+from harness.config import Calibrating, Motion, Scenario, load_scenario
+from harness.core import rotations
+from harness.core.protocol import Part
+from harness.errors import BadInput, Outcome
+from harness.mocap import performer
+from harness.mocap.sources import open_source
+from harness.reconstruct.ik import PREVIOUS
+from harness.report.text import table
+from harness.score.results import read_cells, read_summary
+from harness.setting import Setting, mounts_of, noise_of, tracker_of
+from harness.simulate.simulate import Simulation, simulate
+from harness.stream.frame import TrackerFrame
+from harness.stream.inputs import combination
+
+BESIDE = Calibrating(beside_m=0.015, turned_deg=180.0)
+SMALL = Scenario(
+    name="small",
+    motion=Motion(
+        "builtin", ("walking_p1_01", "boxing_p2_01"), ("walking", "boxing"), ("walking_p3_01",), longest_s=2.5
+    ),
+    stations=load_scenario("demo").stations,
+    methods=("ik:previous", "mean_pose"),
+)
+KINDS = ("exact", "tpose")
+
+
+def setting(scenario: Scenario = SMALL, clip: str = "walking_p1_01") -> Setting:
+    source = open_source("builtin", None, seed=scenario.seed, rate_hz=None)
+    return Setting(scenario, source, Part(clip), "walking")
+
+
+def same_frames(a: tuple[TrackerFrame, ...], b: tuple[TrackerFrame, ...]) -> bool:
+    """Bit for bit, NaN like NaN."""
+
+    def told(frame: TrackerFrame) -> bytes:
+        arrays = frame.measured_s, frame.position_m, frame.tracker_from_station, frame.quality, frame.suspect
+        return b"".join(array.tobytes() for array in arrays)
+
+    return [told(frame) for frame in a] == [told(frame) for frame in b]
+
+
+def plainly(scenario: Scenario) -> Simulation:
+    """The take worn as if nobody had ever calibrated."""
+    made = setting(scenario)
+    return simulate(
+        made.body, made.take, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
+    )
+
+
+@pytest.mark.parametrize("noise", ["clean", "default"])
+def test_without_calibrating_everything_is_as_it_was(noise: str) -> None:
+    scenario = replace(SMALL, noise=noise)  # type: ignore[arg-type]
+    made = setting(scenario)
+    assert same_frames(made.simulation.frames, plainly(scenario).frames)
+    assert made.calibrated.body is made.body
+    assert made.calibrated.notes == ()
+    assert made.calibrated.errors == {}
+    for name in ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m"):
+        exact, known = (getattr(c, name) for c in (made.simulation.calibration, made.calibrated.calibration))
+        np.testing.assert_array_equal(exact, known)
+    assert "calibrating" not in made.inputs_of(PREVIOUS, "pos+ori")
+
+
+def test_who_stands_model_how_is_no_input_where_nobody_does() -> None:
+    told = [
+        setting(replace(SMALL, calibrating=Calibrating(miss_deg=deg))).inputs_of(PREVIOUS, "pos+ori") for deg in (1, 5)
+    ]
+    assert told[0] == told[1]
+    found = [
+        setting(replace(SMALL, calibration="tpose", calibrating=Calibrating(miss_deg=deg))).inputs_of(PREVIOUS, "")
+        for deg in (1, 5)
+    ]
+    assert {key for key in found[0] if found[0][key] != found[1][key]} == {"calibrating"}
+
+
+def test_where_trackers_really_sit_is_an_input() -> None:
+    plain, beside = (
+        setting(replace(SMALL, calibrating=how)).inputs_of(PREVIOUS, "") for how in (Calibrating(), BESIDE)
+    )
+    assert {key for key in plain if plain[key] != beside[key]} == {"mounts_digest"}
+
+
+@pytest.mark.parametrize("how", [Calibrating(), BESIDE], ids=["nominal", "beside"])
+def test_the_stream_under_test_is_the_same_whatever_the_calibration(how: Calibrating) -> None:
+    streams = [setting(replace(SMALL, calibration=kind, calibrating=how)).simulation for kind in KINDS]  # type: ignore[arg-type]
+    for stream in streams[1:]:
+        assert same_frames(stream.frames, streams[0].frames)
+        np.testing.assert_array_equal(stream.truth_qpos, streams[0].truth_qpos)
+    assert same_frames(streams[0].frames, plainly(SMALL).frames) == (how == Calibrating())
+
+
+def test_exact_knows_where_trackers_really_sit() -> None:
+    """Whatever the straps, perfect trackers are where the exact calibration says."""
+    scenario = replace(SMALL, noise="clean", calibrating=BESIDE)
+    made = setting(scenario)
+    known = made.calibrated.calibration
+    off_m = np.linalg.norm(known.mount_m - setting().calibrated.calibration.mount_m, axis=1)
+    assert off_m.min() > 0.002
+    fitted = made.fitted(PREVIOUS, "ik:previous")
+    qpos, _, _ = experiment.reconstruct(fitted, known, made.simulation, combination("pos+ori", known.stations))
+    there_m = made.simulation.truth_qpos[made.simulation.frame_index][:, :3]
+    assert np.linalg.norm(qpos[40:, :3] - there_m[40:], axis=1).mean() < 0.02
+
+
+def session(scenario: Scenario = SMALL) -> TrackerSession:
+    return setting(scenario).session
+
+
+def test_a_perfect_model_of_perfect_trackers_is_calibrated_exactly() -> None:
+    scenario = replace(
+        SMALL, noise="clean", calibration="tpose", calibrating=Calibrating(miss_deg=0.0, turned_deg=180.0)
+    )
+    errors = setting(scenario).calibrated.errors
+    assert errors["mount_deg"] < 0.01
+    assert all(errors[name] < 0.1 for name in ("mount_mm", "room_origin_mm"))
+    assert errors["room_heading_deg"] < 0.01
+
+
+def test_errors_are_what_they_say() -> None:
+    worn = session()
+    true, skeleton = worn.exact, worn.body.skeleton
+    turn = rotations.exp(np.array([0.0, np.deg2rad(5.0), 0.0]))
+    wrong = replace(
+        true,
+        mount_m=true.mount_m + np.array([0.003, 0.0, 0.004]),
+        bone_from_station=rotations.multiply(true.bone_from_station, turn),
+        world_from_tracker=rotations.multiply(rotations.about_z(np.deg2rad(-7.0)), true.world_from_tracker),
+        tracker_origin_m=true.tracker_origin_m + np.array([0.0, 0.06, -0.08]),
+    )
+    longer = skeleton.with_bones(skeleton.bone_m * (1.0 + 0.01 / skeleton.length_m)[:, None])
+    expected = {"mount_mm": 5.0, "mount_deg": 5.0, "length_mm": 10.0, "room_heading_deg": 7.0, "room_origin_mm": 100.0}
+    assert errors_of(wrong, longer, worn) == pytest.approx(expected, abs=1e-9)
+    assert errors_of(true, skeleton, worn) == pytest.approx(dict.fromkeys(expected, 0.0), abs=1e-6)
+
+
+def test_whoever_misses_the_pose_more_pays_more() -> None:
+    """The same draws, four times as large."""
+    worn = session(replace(SMALL, noise="clean"))
+    few, many = (
+        [by_tpose(replace(worn, seed=s), miss_rad=np.deg2rad(deg), hold_s=2.0).errors["mount_deg"] for s in range(4)]
+        for deg in (0.5, 2.0)
+    )
+    assert np.mean(many) == pytest.approx(4.0 * np.mean(few), rel=0.1)
+
+
+def test_a_model_that_nobody_takes_for_one_fails_its_cells(tmp_path: Path) -> None:
+    """Of two performers who are far off their pose, each cell fails with the reason; nothing stops the run."""
+    scenario = replace(SMALL, calibration="tpose", calibrating=Calibrating(miss_deg=30.0))
+    with pytest.raises(BadInput, match="Nothing could be run"):
+        experiment.run(scenario, tmp_path / "run")
+    failures = read_summary(tmp_path / "run")["failures"]
+    assert len(failures) == 4
+    assert all("T-pose" in text or "exchanged" in text for text in failures.values())
+
+
+def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
+    """And two workers agree with one, and a run goes on where it was."""
+    scenario = replace(SMALL, calibrating=BESIDE, vary={"calibration": list(KINDS)})
+    assert experiment.run(scenario, tmp_path / "one") is Outcome.PASS
+    assert experiment.run(scenario, tmp_path / "two", jobs=2) is Outcome.PASS
+    one, two = ({cell.key: cell for cell in read_cells(tmp_path / name)} for name in ("one", "two"))
+    assert len(one) == 2 * 2 * len(KINDS)
+    assert set(one) == set(two)
+    for key, cell in one.items():
+        np.testing.assert_array_equal(cell.estimate_qpos, two[key].estimate_qpos)
+        np.testing.assert_array_equal(cell.estimate_bone_m, two[key].estimate_bone_m)
+        assert cell.calibration_errors == two[key].calibration_errors
+        assert bool(cell.calibration_errors) == (cell.calibration != "exact")
+        assert cell.calibration == cell.varied["calibration"]
+    printed = table(read_summary(tmp_path / "one"))
+    assert "calibration exact, tpose" in printed
+    assert all(f"calibration={kind}" in printed for kind in KINDS)
+    made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "one" / "cells").iterdir()}
+    experiment.run(scenario, tmp_path / "one")
+    assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "one" / "cells").iterdir()} == made
+
+
+def test_what_was_learnt_is_shared_while_the_body_is_the_same() -> None:
+    exact = setting()
+    tpose = exact.under(replace(SMALL, calibration="tpose"))
+    assert tpose is not None
+    assert tpose.fitted(PREVIOUS, "ik:previous") is exact.fitted(PREVIOUS, "ik:previous")
+    assert tpose.calibrated.calibration.kind == "tpose"
+    assert exact.calibrated.calibration.kind == "exact"
+
+
+def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
+    source = open_source("builtin", None, seed=1, rate_hz=None)
+    performers = [performer.skeleton(name).length_m for name in performer.performers()]
+    for skeleton in source.people("p1").values():
+        assert min(np.abs(skeleton.length_m - own).max() for own in performers) > 0.002
+
+
+@pytest.mark.parametrize("wrong", [{"miss_deg": -1.0}, {"hold_s": 1.0}, {"beside_m": 2.0}, {"turned_deg": -5.0}])
+def test_absurd_models_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(BadInput, match=next(iter(wrong))):
+        Calibrating(**wrong)
