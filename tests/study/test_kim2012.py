@@ -11,7 +11,8 @@ from harness.core.share import share_folder
 from harness.experiment import check_names, source_of
 from harness.score.findings import Findings, read_findings, write_findings
 from harness.setting import Setting
-from harness.study.kim2012 import ARM_AND_SPINE, PAPER
+from harness.study.kim2012 import PAPER
+from harness.study.sparse_database import ARM_AND_SPINE
 from harness.study.study import Study, open_study, run_experiments
 from harness.study.tables import GROUPS
 from harness.study.tracker_sets import named
