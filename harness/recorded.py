@@ -76,7 +76,7 @@ def rehearsal_of(
         )
     its_own = load_scenario(played)
     stations: int | Sequence[str] = stream.stations
-    if not set(stream.stations) & set(its_own.stations) and set("".join(stream.stations).encode()) <= set(
+    if not set(stream.stations) & set(its_own.wearing) and set("".join(stream.stations).encode()) <= set(
         STATION_CHARACTERS
     ):
         stations = len(stream.stations)  # the driver was told no names: the first so many were played

@@ -88,7 +88,7 @@ def stations_of(args: argparse.Namespace) -> int | list[str]:
     from harness.config import load_scenario
 
     if args.stations is None:
-        return min(FEWEST, len(load_scenario(args.scenario).stations))
+        return min(FEWEST, len(load_scenario(args.scenario).wearing))
     return int(args.stations) if whole(args.stations) else names_of(args.stations)
 
 
