@@ -1,0 +1,89 @@
+"""The papers' speeds: databases of exactly their frames, verdicts by the slowest, and nothing measured twice."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from harness.score.findings import Bars
+from harness.study import speed as module
+from harness.study.pace import Pace
+from harness.study.speed import KIM2012, LIU2011, Published, judge, speed
+from harness.study.study import Study
+
+TINY = Published("It runs.", "walking", {"golf": {"golf": 850}}, ("weighted_blend", "ik"), ("weighted_blend",), fps=0.1)
+
+
+def pace(method: str, frames: int, fps: float, p99_ms: float = 1.0) -> Pace:
+    return Pace(method, frames, 700, fps, 1e3 / fps, p99_ms, 5.0, 1.0, 0.5, 2.0)
+
+
+def paces(published: Published, fps: float, p99_ms: float = 1.0, *, share: float = 1.0) -> dict[str, list[Pace]]:
+    """Of every method with every database, the last one a little slower."""
+    return {
+        database: [pace(m, int(share * sum(frames.values())), fps - 0.1 * n, p99_ms) for m in published.methods]
+        for n, (database, frames) in enumerate(published.databases.items())
+    }
+
+
+def test_the_papers_databases_have_the_frames_that_they_state() -> None:
+    assert {name: sum(frames.values()) for name, frames in LIU2011.databases.items()} == {
+        "walking": 18_160,
+        "boxing": 31_358,
+        "jumping": 6_483,
+        "golf": 2_339,
+        "table_tennis": 7_582,
+        "all together": 65_922,
+    }
+    assert KIM2012.databases["boxing"] == {"boxing": 7_233}
+    assert set(LIU2011.own) <= set(LIU2011.methods)
+    assert set(KIM2012.own) <= set(KIM2012.methods)
+
+
+@pytest.mark.parametrize(("published", "claims"), [(LIU2011, 4), (KIM2012, 1)])
+def test_the_slowest_database_decides(published: Published, claims: int) -> None:
+    last = list(published.databases)[-1]
+    fast = judge(published, paces(published, published.fps + 1.0), on="this machine")
+    slow = judge(published, paces(published, published.fps, 26.0), on="this machine")
+    assert len(fast.claims) == len(slow.claims) == claims
+    assert {claim.verdict for claim in fast.claims} == {"reproduced"}
+    assert {claim.verdict for claim in slow.claims} == {"not reproduced"}
+    assert last in slow.claims[0].ours
+    assert all("another machine" in claim.why for claim in slow.claims)
+    assert any("this machine" in difference for difference in fast.differences)
+
+
+def test_a_smaller_database_is_not_comparable_and_none_not_run() -> None:
+    small = judge(LIU2011, paces(LIU2011, 1_000.0, share=0.5), on="this machine")
+    assert {claim.verdict for claim in small.claims} == {"not comparable"}
+    assert "walking 9,080 of 18,160" in small.claims[0].why
+    none = judge(LIU2011, {}, on="this machine", absent=["golf: there is none"])
+    assert {claim.verdict for claim in none.claims} == {"not run"}
+    assert "golf: there is none" in none.notes[-1]
+
+
+def test_tables_and_bars_have_every_pace() -> None:
+    told = judge(LIU2011, paces(LIU2011, 500.0), on="this machine")
+    (table,), (bars,) = told.tables, told.figures
+    assert len(table.rows) == len(LIU2011.databases) * len(LIU2011.methods)
+    assert all(len(row) == len(table.columns) for row in table.rows)
+    assert isinstance(bars, Bars)
+    assert set(bars.series) == set(LIU2011.methods)
+    assert {len(values) for values in (*bars.series.values(), *bars.published.values())} == {len(bars.groups)}
+
+
+def test_a_speed_is_measured_once_and_its_database_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("harness.study.gathering.SECONDS", 3.2)
+    study = Study(tmp_path, "builtin", 1, {})
+    first = speed(study, TINY)
+    assert [claim.verdict for claim in first.claims] == ["reproduced"]
+    assert "850" in first.tables[0].rows[0]
+    assert {path.name for path in (tmp_path / "measured").iterdir()} == {"speed_golf.json"}
+
+    def never(*_: object) -> list[Pace]:
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr(module, "frame_rate", never)
+    assert speed(study, TINY) == first
+    with pytest.raises(AssertionError, match="again"):
+        speed(study, replace(TINY, databases={"swings": {"golf": 850}}))
