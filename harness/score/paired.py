@@ -78,8 +78,10 @@ def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
     spread = float(np.ptp(values))
     if spread <= 1e-9 * float(np.abs(values).max()):  # all equal: nothing to resample, and BCa is undefined
         return float(values.mean()), float(values.mean())
+    grain = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
+    whole = grain * np.round(values / grain)  # their sums are exact in any order: what ties on paper ties here
     found = stats.bootstrap(
-        (values,),
+        (whole,),
         np.mean,
         method="BCa",
         confidence_level=expanded(level, len(values)),

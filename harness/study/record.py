@@ -12,7 +12,7 @@ from harness.score.cell import varied_text
 from harness.score.findings import Table
 from harness.study.study import Study
 
-CHOSEN = "scenarios/tune_*.toml and validate_*.toml, on real clips that no test clip here is taken from"
+CHOSEN = "scenarios/tune_*.toml and validate_*.toml, on the real clips that stand there as tests"
 
 
 def record(study: Study) -> tuple[Table, ...]:
