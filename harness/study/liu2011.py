@@ -1,5 +1,6 @@
 """Liu et al. 2011, rerun: every experiment of docs/methods.md A6, and the speed that the paper states."""
 
+from functools import partial
 from itertools import pairwise
 
 from harness.mocap.performer import population
@@ -10,6 +11,7 @@ from harness.study.eigenmodes import bone_modes
 from harness.study.frame_by_frame import frame_by_frame
 from harness.study.leave_one_out import INPUTS, OURS, WINDOW, differences, leave_one_out, own_model
 from harness.study.paper import Paper
+from harness.study.speed import LIU2011, speed
 from harness.study.study import Study
 from harness.study.tables import by_clip, joint_groups, mean_bars, mean_table
 
@@ -87,5 +89,6 @@ PAPER = Paper(
         "frame_by_frame": frame_by_frame,
         "boxing_inputs": boxing_inputs,
         "eigenmodes": eigenmodes,
+        "speed": partial(speed, published=LIU2011),
     },
 )
