@@ -19,7 +19,7 @@ from harness.core.estimate import Estimate
 from harness.errors import BadInput
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.rehearsal import Rehearsal, rehearse
+from harness.rehearsal import Rehearsal, chosen, rehearse
 from harness.report.text import COLUMNS
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pooled, score
@@ -90,7 +90,25 @@ def rehearsal_of(
         noise=noise or note.get("noise"),
         seed=seed if seed is not None else note.get("seed"),
         folder=folder,
+        posing=bool(note.get("posing")),
     )
+
+
+def stations_in(stream: RecordingStream, scenario: Path | str, names: Sequence[str] | None = None) -> tuple[str, ...]:
+    """What a scenario calls the stations of a recording: as told, else as recorded; where the driver was told no names,
+    they are the first so many. BadInput for another number, UnknownName for others than the scenario's."""
+    known, count = load_scenario(scenario), len(stream.stations)
+    if names is not None:
+        if len(names) != count:
+            raise BadInput(
+                f"{len(names)} names for {count} recorded stations: {', '.join(stream.stations)}.",
+                "Name each of them, in this order.",
+            )
+        return tuple(chosen(known, names))
+    unnamed = set("".join(stream.stations).encode()) <= set(STATION_CHARACTERS)
+    if unnamed and not set(stream.stations) & set(known.wearing):
+        return tuple(chosen(known, count))
+    return tuple(chosen(known, stream.stations))
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,7 +212,19 @@ def _judged(name: str, made: _Made, laps: Sequence[_Lap], rehearsal: Rehearsal) 
         first, last = int(lap.index[0]), int(lap.index[-1])
         warm_s = first / rate_hz + WARM_UP_S if number == 0 else 0.0
         qpos, status, step_ms = made.at(lap.rows)
-        scores.append(score(skeleton, rate_hz, truth_qpos, qpos, lap.index, status, step_ms, warm_up_s=warm_s))
+        scores.append(
+            score(
+                skeleton,
+                rate_hz,
+                truth_qpos,
+                qpos,
+                lap.index,
+                status,
+                step_ms,
+                estimate_skeleton=rehearsal.calibrated.body.skeleton,
+                warm_up_s=warm_s,
+            )
+        )
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(one.scored.sum()) for one in scores)
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected

@@ -1,14 +1,21 @@
-"""A scenario's clip made ready to be worn outside a run: played by an emulator, tracked live, or recorded."""
+"""A scenario's clip, or its performer standing model for a calibration, made ready to be worn outside a run: played by
+an emulator, tracked live, or recorded."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
+from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
+from harness.calibrate.file import CalibrationFile
+from harness.calibrated import Calibrated
 from harness.config import Scenario, load_scenario
 from harness.core.calibration import Calibration
+from harness.core.motion import Take
 from harness.core.protocol import Part
 from harness.errors import BadInput, UnknownName
 from harness.experiment import check_names, source_of
@@ -19,10 +26,11 @@ from harness.stream.samples import Samples
 
 
 class Rehearsal:
-    """One clip of a scenario with some of its stations; each part is made when it is first asked for."""
+    """One clip of a scenario with some of its stations, or with `posing` the poses of a calibration, held before it in
+    the same session of the tracker; each part is made when it is first asked for."""
 
-    def __init__(self, setting: Setting) -> None:
-        self.setting = setting
+    def __init__(self, setting: Setting, *, posing: bool = False) -> None:
+        self.setting, self.posing = setting, posing
 
     @property
     def scenario(self) -> Scenario:
@@ -35,6 +43,7 @@ class Rehearsal:
 
     @property
     def body(self) -> Body:
+        """The performer's, in truth."""
         return self.setting.body
 
     @property
@@ -43,21 +52,48 @@ class Rehearsal:
         return mounts_of(self.scenario)
 
     @property
-    def calibration(self) -> Calibration:
-        """Exact: the mounts as they are and the true frame of the tracker."""
-        return self.setting.session.exact
+    def calibrated(self) -> Calibrated:
+        """What methods are told of trackers, room and body: the truth, until somebody calibrates."""
+        return self.setting.calibrated
 
     @property
+    def calibration(self) -> Calibration:
+        """Of the trackers and the room, as methods are told."""
+        return self.calibrated.calibration
+
+    def going_by(self, kept: CalibrationFile) -> "Rehearsal":
+        """The same with methods told what a calibration found, for these stations; BadInput when it lacks one.
+
+        Where it has no skeleton the body is the scenario's.
+        """
+        chosen = kept.of(tuple(self.scenario.stations))
+        body = self.body if chosen.skeleton is None else humanoid.build(chosen.skeleton)
+        calibrated = Calibrated(chosen.calibration, body, {})
+        return Rehearsal(self.setting.going_by(calibrated), posing=self.posing)
+
+    @cached_property
+    def take(self) -> Take:
+        """What the performer does."""
+        if not self.posing:
+            return self.setting.take
+        from harness.calibrate.poses import POSES, configuration
+
+        how = self.scenario.calibrating
+        poses = [configuration(pose, self.body.skeleton) for pose in POSES]
+        return self.setting.session.model(poses, miss_rad=float(np.deg2rad(how.miss_deg)), hold_s=how.hold_s)
+
+    @cached_property
     def simulation(self) -> Simulation:
         """The first lap as a run of the scenario sees it, with the truth."""
-        return self.setting.simulation
+        return self.setting.session.seen(self.take) if self.posing else self.setting.simulation
 
     @cached_property
     def samples(self) -> Samples:
         """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
-        noise = self.scenario.disturbance.added(noise_of(self.scenario), tuple(self.scenario.stations))
-        worn = self.setting.session.strapped
-        return lap(self.body, self.setting.take, worn, self.tracker, noise, seed=self.scenario.seed)
+        session, scenario = self.setting.session, self.scenario
+        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
+        noise, name = (session.lasting, session.name) if self.posing else (noise, "")
+        return lap(self.body, self.take, session.strapped, self.tracker, noise, seed=scenario.seed, session=name)
 
 
 def rehearse(
@@ -69,6 +105,7 @@ def rehearse(
     noise: str | None = None,
     seed: int | None = None,
     folder: Path | None = None,
+    posing: bool = False,
 ) -> Rehearsal:
     """A clip of a scenario (its first by default), with the first so many of its stations or those that are named.
 
@@ -78,7 +115,7 @@ def rehearse(
     asked = load_scenario(scenario)
     asked = replace(asked, stations=asked.wearing, worn=())
     if stations is not None:
-        asked = replace(asked, stations={name: asked.stations[name] for name in _chosen(asked, stations)})
+        asked = replace(asked, stations={name: asked.stations[name] for name in chosen(asked, stations)})
     if rate_hz is not None:
         asked = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz))
     if noise is not None:
@@ -89,11 +126,14 @@ def rehearse(
     part = Part.parse(clip or asked.motion.test[0])
     source = source_of(asked.motion, folder, asked.seed)
     check_names(asked, source, [part])
-    return Rehearsal(Setting(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)))
+    return Rehearsal(
+        Setting(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
+    )
 
 
-def _chosen(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
-    names = list(scenario.stations)
+def chosen(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
+    """Names of the first so many stations of a scenario, or of those named; BadInput, UnknownName."""
+    names = list(scenario.wearing)
     if isinstance(stations, int):
         if not 1 <= stations <= len(names):
             raise BadInput(f"{stations} stations of {len(names)}.", f"{scenario.name} has: {', '.join(names)}.")

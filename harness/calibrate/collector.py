@@ -1,6 +1,6 @@
 """Finds the poses that a performer holds, one after another, in a stream: live or from a recording.
 
-A hold is `SECONDS` in which every station is still (by the rules of `still`), with its beginning and end left out.
+A hold is `HOLD_S` in which every station is still (by the rules of `still`), with its beginning and end left out.
 The next one counts when a station has been somewhere else in between and is there now; and, where it is known what
 the poses look like, when it looks like the pose that is wanted: a rest, a repeated pose or one that was left out
 never shifts the order.
@@ -18,7 +18,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.stream.frame import TrackerFrame
 
-SECONDS, EDGE_S = 2.7, 0.25
+HOLD_S, EDGE_S = 2.7, 0.25
 """A hold, and what is left out of it at either end [s]; what remains is `still.LEAST_S` and two periods of 10 Hz."""
 LOOK_S = 0.2
 """So often it is looked whether somebody holds still [choice]."""
@@ -67,9 +67,9 @@ class PoseCollector:
         if window and now_s - window[-1].received_s > GAP_S:
             window.clear()
         window.append(frame)
-        while len(window) > 2 and now_s - window[1].received_s >= SECONDS:
+        while len(window) > 2 and now_s - window[1].received_s >= HOLD_S:
             window.popleft()
-        if now_s - self._looked_s < LOOK_S or span_s(window) < SECONDS:
+        if now_s - self._looked_s < LOOK_S or span_s(window) < HOLD_S:
             return None
         self._looked_s = now_s
         return self._look(list(window))

@@ -33,6 +33,10 @@ def add_emulate(verbs: Verbs) -> None:
     where.add_argument("--tcp", metavar="HOST:PORT", help="TCP port; 0 takes a free one")
     verb.add_argument("--anywhere", action="store_true", help="let a TCP port be reached from other computers")
     verb.add_argument("--clip", help="a clip to play (default: the scenario's first)")
+    text = (
+        "the performer holds the poses of `harness calibrate` instead, one after another, in the session of that clip"
+    )
+    verb.add_argument("--poses", action="store_true", help=text)
     text = f"how many of the scenario's stations, or their names (default: the first {FEWEST})"
     verb.add_argument("--stations", metavar="N|A,B", help=text)
     verb.add_argument("--rate", type=positive_number, metavar="HZ", help="records per second of each station")
@@ -67,6 +71,7 @@ def emulate(args: argparse.Namespace) -> Outcome:
         noise=args.noise,
         seed=args.seed,
         folder=args.mocap,
+        posing=args.poses,
     )
     scenario, tracker = rehearsal.scenario, rehearsal.tracker
     config = _config(args, scenario)
@@ -77,7 +82,8 @@ def emulate(args: argparse.Namespace) -> Outcome:
     with closing(port), ended_by_sigterm():
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
-        talk(f"{rehearsal.setting.part} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
+        played = f"the poses of {rehearsal.setting.part}'s performer" if args.poses else rehearsal.setting.part
+        talk(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
         talk(f"an IS-900 at {port.name}{_reach(args)}; Ctrl-C ends it")
         counts = play(samples, config, port)
     return say(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))

@@ -18,6 +18,7 @@ from harness.commands.verb import (
     line_wanted,
     names_of,
     positive_number,
+    progress,
     say,
     talk,
     whole,
@@ -47,6 +48,8 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("--seconds", type=float, metavar="N", help="stop by itself after so long")
     verb.add_argument("--clip", metavar="CLIP", help="of sim: which of its clips (default: the first)")
     verb.add_argument("--noise", metavar="LEVEL", help="of sim: replaces the scenario's noise")
+    text = "of sim: the performer holds the poses of `harness calibrate`, in the session of that clip"
+    verb.add_argument("--poses", action="store_true", default=None, help=text)
 
 
 def record(args: argparse.Namespace) -> Outcome:
@@ -59,7 +62,7 @@ def record(args: argparse.Namespace) -> Outcome:
                     f"--{name} with {args.port}.", "It is for a device; the scenario says what is simulated."
                 )
         return _record_simulation(args, args.port.removeprefix(SIMULATED))
-    for name in ("clip", "noise", "seed"):
+    for name in ("clip", "noise", "poses", "seed"):
         if getattr(args, name) is not None:
             raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATED}SCENARIO; a device does what it does.")
     return _record_port(args)
@@ -81,6 +84,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
         noise=args.noise,
         seed=args.seed,
         folder=args.mocap,
+        posing=bool(args.poses),
     )
     asked, simulation = rehearsal.scenario, rehearsal.simulation
     note = {
@@ -91,6 +95,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
         "noise": asked.noise,
         "stations": list(asked.stations),
         "rate_hz": asked.tracker.rate_hz,
+        "posing": rehearsal.posing,
         "harness": __version__,
     }
     seconds = math.inf if args.seconds is None else args.seconds
@@ -107,14 +112,8 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     wanted = Wanted(stations=stations, rate_hz=args.rate, **line_wanted(args))
     note = {"source": "port", "port": args.port, "harness": __version__}
     with RecordingWriter(args.file, note) as writer, ended_by_sigterm():
-        record_port(args.port, wanted, writer, seconds=args.seconds, say=talk, progress=_progress)
+        record_port(args.port, wanted, writer, seconds=args.seconds, say=talk, progress=progress)
     return _recorded(args, writer.counts)
-
-
-def _progress(text: str) -> None:
-    """One line that changes, for whoever watches a terminal."""
-    if sys.stderr.isatty():
-        print(f"\r{text}\033[K", end="", file=sys.stderr, flush=True)
 
 
 def _recorded(args: argparse.Namespace, counts: Mapping[str, int]) -> Outcome:
@@ -139,6 +138,8 @@ def add_replay(verbs: Verbs) -> None:
     verb.add_argument("--clip", metavar="CLIP", help="which of its clips (default: the first)")
     verb.add_argument("--noise", metavar="LEVEL", help="replaces the scenario's noise")
     verb.add_argument("--rate", type=float, metavar="HZ", help="replaces the scenario's rate")
+    text = "what methods are told of trackers, room and body (see `harness calibrate`; default: the truth)"
+    verb.add_argument("--calibration", type=Path, metavar="FILE", help=text)
 
 
 def replay(args: argparse.Namespace) -> Outcome:
@@ -147,7 +148,8 @@ def replay(args: argparse.Namespace) -> Outcome:
     stream = RecordingStream(args.file, speed_of(args.speed))
     for lost in stream.recording.lost:
         print(f"lost: {lost}", file=sys.stderr)
-    if any(value is not None for value in (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed)):
+    told = (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed, args.calibration)
+    if any(value is not None for value in told):
         return _judge(args, stream)
     return _play(args, stream)
 
@@ -184,10 +186,13 @@ def _counts(stream: "RecordingStream") -> str:
 
 def _judge(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
     from harness import recorded
+    from harness.calibrate.file import read_calibration
     from harness.core.options import alternatives, split
 
     told = {"scenario": args.scenario, "clip": args.clip, "rate_hz": args.rate, "noise": args.noise, "seed": args.seed}
     rehearsal = recorded.rehearsal_of(stream, **told, folder=args.mocap)
+    if args.calibration is not None:
+        rehearsal = rehearsal.going_by(read_calibration(args.calibration))
     methods = rehearsal.scenario.methods
     if args.methods is not None:
         methods = tuple(name for text in split(args.methods, ",") for name in alternatives(text))

@@ -101,8 +101,14 @@ def names_of(text: str) -> list[str]:
 
 
 def talk(line: str) -> None:
-    """To whoever sits there; stdout is data."""
-    print(line, file=sys.stderr, flush=True)
+    """To whoever sits there, over what `progress` left; stdout is data."""
+    print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
+
+
+def progress(line: str) -> None:
+    """One line that changes, for whoever watches a terminal."""
+    if sys.stderr.isatty():
+        print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager
