@@ -24,7 +24,7 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     assert ended.value.code == 0
     text = capsys.readouterr().out
-    for verb in ("demo", "run", "list", "inspect", "mocap", "export", "report", "check", "bench", "doctor"):
+    for verb in ("demo", "run", "list", "inspect", "mocap", "export", "report", "check", "bench", "doctor", "paper"):
         assert f"    {verb} " in text
 
 

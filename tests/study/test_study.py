@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.cli import main
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.score.files import TEMPORARY
 from harness.score.findings import Bars, Experiment, Lines, read_findings
@@ -178,3 +179,22 @@ def test_known_and_new_performers_are_never_pooled(finished: Path) -> None:
 def test_a_paper_without_runs_on_a_motion_says_so(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no runs on builtin"):
         rerun(Paper("unheard", "", {}), tmp_path / "out")
+
+
+def test_the_verb_prints_claims_and_where_the_report_lies(
+    finished: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("harness.study.paper.paper", lambda name: TINY)
+    words = ["paper", "liu2011", "--out", str(finished), "--jobs", "1"]
+    assert main(words) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[-1] == "pass"
+    assert said[-2] == f"report: {finished / 'report.html'}"
+    assert any("mean_pose errs less" in line and "cannot tell" in line for line in said)
+    assert main([*words, "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["outcome"] == "pass"
+    assert content["experiments"][0]["claims"][0]["clips"] == 2
+    assert Path(content["report"]).is_file()
+    assert main([*words, "--seed", "2"]) == 2
+    assert "another study (seed: 1, not 2)" in capsys.readouterr().err
