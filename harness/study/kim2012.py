@@ -4,9 +4,12 @@ What claims are judged by was written down before anything was run. The paper pr
 and what it calls suitable, are held against intervals over clips.
 """
 
+from functools import partial
+
 from harness.study.five_trackers import five_trackers
 from harness.study.paper import Paper
 from harness.study.sparse_database import extrapolation, sparse
+from harness.study.speed import KIM2012, speed
 from harness.study.which_trackers import one_tracker, sensors
 
 PAPER = Paper(
@@ -18,5 +21,6 @@ PAPER = Paper(
         "extrapolation": extrapolation,
         "one_tracker": one_tracker,
         "five_trackers": five_trackers,
+        "speed": partial(speed, published=KIM2012),
     },
 )

@@ -21,6 +21,8 @@ FILES = sorted((share_folder("scenarios") / "papers" / "kim2012").glob("*.toml")
 BUILT_IN = [path for path in FILES if path.stem.startswith("builtin_")]
 CMU = [path for path in FILES if path.stem.startswith("cmu_")]
 DATABASE = {"boxing": 7_233, "table_tennis": 4_271, "walking": 1_317}
+READ_BACK = [name for name in PAPER.experiments if name != "speed"]
+"""Experiments that rest on runs alone."""
 SPARSE = {"table_tennis": 31, "walking": 43}
 
 
@@ -78,8 +80,8 @@ def test_joint_groups_are_of_different_bones_and_all_of_them() -> None:
 
 def test_what_did_not_run_is_said_not_to_have_run(tmp_path: Path) -> None:
     study = Study(tmp_path, "cmu", 1, PAPER.plan("cmu", 1), tmp_path)
-    for ask in PAPER.experiments.values():
-        experiment = ask(study)
+    for name in READ_BACK:
+        experiment = PAPER.experiments[name](study)
         assert {claim.verdict for claim in experiment.claims} <= {"not run"}
         assert len(experiment.question) > 100
         assert set(experiment.runs) <= set(study.runs)
@@ -100,7 +102,7 @@ def test_experiments_are_judged_from_what_ran(tmp_path: Path) -> None:
     open_study(tmp_path / "study", {"paper": "kim2012"})
     assert run_experiments(runs, tmp_path / "study") == {}
     study = Study(tmp_path / "study", "builtin", 1, runs)
-    found = tuple(ask(study) for ask in PAPER.experiments.values())
+    found = tuple(PAPER.experiments[name](study) for name in READ_BACK)
     assert {claim.verdict for experiment in found for claim in experiment.claims} <= {"cannot tell", "not run"}
     assert all(experiment.tables for experiment in found)
     assert all(experiment.runs for experiment in found)
