@@ -41,7 +41,7 @@ def lines(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
 
 def text(summary: Mapping[str, Any]) -> list[str]:
     """Lines for the terminal."""
-    found = lines(summary["cells"])
+    found = lines(summary.get("cells", []))
     if not found:
         return []
     widths = [max(len(line[i]) for line in found) for i in range(len(found[0]))]

@@ -50,6 +50,21 @@ def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCe
         np.testing.assert_allclose(back.scores.per_frame[name], values, rtol=1e-6, err_msg=name)
 
 
+def test_what_calibration_found_is_kept(run_folder: Path, make_cell: MakeCell) -> None:
+    """The estimate stands on the true bones unless others are named."""
+    results.open_run(run_folder, manifest())
+    known, found = make_cell(), make_cell(0.02, calibration_errors={"length_mm": 4.0})
+    np.testing.assert_array_equal(known.estimate_bone_m, known.bone_m)
+    longer = make_cell(0.03, calibration_errors={"length_mm": 4.0}, estimate_bone_m=1.05 * known.bone_m)
+    for cell in (known, found, longer):
+        back = results.read_cell(results.write_cell(run_folder, cell))
+        np.testing.assert_array_equal(back.bone_m, known.bone_m)
+        np.testing.assert_array_equal(back.estimate_bone_m, cell.estimate_bone_m)
+        assert results.summary_rows([back])[0]["calibration_errors"] == cell.calibration_errors
+    with pytest.raises(ShapeError, match="estimate_bone_m"):
+        make_cell(estimate_bone_m=known.bone_m[:5])
+
+
 def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:
     with pytest.raises(ShapeError, match="quality"):
         make_cell(quality=np.ones((3, 2)))

@@ -1,0 +1,49 @@
+"""What a reader is told of calibration."""
+
+from typing import Any
+
+from harness.report.calibrating import section, text
+
+FOUND = {"mount_mm": 20.0, "mount_deg": 5.0, "length_mm": 0.0, "room_heading_deg": 3.0, "room_origin_mm": 30.0}
+
+
+def cell(kind: str, clip: str, errors: dict[str, float] | None = None, method: str = "ik") -> dict[str, Any]:
+    varied = {"calibration": kind}
+    return {"calibration": kind, "varied": varied, "clip": clip, "method": method, "calibration_errors": errors or {}}
+
+
+CELLS = [
+    *(cell("exact", clip) for clip in ("a", "b")),
+    *(cell("tpose", "a", FOUND, method) for method in ("ik", "dynamic_map")),
+    cell("tpose", "b", FOUND | {"mount_mm": 30.0}),
+    *(cell("poses", clip, FOUND | {"length_mm": 6.0}) for clip in ("a", "b")),
+]
+
+
+def test_each_session_counts_once_whatever_methods_were_shown_it() -> None:
+    head, exact, tpose, poses = text({"cells": CELLS})[2:6]
+    assert head.split("  ")[0] == "calibration"
+    assert exact.split() == ["exact", "2", *["known"] * 5]
+    assert "25.0 (30.0)" in tpose  # not the mean over cells
+    assert "known" in tpose
+    assert "6.0 (6.0)" in poses
+    assert "known" not in poses
+
+
+def test_what_else_is_varied_stands_beside_it() -> None:
+    cells = [{**one, "varied": {**one["varied"], "noise": noise}} for noise in ("clean", "default") for one in CELLS]
+    lines = text({"cells": cells})
+    assert len(lines) == len(text({"cells": CELLS})) + 3
+    assert "calibration=poses noise=default" in "\n".join(lines)
+
+
+def test_the_page_has_the_same_table() -> None:
+    page = section(CELLS)
+    assert "<td>25.0 (30.0)</td>" in page
+    assert '<th scope="row">poses</th>' in page
+
+
+def test_a_run_whose_calibration_is_exact_says_nothing() -> None:
+    assert text({"cells": CELLS[:2]}) == []
+    assert text({}) == []
+    assert section(CELLS[:2]) == ""
