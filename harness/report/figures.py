@@ -152,7 +152,9 @@ def drawn(
     with matplotlib.rc_context(SETTINGS):
         figure = Figure(figsize=(_WIDTH_IN, height_in), layout="constrained")
         draw(figure)
-        return Chart(name, title, caption, alt, to_svg(figure, name), to_png(figure) if raster else b"")
+        svg = to_svg(figure, name)
+        figure.set_layout_engine("none")  # it is laid out now
+        return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"")
 
 
 def _quality(axes: "Axes", trace: Trace) -> None:

@@ -9,9 +9,8 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.report.figures import legend
-from harness.report.paper_numbers import Values, known
+from harness.report.paper_numbers import Values, known, shown
 from harness.report.style import COLOURS, FAINT, INK, PAPER
-from harness.report.tables import number
 from harness.score.findings import Bars
 
 if TYPE_CHECKING:
@@ -22,10 +21,10 @@ _HATCHES = ("", "////", "....", "xxxx")
 """Change after every round of colours, as dashes of lines do."""
 _LETTERS, _LYING_LETTERS, _MOST_ROWS = 96, 34, 3
 """Under all standing bars together; before a lying one; rows of letters under a standing one."""
-_MOST_STANDING, _MOST_NUMBERED = 45, 25
-"""Bars side by side; standing bars that have room for their number on top."""
-_BAR_IN, _GROUP_IN, _FRAME_IN, _STANDING_IN = 0.15, 0.09, 0.75, 3.4
-"""Height of a lying bar, of the space between groups, of what is around them, and of standing bars."""
+_MOST_STANDING, _MOST_NUMBERED, _MOST_LYING_NUMBERED = 45, 25, 64
+"""Bars side by side; bars that have room for their number at their end, standing and lying."""
+_BAR_IN, _THIN_IN, _GROUP_IN, _FRAME_IN, _STANDING_IN = 0.15, 0.07, 0.09, 0.75, 3.4
+"""Height of a lying bar with its number, without, of the space between groups, of what is around; of standing bars."""
 _GROUP = 0.82
 """Of the distance between groups, filled by bars."""
 
@@ -58,9 +57,11 @@ def draw_bars(canvas: "Figure", bars: Bars, places: Mapping[str, int]) -> None:
         bar = axes.barh if lying else axes.bar
         bar(row.along, row.length, 0.94 * thick, label=row.name, **_look(places[row.name]))
         _whiskers(axes, row, min(0.2 * thick, 0.04), lying)
-        if lying or len(bars.groups) * len(rows) <= _MOST_NUMBERED:
+        if _numbered(bars):
             _numbers(axes, row, bars.unit, lying)
     _published(axes, rows, lying)
+    if any(np.nanmin(row.length, initial=0.0) < 0.0 for row in rows):
+        (axes.axvline if lying else axes.axhline)(0.0, color=INK, linewidth=0.8)
     _scales(axes, bars, lying)
     if len(rows) > 1 or any_known(bars.published):
         legend(canvas, axes)
@@ -68,8 +69,9 @@ def draw_bars(canvas: "Figure", bars: Bars, places: Mapping[str, int]) -> None:
 
 def height_in(bars: Bars) -> float:
     """Of the chart [in]."""
-    lying = _FRAME_IN + len(bars.groups) * (_GROUP_IN + _BAR_IN * max(len(bars.series), 1))
-    return max(lying, 1.6) if lies(bars) else _STANDING_IN
+    bar_in = _BAR_IN if _numbered(bars) else _THIN_IN
+    lying_in = _FRAME_IN + len(bars.groups) * (_GROUP_IN + bar_in * max(len(bars.series), 1))
+    return max(lying_in, 1.6) if lies(bars) else _STANDING_IN
 
 
 def lies(bars: Bars) -> bool:
@@ -94,6 +96,11 @@ def key(bars: Bars) -> str:
 
 def any_known(values: Values) -> bool:
     return any(value is not None for row in values.values() for value in row)
+
+
+def _numbered(bars: Bars) -> bool:
+    """Whether each bar's number fits to it; else they are in the table alone."""
+    return len(bars.groups) * len(bars.series) <= (_MOST_LYING_NUMBERED if lies(bars) else _MOST_NUMBERED)
 
 
 def _rows(bars: Bars, thick: float) -> list[_Row]:
@@ -126,7 +133,7 @@ def _numbers(axes: "Axes", row: _Row, unit: str, lying: bool) -> None:
     for along, value, tip, theirs in zip(row.along, row.length, row.tips, row.theirs, strict=True):
         off = 10 if tip == theirs else 4
         axes.annotate(
-            number(value, unit) if np.isfinite(value) else "–",
+            shown(value, unit) if np.isfinite(value) else "–",
             (tip, along) if lying else (along, tip),
             xytext=(off, 0) if lying else (0, off),
             textcoords="offset points",

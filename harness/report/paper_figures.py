@@ -1,6 +1,8 @@
-"""The charts of a paper's page: a colour for each name that holds for the whole page, and one chart for each figure."""
+"""The charts of a paper's page: one for each figure, a method in one colour throughout."""
 
+from collections import Counter
 from collections.abc import Mapping
+from itertools import count
 
 from harness.report.figures import drawn
 from harness.report.paper_bars import draw_bars, height_in, key
@@ -15,16 +17,22 @@ _LINES_IN = 3.4
 
 def charts(findings: Findings) -> dict[str, list[Chart]]:
     """Name of the experiment -> its figures."""
-    figures = (figure for experiment in findings.experiments for figure in experiment.figures)
-    names = dict.fromkeys(name for figure in figures for name in figure.series)
-    places = {name: place for place, name in enumerate(names)}
+    names = Counter(name for e in findings.experiments for figure in e.figures for name in figure.series)
+    shared = {name: place for place, name in enumerate(name for name, figures in names.items() if figures > 1)}
     return {
         experiment.name: [
-            _chart(f"{file_name(experiment.name)}_{n}", figure, places)
+            _chart(f"{file_name(experiment.name)}_{n}", figure, _places(figure, shared))
             for n, figure in enumerate(experiment.figures, start=1)
         ]
         for experiment in findings.experiments
     }
+
+
+def _places(figure: Bars | Lines, shared: Mapping[str, int]) -> dict[str, int]:
+    """Series -> which colour: what several figures draw has one for the whole page, the others what is left."""
+    taken = {name: shared[name] for name in figure.series if name in shared}
+    free = (place for place in count() if place not in taken.values())
+    return {name: taken[name] if name in taken else next(free) for name in figure.series}
 
 
 def _chart(name: str, figure: Bars | Lines, places: Mapping[str, int]) -> Chart:

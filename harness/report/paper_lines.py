@@ -25,18 +25,23 @@ _DOTTED = 25
 
 def draw_lines(canvas: "Figure", lines: Lines, places: Mapping[str, int]) -> None:
     """The whole chart; `places` says which colour each series has. Nothing is drawn across gaps."""
+    from matplotlib.ticker import MaxNLocator
+
     axes = canvas.subplots()
     ends = []
     for name in lines.series:
         style = line_style(places[name])
         x, values = thinned(np.array(lines.x, dtype=float), known(lines.series, name, len(lines.x)))
-        axes.plot(x, values, "o" if len(x) <= _DOTTED else "", markersize=3.5, label=name, **style)
+        marker = "o" if len(x) <= _DOTTED else None
+        axes.plot(x, values, marker=marker, markersize=3.5, label=name, **style)
         finite = values[np.isfinite(values)]
         if len(finite):
             ends.append((float(finite[-1]), name, style["color"]))
     axes.set_xlabel(lines.x_label)
     axes.set_ylabel(lines.y_label)
     axes.margins(x=0.0)
+    if len(lines.x) <= _DOTTED and all(x == int(x) for x in lines.x):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     heights = [value for values in lines.series.values() for value in values if value is not None]
     if heights and 0.0 <= min(heights) < 0.5 * max(heights):
         axes.set_ylim(bottom=0.0)

@@ -39,6 +39,12 @@ def value_at(values: Values, series: str, n: int) -> float | None:
     return found[n] if n < len(found) else None
 
 
+def shown(value: float, unit: str) -> str:
+    """With the decimals that suit the unit, and no zero below zero."""
+    text = number(float(value), unit)
+    return (text if text.strip("-0.") else text.strip("-")).replace("-", MINUS)
+
+
 def known(values: Values, series: str, count: int) -> Floats:
     """(count,) of one series, NaN where nothing was measured."""
     found = [value_at(values, series, n) for n in range(count)]
@@ -83,4 +89,4 @@ def _of_lines(lines: Lines) -> Table:
 
 
 def _text(value: float | None, unit: str, absent: str = NOT_MEASURED) -> str:
-    return absent if value is None else number(float(value), unit).replace("-", MINUS)
+    return absent if value is None else shown(value, unit)

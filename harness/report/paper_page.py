@@ -11,7 +11,7 @@ from urllib.parse import quote
 from harness.report.document import Section, document, pictured
 from harness.report.markup import Markup, folded, joined, table, tag
 from harness.report.paper_numbers import NOT_MEASURED, numbers
-from harness.report.paper_verdicts import MARKS, MEANINGS, claims, difference, interval, sentence, tally
+from harness.report.paper_verdicts import MARKS, MEANINGS, claims, common, difference, interval, sentence, tally
 from harness.report.run import file_name
 from harness.report.style import Chart
 from harness.score.files import plain
@@ -47,6 +47,7 @@ def paper_page(content: PaperContent) -> str:
     sections: list[Section] = [
         ("Every claim", "claims", _claims(findings)),
         *experiments,
+        ("Different throughout", "throughout", _throughout(findings)),
         ("Databases and clips", "databases", joined(*map(_table, findings.tables))),
         ("Circumstances", "circumstances", _circumstances(findings)),
     ]
@@ -121,15 +122,29 @@ def _experiment(content: PaperContent, experiment: Experiment) -> Markup:
             figures += [pictured(charts[n], 3), folded("Its numbers", data)]
         else:
             figures += [tag("h3", figure.title), data]
+    shared = common(content.findings)
+    own: list[Any] = [text for text in experiment.differences if text not in shared]
+    if len(own) < len(experiment.differences):
+        own.append(joined("And ", tag("a", "what several experiments differ in", href="#throughout"), "."))
     return joined(
         tag("p", experiment.question),
         verdicts,
-        _listed("Different here", experiment.differences),
+        _listed("Different here", own),
         *figures,
         *map(_table, experiment.tables),
         _listed("What came out besides", experiment.notes),
         _listed("Runs", [_run(content, name) for name in experiment.runs]),
     )
+
+
+def _throughout(findings: Findings) -> Markup:
+    """What several experiments differ from the paper in, and which."""
+    items = []
+    for text, experiments in common(findings).items():
+        links = [tag("a", experiment.title, href=f"#{_anchor(experiment)}") for experiment in experiments]
+        between = [joined("; " if n else "", link) for n, link in enumerate(links)]
+        items.append(tag("li", text, tag("span", "In: ", *between, ".", class_="spread under")))
+    return tag("ul", *items, class_="notes") if items else Markup()
 
 
 def _listed(title: str, items: Sequence[Any]) -> Markup | None:

@@ -8,6 +8,8 @@ from harness.report.paper_text import text_tables
 from harness.score.files import write_text
 from harness.score.findings import Findings
 
+_END = "\n"
+
 
 def show_in_readme(readme: Path, findings: Findings) -> None:
     """Put the tables where those of this paper and motion stand, at the end if none do; the rest keeps every byte.
@@ -28,7 +30,7 @@ def show_in_readme(readme: Path, findings: Findings) -> None:
         before, _, rest = text.partition(start)
         whole = before + section + rest.partition(end)[2]
     else:
-        whole = f"{text.rstrip()}\n\n{section}\n"
+        whole = f"{text}{'' if text.endswith(_END) else _END}\n{section}\n"
     if whole != text:
         write_text(readme, whole)
 

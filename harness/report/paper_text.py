@@ -3,7 +3,7 @@
 import textwrap
 from collections.abc import Sequence
 
-from harness.report.paper_verdicts import claims, difference, interval, sentence
+from harness.report.paper_verdicts import claims, common, difference, interval, sentence
 from harness.score.findings import Claim, Experiment, Findings
 
 WIDTH = 160
@@ -18,15 +18,20 @@ def text_tables(findings: Findings) -> str:
     whole = sentence(claims(findings))
     head = [findings.reference, f"{findings.paper} on {findings.motion}, seed {findings.seed}. {whole}"]
     parts = [_wrapped(line) for line in head]
+    shared = common(findings)
     for experiment in findings.experiments:
-        parts += ["", *_experiment(experiment)]
+        parts += ["", *_experiment(experiment, [text for text in experiment.differences if text not in shared])]
+    if shared:
+        parts += ["", "Different in several experiments"]
+    for text, experiments in shared.items():
+        parts.append(_wrapped(f"{text} ({', '.join(experiment.name for experiment in experiments)})", _INDENT))
     return "\n".join(line.rstrip() for part in parts for line in part.split("\n"))
 
 
-def _experiment(experiment: Experiment) -> list[str]:
-    lines = [_wrapped(experiment.title)]
+def _experiment(experiment: Experiment, differences: Sequence[str]) -> list[str]:
+    lines = [_wrapped(f"{experiment.name}: {experiment.title}")]
     lines += _table(experiment.claims) if experiment.claims else [f"{_INDENT}no statement to hold a figure against"]
-    lines += [_wrapped(f"different here: {text}", _INDENT) for text in experiment.differences]
+    lines += [_wrapped(f"different here: {text}", _INDENT) for text in differences]
     return lines
 
 

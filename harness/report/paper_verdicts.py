@@ -1,4 +1,4 @@
-"""What became of a paper's statements, counted and in words."""
+"""What became of a paper's statements, counted and in words, and in what the experiments differ."""
 
 import math
 from collections import Counter
@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import get_args
 
 from harness.report.tables import number
-from harness.score.findings import Claim, Findings, Verdict
+from harness.score.findings import Claim, Experiment, Findings, Verdict
 
 KINDS: tuple[Verdict, ...] = get_args(Verdict)
 MARKS: Mapping[Verdict, str] = {
@@ -46,6 +46,15 @@ def sentence(found: list[Claim]) -> str:
     first, *others = tally(found).items()
     start = f"{first[1]} of {len(found)} published statement{'s'[: len(found) != 1]} {first[0]}"
     return f"{', '.join([start, *(f'{count} {kind}' for kind, count in others if count)])}."
+
+
+def common(findings: Findings) -> dict[str, list[Experiment]]:
+    """What several experiments differ from the paper in -> which: it is told once."""
+    found: dict[str, list[Experiment]] = {}
+    for experiment in findings.experiments:
+        for text in dict.fromkeys(experiment.differences):
+            found.setdefault(text, []).append(experiment)
+    return {text: those for text, those in found.items() if len(those) > 1}
 
 
 def difference(claim: Claim) -> str:

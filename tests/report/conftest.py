@@ -1,12 +1,23 @@
-"""What the report's tests share: whether this machine can render, found out in a process that may crash."""
+"""What tests of pages share: a browser, and whether this machine can render, found out in a process that may crash."""
 
 import os
+import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 PROBE = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.show(); print('drawn')"
+
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-background-networking",
+]
 
 
 @pytest.fixture(scope="session")
@@ -20,3 +31,15 @@ def renders() -> None:
     )
     if "drawn" not in done.stdout:
         pytest.skip(f"no off-screen rendering here (exit code {done.returncode})")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    chromium = os.environ.get("HARNESS_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
+    if chromium is None:
+        pytest.skip("no Chromium: install it or name it in HARNESS_CHROMIUM")
+    with sync_api.sync_playwright() as playwright:
+        opened = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield opened
+        opened.close()

@@ -1,8 +1,6 @@
 """The page in a browser: headless Chromium opens it, nothing leaves it, and the 3-D view follows the slider."""
 
 import json
-import os
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,13 +10,6 @@ import pytest
 from harness.report.report import write_report
 from tests.report.fabricate import Plan, fabricate
 
-FLAGS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
-    "--disable-background-networking",
-]
 HOSTILE = "<script>alert(1)</script>"
 
 
@@ -27,18 +18,6 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with a hostile clip name; rendered where that is possible."""
     plan = Plan(methods={"ik": 2.0, "mean_pose": 12.0}, clip_name=HOSTILE, behaviours=("walking",), failing=())
     return write_report(fabricate(tmp_path_factory.mktemp("browser") / "run", plan))
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = os.environ.get("HARNESS_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("no Chromium: install it or name it in HARNESS_CHROMIUM")
-    with sync_api.sync_playwright() as playwright:
-        opened = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
-        yield opened
-        opened.close()
 
 
 @pytest.fixture

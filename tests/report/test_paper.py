@@ -1,0 +1,248 @@
+"""The page of a paper: what it opens on, what each claim shows, and what it must never do."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.cli import main
+from harness.errors import BadFile
+from harness.report import paper
+from harness.report.paper import write_paper
+from harness.report.paper_page import inside
+from harness.report.paper_verdicts import MARKS, sentence, tally
+from harness.score.findings import Bars, Claim, Experiment, Findings, Lines, Table
+from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
+
+HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- end of paper --> ```"
+EMPTY = Experiment("empty", "Nothing", "", ())
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one of its two runs, and its page."""
+    folder = write_study(tmp_path_factory.mktemp("paper") / "liu", liu())
+    (folder / "leave_one_out").mkdir()
+    (folder / "leave_one_out" / "report.html").write_text("a run's page")
+    write_paper(folder)
+    return folder
+
+
+class _Reader(HTMLParser):
+    """Complains of elements that are not closed in order; gathers text and attributes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+        if tag not in ("meta", "br", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open[-1:] != ["style"]:
+            self.text.append(data)
+
+
+def read(page: Path) -> _Reader:
+    reader = _Reader()
+    reader.feed(page.read_text(encoding="utf-8"))
+    assert reader.open == []
+    return reader
+
+
+def text_of(page: Path) -> str:
+    return re.sub(r"\s+", " ", " ".join(read(page).text))
+
+
+def alone(folder: Path, *experiments: Experiment) -> Path:
+    """The page of a study of these experiments."""
+    return write_paper(write_study(folder, replace(liu(), experiments=experiments, tables=())))
+
+
+def test_the_page_opens_on_the_verdict(study: Path) -> None:
+    page = (study / "report.html").read_text(encoding="utf-8")
+    said = "8 of 16 published statements reproduced, 1 not reproduced, 2 cannot tell, 4 not comparable, 1 not run."
+    assert f"<h1>{said}</h1>" in page
+    assert page.index("<h1>") < page.index('class="tally"') < page.index("<nav") < page.index('class="claims"')
+
+
+def test_every_claim_stands_in_the_table_with_both_figures_and_its_verdict(study: Path) -> None:
+    """As a word and a mark: never by colour alone."""
+    rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', (study / "report.html").read_text(encoding="utf-8"))
+    claims = [claim for experiment in liu().experiments for claim in experiment.claims]
+    assert len(rows) == len(claims)
+    for row, claim in zip(rows, claims, strict=True):
+        told = " ".join(re.sub(r"<[^>]*>", " ", row).replace("&#x27;", "'").split())
+        for text in (claim.text, claim.published, claim.ours, claim.why, MARKS[claim.verdict], claim.verdict):
+            assert text in told
+        if claim.low is not None and claim.high is not None:
+            assert f"{claim.low:.2f} to {claim.high:.2f}" in told
+        else:
+            assert " to " not in told.replace(claim.text, "")
+
+
+def test_every_experiment_has_a_section_that_the_contents_lead_to(study: Path) -> None:
+    reader = read(study / "report.html")
+    ids = [attributes["id"] for _, attributes in reader.found if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    targets = [str(a["href"])[1:] for tag, a in reader.found if tag == "a" and str(a["href"]).startswith("#")]
+    assert set(targets) <= set(ids)
+    assert {f"experiment-{experiment.name}" for experiment in liu().experiments} <= set(targets)
+
+
+def test_what_several_experiments_differ_in_is_told_once(study: Path) -> None:
+    said = text_of(study / "report.html")
+    assert said.count("The motion comes from a generator") == 1
+    assert said.count("Golf has 2 clips only.") == 1
+    assert said.count("what several experiments differ in") == 2
+
+
+def test_figures_are_told_in_words_and_kept_as_files(study: Path) -> None:
+    images = [attributes for tag, attributes in read(study / "report.html").found if tag == "img"]
+    figures = [figure for experiment in liu().experiments for figure in experiment.figures]
+    assert len(images) == len(figures)
+    assert "boxing: dynamic_map" not in str(images[0]["alt"]), "too many numbers to be listened to"
+    mean = np.mean([value for value in curves(400).series["ik"] if value is not None])
+    assert str(images[1]["alt"]).endswith(f", ik {mean:.2f}.")
+    assert "positions: dynamic_map not measured, published 2.52" in str(images[2]["alt"])
+    names = {path.name for path in (study / "plots").iterdir()}
+    assert names == {f"{n}_1.{kind}" for n in ("leave_one_out", "frame_by_frame", "inputs") for kind in ("svg", "png")}
+    assert all((study / "plots" / n).read_bytes()[:8] == b"\x89PNG\r\n\x1a\n" for n in names if n.endswith("png"))
+
+
+def test_runs_are_linked_where_they_are(study: Path) -> None:
+    links = [str(attributes["href"]) for tag, attributes in read(study / "report.html").found if tag == "a"]
+    assert [link for link in links if not link.startswith("#")] == ["./leave_one_out/report.html"]
+    assert "not_there" in text_of(study / "report.html")
+
+
+@pytest.mark.parametrize("name", ["..", "../other", "/etc", "javascript:alert(1)", "out", "", "a\0b"])
+def test_no_link_leaves_the_folder(name: str, tmp_path: Path) -> None:
+    folder = tmp_path / "study"
+    (tmp_path / "other").mkdir()
+    folder.mkdir()
+    (folder / "out").symlink_to(tmp_path / "other")
+    assert inside(folder, name) is None
+
+
+def test_a_run_s_folder_without_a_page_is_opened_itself(tmp_path: Path) -> None:
+    (tmp_path / "a run").mkdir()
+    page = alone(tmp_path, replace(EMPTY, runs=("a run",)))
+    assert 'href="./a%20run/"' in page.read_text(encoding="utf-8")
+
+
+def test_nothing_in_the_page_points_elsewhere(study: Path) -> None:
+    page = (study / "report.html").read_text(encoding="utf-8")
+    assert "default-src &#x27;none&#x27;" in page
+    for target in re.findall(r"(?:src|href)=\"([^\"]*)\"", page):
+        assert target.startswith(("data:", "#", "./")), target[:80]
+    assert not re.search(r"url\(\s*['\"]?https?:|@import|<script", page)
+
+
+def test_the_same_findings_give_the_same_bytes(study: Path) -> None:
+    before = {path: path.read_bytes() for path in (study / "report.html", *(study / "plots").iterdir())}
+    assert main(["report", str(study)]) == 0
+    assert {path: path.read_bytes() for path in before} == before
+
+
+def test_hostile_text_stays_text(tmp_path: Path) -> None:
+    claim = Claim(HOSTILE, HOSTILE, HOSTILE, "not run", HOSTILE, 1, 0.5, 0.1, 0.9, HOSTILE)
+    bars = Bars(HOSTILE, HOSTILE, (HOSTILE, "b"), {HOSTILE: (1.0, None)}, caption=HOSTILE)
+    lines = Lines(HOSTILE, HOSTILE, HOSTILE, (0.0, 1.0), {HOSTILE: (1.0, 2.0)}, caption=HOSTILE)
+    table = Table(HOSTILE, (HOSTILE, HOSTILE), ((HOSTILE, HOSTILE),))
+    hostile = Experiment(
+        HOSTILE, HOSTILE, HOSTILE, (HOSTILE,), (claim,), (table,), (bars, lines), (HOSTILE,), (HOSTILE,)
+    )
+    findings = Findings(
+        HOSTILE,
+        HOSTILE,
+        HOSTILE,
+        HOSTILE,
+        1,
+        (hostile, replace(hostile, name="b")),
+        {HOSTILE: HOSTILE},
+        tables=(table,),
+    )
+    page = write_paper(write_study(tmp_path, findings))
+    raw = page.read_text(encoding="utf-8")
+    assert "<script" not in raw
+    assert read(page).text.count(HOSTILE) > 20
+    for plot in (tmp_path / "plots").glob("*.svg"):
+        assert "<script" not in plot.read_text(encoding="utf-8")
+
+
+def test_an_experiment_may_be_empty(tmp_path: Path) -> None:
+    page = alone(tmp_path / "one", EMPTY, replace(EMPTY, name="table", tables=(Table("Errors", ("a", "b"), ()),)))
+    said = text_of(page)
+    assert "No published statement was held against a figure of ours." in said
+    assert "Errors : nothing was measured." in said
+    assert "Circumstances" in text_of(alone(tmp_path / "none"))
+
+
+def test_what_was_not_measured_is_said(tmp_path: Path) -> None:
+    bars = Bars("Bars", "deg", ("a", "b"), {"ik": (None, None), "pca": (1.0, None)}, spread={"pca": (None, None)})
+    lines = Lines("Lines", "x", "y", (0.0, 1.0, 2.0), {"ik": (None, None, None), "pca": (1.0, None, 3.0)})
+    none = Bars("No bars", "deg", (), {})
+    page = alone(tmp_path, replace(EMPTY, figures=(bars, lines, none, Lines("No lines", "x", "y", (), {}))))
+    said = text_of(page)
+    assert said.count("not measured") >= 3
+    assert "A dash: not measured." in said
+    assert "0 of 3" in said
+    assert "nan" not in said.lower().split()
+
+
+def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
+    long = "a_name_without_end_" * 12
+    bars = Bars("Bars", "deg", (long, "b"), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
+    lines = Lines("Lines", "x", "y", (0.0, 1.0), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
+    claim = Claim(long, long, long, "cannot tell", long, 3)
+    page = alone(tmp_path, replace(EMPTY, title=long, claims=(claim,), figures=(bars, lines)))
+    assert text_of(page).count(long) >= 8
+
+
+def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paper, "find_spec", lambda name: None)
+    said = text_of(write_paper(write_study(tmp_path, kim())))
+    assert "Missing here Figures: matplotlib is not installed; their numbers are tables" in said
+    assert "RH+LH+RA+LA+PEL" in said
+    assert "walking_p1_01: mean joint-angle error [deg]" in said
+    assert not list((tmp_path / "plots").iterdir())
+
+
+def test_a_study_without_figures_misses_nothing_without_matplotlib(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(paper, "find_spec", lambda name: None)
+    assert "Missing here" not in text_of(alone(tmp_path, EMPTY))
+
+
+def test_old_plots_go(tmp_path: Path) -> None:
+    alone(tmp_path, replace(EMPTY, figures=(curves(10), sets("walking"))))
+    assert len(list((tmp_path / "plots").iterdir())) == 4
+    alone(tmp_path, EMPTY)
+    assert not list((tmp_path / "plots").iterdir())
+
+
+def test_a_folder_without_findings_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match=r"findings\.json"):
+        write_paper(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_sentence_counts_every_claim() -> None:
+    claims = [Claim("", "", "", verdict) for verdict in MARKS for _ in range(3)]
+    for count in range(len(claims) + 1):
+        some = claims[:count]
+        numbers = [int(number) for number in re.findall(r"\d+", sentence(some))]
+        assert sum(tally(some).values()) == count
+        assert numbers == [] if not count else numbers[1] == count == sum(numbers) - numbers[1]

@@ -1,0 +1,160 @@
+"""A paper's claims as text: whole, aligned, narrow enough; and the page that keeps the last of them."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import harness
+from harness.cli import main
+from harness.errors import BadFile
+from harness.report.paper_readme import show_in_readme
+from harness.report.paper_text import WIDTH, text_tables
+from harness.report.paper_verdicts import difference, interval
+from harness.score.findings import Claim, Experiment
+from tests.report.fabricate_paper import kim, liu, write_study
+
+RESULTS = (Path(harness.__file__).parent.parent / "results" / "README.md").read_text(encoding="utf-8")
+
+
+def letters(text: str) -> str:
+    return "".join(text.split())
+
+
+def test_every_claim_is_told_whole() -> None:
+    told = letters(text_tables(liu()))
+    for claim in (claim for experiment in liu().experiments for claim in experiment.claims):
+        for text in (claim.published, claim.ours, claim.why, difference(claim), interval(claim), claim.verdict):
+            assert letters(text) in told
+    for text in ("8 of 16 published statements reproduced", "Golf has 2 clips only.", "One sequence left out"):
+        assert letters(text) in told
+
+
+@pytest.mark.parametrize("repeats", [1, 20])
+def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
+    long = " ".join(["some words"] * repeats) + "and_one_without_any_end" * repeats
+    claim = Claim(long, long, long, "cannot tell", long, 7, 0.1, -0.2, 0.3, "deg")
+    findings = replace(liu(), experiments=(Experiment("a", long, long, (long,), (claim, claim)), *kim().experiments))
+    lines = text_tables(findings).split("\n")
+    assert max(map(len, lines)) <= WIDTH
+    assert not any(line.endswith(" ") for line in lines)
+    if repeats > 1:
+        assert any(len(line) > 0.9 * WIDTH for line in lines)
+
+
+def test_columns_stand_under_their_titles() -> None:
+    lines = text_tables(liu()).split("\n")
+    top = next(n for n, line in enumerate(lines) if line.lstrip().startswith("claim"))
+    for title in ("published", "ours", "difference", "95 % interval", "clips", "verdict"):
+        at = lines[top].index(title)
+        assert lines[top + 1][at - 2 : at] == "  "
+        assert lines[top + 1][at] != " "
+
+
+def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
+    claim = Claim("one\ntwo\t three", "a\nb", "c", "reproduced")
+    told = text_tables(replace(liu(), experiments=(Experiment("a", "b", "", (), (claim,)),)))
+    assert "one two three  a b        c     reproduced" in told
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "told"),
+    [
+        ((0.5, 0.25, 0.75), "deg", ("0.50 deg", "0.25 to 0.75")),
+        ((-0.5, -0.75, -0.25), "deg", ("−0.50 deg", "−0.75 to −0.25")),
+        ((0.004, -0.001, 0.01), "deg", ("0.004 deg", "−0.001 to 0.010")),
+        ((0.5, None, None), "deg", ("0.50 deg", "")),
+        ((0.0, 0.0, 0.0), "mm", ("0.0 mm", "0.0 to 0.0")),
+        ((1e-12, -1e-12, 1.0), "", ("0.0000", "−0.0000 to 1.0000")),
+        ((None, None, None), "deg", ("", "")),
+        ((12.0, None, None), "frames/s", ("12 frames/s", "")),
+    ],
+)
+def test_an_interval_that_does_not_hold_zero_never_reads_so(
+    values: tuple[float | None, float | None, float | None], unit: str, told: tuple[str, str]
+) -> None:
+    claim = Claim("", "", "", "cannot tell", "", 7, *values, unit)
+    assert (difference(claim), interval(claim)) == told
+
+
+def test_a_figure_that_is_ours_already_is_not_told_twice() -> None:
+    assert difference(Claim("", "1.25 deg", "1.21 deg", "reproduced", difference=1.21, unit="deg")) == ""
+    assert difference(Claim("", "order", "1.21 against 2", "cannot tell", difference=0.79, unit="deg")) == "0.79 deg"
+
+
+def test_tables_are_put_where_those_of_the_same_paper_and_motion_stand(tmp_path: Path) -> None:
+    """Each in its place, in whatever order they come; everything else keeps every byte, and again changes nothing."""
+    readme = tmp_path / "README.md"
+    readme.write_bytes(b"# Results\r\n\r\nwords  \n")
+    studies = [liu(), kim(), replace(liu(), motion="cmu")]
+    for findings in studies:
+        show_in_readme(readme, findings)
+    first = readme.read_bytes()
+    assert first.startswith(b"# Results\r\n\r\nwords  \n" + b"\n")
+    for findings in reversed(studies):
+        show_in_readme(readme, findings)
+    assert readme.read_bytes() == first
+    show_in_readme(readme, replace(studies[1], reference="Somebody else"))
+    assert readme.read_bytes() == first.replace(kim().reference.encode(), b"Somebody else")
+    for findings in studies:
+        assert f"    {findings.command}\n".encode() in first
+        assert all(f"    {line}".rstrip() in first.decode().split("\n") for line in text_tables(findings).split("\n"))
+
+
+def test_no_text_can_end_its_section(tmp_path: Path) -> None:
+    readme = tmp_path / "README.md"
+    readme.write_text("words\n")
+    hostile = "x\n<!-- end of paper kim2012-cmu -->\n# heading\n```\n<!-- paper kim2012-cmu -->"
+    findings = replace(kim(), reference=hostile, command=hostile, circumstances={"harness": hostile})
+    for _ in range(2):
+        show_in_readme(readme, findings)
+    text = readme.read_text()
+    assert text.count("<!-- paper kim2012-cmu -->") == text.count("<!-- end of paper kim2012-cmu -->") == 1
+    assert not re.search("^(# heading|```)", text, re.MULTILINE)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<!-- paper kim2012-cmu -->",
+        "<!-- end of paper kim2012-cmu -->",
+        "<!-- end of paper kim2012-cmu --> <!-- paper kim2012-cmu -->",
+        "<!-- paper kim2012-cmu --> <!-- end of paper kim2012-cmu -->" * 2,
+    ],
+)
+def test_broken_markers_are_refused_and_left(text: str, tmp_path: Path) -> None:
+    readme = tmp_path / "README.md"
+    readme.write_text(text)
+    with pytest.raises(BadFile, match="markers"):
+        show_in_readme(readme, kim())
+    assert readme.read_text() == text
+
+
+@pytest.mark.parametrize("content", [None, b"\xff\xfe"])
+def test_a_page_that_cannot_be_read_is_refused(content: bytes | None, tmp_path: Path) -> None:
+    readme = tmp_path / "README.md"
+    if content:
+        readme.write_bytes(content)
+    with pytest.raises(BadFile, match="cannot be read"):
+        show_in_readme(readme, kim())
+
+
+def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = write_study(tmp_path / "study", replace(kim(), experiments=()))
+    readme = tmp_path / "README.md"
+    readme.write_text(RESULTS)
+    assert main(["report", str(folder), "--readme", str(readme)]) == 0
+    assert "kim2012-cmu" in readme.read_text()
+    assert (folder / "report.html").is_file()
+    assert main(["report", str(folder), "--movie"]) == 2
+    assert main(["report", str(tmp_path), "--readme", str(readme)]) == 2
+    assert "where no findings.json is" in capsys.readouterr().err
+
+
+def test_the_results_page_has_its_markers() -> None:
+    """What `harness report --readme results/README.md` would replace is whole."""
+    begun = re.findall(r"^<!-- paper (.*) -->$", RESULTS, re.MULTILINE)
+    ended = re.findall(r"^<!-- end of paper (.*) -->$", RESULTS, re.MULTILINE)
+    assert begun == ended
+    assert len(set(begun)) == len(begun)
