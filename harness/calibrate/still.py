@@ -48,13 +48,16 @@ class Still:
         freeze(self, position_m=("S", 3), tracker_from_station=("S", 4), moved_m=("S",), turned_rad=("S",))
 
 
-def stood_still(frames: Sequence[TrackerFrame], stations: Sequence[str]) -> Still:
-    """Typical readings; NotStanding when they are too few or somebody moved, BadInput for other stations."""
+def stood_still(frames: Sequence[TrackerFrame], stations: Sequence[str], pose: str = "T-pose") -> Still:
+    """Typical readings; NotStanding when they are too few or somebody moved, BadInput for other stations.
+
+    `pose` is what the performer is asked to hold.
+    """
     seconds = span_s(frames)
     if seconds < LEAST_S or len(frames) < LEAST_FRAMES:
         raise NotStanding(
             f"{len(frames)} frames within {seconds:.1f} s are too few to calibrate from.",
-            f"Hold the T-pose for {LEAST_S:g} s or more while the tracker streams.",
+            f"Hold the pose ({pose}) for {LEAST_S:g} s or more while the tracker streams.",
         )
     if any(len(frame.quality) != len(stations) for frame in frames):
         raise BadInput(
@@ -64,10 +67,10 @@ def stood_still(frames: Sequence[TrackerFrame], stations: Sequence[str]) -> Stil
     position_m = np.array([frame.position_m for frame in frames])
     turn = np.array([frame.tracker_from_station for frame in frames])
     usable = _usable(frames, position_m, turn)
-    _require_readings(frames, usable.mean(axis=0), stations)
+    _require_readings(frames, usable.mean(axis=0), stations, pose)
     rows = [_of_one(position_m[usable[:, s], s], turn[usable[:, s], s]) for s in range(len(stations))]
     at_m, turned, moved_m, turned_rad, limit_m, limit_rad = (np.array(column) for column in zip(*rows, strict=True))
-    _require_stillness(stations, moved_m, limit_m, turned_rad, limit_rad)
+    _require_stillness(stations, moved_m, limit_m, turned_rad, limit_rad, pose)
     return Still(seconds, at_m, turned, moved_m, turned_rad)
 
 
@@ -109,7 +112,7 @@ def _usable(frames: Sequence[TrackerFrame], position_m: Floats, turn: Floats) ->
     return out
 
 
-def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: Sequence[str]) -> None:
+def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: Sequence[str], pose: str) -> None:
     """NotStanding when too small a share (S,) of a station's readings is of use."""
     if share.min() >= LEAST_SHARE:
         return
@@ -127,12 +130,12 @@ def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: S
         why, advice = "sent records in doubt", "Check the line, the output lists and which stations are on."
     raise NotStanding(
         f"Station {stations[worst]!r} {why}: {share[worst]:.0%} of its readings are of use; {LEAST_SHARE:.0%} must be.",
-        f"{advice} Then hold the T-pose again.",
+        f"{advice} Then hold the pose again ({pose}).",
     )
 
 
 def _require_stillness(
-    stations: Sequence[str], moved_m: Floats, limit_m: Floats, turned_rad: Floats, limit_rad: Floats
+    stations: Sequence[str], moved_m: Floats, limit_m: Floats, turned_rad: Floats, limit_rad: Floats, pose: str
 ) -> None:
     worst = int(np.argmax(np.maximum(moved_m / limit_m, turned_rad / limit_rad)))
     if moved_m[worst] <= limit_m[worst] and turned_rad[worst] <= limit_rad[worst]:
@@ -141,5 +144,5 @@ def _require_stillness(
         f"Station {stations[worst]!r} moved: it strayed by {1e3 * moved_m[worst]:.0f} mm and "
         f"{np.rad2deg(turned_rad[worst]):.0f} deg, where {1e3 * limit_m[worst]:.0f} mm and "
         f"{np.rad2deg(limit_rad[worst]):.0f} deg are sway and noise.",
-        "Stand still in T-pose, and see that the strap is tight.",
+        f"Stand still in the pose ({pose}), and see that the strap is tight.",
     )

@@ -1,0 +1,111 @@
+"""What people's bones are like: PCA of bone lengths over a population of skeletons (Liu et al. 2011, section 3;
+docs/methods.md A2, H15), and how bones of other people point in the rest pose.
+
+Lengths are in metres, not divided by the left tibia as for the paper's figure. Every skeleton counts twice, as it is
+and mirrored, so that nothing is learnt of the difference between left and right but how large it is. What the modes
+leave is normal bone by bone.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats, Ints, freeze
+from harness.core.skeleton import Skeleton
+from harness.errors import BadInput
+
+LEAST_REST_M = 1e-3
+"""Nobody's bones are known better than this from other bones [choice]."""
+
+
+@dataclass(frozen=True, eq=False)
+class BoneSpace:
+    """N bones, B modes of their lengths, normal statistics of lengths and of directions."""
+
+    mean_m: Floats
+    """(N,) mean lengths."""
+    modes: Floats
+    """(B, N) orthonormal rows: the principal directions of lengths."""
+    spread_m: Floats
+    """(B,) standard deviation of each mode's weight."""
+    rest_m: Floats
+    """(N,) standard deviation of what the modes leave."""
+    direction: Floats
+    """(N, 3) mean direction of each bone in the rest pose, unit vectors."""
+    across: Floats
+    """(N, 2, 3) two unit vectors square to it."""
+    across_m: Floats
+    """(N, 2) standard deviation of the bone's far end along these; 0 where all people's bones point alike."""
+    source: str
+    """Whose bones, for tables."""
+
+    def __post_init__(self) -> None:
+        freeze(self, mean_m=("N",), modes=("B", "N"), spread_m=("B",), rest_m=("N",))
+        freeze(self, direction=("N", 3), across=("N", 2, 3), across_m=("N", 2))
+
+    @property
+    def covariance_m2(self) -> Floats:
+        """(N, N) of lengths."""
+        out: Floats = (self.modes.T * self.spread_m**2) @ self.modes + np.diag(self.rest_m**2)
+        return out
+
+    def kept(self) -> float:
+        """Share of the variance of lengths that the modes keep."""
+        modes = float(np.sum(self.spread_m**2))
+        return modes / (modes + float(np.sum(self.rest_m**2)))
+
+    def mean_skeleton(self, like: Skeleton) -> Skeleton:
+        """Bones of mean length and direction, on the hinges of another skeleton."""
+        return like.with_bones(self.mean_m[:, None] * self.direction)
+
+
+def bone_space(skeletons: Sequence[Skeleton], modes: int = 5, source: str = "") -> BoneSpace:
+    """The statistics of a population; BadInput when it has fewer people than modes and one more."""
+    count = len(skeletons)
+    if modes < 0 or count < modes + 2:
+        raise BadInput(
+            f"{count} skeletons do not give {modes} modes of bone lengths.",
+            f"Take {modes + 2} or more, or fewer modes.",
+        )
+    names = skeletons[0].names
+    if any(skeleton.names != names for skeleton in skeletons):
+        raise BadInput("Skeletons of different bones have no common space.", "Take their 24 bones first.")
+    bone_m = np.array([skeleton.bone_m for skeleton in skeletons])
+    both_m = np.concatenate([bone_m, bone_m[:, _other_side(names)] * [1.0, -1.0, 1.0]])
+    length_m = np.sqrt(np.sum(both_m**2, axis=2))
+    mean_m = length_m.mean(axis=0)
+    _, size, rows = np.linalg.svd(length_m - mean_m, full_matrices=False)
+    variance = size**2 / (2.0 * (count - 1))
+    whole = np.sum((length_m - mean_m) ** 2, axis=0) / (2.0 * (count - 1))
+    # Modes fit the people that they come from: others lie farther from them.
+    rest = (whole - variance[:modes] @ rows[:modes] ** 2) * count / (count - modes)
+    direction, across, across_m = _directions(both_m, count)
+    return BoneSpace(
+        mean_m=mean_m,
+        modes=rows[:modes],
+        spread_m=np.sqrt(variance[:modes]),
+        rest_m=np.sqrt(np.maximum(rest, LEAST_REST_M**2)),
+        direction=direction,
+        across=across,
+        across_m=across_m,
+        source=source,
+    )
+
+
+def _directions(both_m: Floats, count: int) -> tuple[Floats, Floats, Floats]:
+    """Mean directions (N, 3), the principal axes across them (N, 2, 3) and the spread along these (N, 2)."""
+    mean = both_m.mean(axis=0)
+    direction = mean / np.sqrt(np.sum(mean**2, axis=1, keepdims=True))
+    along = np.einsum("kbi,bi->kb", both_m, direction)
+    off = np.swapaxes(both_m - along[:, :, None] * direction, 0, 1)
+    # The direction itself is added as an axis of a spread beyond all others, so that the next two are square to it.
+    _, size, axes = np.linalg.svd(np.concatenate([off, 1e3 * direction[:, None]], axis=1), full_matrices=False)
+    return direction, axes[:, 1:], size[:, 1:] / np.sqrt(2.0 * (count - 1))
+
+
+def _other_side(names: Sequence[str]) -> Ints:
+    """(N,) index of the bone on the other side; its own for a bone of the middle."""
+    swap = {"l": "r", "r": "l"}
+    twins = [swap.get(name[0], "") + name[1:] for name in names]
+    return np.array([names.index(twin) if twin in names else b for b, twin in enumerate(twins)], dtype=np.int64)

@@ -1,0 +1,104 @@
+"""What cannot be calibrated from: stations turned in the room, poses that were not held, stations exchanged."""
+
+from itertools import combinations
+
+import numpy as np
+
+from harness.calibrate import frames
+from harness.calibrate.bundle import Bundle, Expected
+from harness.calibrate.fit import Fit, descended
+from harness.calibrate.poses import POSES
+from harness.calibrate.still import NotStanding
+from harness.calibrate.unknowns import Solution
+from harness.core.arrays import Floats
+
+MOST_MISS_RAD = float(np.deg2rad(10.0))
+"""A pose whose hinges are off by more than this on the whole is another pose: twice what people who try are off, and
+half of what leaving out an arm or a leg makes [choice]."""
+_LIKELIER = 0.5
+"""Stations are called exchanged when the other way round leaves less than this share of the squared residuals."""
+_TRIED = 6
+
+
+def require_one_room(bundle: Bundle) -> None:
+    """NotStanding when a station's orientations look turned in the room."""
+    at = bundle.start()
+    turn_rad = frames.turned_in_room(bundle.reach(at).world_from_bone[:, bundle.shared.carriers], bundle.turn)
+    found = np.flatnonzero(np.any(turn_rad != 0.0, axis=1))
+    if len(found) == 0:
+        return
+    mounts = bundle.shared.mounts
+    told = "; ".join(f"station {j + 1} ({mounts[j].station}) {frames.about(turn_rad[j])}" for j in found)
+    undo = ", ".join(f"b{j + 1}" for j in found)
+    raise NotStanding(
+        f"The same turn in every pose, in the room's axes (x forward, z up), is in what these report: {told}.",
+        f"Undo the boresight (send {undo}) or the alignment (R) of these stations, or turn no orientation after "
+        "reading it; then hold the poses again.",
+    )
+
+
+def require_poses(bundle: Bundle, found: Fit) -> None:
+    """NotStanding when a pose was not held as shown: because stations are exchanged, or because it was another pose."""
+    worst = int(np.argmax(found.pose_miss_rad))
+    if found.pose_miss_rad[worst] <= MOST_MISS_RAD:
+        return
+    _require_sides(bundle, found)
+    mounts = bundle.shared.mounts
+    off_m = _off_m(bundle, found)[worst]
+    station = int(np.argmax(off_m))
+    off_deg, off_mm = np.rad2deg(found.pose_miss_rad[worst]), 1e3 * off_m[station]
+    raise NotStanding(
+        f"Pose {worst + 1} ({POSES[worst].name}) was not held as shown: hinges are {off_deg:.0f} deg off on the whole, and "
+        f"station {mounts[station].station!r} is the farthest from its place in it, {off_mm:.0f} mm.",
+        f"Hold it again: {POSES[worst].instruction}",
+    )
+
+
+def _off_m(bundle: Bundle, found: Fit) -> Floats:
+    """(P, S) from where stations would be had the poses been held as shown, upright, to where they were."""
+    at = found.solution
+    start = bundle.start()
+    asked = Solution(
+        at.bone_m,
+        at.weights_m,
+        at.mount_m,
+        at.bone_from_station,
+        at.root_m,
+        start.world_from_root,
+        bundle.asked_rad,
+    )
+    place_m = bundle.reach(asked).place_m
+    shift_m = np.median(bundle.place_m - place_m, axis=1, keepdims=True)
+    return np.asarray(np.linalg.norm(bundle.place_m - place_m - shift_m, axis=2))
+
+
+def _require_sides(bundle: Bundle, found: Fit) -> None:
+    mounts = bundle.shared.mounts
+    everyone = list(range(len(mounts)))
+    bones = [mount.bone for mount in mounts]
+    sides = [(bones.index(b), bones.index(f"r{b[1:]}")) for b in bones if b[0] == "l" and f"r{b[1:]}" in bones]
+    given = Expected(MOST_MISS_RAD / 2.0, 1.0, found.expected.flesh_m, 0.005, np.deg2rad(1.0))
+    plain = _cost(bundle, everyone, given)
+    best, which = plain, sides
+    for exchange in [*([pair] for pair in combinations(everyone, 2)), sides]:
+        rows = list(everyone)
+        for a, b in exchange:
+            rows[a], rows[b] = b, a
+        if (cost := _cost(bundle, rows, given)) < best:
+            best, which = cost, exchange
+    if best > _LIKELIER * plain:
+        return
+    told = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
+    raise NotStanding(
+        f"Stations look exchanged: {told}.",
+        "Check which tracker is worn where, or name the stations the other way round; then hold the poses again.",
+    )
+
+
+def _cost(bundle: Bundle, rows: list[int], given: Expected) -> float:
+    """Squared residuals that are left with the readings of these stations in the places of the others'."""
+    other = Bundle(bundle.shared, bundle.asked_rad, bundle.place_m[:, rows], bundle.turn[:, rows])
+    at, damping, weight = other.start(), 1e-3, np.ones((*other.place_m.shape[:2], 2))
+    for _ in range(_TRIED):
+        at, damping, _ = descended(other, at, given, weight, damping)
+    return other.cost(at, given, weight)
