@@ -58,11 +58,11 @@ def common(findings: Findings) -> dict[str, list[Experiment]]:
 
 
 def difference(claim: Claim) -> str:
-    """The mean difference with its unit, "" where there is none or `ours` is this very figure."""
+    """The mean difference with its unit, "" where there is none or `ours` has this very figure."""
     if claim.difference is None:
         return ""
     text = f"{_figure(claim.difference, claim)} {claim.unit}".rstrip()
-    return "" if claim.low is None and claim.ours.startswith(text) else text
+    return "" if claim.low is None and f" {text}" in f" {claim.ours}" else text
 
 
 def interval(claim: Claim) -> str:
