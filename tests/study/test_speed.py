@@ -43,8 +43,8 @@ def test_the_papers_databases_have_the_frames_that_they_state() -> None:
 @pytest.mark.parametrize(("published", "claims"), [(LIU2011, 4), (KIM2012, 1)])
 def test_the_slowest_database_decides(published: Published, claims: int) -> None:
     last = list(published.databases)[-1]
-    fast = judge(published, paces(published, published.fps + 1.0), on="this machine")
-    slow = judge(published, paces(published, published.fps, 26.0), on="this machine")
+    fast = judge(published, paces(published, published.fps + 1.0), on="this machine", real=False)
+    slow = judge(published, paces(published, published.fps, 26.0), on="this machine", real=False)
     assert len(fast.claims) == len(slow.claims) == claims
     assert {claim.verdict for claim in fast.claims} == {"reproduced"}
     assert {claim.verdict for claim in slow.claims} == {"not reproduced"}
@@ -54,16 +54,16 @@ def test_the_slowest_database_decides(published: Published, claims: int) -> None
 
 
 def test_a_smaller_database_is_not_comparable_and_none_not_run() -> None:
-    small = judge(LIU2011, paces(LIU2011, 1_000.0, share=0.5), on="this machine")
+    small = judge(LIU2011, paces(LIU2011, 1_000.0, share=0.5), on="this machine", real=False)
     assert {claim.verdict for claim in small.claims} == {"not comparable"}
     assert "walking 9,080 of 18,160" in small.claims[0].why
-    none = judge(LIU2011, {}, on="this machine", absent=["golf: there is none"])
+    none = judge(LIU2011, {}, on="this machine", real=True, absent=["golf: there is none"])
     assert {claim.verdict for claim in none.claims} == {"not run"}
     assert "golf: there is none" in none.notes[-1]
 
 
 def test_tables_and_bars_have_every_pace() -> None:
-    told = judge(LIU2011, paces(LIU2011, 500.0), on="this machine")
+    told = judge(LIU2011, paces(LIU2011, 500.0), on="this machine", real=False)
     (table,), (bars,) = told.tables, told.figures
     assert len(table.rows) == len(LIU2011.databases) * len(LIU2011.methods)
     assert all(len(row) == len(table.columns) for row in table.rows)
