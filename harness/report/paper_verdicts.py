@@ -17,11 +17,11 @@ MARKS: Mapping[Verdict, str] = {
     "not run": "–",
 }
 MEANINGS: Mapping[Verdict, str] = {
-    "reproduced": "the 95 % interval of the paired difference lies on the published side; an absolute figure: ours is "
-    "within 25 % of it",
-    "not reproduced": "the interval lies on the other side; an absolute figure: ours is further off",
+    "reproduced": "the 95 % interval of the paired difference lies on the published side; or a printed figure is "
+    "met, an error within 25 %",
+    "not reproduced": "the interval lies on the other side; or a printed figure is missed",
     "cannot tell": "the interval holds zero, or there are fewer than 6 clips to take one from",
-    "not comparable": "the paper prints an absolute figure, and it was measured on other motion than ours",
+    "not comparable": "a printed figure is of other motion or conditions than ours",
     "not run": "not measured here",
 }
 MINUS = "−"

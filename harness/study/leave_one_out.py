@@ -114,7 +114,7 @@ def _compared(study: Study, theirs: str, *, name: str, title: str, question: str
             f"Error with {INPUTS[inputs]}",
             "deg",
             {setting.who: each for setting, each in errors.items() if setting.inputs == inputs},
-            caption="Mean joint-angle error over clips; whiskers are standard deviations over clips.",
+            caption="Mean joint-angle error over clips.",
         )
         for inputs in dict.fromkeys(setting.inputs for setting in errors)
     )

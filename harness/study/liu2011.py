@@ -49,7 +49,7 @@ def boxing_inputs(study: Study) -> Experiment:
         "Error by inputs",
         "deg",
         groups,
-        caption="Mean joint-angle error over clips; whiskers are standard deviations over clips.",
+        caption="Mean joint-angle error over clips.",
         published={OURS: tuple(PUBLISHED_DEG.values())},
     )
     parts = "A fifth of a bout is left out with 1 s around it; the rest of it is in the database: nearest to the paper."

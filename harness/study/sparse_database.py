@@ -80,7 +80,7 @@ def extrapolation(study: Study) -> Experiment:
     ]
     groups = {group: {method: errors[method][group] for method in errors} for group in errors[KERNEL]}
     title = "Three trackers, 31 frames of table tennis, no final inverse kinematics"
-    caption = "Mean error of the hinges of each group; thin lines are standard deviations over clips."
+    caption = "Mean error of the hinges of each group."
     return Experiment(
         name="extrapolation",
         title="Beyond the examples: right arm and spine",

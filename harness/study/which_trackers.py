@@ -72,7 +72,7 @@ def sensors(study: Study) -> Experiment:
                 ranked_bars(
                     f"{b}: mean joint-angle error of kernel_cca, by the trackers worn",
                     angles[b],
-                    f"The paper calls {SUITED[b]} suitable. Lines are 95 % intervals of the mean over clips.",
+                    f"The paper calls {SUITED[b]} suitable. Intervals are of the mean over clips.",
                 )
                 for b in SUITED
             ),

@@ -1,0 +1,62 @@
+"""docs/papers.md says what there is."""
+
+import importlib.util
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import harness
+from harness.report.paper_verdicts import MARKS
+from harness.score.findings import Experiment
+from harness.study.paper import PAPERS, paper
+from harness.study.study import Study
+
+ROOT = Path(harness.__file__).parent.parent
+PAGE = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
+
+
+def test_every_experiment_and_no_other_has_a_row() -> None:
+    tables = re.findall(r"\| experiment \| the paper \| where \|\n\|---\|---\|---\|\n((?:\|.*\n)+)", PAGE)
+    named = [re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) for table in tables]
+    assert named == [list(paper(name).experiments) for name in PAPERS]
+
+
+def test_every_verdict_has_a_row() -> None:
+    assert re.findall(r"^\| (\S) ([a-z ]+) \|", PAGE, re.MULTILINE) == [(mark, word) for word, mark in MARKS.items()]
+
+
+def test_every_file_that_is_named_is_there() -> None:
+    names = re.findall(r"`((?:harness|scenarios)/[a-z0-9_/.*]+)`", PAGE) + re.findall(r"\]\(([^)]+)\)", PAGE)
+    assert len(names) > 5
+    for name in names:
+        assert list(ROOT.glob(name)) or (ROOT / "docs" / name).exists(), name
+
+
+def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
+    """Where nothing ran it says so."""
+    (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    imports = (
+        "from harness.score.findings import Experiment\nfrom harness.study.claims import errs_less\n"
+        "from harness.study.study import Study\nfrom harness.study.tables import by_clip, mean_bars\n\n\n"
+    )
+    file = tmp_path / "swords.py"
+    file.write_text(imports + code)
+    spec = importlib.util.spec_from_file_location("swords", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module: Any = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    found = module.swords(Study(tmp_path, "builtin", 1, {}))
+    assert isinstance(found, Experiment)
+    assert [claim.verdict for claim in found.claims] == ["not run"]
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_a_paper_s_runs_are_found_by_their_files(name: str) -> None:
+    folder = ROOT / "scenarios" / "papers" / name
+    for motion in ("builtin", "cmu"):
+        files = {path.stem.removeprefix(f"{motion}_") for path in folder.glob(f"{motion}_*.toml")}
+        assert set(paper(name).plan(motion, 1)) == files
+        assert files
