@@ -6,8 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.body.humanoid import Body, tpose
+from harness.body.humanoid import Body, build, tpose
 from harness.body.mounts import Mount
+from harness.calibrate.bone_space import BoneSpace
+from harness.calibrate.collector import PoseCollector
+from harness.calibrate.eight import calibrate_poses
+from harness.calibrate.likeness import Likeness
+from harness.calibrate.poses import POSES, configuration
 from harness.calibrate.tpose import calibrate_tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -15,6 +20,7 @@ from harness.core.calibration import Calibration
 from harness.core.motion import Take
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
+from harness.live.calibrate import HoldPoses
 from harness.simulate.holding import holding
 from harness.simulate.noise import Noise
 from harness.simulate.simulate import Simulation, TrackerConfig, exact_calibration, simulate
@@ -92,6 +98,22 @@ def by_tpose(session: TrackerSession, *, miss_rad: float, hold_s: float) -> Cali
     found = calibrate_tpose(frames, session.body, session.nominal)
     errors = errors_of(found.calibration, session.body.skeleton, session)
     return Calibrated(found.calibration, session.body, errors, (_note("T-pose, bone lengths known", errors),))
+
+
+def by_poses(session: TrackerSession, space: BoneSpace, *, miss_rad: float, hold_s: float) -> Calibrated:
+    """Bone lengths, mounts and room from eight poses and from what other people's bones are like: of the performer,
+    nothing is known but the stream. NotStanding when the poses cannot be found in it, or not be calibrated from."""
+    poses = [configuration(pose, session.body.skeleton) for pose in POSES]
+    frames = session.standing_model(poses, miss_rad=miss_rad, hold_s=hold_s)
+    nobody = build()
+    shown = [configuration(pose, nobody.skeleton) for pose in POSES]
+    stations = [mount.station for mount in session.nominal]
+    collector = PoseCollector(stations, len(POSES), Likeness(nobody, session.nominal, shown))
+    HoldPoses(collector, POSES).lead(frames, say=lambda text: None)
+    found = calibrate_poses(collector.held, space, session.nominal)
+    errors = errors_of(found.calibration, found.skeleton, session)
+    notes = (_note(f"eight poses, other bones learnt from {space.source}", errors),)
+    return Calibrated(found.calibration, build(found.skeleton), errors, notes)
 
 
 def errors_of(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:

@@ -97,9 +97,9 @@ class Scenario:
     worn: tuple[str, ...] = ()
     """Which of the stations are worn, all of them if none is named: vary "worn" to compare sets of trackers. The stream
     has no others, so that one that is not worn is not a lost one."""
-    calibration: Literal["exact", "tpose"] = "exact"
-    """What methods are told of trackers, room and body: the truth; or what a T-pose tells of trackers and room
-    (bone lengths are known). Vary it to see what calibrating costs."""
+    calibration: Literal["exact", "tpose", "poses"] = "exact"
+    """What methods are told of trackers, room and body: the truth; what a T-pose tells of trackers and room (bone
+    lengths are known); or what eight poses tell of all three. Vary it to see what calibrating costs."""
     calibrating: Calibrating = field(default_factory=Calibrating)
     """How that is done."""
     mount: str = "tibia"

@@ -9,7 +9,8 @@ import numpy as np
 
 from harness.body import humanoid, retarget
 from harness.body.mounts import Mount, place
-from harness.calibrated import Calibrated, TrackerSession, by_tpose, exactly
+from harness.calibrate.bone_space import bone_space
+from harness.calibrated import Calibrated, TrackerSession, by_poses, by_tpose, exactly
 from harness.config import Scenario
 from harness.core.fields import changed
 from harness.core.humanoid24 import BONES, standard_skeleton
@@ -67,12 +68,16 @@ class Setting:
 
     def under(self, scenario: Scenario) -> "Setting | None":
         """The same under other errors of the tracker, with others of its stations worn or calibrated otherwise, sharing
-        motion and what was learnt, which knows of none of these; None if more differs."""
+        motion and, on the same body, what was learnt, which knows of none of these; None if more differs."""
         free = ("noise", "profile", "components", "disturbance", "worn", "calibration", "calibrating")
         if replace(self.scenario, **{name: getattr(scenario, name) for name in free}) != scenario:
             return None
         other = copy.copy(self)
         other.scenario = scenario
+        if "poses" in (self.scenario.calibration, scenario.calibration):  # another skeleton, and all that stood on it
+            other._fitted = {}
+            other._retargeted = {name: r for name, r in self._retargeted.items() if name == self.clip.name}
+            other.__dict__.pop("examples", None)
         for own in ("session", "calibrated", "simulation", "_worn"):
             other.__dict__.pop(own, None)
         return other
@@ -112,6 +117,14 @@ class Setting:
                 return exactly(self.session)
             case "tpose":
                 return by_tpose(self.session, **model)
+            case "poses":
+                known = f"{len(self.people)} others ({self.source.title})"
+                return by_poses(self.session, bone_space(list(self.people.values()), source=known), **model)
+
+    @cached_property
+    def people(self) -> dict[str, Skeleton]:
+        """Of whose bones something is known before eight poses are held: never the performer's own."""
+        return self.source.people(without=self.source.subject(self.part.clip))
 
     @cached_property
     def body(self) -> humanoid.Body:
@@ -211,6 +224,7 @@ class Setting:
             "clip": str(self.part),
             "motion_digest": _motion_digest(self.clip),
             **self._worn,
+            **({"people_digest": self._people_digest} if scenario.calibration == "poses" else {}),
             "examples": learnt,
             "withheld": sorted(str(part) for part in self.closed[1:] if part.clip in learnt),
             "inputs": inputs,
@@ -224,6 +238,10 @@ class Setting:
         worn = [array for mount in self.session.strapped for array in place(skeleton, mount)]
         body = results.digest(skeleton.bone_m, skeleton.axes, self.body.limits_rad)
         return {"body_digest": body, "mounts_digest": results.digest(*worn)}
+
+    @cached_property
+    def _people_digest(self) -> str:
+        return results.digest(*(skeleton.bone_m for skeleton in self.people.values()))
 
     def notes(self, method: Method) -> tuple[str, ...]:
         """What a reader should know: notes of the clip, what was calibrated, what retargeting to another body cost."""

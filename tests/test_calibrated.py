@@ -1,5 +1,6 @@
 """What a method is told comes from a stream; what it is judged on is the same whatever it was told."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,18 +8,24 @@ import numpy as np
 import pytest
 
 from harness import experiment
-from harness.calibrated import TrackerSession, by_tpose, errors_of
+from harness.body import kinematics
+from harness.body.humanoid import Body
+from harness.calibrate.bone_space import BoneSpace, bone_space
+from harness.calibrate.poses import POSES, configuration
+from harness.calibrated import Calibrated, TrackerSession, by_poses, by_tpose, errors_of
 from harness.config import Calibrating, Motion, Scenario, load_scenario
 from harness.core import rotations
+from harness.core.motion import Take
 from harness.core.protocol import Part
 from harness.errors import BadInput, Outcome
 from harness.mocap import performer
 from harness.mocap.sources import open_source
 from harness.reconstruct.ik import PREVIOUS
+from harness.reconstruct.mean_pose import FittedMeanPose, MeanPose
 from harness.report.text import table
 from harness.score.results import read_cells, read_summary
 from harness.setting import Setting, mounts_of, noise_of, tracker_of
-from harness.simulate.simulate import Simulation, simulate
+from harness.simulate.simulate import Simulation, exact_calibration, simulate
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import combination
 
@@ -31,7 +38,7 @@ SMALL = Scenario(
     stations=load_scenario("demo").stations,
     methods=("ik:previous", "mean_pose"),
 )
-KINDS = ("exact", "tpose")
+KINDS = ("exact", "tpose", "poses")
 
 
 def setting(scenario: Scenario = SMALL, clip: str = "walking_p1_01") -> Setting:
@@ -165,20 +172,20 @@ def test_a_model_that_nobody_takes_for_one_fails_its_cells(tmp_path: Path) -> No
 
 def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
     """And two workers agree with one, and a run goes on where it was."""
-    scenario = replace(SMALL, calibrating=BESIDE, vary={"calibration": list(KINDS)})
+    scenario = replace(SMALL, methods=("ik:previous",), calibrating=BESIDE, vary={"calibration": list(KINDS)})
     assert experiment.run(scenario, tmp_path / "one") is Outcome.PASS
     assert experiment.run(scenario, tmp_path / "two", jobs=2) is Outcome.PASS
-    one, two = ({cell.key: cell for cell in read_cells(tmp_path / name)} for name in ("one", "two"))
-    assert len(one) == 2 * 2 * len(KINDS)
-    assert set(one) == set(two)
-    for key, cell in one.items():
-        np.testing.assert_array_equal(cell.estimate_qpos, two[key].estimate_qpos)
-        np.testing.assert_array_equal(cell.estimate_bone_m, two[key].estimate_bone_m)
-        assert cell.calibration_errors == two[key].calibration_errors
+    one, two = (list(read_cells(tmp_path / name)) for name in ("one", "two"))
+    assert len(one) == len(two) == 2 * len(KINDS)
+    for cell, other in zip(one, two, strict=True):
+        np.testing.assert_array_equal(cell.estimate_qpos, other.estimate_qpos)
+        np.testing.assert_array_equal(cell.estimate_bone_m, other.estimate_bone_m)
+        assert (cell.clip, cell.calibration_errors) == (other.clip, other.calibration_errors)
         assert bool(cell.calibration_errors) == (cell.calibration != "exact")
         assert cell.calibration == cell.varied["calibration"]
+        assert (cell.estimate_bone_m == cell.bone_m).all() == (cell.calibration != "poses")
     printed = table(read_summary(tmp_path / "one"))
-    assert "calibration exact, tpose" in printed
+    assert f"calibration {', '.join(KINDS)}" in printed
     assert all(f"calibration={kind}" in printed for kind in KINDS)
     made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "one" / "cells").iterdir()}
     experiment.run(scenario, tmp_path / "one")
@@ -192,6 +199,67 @@ def test_what_was_learnt_is_shared_while_the_body_is_the_same() -> None:
     assert tpose.fitted(PREVIOUS, "ik:previous") is exact.fitted(PREVIOUS, "ik:previous")
     assert tpose.calibrated.calibration.kind == "tpose"
     assert exact.calibrated.calibration.kind == "exact"
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[TrackerSession, Calibrated, BoneSpace]:
+    """What eight poses of p2 told."""
+    scenario = replace(SMALL, calibration="poses", calibrating=BESIDE)
+    made = setting(scenario, "walking_p2_01")
+    return made.session, made.calibrated, bone_space(list(made.people.values()))
+
+
+def test_eight_poses_find_bones_mounts_and_room(found: tuple[TrackerSession, Calibrated, BoneSpace]) -> None:
+    worn, calibrated, space = found
+    assert calibrated.calibration.kind == "poses"
+    nominal = exact_calibration(worn.body, worn.nominal, worn.tracker)
+    untold = errors_of(nominal, space.mean_skeleton(worn.body.skeleton), worn)
+    assert calibrated.errors["length_mm"] < 0.7 * untold["length_mm"]
+    assert calibrated.errors["mount_mm"] < 0.7 * untold["mount_mm"]
+    assert calibrated.errors["mount_deg"] < 6.0
+    assert calibrated.errors["room_heading_deg"] < 10.0
+
+
+def test_nothing_of_the_performer_but_the_stream_is_told(
+    found: tuple[TrackerSession, Calibrated, BoneSpace], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where p1 stands but the stream of p2 is heard, what is found is p2's to the bit; its errors alone are others."""
+    worn, calibrated, space = found
+    poses = [configuration(pose, worn.body.skeleton) for pose in POSES]
+    heard = worn.standing_model(poses, miss_rad=np.deg2rad(BESIDE.miss_deg), hold_s=BESIDE.hold_s)
+    other = session(replace(SMALL, calibrating=Calibrating(beside_m=0.3)))
+    assert other.body is not worn.body
+    monkeypatch.setattr(TrackerSession, "standing_model", lambda *_, **__: heard)
+    again = by_poses(other, space, miss_rad=0.0, hold_s=3.0)
+    for name in ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m"):
+        one, two = (getattr(c.calibration, name) for c in (calibrated, again))
+        np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(again.body.skeleton.bone_m, calibrated.body.skeleton.bone_m)
+    assert again.errors["mount_mm"] > calibrated.errors["mount_mm"] + 100.0
+
+
+def test_methods_and_their_examples_stand_on_the_body_that_was_found(
+    found: tuple[TrackerSession, Calibrated, BoneSpace],
+) -> None:
+    made, bodies = setting(), []
+
+    class Watching(MeanPose):
+        def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> FittedMeanPose:
+            bodies.append((body, [example.qpos for example in examples]))
+            return super().fit(body, examples, rng)
+
+    made.fitted(Watching(), "watching")
+    other = made.under(replace(SMALL, calibration="poses"))
+    assert other is not None
+    other.__dict__["calibrated"] = found[1]
+    other.fitted(Watching(), "watching")
+    assert [body for body, _ in bodies] == [made.body, found[1].body]
+    (own,), (calibrated,) = (examples for _, examples in bodies)
+    reach_m = [
+        kinematics.joint_centres_m(body.skeleton, q[:1]) for (body, _), q in zip(bodies, (own, calibrated), strict=True)
+    ]
+    assert np.abs(own - calibrated).max() > 1e-3
+    assert np.abs(reach_m[0] - reach_m[1]).max() < 0.3
 
 
 def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
