@@ -42,9 +42,11 @@ def five_trackers(study: Study) -> Experiment:
     """The whole system on whole databases."""
     runs = [f"five_{b}" for b in ("boxing", "table_tennis", "walking") if f"five_{b}" in study.runs]
     tables: list[Table] = []
-    gains = []
+    gains: list[tuple[str, ...]] = []
     for run in runs:
         rows, shown = study.rows(run), run.removeprefix("five_").replace("_", " ")
+        if not rows:
+            continue
         tables += both_units(shown, rows)
         gains += list(_gains(shown, rows))
     columns = ("behaviour", "performers", "calibration", "against", "kernel_cca errs less by [deg]", "95 %", "clips")
@@ -62,7 +64,7 @@ def five_trackers(study: Study) -> Experiment:
             "Distances of joint centres hold what `tpose` got wrong of the room's heading and place.",
             *differences(study),
         ),
-        tables=(*tables, Table("What kernel CCA gains", columns, tuple(gains))),
+        tables=(*tables, Table("What kernel CCA gains", columns, tuple(gains))) if gains else (),
         runs=tuple(runs),
     )
 
