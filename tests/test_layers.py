@@ -30,10 +30,12 @@ MAY_IMPORT: dict[str, set[str]] = {
     "study": (EVERYTHING | {"config", "contest", "experiment", "progress", "setting", "trials"})
     - {"bench", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
-    "commands": EVERYTHING | {"catalogue", "config", "doctor", "experiment", "progress", "recorded", "rehearsal"},
+    "commands": EVERYTHING
+    | {"catalogue", "config", "doctor", "experiment", "posing", "progress", "recorded", "rehearsal"},
 }
 TOP = {
     "calibrated",
+    "calibration_trial",
     "cli",
     "catalogue",
     "config",
@@ -41,6 +43,7 @@ TOP = {
     "doctor",
     "errors",
     "experiment",
+    "posing",
     "progress",
     "recorded",
     "rehearsal",

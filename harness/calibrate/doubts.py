@@ -48,7 +48,7 @@ def require_poses(bundle: Bundle, found: Fit) -> None:
     station = int(np.argmax(off_m))
     off_deg, off_mm = np.rad2deg(found.pose_miss_rad[worst]), 1e3 * off_m[station]
     raise NotStanding(
-        f"Pose {worst + 1} ({POSES[worst].name}) was not held as shown: hinges are {off_deg:.0f} deg off on the whole, and "
+        f"Pose {worst + 1} ({POSES[worst].name}) was not held as shown: hinges are {off_deg:.0f} deg off on the whole; "
         f"station {mounts[station].station!r} is the farthest from its place in it, {off_mm:.0f} mm.",
         f"Hold it again: {POSES[worst].instruction}",
     )

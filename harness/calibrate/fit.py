@@ -95,7 +95,7 @@ def _missed_rad(bundle: Bundle, at: Solution, given: Expected, own: Floats) -> F
 
 def _told(given: Expected, own: Floats) -> Floats:
     """(P,) how many hinges' worth the readings tell of each pose, given variances (P, 6 + H)."""
-    return np.maximum(np.sum(1.0 - own[:, 6:] / given.miss_rad**2, axis=1), 1.0)
+    return np.asarray(np.maximum(np.sum(1.0 - own[:, 6:] / given.miss_rad**2, axis=1), 1.0))
 
 
 def _weights(bundle: Bundle, at: Solution, given: Expected) -> Floats:

@@ -19,8 +19,10 @@ TURNED_RAD = float(np.deg2rad(30.0))
 """Less than this is how straps sit [choice]."""
 EXPLAINED = 0.25
 """A turn in the room is believed when it leaves no more of the squared angles than this [choice]."""
+_AS_POSED_RAD = float(np.deg2rad(8.0))
+"""Angles off a mount, on each axis, that a good performer's misses make of themselves [choice]."""
 _NEAR_AXIS = float(np.cos(np.deg2rad(20.0)))
-_ROUNDS = 40
+_ROUNDS = 20
 
 
 def strapped(skeleton: Skeleton, mounts: Sequence[Mount], bone_from_station: Floats) -> tuple[str, ...]:
@@ -38,6 +40,8 @@ def turned_in_room(world_from_bone: Floats, world_from_station: Floats) -> Float
     """(S, 3) rotation vector by which each station's orientations (P, S, 3, 3) look turned in the room, given how its
     bone (P, S, 3, 3) was about turned in each pose; 0 where a mount explains them as well [rad]."""
     plain = _left(np.eye(3)[None, None], world_from_bone, world_from_station)
+    if np.all(plain < 3.0 * len(world_from_bone) * _AS_POSED_RAD**2):
+        return np.zeros((len(plain), 3))
     best, turn = plain, np.zeros((world_from_bone.shape[1], 3))
     for start in _STARTS:
         room = np.tile(rotations.to_matrix(rotations.exp(start)), (len(turn), 1, 1))
