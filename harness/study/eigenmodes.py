@@ -6,90 +6,33 @@ calibration is asked of people who were left out.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
-from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 from harness.score.findings import Bars, Claim, Experiment, Lines, Table
+from harness.study.bone_lengths import (
+    DRAWS,
+    MODES,
+    OTHER_SIDE,
+    Eigenmodes,
+    by_tibia,
+    eigenmodes,
+    kept_by_count,
+    left_out_m,
+    mirrored,
+)
 
-MODES, PUBLISHED = 5, 0.99
-"""The paper keeps five modes, and about 99 % of the variation with them."""
+PUBLISHED = 0.99
+"""What five modes keep of the variation, about."""
 _ROUND = 0.005
 """What "about 99 %" may have been rounded from."""
 _SHOWN = 12
 """Modes on the curve."""
-_DRAWS = 200
-"""Of some of the people, to see what their number does."""
 _NOT_HANDS = np.array([name not in ("lhand", "rhand") for name in BONES])
-_OTHER_SIDE = [
-    BONES.index(other) if (other := {"l": "r", "r": "l"}.get(name[0], "") + name[1:]) in BONES else b
-    for b, name in enumerate(BONES)
-]
-
-
-@dataclass(frozen=True, eq=False)
-class Eigenmodes:
-    """Principal directions of N numbers of P people."""
-
-    mean: Floats
-    """(N,)"""
-    modes: Floats
-    """(B, N) orthonormal, B = min(P, N), the largest first; the largest number of each is positive."""
-    spread: Floats
-    """(B,) standard deviation of the people along each."""
-
-    @property
-    def kept(self) -> Floats:
-        """(B,) the share of the variance that the first 1..B modes keep."""
-        variance = self.spread**2
-        out: Floats = np.cumsum(variance) / np.sum(variance)
-        return out
-
-
-def eigenmodes(numbers: Floats) -> Eigenmodes:
-    """Of the numbers (P, N) of two people or more."""
-    mean = numbers.mean(axis=0)
-    _, size, modes = np.linalg.svd(numbers - mean, full_matrices=False)
-    largest = np.take_along_axis(modes, np.abs(modes).argmax(axis=1, keepdims=True), axis=1)
-    return Eigenmodes(mean, modes * np.sign(largest), size / np.sqrt(len(numbers) - 1.0))
-
-
-def by_tibia(length_m: Floats) -> Floats:
-    """Lengths (P, 24) over each person's left tibia."""
-    out: Floats = length_m / length_m[:, [BONES.index("ltibia")]]
-    return out
-
-
-def mirrored(length_m: Floats) -> Floats:
-    """Lengths (P, 24) with left and right alike: the mean of both."""
-    out: Floats = (length_m + length_m[:, _OTHER_SIDE]) / 2.0
-    return out
-
-
-def left_out_m(length_m: Floats, modes: int) -> Floats:
-    """Errors (P, 24) [m] of each person's lengths, as told by so many modes of all the others; 0: by their mean."""
-    errors = np.empty_like(length_m)
-    for person in range(len(length_m)):
-        others = eigenmodes(np.delete(length_m, person, axis=0))
-        off, kept = length_m[person] - others.mean, others.modes[:modes]
-        errors[person] = off - off @ kept.T @ kept
-    return errors
-
-
-def kept_by_count(length_m: Floats, counts: range, seed: int) -> Floats:
-    """(C, 3) lowest, median and highest share that five modes keep of so many of the people, drawn again and again."""
-    shares = np.empty((len(counts), _DRAWS))
-    for row, count in enumerate(counts):
-        for draw in range(_DRAWS):
-            chosen = generator(seed, "eigenmodes", count, draw).choice(len(length_m), count, replace=False)
-            shares[row, draw] = eigenmodes(length_m[chosen]).kept[MODES - 1]
-    out: Floats = np.quantile(shares, [0.0, 0.5, 1.0], axis=1).T
-    return out
 
 
 def bone_modes(people: Mapping[str, Skeleton], source: str, *, measured: bool, seed: int) -> Experiment:
@@ -108,7 +51,13 @@ def bone_modes(people: Mapping[str, Skeleton], source: str, *, measured: bool, s
         ),
         differences=(
             f"{len(people)} skeletons: {source}. The paper does not say how many it used, or which.",
-            *(() if measured else ("Drawn bones are nobody's: left and right are alike, and few bones go together.",)),
+            *(
+                ()
+                if measured
+                else (
+                    "Drawn bones are nobody's: left and right are alike, and beyond stature each part is drawn on its own.",
+                )
+            ),
         ),
         claims=(_claim(float(shown.kept[MODES - 1]), len(people), measured),),
         tables=(_ways(length_m), _left_out(length_m)),
@@ -206,7 +155,7 @@ def _counts(length_m: Floats, seed: int) -> Lines:
         y_label="share kept [%]",
         x=tuple(float(n) for n in counts),
         series={name: tuple(map(float, found[:, i])) for i, name in enumerate(("lowest", "median", "highest"))},
-        caption=f"Of {_DRAWS} draws of so many of the people, lengths by the left tibia: few people, few directions.",
+        caption=f"Of {DRAWS} draws of so many of the people, lengths by the left tibia: few people, few directions.",
     )
 
 
@@ -229,19 +178,28 @@ def _by_bone_mm(length_m: Floats) -> dict[str, Floats]:
 
 def _notes(length_m: Floats) -> tuple[str, ...]:
     kept = eigenmodes(by_tibia(length_m)).kept
-    uneven = np.abs(length_m - length_m[:, _OTHER_SIDE]) / mirrored(length_m)
-    hands, others = float(uneven[:, ~_NOT_HANDS].max()), float(uneven[:, _NOT_HANDS].max())
     of_mean, of_modes = (1e3 * float(np.abs(left_out_m(length_m, n)).mean()) for n in (0, MODES))
     by_mean_mm, by_modes_mm = _by_bone_mm(length_m).values()
     worse = [name for name, mean, modes in zip(BONES, by_mean_mm, by_modes_mm, strict=True) if modes > mean]
     return (
         f"To keep 99 % it takes {_needed(kept)} modes; five lose {_percent(1.0 - kept[MODES - 1])}.",
-        f"Left and right hands differ by up to {hands:.0%}, other pairs by up to {others:.0%} of their mean. Hands are "
-        "short: without them the share is hardly another. Left and right made alike, five modes keep more.",
+        *_uneven(length_m),
         f"Five modes of the others miss the bones of a person left out by {of_modes:.1f} mm on average, their mean by "
         f"{of_mean:.1f} mm; and this is with all of that person's bones known, so no calibration does better by such a "
         "prior alone.",
         f"Bones that five modes tell worse than the mean does: {', '.join(worse) or 'none'}.",
+    )
+
+
+def _uneven(length_m: Floats) -> tuple[str, ...]:
+    """How left and right differ, if they do."""
+    uneven = 100.0 * np.abs(length_m - length_m[:, OTHER_SIDE]) / mirrored(length_m)
+    hands, others = float(uneven[:, ~_NOT_HANDS].max()), float(uneven[:, _NOT_HANDS].max())
+    if max(hands, others) < 0.5:
+        return ()
+    return (
+        f"Left and right hands differ by up to {hands:.0f} %, other pairs by up to {others:.0f} % of their mean. Hands "
+        "are short: without them the share is hardly another. Left and right made alike, five modes keep more.",
     )
 
 
