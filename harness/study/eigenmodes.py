@@ -32,6 +32,7 @@ _ROUND = 0.005
 """What "about 99 %" may have been rounded from."""
 _SHOWN = 12
 """Modes on the curve."""
+_DRAWN = "Drawn bones are nobody's: left and right are alike, and beyond stature each part is drawn on its own."
 _NOT_HANDS = np.array([name not in ("lhand", "rhand") for name in BONES])
 
 
@@ -51,13 +52,7 @@ def bone_modes(people: Mapping[str, Skeleton], source: str, *, measured: bool, s
         ),
         differences=(
             f"{len(people)} skeletons: {source}. The paper does not say how many it used, or which.",
-            *(
-                ()
-                if measured
-                else (
-                    "Drawn bones are nobody's: left and right are alike, and beyond stature each part is drawn on its own.",
-                )
-            ),
+            *(() if measured else (_DRAWN,)),
         ),
         claims=(_claim(float(shown.kept[MODES - 1]), len(people), measured),),
         tables=(_ways(length_m), _left_out(length_m)),
