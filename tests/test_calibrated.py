@@ -273,3 +273,15 @@ def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
 def test_absurd_models_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(BadInput, match=next(iter(wrong))):
         Calibrating(**wrong)
+
+
+def test_nobody_s_own_skeleton_is_learnt_from_a_library(mocap: Path) -> None:
+    scenario = load_scenario("calibration_cmu")
+    source = open_source("cmu", mocap, seed=1, rate_hz=120.0)
+    for clip in scenario.motion.test:
+        made = Setting(scenario, source, Part(clip), "walking")
+        own = made.body.skeleton.length_m
+        assert source.subject(clip) not in made.people
+        assert len(made.people) == len(source.people("")) - 1 >= 19
+        assert min(np.abs(skeleton.length_m - own).max() for skeleton in made.people.values()) > 0.002
+        assert source.subject(clip) not in {source.subject(name) for name in scenario.motion.examples}
