@@ -1,7 +1,17 @@
 """Kim et al. 2012, Figs. 4 and 5: hardly any examples, and poses that none of them shows."""
 
 from harness.score.findings import Claim, Experiment, Lines, Table
-from harness.study.five_trackers import BLEND, KERNEL, METHODS, both_units, by_method, differences, held, performers
+from harness.study.five_trackers import (
+    ANYWHERE,
+    BLEND,
+    KERNEL,
+    METHODS,
+    by_method,
+    differences,
+    held,
+    method_tables,
+    performers,
+)
 from harness.study.study import Study
 from harness.study.tables import by_clip, error_lines, joint_groups, mean_bars, mean_table
 
@@ -37,7 +47,7 @@ def sparse(study: Study) -> Experiment:
                 text = f"{told}: {less} errs less than {more}"
                 claims.append(held(study, run, text, errors.get(less, {}), errors.get(more, {})))
         if rows:
-            tables += both_units(f"{shown}, {count} frames", rows)
+            tables += method_tables(f"{shown}, {count} frames", rows, ANYWHERE)
             cells = study.cells(run, clip=rows[0]["clip"])
             curves = {cell.method: cell for cell in cells if cell.method in METHODS}
             title = f"{shown}, {count} frames: error over time in {rows[0]['clip']}"

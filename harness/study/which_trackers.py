@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from harness.score.cell import Cell
 from harness.score.findings import Experiment, Table
 from harness.study.claims import Errors, errs_less
-from harness.study.five_trackers import MILLIMETRES, differences, held
+from harness.study.five_trackers import differences, held
 from harness.study.study import Study
 from harness.study.tables import GROUPS, joint_groups, mean_table
 from harness.study.tracker_sets import (
@@ -31,7 +31,7 @@ def sensors(study: Study) -> Experiment:
     """Fig. 3."""
     rows = {behaviour: study.rows(f"sensors_{behaviour}") for behaviour in SUITED}
     angles: dict[str, Sets] = {behaviour: by_set(found) for behaviour, found in rows.items()}
-    positions = {behaviour: by_set(found, MILLIMETRES) for behaviour, found in rows.items()}
+    positions = {behaviour: by_set(found, "mpjpe_mm") for behaviour, found in rows.items()}
     claims = []
     for behaviour, other in (("walking", "boxing"), ("boxing", "walking")):
         sets, suited, theirs = angles[behaviour], SUITED[behaviour], SUITED[other]
