@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import emulate, live, motion, paper, record, runs, trust
+from harness.commands import calibrate, emulate, live, motion, paper, record, runs, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -66,6 +66,7 @@ def build_parser() -> argparse.ArgumentParser:
         trust.add_check,
         trust.add_bench,
         trust.add_doctor,
+        calibrate.add_calibrate,
         emulate.add_emulate,
         live.add_live,
         record.add_record,

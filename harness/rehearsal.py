@@ -12,6 +12,7 @@ from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
 from harness.calibrate.file import CalibrationFile
+from harness.calibrate.poses import POSES, configuration
 from harness.calibrated import Calibrated
 from harness.config import Scenario, load_scenario
 from harness.core.calibration import Calibration
@@ -76,8 +77,6 @@ class Rehearsal:
         """What the performer does."""
         if not self.posing:
             return self.setting.take
-        from harness.calibrate.poses import POSES, configuration
-
         how = self.scenario.calibrating
         poses = [configuration(pose, self.body.skeleton) for pose in POSES]
         return self.setting.session.model(poses, miss_rad=float(np.deg2rad(how.miss_deg)), hold_s=how.hold_s)

@@ -36,6 +36,9 @@ class Passed:
     """Since the first frame [s]."""
     why: str
 
+    def __str__(self) -> str:
+        return f"not taken what was held from {self.began_s:.1f} s on: {self.why}"
+
 
 class PoseCollector:
     """Takes the holds of so many poses, in their order; `likeness` knows what they look like."""
@@ -52,8 +55,9 @@ class PoseCollector:
         """What is going on, for the performer."""
         self._likeness = likeness
         self._window: deque[TrackerFrame] = deque()
-        self._first_s: float | None = None
+        self._began_s: float | None = None
         self._looked_s = -np.inf
+        self._first: Still | None = None
         self._last: Still | None = None
 
     @property
@@ -63,7 +67,7 @@ class PoseCollector:
     def add(self, frame: TrackerFrame) -> int | None:
         """How many poses are complete, when one just was."""
         now_s, window = frame.received_s, self._window
-        self._first_s = now_s if self._first_s is None else self._first_s
+        self._began_s = now_s if self._began_s is None else self._began_s
         if window and now_s - window[-1].received_s > GAP_S:
             window.clear()
         window.append(frame)
@@ -79,7 +83,7 @@ class PoseCollector:
             self.told = f"hold still: station {moving!r} moves"
             return None
         try:
-            still = stood_still(frames, self.stations)
+            still = stood_still(_inner(frames), self.stations)
         except NotStanding as error:
             self.told = f"hold still: {error.what}"
             return None
@@ -89,21 +93,22 @@ class PoseCollector:
 
     def _held(self, frames: list[TrackerFrame], still: Still) -> int | None:
         """A hold that is none of those before."""
-        began_s = frames[0].received_s - (self._first_s or 0.0)
+        began_s = frames[0].received_s - (self._began_s or 0.0)
         wanted = len(self.held)
         if self.done:
             why = f"all {self.poses} poses were taken before"
-        elif self._likeness is None or self._likeness.held(still.position_m, wanted):
+        elif self._likeness is None or self._likeness.held(wanted, still, self._first):
+            self._first = self._first or still
             self.held.append(_inner(frames))
             self.began_s.append(began_s)
             self.told = f"pose {wanted + 1} of {self.poses} taken"
             return wanted + 1
         else:
-            nearest = self._likeness.nearest(still.position_m)
+            nearest = self._likeness.nearest(still, self._first)
             looks = "none of the poses" if nearest is None else f"pose {nearest + 1}"
             why = f"that looks like {looks}, and pose {wanted + 1} is wanted"
         self.passed.append(Passed(began_s, why))
-        self.told = f"not taken: {why}"
+        self.told = str(self.passed[-1])
         return None
 
     def _moving(self, frames: Sequence[TrackerFrame]) -> str | None:

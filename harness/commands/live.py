@@ -16,19 +16,22 @@ from harness.commands.verb import (
     ended_by_sigterm,
     line_wanted,
     positive_number,
+    progress,
     say,
     stations_of,
     talk,
 )
-from harness.errors import BadInput, Outcome, was_interrupted
+from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
+    from harness.calibrate.file import CalibrationFile
     from harness.core.calibration import Calibration
     from harness.live.calibrate import Calibrator
     from harness.live.pose import Output
     from harness.rehearsal import Rehearsal
     from harness.stream.driver import Is900, LineEvent
 
+_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
 _RATE_SLACK = 0.02
 """How far a device may be off the rate that a method learnt at, as a share [choice]."""
@@ -49,8 +52,11 @@ def add_live(verbs: Verbs) -> None:
     text = "frames per second of the tracker, and of what is learnt (default: the scenario's)"
     verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
     add_line(verb)
-    text = "exact: worn as the scenario says; tpose: of the first seconds, in which the performer stands in T-pose"
-    verb.add_argument("--calibration", choices=["exact", "tpose"], default="exact", help=text)
+    text = (
+        "exact: worn as the scenario says, by whom it says; tpose: as a T-pose in the first seconds tells; poses: as "
+        "eight poses tell, held first; or a file that `harness calibrate` wrote (default exact)"
+    )
+    verb.add_argument("--calibration", metavar="exact|tpose|poses|FILE", default="exact", help=text)
     text = "window: as it moves; frames: PNG files in the folder --out"
     verb.add_argument("--view", choices=["window", "frames"], help=text)
     verb.add_argument("--out", type=Path, metavar="DIR", help="folder of --view frames")
@@ -76,6 +82,7 @@ def live(args: argparse.Namespace) -> Outcome:
 
 
 def _live(args: argparse.Namespace) -> Outcome:
+    from harness.calibrate.file import read_calibration
     from harness.live import summary
     from harness.live.floor import Floor
     from harness.live.perform import Plan, perform, warm_up
@@ -84,8 +91,14 @@ def _live(args: argparse.Namespace) -> Outcome:
 
     told = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
     rehearsal = rehearse(args.scenario, stations=stations_of(args), **told)
+    if args.calibration not in _KINDS:
+        if not Path(args.calibration).suffix:
+            raise UnknownName("file or kind of calibration", args.calibration, _KINDS)
+        rehearsal = rehearsal.going_by(read_calibration(args.calibration))
     method = registry.resolve(args.method)
     events: list[LineEvent] = []
+    if args.calibration == "poses":
+        rehearsal = rehearsal.going_by(_posed(args, rehearsal, events))
     with ExitStack() as opened:
         outputs = _outputs(args, rehearsal, opened)
         device = opened.enter_context(_device(args, rehearsal, events))
@@ -97,7 +110,9 @@ def _live(args: argparse.Namespace) -> Outcome:
             floor = opened.enter_context(Floor())
             talk("Ctrl-C ends it")
             plan = Plan(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
-            done = perform(device, rehearsal.body, reconstructor, _worn(args, rehearsal), outputs, plan, say=talk)
+            done = perform(
+                device, rehearsal.calibrated.body, reconstructor, _worn(args, rehearsal), outputs, plan, say=talk
+            )
         beside = floor.finish()
         content = {
             "method": args.method,
@@ -150,7 +165,8 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
         raise BadInput("--out without --view frames.", "Say both, or neither.")
     if args.lsl_network and args.lsl is None:
         raise BadInput("--lsl-network without --lsl.", "Name the streams with --lsl.")
-    own, stations, rate_hz = rehearsal.body.skeleton, tuple(rehearsal.scenario.stations), rehearsal.tracker.rate_hz
+    own, rate_hz = rehearsal.calibrated.body.skeleton, rehearsal.tracker.rate_hz
+    stations = tuple(rehearsal.scenario.stations)
     wanted: dict[str, Any] = {
         "vmc": lambda: Vmc(args.vmc, own),
         "lsl": lambda: Lsl(args.lsl, own, rate_hz, network=args.lsl_network),
@@ -165,6 +181,19 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
             opened.callback(outputs[-1].close)
             talk(outputs[-1].told)
     return outputs
+
+
+def _posed(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[LineEvent]") -> "CalibrationFile":
+    """What eight poses tell, held before anything is learnt: methods learn on the bones that are found."""
+    from harness.posing import Posing
+
+    posing = Posing(args.scenario, tuple(rehearsal.scenario.stations), folder=args.mocap)
+    with _device(args, rehearsal, events) as device:
+        held = posing.held(device, talk, watch=progress).held
+    found = posing.found(held, args.port)
+    for line in found.lines:
+        talk(line)
+    return found.kept
 
 
 def _worn(args: argparse.Namespace, rehearsal: "Rehearsal") -> "Calibration | Calibrator":

@@ -89,10 +89,10 @@ class HoldPoses:
             taken = self.collector.add(frame)
             watch(self.collector.told)
             for passed in self.collector.passed[self._passed :]:
-                say(f"not taken: {passed.why}")
+                say(str(passed))
             self._passed = len(self.collector.passed)
             if taken is not None:
-                say(f"pose {taken} of {len(self._poses)} taken")
+                say(f"pose {taken} of {len(self._poses)} taken, held from {self.collector.began_s[-1]:.1f} s on")
                 if self.collector.done:
                     return
                 self._wanted(say)
@@ -114,7 +114,7 @@ def not_all(collector: PoseCollector, poses: "Sequence[CalibrationPose]") -> Not
     """What was held, of a stream that ended before all poses were."""
     taken = ", ".join(f"{at_s:.1f} s" for at_s in collector.began_s)
     held = f"{len(collector.held)} of {len(poses)} poses were held" + (f", at {taken}" if taken else "")
-    passed = "; ".join(f"not taken at {one.began_s:.1f} s: {one.why}" for one in collector.passed)
+    passed = "; ".join(map(str, collector.passed))
     wanted = poses[len(collector.held)]
     return NotStanding(
         f"The stream ended before calibration was done: {held}{f'; {passed}' if passed else ''}.",

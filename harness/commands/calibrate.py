@@ -1,0 +1,172 @@
+"""The verb that finds where trackers are worn, and on whose bones."""
+
+import argparse
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from harness.commands.verb import (
+    Verbs,
+    add_line,
+    add_verb,
+    ended_by_sigterm,
+    line_wanted,
+    names_of,
+    positive,
+    positive_number,
+    progress,
+    say,
+    stations_of,
+    talk,
+)
+from harness.errors import BadInput, Outcome, was_interrupted
+
+if TYPE_CHECKING:
+    from harness.live.calibrate import Show
+    from harness.posing import Found
+
+_SOURCES = ("recording", "live", "simulate", "sheet")
+_OF = {
+    "recording": ("scenario", "stations", "clip", "out"),
+    "live": ("port", "scenario", "stations", "clip", "out", "rate", "items", "baud", "quality", "view", "pictures"),
+    "simulate": ("miss", "noise", "seed"),
+    "sheet": (),
+}
+"""Flags that are of use to each source only."""
+
+
+def add_calibrate(verbs: Verbs) -> None:
+    text = "find mounts and bone lengths from a performer who holds eight poses, or mounts from a T-pose"
+    verb = add_verb(verbs, "calibrate", text, calibrate, "seed", "mocap")
+    text = "recording (see `harness record`) of somebody who holds the poses"
+    verb.add_argument("recording", nargs="?", type=Path, metavar="RECORDING", help=text)
+    verb.add_argument(
+        "--live", action="store_true", help="from the tracker at --port; the performer is shown the poses"
+    )
+    verb.add_argument("--simulate", type=positive, metavar="N", help="N simulated performers, and how far off each was")
+    verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files")
+    verb.add_argument("--port", help="/dev/ttyUSB0, COM3, the link of an emulator's pty, tcp://HOST:PORT")
+    text = "names the stations and where they are worn (see `harness list`)"
+    verb.add_argument("--scenario", metavar="NAME", help=text)
+    text = "how many of the scenario's stations, or their names (default: the first 4; of a recording: its own)"
+    verb.add_argument("--stations", metavar="N|A,B", help=text)
+    text = "poses: eight, for bones and mounts; tpose: the first alone, for mounts on a known body (default poses)"
+    verb.add_argument("--kind", choices=["poses", "tpose"], default="poses", help=text)
+    verb.add_argument("--clip", help="of tpose: whose body that is (default: of the scenario's first clip)")
+    verb.add_argument("--out", type=Path, metavar="FILE", help="the calibration to write, in TOML")
+    verb.add_argument("--force", action="store_true", help="write over files that exist")
+    text = "frames per second, where the device does not tell"
+    verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
+    add_line(verb)
+    text = "show the poses: in a window, or as PNG files in the folder --pictures"
+    verb.add_argument("--view", choices=["window", "frames"], help=text)
+    verb.add_argument("--pictures", type=Path, metavar="DIR", help="folder of --view frames")
+    text = "of --simulate: how far each hinge misses each pose, standard deviation (default 2.5)"
+    verb.add_argument("--miss", type=float, metavar="DEG", help=text)
+    verb.add_argument("--noise", metavar="LEVEL", help="of --simulate: clean, noise or default (default default)")
+
+
+def calibrate(args: argparse.Namespace) -> Outcome:
+    given = [name for name in _SOURCES if getattr(args, name)]
+    if len(given) != 1:
+        found = "Nothing to calibrate from" if not given else f"{len(given)} sources: {', '.join(given)}"
+        raise BadInput(f"{found}.", "Name a RECORDING, or say one of --live, --simulate N, --sheet DIR.")
+    for name in sorted({name for names in _OF.values() for name in names} - set(_OF[given[0]])):
+        if getattr(args, name) is not None:
+            users = " or ".join(source for source, names in _OF.items() if name in names)
+            raise BadInput(f"--{name} with {given[0]}.", f"It is for {users}: leave it out.")
+    if args.sheet:
+        return _sheet(args)
+    if args.simulate:
+        return _trial(args)
+    with ended_by_sigterm():
+        try:
+            return _found(args)
+        except (KeyboardInterrupt, Exception) as error:
+            if not was_interrupted(error):
+                raise
+            return say(args, {}, "stopped; nothing was written", outcome=Outcome.INTERRUPTED)
+
+
+def _sheet(args: argparse.Namespace) -> Outcome:
+    from harness.calibrate.poses import POSES
+    from harness.core.humanoid24 import standard_skeleton
+    from harness.live.sheet import draw_poses
+
+    paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
+    poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
+    lines = [f"{number}  {pose.name}: {pose.instruction}" for number, pose in enumerate(POSES, 1)]
+    return say(args, {"poses": poses, "pictures": [str(path) for path in paths]}, *lines, f"drawn in {args.sheet}")
+
+
+def _trial(args: argparse.Namespace) -> Outcome:
+    raise NotImplementedError
+
+
+def _found(args: argparse.Namespace) -> Outcome:
+    from harness.calibrate.file import require_place, write_calibration
+
+    if args.out is None:
+        raise BadInput("--out is missing.", "Name the file to write: --out me.toml.")
+    if args.pictures is not None and args.view != "frames":
+        raise BadInput("--pictures without --view frames.", "Say both, or neither.")
+    require_place(args.out, force=args.force)
+    found = _of_device(args) if args.live else _of_recording(args)
+    write_calibration(args.out, found.kept, force=args.force)
+    content = {"file": str(args.out), "stations": list(found.kept.calibration.stations), **found.kept.told}
+    return say(args, content, *found.lines, "", f"{args.out}: written")
+
+
+def _of_device(args: argparse.Namespace) -> "Found":
+    from harness.config import load_scenario
+    from harness.live.view import View
+    from harness.posing import Posing
+    from harness.rehearsal import chosen
+    from harness.stream.driver import Is900, Wanted
+
+    for name in ("port", "scenario"):
+        if getattr(args, name) is None:
+            raise BadInput(f"--live without --{name}.", "It takes both.")
+    stations = tuple(chosen(load_scenario(args.scenario), stations_of(args)))
+    posing = Posing(args.scenario, stations, args.kind, args.clip, args.mocap)
+    with ExitStack() as opened:
+        show: Show | None = None
+        if args.view is not None:
+            view = View(args.view, posing.body.skeleton, args.pictures, force=args.force)
+            opened.callback(view.close)
+            talk(view.told)
+            show = view.show
+        wanted = Wanted(stations=stations, rate_hz=args.rate, **line_wanted(args))
+        device = opened.enter_context(Is900(args.port, wanted, on_event=lambda event: talk(f"line: {event.text}")))
+        worn = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
+        talk(f"{device.identification or 'an IS-900'} at {args.port}; stations {worn}; Ctrl-C ends it")
+        collector = posing.held(device, talk, show, progress)
+    talk("solving")
+    return posing.found(collector.held, f"the tracker at {args.port}")
+
+
+def _of_recording(args: argparse.Namespace) -> "Found":
+    from harness.posing import Posing
+    from harness.recorded import stations_in
+    from harness.stream.replay import RecordingStream
+
+    stream = RecordingStream(args.recording)
+    for lost in stream.recording.lost:
+        talk(f"lost: {lost}")
+    note = stream.recording.note
+    scenario, clip = args.scenario or note.get("scenario"), args.clip or note.get("clip")
+    if scenario is None:
+        raise BadInput(
+            f"Nothing says how trackers are worn in {args.recording}.", "Name the scenario: --scenario NAME."
+        )
+    names = None if args.stations is None else names_of(args.stations)
+    posing = Posing(scenario, stations_in(stream, scenario, names), args.kind, clip, args.mocap)
+    frames = iter(stream)
+    collector = posing.held(frames, talk)
+    if args.kind == "poses":  # one more is one too many, or one before it was none
+        before = len(collector.passed)
+        for frame in frames:
+            collector.add(frame)
+        for passed in collector.passed[before:]:
+            talk(str(passed))
+    return posing.found(collector.held, str(args.recording))
