@@ -24,7 +24,7 @@ def write_paper(folder: Path) -> Path:
         old.unlink()
     drawable = find_spec("matplotlib") is not None
     pictures = charts(findings) if drawable else {}
-    for chart in (chart for found in pictures.values() for chart in found):
+    for chart in (chart for found in pictures.values() for chart in found if chart):
         chart.write(plots)
     runs = (name for experiment in findings.experiments for name in experiment.runs)
     pages = {name: target for name in runs if (target := inside(folder, name))}

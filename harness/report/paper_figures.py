@@ -7,7 +7,7 @@ from itertools import count
 from harness.report.figures import drawn
 from harness.report.paper_bars import draw_bars, height_in, key
 from harness.report.paper_lines import draw_lines
-from harness.report.paper_numbers import alternative
+from harness.report.paper_numbers import alternative, measured
 from harness.report.run import file_name
 from harness.report.style import Chart
 from harness.score.findings import Bars, Findings, Lines
@@ -15,13 +15,13 @@ from harness.score.findings import Bars, Findings, Lines
 _LINES_IN = 3.4
 
 
-def charts(findings: Findings) -> dict[str, list[Chart]]:
-    """Name of the experiment -> its figures."""
+def charts(findings: Findings) -> dict[str, list[Chart | None]]:
+    """Name of the experiment -> its figures, None for one of which nothing was measured."""
     names = Counter(name for e in findings.experiments for figure in e.figures for name in figure.series)
     shared = {name: place for place, name in enumerate(name for name, figures in names.items() if figures > 1)}
     return {
         experiment.name: [
-            _chart(f"{file_name(experiment.name)}_{n}", figure, _places(figure, shared))
+            _chart(f"{file_name(experiment.name)}_{n}", figure, _places(figure, shared)) if measured(figure) else None
             for n, figure in enumerate(experiment.figures, start=1)
         ]
         for experiment in findings.experiments

@@ -20,6 +20,11 @@ def numbers(figure: Bars | Lines) -> Table:
     return _of_bars(figure) if isinstance(figure, Bars) else _of_lines(figure)
 
 
+def measured(figure: Bars | Lines) -> bool:
+    """Whether there is anything to draw."""
+    return any(value is not None for values in figure.series.values() for value in values)
+
+
 def alternative(figure: Bars | Lines) -> str:
     """What a reader who cannot see the figure is told."""
     table = numbers(figure)
@@ -58,8 +63,8 @@ def _named(column: str, text: str) -> str:
 def _of_bars(bars: Bars) -> Table:
     published = [name for name in bars.series if any(v is not None for v in bars.published.get(name, ()))]
     columns = ("", *bars.series, *(f"{name}, published" if len(bars.series) > 1 else "published" for name in published))
-    rows = []
-    for n, group in enumerate(bars.groups):
+    rows: list[tuple[str, ...]] = []
+    for n, group in enumerate(bars.groups if measured(bars) else ()):
         ours = [_bar(bars, name, n) for name in bars.series]
         theirs = [_text(value_at(bars.published, name, n), bars.unit, "") for name in published]
         rows.append((group, *ours, *theirs))
@@ -80,8 +85,8 @@ def _bar(bars: Bars, name: str, n: int) -> str:
 
 def _of_lines(lines: Lines) -> Table:
     columns = ("", "mean", "median", "95th percentile", "largest", "points")
-    rows = []
-    for name, values in lines.series.items():
+    rows: list[tuple[str, ...]] = []
+    for name, values in (lines.series if measured(lines) else {}).items():
         known = np.array([value for value in values if value is not None], dtype=float)
         figures = [known.mean(), *np.quantile(known, [0.5, 0.95, 1.0])] if len(known) else [None] * 4
         rows.append((name, *(_text(value, "") for value in figures), f"{len(known):,} of {len(lines.x):,}"))

@@ -24,7 +24,9 @@ def text_tables(findings: Findings) -> str:
     if shared:
         parts += ["", "Different in several experiments"]
     for text, experiments in shared.items():
-        parts.append(_wrapped(f"{text} ({', '.join(experiment.name for experiment in experiments)})", _INDENT))
+        all_of_them = len(experiments) == len(findings.experiments)
+        where = "all" if all_of_them else ", ".join(experiment.name for experiment in experiments)
+        parts.append(_wrapped(f"{text} ({where})", _INDENT))
     return "\n".join(line.rstrip() for part in parts for line in part.split("\n"))
 
 

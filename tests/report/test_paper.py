@@ -201,6 +201,29 @@ def test_what_was_not_measured_is_said(tmp_path: Path) -> None:
     assert "nan" not in said.lower().split()
 
 
+def test_what_has_nothing_to_draw_is_said_and_not_drawn(tmp_path: Path) -> None:
+    none: dict[str, tuple[float | None, ...]] = {"ik": (None, None)}
+    bars, lines = Bars("Bars", "deg", ("a", "b"), none), Lines("Lines", "x", "y", (0.0, 1.0), none)
+    page = alone(tmp_path, replace(EMPTY, figures=(bars, lines, sets("walking"))))
+    assert {path.name for path in (tmp_path / "plots").iterdir()} == {"empty_3.svg", "empty_3.png"}
+    said = text_of(page)
+    assert "Bars [deg] : nothing was measured." in said
+    assert "Lines: y : nothing was measured." in said
+
+
+def test_words_stand_on_the_left_of_their_column_and_numbers_on_the_right(tmp_path: Path) -> None:
+    """Whatever begins with a number and goes on is words."""
+    rows = (("a", "1.2 ± 0.4 (8)", "8: one, two, three, four, five, six, seven"), ("b", "not measured", "none"))
+    page = alone(tmp_path, replace(EMPTY, tables=(Table("Errors", ("a", "b", "c"), rows),)))
+    words = re.findall(r'<span class="words"[^>]*>([^<]*)<', page.read_text(encoding="utf-8"))
+    assert words == ["c", rows[0][2], "none"]
+
+
+def test_names_between_backticks_are_code(tmp_path: Path) -> None:
+    page = alone(tmp_path, replace(EMPTY, question="`<ik>` is plain, `a` is not`"))
+    assert "<p><code>&lt;ik&gt;</code> is plain, <code>a</code> is not`</p>" in page.read_text()
+
+
 def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
     long = "a_name_without_end_" * 12
     bars = Bars("Bars", "deg", (long, "b"), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
