@@ -23,8 +23,8 @@ _TRACKERS = (
 _CONSTANTS = "The methods' constants are ours, chosen on other clips: the paper's k = 8 is 12 and 16 neighbours here."
 _BUILT_IN = (
     "The motion is a procedure's, not people's: eight performers with one judged take each.",
-    "Databases are cut to the paper's size: 7,200 frames of boxing, 4,272 of table tennis, 1,320 of walking, a little "
-    "of every performer who is judged.",
+    "Databases are cut to the paper's size: 7,200 frames of boxing, 4,272 of table tennis, 1,320 of walking, from "
+    "other takes of everyone who is judged.",
 )
 _REAL = (
     "The paper's recordings are not public: these are other clips. Walking is learnt from 1,314 frames of two people "

@@ -120,8 +120,9 @@ def one_tracker(study: Study) -> Experiment:
 def _what_suffers(behaviour: str, study: Study, run: str) -> Table:
     """Every group of hinges, and the root, with one tracker and with five."""
     groups: dict[str, dict[str, Errors]] = {}
+    worn = {named(row["stations"]): row["stations"] for row in study.rows(run)}
     for name in (HAND, ALL_FIVE):
-        cells = [cell for cell in study.cells(run) if named(cell.stations) == name]
+        cells = list(study.cells(run, stations=worn.get(name, [])))
         for group, errors in joint_groups(cells, GROUPS).items():
             groups.setdefault(f"{group} [deg]", {})[name] = errors
         for metric, title in (("root_heading_deg", "root's heading [deg]"), ("root_position_mm", "root [mm]")):
