@@ -109,20 +109,20 @@ def test_the_level_grows_as_clips_become_few() -> None:
 
 
 DRAWS: dict[str, tuple[Callable[[np.random.Generator, int], Floats], float]] = {
-    "normal": (lambda rng, n: rng.normal(size=n), 0.925),
-    "skewed": (lambda rng, n: rng.exponential(size=n) - 1.0, 0.875),
-    "heavy": (lambda rng, n: rng.standard_t(3, size=n), 0.89),
+    "normal": (lambda rng, n: rng.normal(size=n), 0.92),
+    "skewed": (lambda rng, n: rng.exponential(size=n) - 1.0, 0.87),
+    "heavy": (lambda rng, n: rng.standard_t(3, size=n), 0.88),
 }
-"""Differences of mean 0, and the coverage that 1,000 studies of them must show."""
+"""Differences of mean 0, and the coverage that 400 studies of them must show."""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [6, 8, 10, 12])
+@pytest.mark.parametrize("count", [6, 8, 12])
 @pytest.mark.parametrize("kind", DRAWS)
 def test_intervals_hold_the_truth_about_as_often_as_they_say(kind: str, count: int) -> None:
     draw, least = DRAWS[kind]
-    rng, studies = generator(3, "coverage", kind, count), 1000
+    rng, studies = generator(3, "coverage", kind, count), 400
     ends = np.array([interval(draw(rng, count)) for _ in range(studies)])
     held = float(np.mean((ends[:, 0] <= 0.0) & (ends[:, 1] >= 0.0)))
     print(f"{kind}, {count} clips: {held:.1%} of {studies}")
-    assert least < held < 0.975
+    assert least < held < 0.98
