@@ -61,11 +61,12 @@ def verdicts(experiment: Experiment, words: str = "") -> Counter[str]:
     return Counter(claim.verdict for claim in experiment.claims if words in claim.text)
 
 
-@pytest.mark.parametrize("compared", [leave_one_out, own_model])
-def test_orders_are_judged_for_every_behaviour_and_both_inputs(compared: Any) -> None:
-    assert verdicts(compared(told("builtin", THEIRS))) == {"reproduced": 3 * 2 * len(BEHAVIOURS)}
+@pytest.mark.parametrize(("compared", "pairs"), [(leave_one_out, 3), (own_model, 2)])
+def test_orders_are_judged_for_every_behaviour_and_both_inputs(compared: Any, pairs: int) -> None:
+    """That local PCA errs less than IK is told once: the second experiment would only repeat it."""
+    assert verdicts(compared(told("builtin", THEIRS))) == {"reproduced": pairs * 2 * len(BEHAVIOURS)}
     swapped = {"dynamic_map": HIGH, "dynamic_map:window": HIGH, "local_pca": MIDDLE, "ik": LOW}
-    assert verdicts(compared(told("builtin", swapped))) == {"not reproduced": 3 * 2 * len(BEHAVIOURS)}
+    assert verdicts(compared(told("builtin", swapped))) == {"not reproduced": pairs * 2 * len(BEHAVIOURS)}
     same = verdicts(compared(told("builtin", {})))
     assert same["cannot tell"] >= 0.8 * same.total()
 
