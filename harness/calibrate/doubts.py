@@ -9,14 +9,19 @@ from harness.calibrate.bundle import Bundle, Expected
 from harness.calibrate.fit import Fit, descended
 from harness.calibrate.poses import POSES
 from harness.calibrate.still import NotStanding
+from harness.calibrate.tpose import HEADING_SD_RAD, LEVEL
 from harness.calibrate.unknowns import Solution
+from harness.core import rotations
 from harness.core.arrays import Floats
 
 MOST_MISS_RAD = float(np.deg2rad(10.0))
 """A pose whose hinges are off by more than this on the whole is another pose: twice what people who try are off, and
 half of what leaving out an arm or a leg makes [choice]."""
-_LIKELIER = 0.5
-"""Stations are called exchanged when the other way round leaves less than this share of the squared residuals."""
+PECULIAR, PECULIAR_RAD = 3.0, float(np.deg2rad(5.0))
+"""So is one that is off by so many times as much as most of them are, if by more than this [choice]."""
+_LIKELIER, _LIKELY = 0.5, 2.0
+"""Stations are called exchanged when the other way round leaves less than this share of the squared residuals, and not
+many more in units of their spread than there are readings [choice]."""
 _TRIED = 6
 
 
@@ -24,6 +29,7 @@ def require_one_room(bundle: Bundle) -> None:
     """NotStanding when a station's orientations look turned in the room."""
     at = bundle.start()
     turn_rad = frames.turned_in_room(bundle.reach(at).world_from_bone[:, bundle.shared.carriers], bundle.turn)
+    turn_rad = rotations.rotate(rotations.inverse(LEVEL), turn_rad)
     found = np.flatnonzero(np.any(turn_rad != 0.0, axis=1))
     if len(found) == 0:
         return
@@ -31,7 +37,7 @@ def require_one_room(bundle: Bundle) -> None:
     told = "; ".join(f"station {j + 1} ({mounts[j].station}) {frames.about(turn_rad[j])}" for j in found)
     undo = ", ".join(f"b{j + 1}" for j in found)
     raise NotStanding(
-        f"The same turn in every pose, in the room's axes (x forward, z up), is in what these report: {told}.",
+        f"The same turn in every pose, in the tracker's axes (x forward, z down), is in what these report: {told}.",
         f"Undo the boresight (send {undo}) or the alignment (R) of these stations, or turn no orientation after "
         "reading it; then hold the poses again.",
     )
@@ -39,8 +45,15 @@ def require_one_room(bundle: Bundle) -> None:
 
 def require_poses(bundle: Bundle, found: Fit) -> None:
     """NotStanding when a pose was not held as shown: because stations are exchanged, or because it was another pose."""
+    if found.heading_sd_rad > HEADING_SD_RAD:
+        raise NotStanding(
+            f"Stations {', '.join(mount.station for mount in bundle.shared.mounts)} do not tell which way the performer "
+            "faces in the poses.",
+            "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
+        )
     worst = int(np.argmax(found.pose_miss_rad))
-    if found.pose_miss_rad[worst] <= MOST_MISS_RAD:
+    usual = PECULIAR * float(np.median(found.pose_miss_rad))
+    if found.pose_miss_rad[worst] <= min(MOST_MISS_RAD, max(usual, PECULIAR_RAD)):
         return
     _require_sides(bundle, found)
     mounts = bundle.shared.mounts
@@ -86,7 +99,7 @@ def _require_sides(bundle: Bundle, found: Fit) -> None:
             rows[a], rows[b] = b, a
         if (cost := _cost(bundle, rows, given)) < best:
             best, which = cost, exchange
-    if best > _LIKELIER * plain:
+    if best > min(_LIKELIER * plain, _LIKELY * 6.0 * bundle.place_m[..., 0].size):
         return
     told = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
     raise NotStanding(

@@ -37,6 +37,8 @@ class Fit:
     """(X, X) of the shared unknowns."""
     pose_miss_rad: Floats
     """(P,) how far hinges missed each pose, standard deviation."""
+    heading_sd_rad: float
+    """How well stations tell which way the performer faced in the first pose, standard deviation."""
     rounds: int
 
 
@@ -56,7 +58,8 @@ def fit(bundle: Bundle, place_m: float, turn_rad: float) -> Fit:
             break
     normal = bundle.normal(at, given, weight)
     covariance, own = normal.variances()
-    return Fit(at, given, weight, normal, covariance, _missed_rad(bundle, at, given, own), rounds)
+    missed_rad, heading_sd_rad = _missed_rad(bundle, at, given, own), float(np.sqrt(own[0, 5]))
+    return Fit(at, given, weight, normal, covariance, missed_rad, heading_sd_rad, rounds)
 
 
 def descended(
