@@ -21,6 +21,10 @@ _WHAT = (
     "room's frame, its turn about the vertical and its origin"
 )
 _HOW = "mean over clips (worst clip)"
+_POSITIONS = (
+    "Nothing is aligned, so positions have the room's error in them: 17 mm for each degree of heading and metre from "
+    "where the performer stood model; mpjpe_pa_mm has not."
+)
 
 
 def lines(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
@@ -46,7 +50,7 @@ def text(summary: Mapping[str, Any]) -> list[str]:
         return []
     widths = [max(len(line[i]) for line in found) for i in range(len(found[0]))]
     aligned = ["  ".join(word.ljust(width) for word, width in zip(line, widths, strict=True)) for line in found]
-    return [f"calibration: {_WHAT}; {_HOW}", "", *(line.rstrip() for line in aligned), ""]
+    return [f"calibration: {_WHAT}; {_HOW}", _POSITIONS, "", *(line.rstrip() for line in aligned), ""]
 
 
 def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
@@ -55,7 +59,7 @@ def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
     if not found:
         return Markup()
     head, *rows = found
-    return table(joined(tag("b", "Calibration"), f": {_WHAT}; {_HOW}."), head, rows, label="calibration")
+    return table(joined(tag("b", "Calibration"), f": {_WHAT}; {_HOW}. {_POSITIONS}"), head, rows, label="calibration")
 
 
 def _error(kind: str, name: str, decimals: int, sessions: Sequence[Mapping[str, float]]) -> str:

@@ -21,7 +21,7 @@ CELLS = [
 
 
 def test_each_session_counts_once_whatever_methods_were_shown_it() -> None:
-    head, exact, tpose, poses = text({"cells": CELLS})[2:6]
+    head, exact, tpose, poses = text({"cells": CELLS})[3:7]
     assert head.split("  ")[0] == "calibration"
     assert exact.split() == ["exact", "2", *["known"] * 5]
     assert "25.0 (30.0)" in tpose  # not the mean over cells
