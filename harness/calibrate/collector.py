@@ -1,25 +1,28 @@
 """Finds the poses that a performer holds, one after another, in a stream: live or from a recording.
 
-A hold is `HOLD_S` in which every station is still (by the rules of `still`), with its beginning and end left out.
-The next one counts when a station has been somewhere else in between and is there now; and, where it is known what
-the poses look like, when it looks like the pose that is wanted: a rest, a repeated pose or one that was left out
-never shifts the order.
+A hold is `HOLD_S` in which every station is still (by the rules of `still`), without its beginning and end; readings
+that stray from it are marked as suspect. The next one counts when a station has been somewhere else in between and is
+there now; and, where it is known what the poses look like, when it looks like the pose that is wanted: a rest, a
+repeated pose or one that was left out never shifts the order.
 """
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from harness.calibrate.likeness import Likeness
 from harness.calibrate.still import SWAY_M, NotStanding, Still, span_s, stood_still
 from harness.core import rotations
-from harness.core.arrays import Floats
+from harness.core.arrays import Bools, Floats
 from harness.stream.frame import TrackerFrame
 
 HOLD_S, EDGE_S = 2.7, 0.25
 """A hold, and what is left out of it at either end [s]; what remains is `still.LEAST_S` and two periods of 10 Hz."""
+STEADY = 0.65
+"""So much of it each station is where it is on the whole. What it reads elsewhere is left out: the device is off for a
+while now and then (docs/is900.md 13.1), at one station at a time, and a performer moves more of them [choice]."""
 LOOK_S = 0.2
 """So often it is looked whether somebody holds still [choice]."""
 GAP_S = 0.5
@@ -58,7 +61,7 @@ class PoseCollector:
         self._began_s: float | None = None
         self._looked_s = -np.inf
         self._first: Still | None = None
-        self._last: Still | None = None
+        self._last: _Stance | None = None
 
     @property
     def done(self) -> bool:
@@ -79,17 +82,34 @@ class PoseCollector:
         return self._look(list(window))
 
     def _look(self, frames: list[TrackerFrame]) -> int | None:
-        if (moving := self._moving(frames)) is not None:  # cheap, and most of what is looked at
+        stance, time_s = _stance(frames), np.array([frame.received_s for frame in frames])
+        if (moving := self._moving(stance.strays, time_s)) is not None:
             self.told = f"hold still: station {moving!r} moves"
             return None
+        if self._last is not None and not stance.elsewhere(self._last):
+            self._last = stance  # whoever drifts while standing has not moved
+            return None
+        inner = np.flatnonzero((time_s >= time_s[0] + EDGE_S) & (time_s <= time_s[-1] - EDGE_S)).tolist()
+        kept = [replace(frames[row], suspect=frames[row].suspect | stance.strays[row]) for row in inner]
         try:
-            still = stood_still(_inner(frames), self.stations)
+            still = stood_still(kept, self.stations)
         except NotStanding as error:
             self.told = f"hold still: {error.what}"
             return None
-        same = self._last is not None and not _elsewhere(still, self._last)
-        self._last = still  # whoever drifts while standing has not moved
-        return None if same else self._held(frames, still)
+        self._last = stance
+        return self._held(kept, still)
+
+    def _moving(self, strays: Bools, time_s: Floats) -> str | None:
+        """A station that strays too long, or the second that is elsewhere as the hold begins or as it ends."""
+        for when, least, share in (
+            (time_s > -np.inf, 1, 1.0 - STEADY),
+            (time_s <= time_s[0] + 2.0 * EDGE_S, 2, 0.5),
+            (time_s >= time_s[-1] - 2.0 * EDGE_S, 2, 0.5),
+        ):
+            strayed = strays[when].mean(axis=0)
+            if np.sum(strayed > share) >= least:
+                return self.stations[int(np.argmax(strayed))]
+        return None
 
     def _held(self, frames: list[TrackerFrame], still: Still) -> int | None:
         """A hold that is none of those before."""
@@ -99,7 +119,7 @@ class PoseCollector:
             why = f"all {self.poses} poses were taken before"
         elif self._likeness is None or self._likeness.held(wanted, still, self._first):
             self._first = self._first or still
-            self.held.append(_inner(frames))
+            self.held.append(frames)
             self.began_s.append(began_s)
             self.told = f"pose {wanted + 1} of {self.poses} taken"
             return wanted + 1
@@ -111,38 +131,39 @@ class PoseCollector:
         self.told = str(self.passed[-1])
         return None
 
-    def _moving(self, frames: Sequence[TrackerFrame]) -> str | None:
-        """A station that is not where it is on the whole as the hold begins, or as it ends."""
-        position_m, time_s = _seen_m(frames), np.array([frame.received_s for frame in frames])
-        middle_m = _median(position_m)
-        near_m = SWAY_M + _median(np.linalg.norm(position_m - middle_m, axis=2))
-        for edge in (time_s <= time_s[0] + 2.0 * EDGE_S, time_s >= time_s[-1] - 2.0 * EDGE_S):
-            off_m = np.linalg.norm(_median(position_m[edge]) - middle_m, axis=1)
-            if (off_m > near_m).any():  # NaN, not seen for this while, is not
-                return self.stations[int(np.argmax(off_m > near_m))]
-        return None
+
+@dataclass(frozen=True, eq=False)
+class _Stance:
+    """Where stations are in some frames, told fast; NaN for one that is never seen."""
+
+    middle_m: Floats
+    """(S, 3)"""
+    turn: Floats
+    """(S, 4)"""
+    strays: Bools
+    """(F, S) whether a station is seen farther from there than sway and its noise take it."""
+
+    def elsewhere(self, before: "_Stance") -> bool:
+        moved_m = np.linalg.norm(self.middle_m - before.middle_m, axis=1)
+        turned_rad = rotations.angle_between_rad(self.turn, before.turn)
+        return bool(np.any(moved_m > MOVED_M) or np.any(turned_rad > MOVED_RAD))
 
 
-def _inner(frames: Sequence[TrackerFrame]) -> list[TrackerFrame]:
-    first_s, last_s = frames[0].received_s + EDGE_S, frames[-1].received_s - EDGE_S
-    return [frame for frame in frames if first_s <= frame.received_s <= last_s]
-
-
-def _seen_m(frames: Sequence[TrackerFrame]) -> Floats:
-    """(F, S, 3) NaN where nothing of use came."""
-    seen = [frame.position_valid & ~frame.suspect for frame in frames]
-    return np.where(np.array(seen)[..., None], np.array([frame.position_m for frame in frames]), np.nan)
+def _stance(frames: Sequence[TrackerFrame]) -> _Stance:
+    sound = np.array([frame.position_valid & frame.orientation_valid & ~frame.suspect for frame in frames])[..., None]
+    seen_m = np.where(sound, np.array([frame.position_m for frame in frames]), np.nan)
+    middle_m = _median(seen_m)
+    off_m = np.linalg.norm(seen_m - middle_m, axis=2)
+    turn = np.where(sound, np.array([frame.tracker_from_station for frame in frames]), np.nan)
+    largest = np.argmax(np.nan_to_num(np.abs(turn)).sum(axis=0), axis=1)  # the sign of a quaternion is anybody's
+    turn = turn * np.where(np.take_along_axis(turn, largest[None, :, None], axis=2) < 0.0, -1.0, 1.0)
+    middle = _median(turn)
+    turned = middle / np.linalg.norm(middle, axis=1, keepdims=True)
+    return _Stance(middle_m, turned, off_m > SWAY_M + _median(off_m))
 
 
 def _median(values: Floats) -> Floats:
     """Over the first axis, of what is not NaN; NaN where all is."""
-    out = np.full(values.shape[1:], np.nan)
-    some = np.isfinite(values).any(axis=0)
-    out[some] = np.nanmedian(values[:, some], axis=0)
+    middle = np.maximum(np.isfinite(values).sum(axis=0) - 1, 0) // 2
+    out: Floats = np.take_along_axis(np.sort(values, axis=0), middle[None], axis=0)[0]
     return out
-
-
-def _elsewhere(now: Still, before: Still) -> bool:
-    moved_m = np.linalg.norm(now.position_m - before.position_m, axis=1)
-    turned_rad = rotations.angle_between_rad(now.tracker_from_station, before.tracker_from_station)
-    return bool(np.any(moved_m > MOVED_M) or np.any(turned_rad > MOVED_RAD))

@@ -18,13 +18,14 @@ from harness.calibrate.tpose import LEVEL
 from harness.core import rotations
 from harness.core.arrays import Floats
 
-SIZES = 0.7, 1.3
-"""Performers are so many times as large as the body [choice]."""
+SIZES = 0.85, 1.15
+"""Performers are so many times as large as the body: 1.5 m to 2 m [choice]."""
 LEVER_M = 0.3
 """A turn counts as what it does to the end of a forearm or a shin [choice]."""
-FAR_M = 0.35
-"""Stations farther than this from a pose, root mean square, are not in it [choice]."""
-AS_NEAR = 0.04
+FIRST_FAR_M, FAR_M = 0.26, 0.40
+"""Stations farther than this from a pose, root mean square, are not in it: from the first one, of which only places
+tell, and from the others. Whoever misses hinges by 5 deg stays within [choice]."""
+AS_NEAR = 0.02
 """A pose is held when no other one is nearer by more than this [m] [choice]."""
 
 
@@ -55,13 +56,13 @@ class Likeness:
     def held(self, pose: int, now: Still, first: Still | None = None) -> bool:
         """Whether it may be this pose."""
         off_m = self.off_m(now, first)
-        return bool(off_m[pose] <= min(float(off_m.min()) + AS_NEAR, FAR_M))
+        return bool(off_m[pose] <= min(float(off_m.min()) + AS_NEAR, _far_m(first)))
 
     def nearest(self, now: Still, first: Still | None = None) -> int | None:
         """The pose that it looks like most; None when it looks like none."""
         off_m = self.off_m(now, first)
         best = int(np.argmin(off_m))
-        return best if off_m[best] <= FAR_M else None
+        return best if off_m[best] <= _far_m(first) else None
 
     def _off_m(self, now: Still, first: Still | None, pose: int) -> float:
         heading, away_m = _fitted(now.position_m, self._place_m[pose])
@@ -72,6 +73,10 @@ class Likeness:
             seen = rotations.multiply(rotations.multiply(heading, turned), rotations.inverse(before))
             squares = squares + (LEVER_M * rotations.angle_between_rad(seen, self._turned[pose])) ** 2
         return float(np.sqrt(np.mean(squares)))
+
+
+def _far_m(first: Still | None) -> float:
+    return FIRST_FAR_M if first is None else FAR_M
 
 
 def _fitted(found_m: Floats, place_m: Floats) -> tuple[Floats, Floats]:

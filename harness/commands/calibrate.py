@@ -1,6 +1,7 @@
 """The verb that finds where trackers are worn, and on whose bones."""
 
 import argparse
+import math
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -100,7 +101,20 @@ def _sheet(args: argparse.Namespace) -> Outcome:
 
 
 def _trial(args: argparse.Namespace) -> Outcome:
-    raise NotImplementedError
+    from harness.calibration_trial import trials
+    from harness.simulate.noise import level
+
+    given = {"noise": args.noise, "seed": args.seed}
+    if args.miss is not None:
+        if not 0.0 <= args.miss <= 45.0:
+            raise BadInput(f"--miss {args.miss:g}.", "Hinges miss poses by 0 to 45 deg.")
+        given["miss_rad"] = math.radians(args.miss)
+    level(args.noise or "default")  # refuses what is none before anybody holds a pose
+    found = trials(
+        args.simulate, **{key: value for key, value in given.items() if value is not None}, folder=args.mocap
+    )
+    outcome = Outcome.PASS if not found.refused else Outcome.INCOMPLETE
+    return say(args, found.as_dict(), *found.lines(), outcome=outcome)
 
 
 def _found(args: argparse.Namespace) -> Outcome:

