@@ -56,7 +56,7 @@ def draw_bars(canvas: "Figure", bars: Bars, places: Mapping[str, int]) -> None:
     for row in rows:
         bar = axes.barh if lying else axes.bar
         bar(row.along, row.length, 0.94 * thick, label=row.name, **_look(places[row.name]))
-        _whiskers(axes, row, min(0.2 * thick, 0.04), lying)
+        _whiskers(axes, row, lying)
         if _numbered(bars):
             _numbers(axes, row, bars.unit, lying)
     _published(axes, rows, lying)
@@ -119,13 +119,14 @@ def _look(place: int) -> dict[str, Any]:
     return {"color": COLOURS[place % len(COLOURS)], "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.6}
 
 
-def _whiskers(axes: "Axes", row: _Row, half_cap: float, lying: bool) -> None:
+def _whiskers(axes: "Axes", row: _Row, lying: bool) -> None:
     """Standard deviations thin, intervals with caps."""
-    line, cap = (axes.hlines, axes.vlines) if lying else (axes.vlines, axes.hlines)
+    line = axes.hlines if lying else axes.vlines
     line(row.along, np.maximum(row.length - row.spread, 0.0), row.length + row.spread, color=FAINT, linewidth=0.9)
     line(row.along, row.low, row.high, color=INK, linewidth=1.3)
     for end in (row.low, row.high):
-        cap(end, row.along - half_cap, row.along + half_cap, color=INK, linewidth=1.3)
+        at = (end, row.along) if lying else (row.along, end)
+        axes.plot(*at, "|" if lying else "_", color=INK, markersize=6, markeredgewidth=1.3)
 
 
 def _numbers(axes: "Axes", row: _Row, unit: str, lying: bool) -> None:

@@ -137,7 +137,7 @@ def _experiment(content: PaperContent, experiment: Experiment) -> Markup:
 def _figure(figure: Bars | Lines, chart: Chart | None) -> Markup:
     """With its numbers under it, or instead of it."""
     data = _table(numbers(figure))
-    return joined(pictured(chart, 3), folded("Its numbers", data)) if chart else joined(tag("h3", figure.title), data)
+    return joined(pictured(chart, 3), folded("Its numbers", data)) if chart else data
 
 
 def _throughout(findings: Findings) -> Markup:
