@@ -46,9 +46,9 @@ def require_one_room(bundle: Bundle) -> None:
 def require_poses(bundle: Bundle, found: Fit) -> None:
     """NotStanding when a pose was not held as shown: because stations are exchanged, or because it was another pose."""
     if found.heading_sd_rad > HEADING_SD_RAD:
+        names = ", ".join(mount.station for mount in bundle.shared.mounts)
         raise NotStanding(
-            f"Stations {', '.join(mount.station for mount in bundle.shared.mounts)} do not tell which way the performer "
-            "faces in the poses.",
+            f"Stations {names} do not tell which way the performer faces in the poses.",
             "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
         )
     worst = int(np.argmax(found.pose_miss_rad))

@@ -1,0 +1,116 @@
+"""The normal equations: slopes against differences, elimination of poses against solving for everything at once."""
+
+import numpy as np
+import pytest
+
+from harness.body.mounts import DEFAULTS
+from harness.calibrate.bundle import Bundle, Expected, Normal, level_turn_rad, mean_turns
+from harness.calibrate.poses import POSES, angles_rad
+from harness.calibrate.unknowns import Shared, Solution
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import standard_skeleton
+from tests.calibrate.standing_model import SIX, space
+
+LIKE = standard_skeleton()
+STEP = 1e-6
+
+
+def setting(rng: np.random.Generator) -> tuple[Bundle, Solution, Expected]:
+    """A solution somewhere near the start, with readings that fit it but for a little."""
+    shared = Shared(LIKE, space(), [DEFAULTS[station] for station in SIX])
+    asked = np.array([angles_rad(pose, LIKE) for pose in POSES])
+    bundle = Bundle(shared, asked, rng.normal(size=(8, 6, 3)), np.tile(np.eye(3), (8, 6, 1, 1)))
+    at = bundle.start()
+    own = 0.1 * rng.normal(size=(8, 6 + len(bundle.hinges)))
+    at = bundle.moved(at, (0.01 * rng.normal(size=shared.count), own))
+    reached = bundle.reach(at)
+    bundle.place_m = reached.place_m + 1e-7 * rng.normal(size=(8, 6, 3))
+    bundle.turn = reached.world_from_station @ _small_turns(1e-7, rng)
+    return bundle, at, Expected(0.04, 0.8, shared.flesh_m(at.bone_m), 0.002, 0.01)
+
+
+def _small_turns(size_rad: float, rng: np.random.Generator) -> Floats:
+    return rotations.to_matrix(rotations.exp(size_rad * rng.normal(size=(8, 6, 3))))
+
+
+def test_the_slope_of_the_cost(rng: np.random.Generator) -> None:
+    """Half its gradient, for every shared unknown and every unknown of a pose."""
+    bundle, at, given = setting(rng)
+    weight = rng.uniform(0.2, 1.0, size=(8, 6, 2))
+    normal = bundle.normal(at, given, weight)
+    none = np.zeros(bundle.shared.count), np.zeros(normal.own_slope.shape)
+
+    def slope(which: int, index: tuple[int, ...]) -> float:
+        costs = []
+        for sign in (STEP, -STEP):
+            step = [np.array(part) for part in none]
+            step[which][index] = sign
+            costs.append(bundle.cost(bundle.moved(at, (step[0], step[1])), given, weight))
+        return -(costs[0] - costs[1]) / (4.0 * STEP)
+
+    shared = np.array([slope(0, (k,)) for k in range(bundle.shared.count)])
+    np.testing.assert_allclose(normal.shared_slope, shared, atol=1e-3 * np.abs(shared).max())
+    pose = 6  # the squat bends legs and arms
+    own = np.array([slope(1, (pose, k)) for k in range(normal.own_slope.shape[1])])
+    np.testing.assert_allclose(normal.own_slope[pose], own, atol=1e-3 * np.abs(own).max())
+
+
+def test_expectations_against_differences(rng: np.random.Generator) -> None:
+    bundle, at, given = setting(rng)
+    shared = bundle.shared
+    _, slope = shared.expected(at, given.beside, given.flesh_m)
+    own = np.zeros((8, 6 + len(bundle.hinges)))
+    for k in range(shared.count):
+        step = STEP * np.eye(shared.count)[k]
+        ahead, behind = (
+            shared.expected(bundle.moved(at, (sign * step, own)), given.beside, given.flesh_m)[0]
+            for sign in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(slope[:, k], (ahead - behind) / (2.0 * STEP), atol=1e-4 * np.abs(slope).max())
+
+
+def whole(normal: Normal) -> tuple[Floats, Floats]:
+    """The normal matrix of everything at once, and its right side."""
+    poses, own, shared = normal.across.shape
+    matrix = np.zeros((shared + poses * own,) * 2)
+    matrix[:shared, :shared] = normal.shared
+    for p in range(poses):
+        rows = slice(shared + p * own, shared + (p + 1) * own)
+        matrix[rows, rows], matrix[rows, :shared] = normal.own[p], normal.across[p]
+        matrix[:shared, rows] = normal.across[p].T
+    return matrix, np.concatenate([normal.shared_slope, normal.own_slope.ravel()])
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-3, 10.0])
+def test_poses_are_eliminated_rightly(damping: float, rng: np.random.Generator) -> None:
+    bundle, at, given = setting(rng)
+    normal = bundle.normal(at, given, np.ones((8, 6, 2)))
+    matrix, right = whole(normal)
+    expected = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
+    shared, own = normal.step(damping)
+    np.testing.assert_allclose(np.concatenate([shared, own.ravel()]), expected, atol=1e-6 * np.abs(expected).max())
+
+
+def test_variances_are_those_of_everything_at_once(rng: np.random.Generator) -> None:
+    bundle, at, given = setting(rng)
+    normal = bundle.normal(at, given, np.ones((8, 6, 2)))
+    everything = np.linalg.inv(whole(normal)[0])
+    covariance, own = normal.variances()
+    count = bundle.shared.count
+    scale = np.sqrt(np.diag(everything)[:count])
+    np.testing.assert_allclose(
+        covariance / np.outer(scale, scale), everything[:count, :count] / np.outer(scale, scale), atol=1e-6
+    )
+    np.testing.assert_allclose(own.ravel(), np.diag(everything)[count:], rtol=1e-6)
+
+
+def test_the_level_turn_and_the_mean_turn(rng: np.random.Generator) -> None:
+    points = rng.normal(size=(6, 3))
+    there = rotations.rotate(rotations.about_z(2.5), points) + np.array([1.0, 2.0, 3.0])
+    assert level_turn_rad(points, there) == pytest.approx(2.5)
+    middle = rotations.exp(rng.normal(size=(4, 3)))
+    near = rotations.multiply(middle, rotations.exp(1e-3 * rng.normal(size=(9, 4, 3))))
+    found = rotations.from_matrix(mean_turns(rotations.to_matrix(near)))
+    assert rotations.angle_between_rad(found, middle).max() < 2e-3
+    assert np.linalg.det(mean_turns(rng.normal(size=(3, 5, 3, 3)))) == pytest.approx(np.ones(5))
