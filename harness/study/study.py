@@ -6,6 +6,7 @@ The folder holds study.json, which says whose it is, a folder for each run, and 
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
@@ -41,10 +42,10 @@ class Study:
 
         Columns are those of `summary.csv`, such as method, inputs, behaviour, performer, clip and varied.
         """
-        if run not in self.runs or not (self.out / run / "summary.json").is_file():
+        summary, wanted = self.out / run / "summary.json", plain(where)
+        if run not in self.runs or not summary.is_file():
             return []
-        wanted = plain(where)
-        rows: list[dict[str, Any]] = read_summary(self.out / run)["cells"]
+        rows = _rows(summary.parent, summary.stat().st_mtime_ns)
         return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
 
     def cells(self, run: str, **where: Any) -> Iterator[Cell]:
@@ -61,6 +62,13 @@ class Study:
         path.parent.mkdir(exist_ok=True)
         write_json(path, {"value": measure(), "source_hash": manifest.source_hash()})
         return read_json(path, "what a study measured")["value"]
+
+
+@lru_cache(maxsize=16)
+def _rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
+    """Of a summary as it was written then; experiments ask for it again and again."""
+    rows: list[dict[str, Any]] = read_summary(run)["cells"]
+    return rows
 
 
 def open_study(out: Path, identity: Mapping[str, Any]) -> None:
