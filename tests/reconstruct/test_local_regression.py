@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.core.estimate import Status
-from harness.core.humanoid24 import unpack
+from harness.core.humanoid24 import BONES, unpack
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, ground
 from harness.reconstruct.kernel_cca import KernelCca
@@ -115,7 +115,14 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
 def test_the_pelvis_is_the_first_choice_of_anchor() -> None:
     assert anchor_of(["head", "thorax", "lhand", "lhipjoint"]) == 3
     assert anchor_of(["lhand", "head", "thorax"]) == 2
-    assert anchor_of(["lhand", "rtibia"]) == 0
+    assert anchor_of(["lhand", "rtibia", "ltibia"]) == 1
+    assert anchor_of(["lhand", "rhand"]) == 0
+
+
+@pytest.mark.parametrize("bone", BONES)
+def test_any_bone_may_be_the_anchor_and_none_is_better_than_the_pelvis(bone: str) -> None:
+    assert anchor_of([bone]) == 0
+    assert anchor_of([bone, "lhipjoint"]) == (bone != "lhipjoint")
 
 
 def test_a_blend_weighs_by_closeness() -> None:
