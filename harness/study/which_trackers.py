@@ -60,8 +60,8 @@ def sensors(study: Study) -> Experiment:
             "The error is the mean of the hinge angles' errors; the paper's axis has no unit.",
             "Suitable is read in three ways: no other set of as many trackers errs less; the others err more on "
             "average; so does the one called suitable for the other behaviour.",
-            "Without a tracker on the pelvis the others are seen from an ankle, or else from a hand; the paper sees all "
-            "from the room, in which its database was recorded.",
+            "Without a tracker on the pelvis the others are seen from an ankle, or else from a hand; the paper sees "
+            "all from the room in which its database was recorded.",
             *differences(study),
         ),
         claims=tuple(claims),
