@@ -76,17 +76,14 @@ def calibrate(args: argparse.Namespace) -> Outcome:
         if getattr(args, name) is not None:
             users = " or ".join(source for source, names in _OF.items() if name in names)
             raise BadInput(f"--{name} with {given[0]}.", f"It is for {users}: leave it out.")
-    if args.sheet:
-        return _sheet(args)
-    if args.simulate:
-        return _trial(args)
+    action = {"sheet": _sheet, "simulate": _trial}.get(given[0], _found)
     with ended_by_sigterm():
         try:
-            return _found(args)
+            return action(args)
         except (KeyboardInterrupt, Exception) as error:
             if not was_interrupted(error):
                 raise
-            return say(args, {}, "stopped; nothing was written", outcome=Outcome.INTERRUPTED)
+            return say(args, {}, "stopped; nothing is calibrated", outcome=Outcome.INTERRUPTED)
 
 
 def _sheet(args: argparse.Namespace) -> Outcome:
@@ -127,7 +124,7 @@ def _found(args: argparse.Namespace) -> Outcome:
     require_place(args.out, force=args.force)
     found = _of_device(args) if args.live else _of_recording(args)
     write_calibration(args.out, found.kept, force=args.force)
-    content = {"file": str(args.out), "stations": list(found.kept.calibration.stations), **found.kept.told}
+    content = {"file": str(args.out), **found.kept.told}
     return say(args, content, *found.lines, "", f"{args.out}: written")
 
 

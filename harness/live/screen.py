@@ -22,6 +22,8 @@ from harness.live.view import CLOSED, READY, Screen, Shared
 _COLOURS = {Status.SOLVED: "#e8850c", Status.HELD: "#a98a63", Status.LOST: "#9aa3ab"}
 """Paler the less a pose rests on readings."""
 _SIZE = (640, 640)
+_VIEW_DEG = 33.0
+"""Arms that are raised are in it too."""
 
 
 class Viewer:
@@ -30,6 +32,7 @@ class Viewer:
     def __init__(self, own: Skeleton, *, off_screen: bool) -> None:
         self._own = own
         self.stage = Stage(_SIZE, 0.0, off_screen=off_screen)
+        self.stage.plotter.camera.view_angle = _VIEW_DEG
         self._figure = Figure(self.stage.plotter, own, _COLOURS[Status.SOLVED], girth=1.0, opacity=1.0)
 
     def pose(self, qpos: Floats, status: Status) -> None:
