@@ -32,10 +32,14 @@ class Told(Study):
     errors: Mapping[str, float] = field(default_factory=dict)
     new: frozenset[str] = frozenset()
     """Clips of new performers."""
+    made: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
-        if run not in self.runs:
-            return []
+        if run not in self.made:
+            self.made[run] = self.make(run) if run in self.runs else []
+        return [row for row in self.made[run] if all(row[name] == value for name, value in where.items())]
+
+    def make(self, run: str) -> list[dict[str, Any]]:
         motion, found = self.runs[run].motion, []
         shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
         for clip, behaviour in zip(motion.test, shown, strict=True):
@@ -47,7 +51,7 @@ class Told(Study):
                     row |= {"protocol": motion.protocol, "performer": "new" if clip in self.new else "known"}
                     error = self.errors.get(inputs, 0.0) + self.errors.get(method, 0.0)
                     found.append({**row, "joint_angle_mean_deg": error + hard + off})
-        return [row for row in found if all(row[name] == value for name, value in where.items())]
+        return found
 
     def cells(self, run: str, **where: Any) -> Iterator[Cell]:
         return iter(())
