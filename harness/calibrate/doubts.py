@@ -17,12 +17,12 @@ from harness.core.arrays import Floats
 MOST_MISS_RAD = float(np.deg2rad(10.0))
 """A pose whose hinges are off by more than this on the whole is another pose: twice what people who try are off, and
 half of what leaving out an arm or a leg makes [choice]."""
-PECULIAR, PECULIAR_RAD = 3.0, float(np.deg2rad(5.0))
+PECULIAR, PECULIAR_RAD = 2.0, float(np.deg2rad(5.0))
 """So is one that is off by so many times as much as most of them are, if by more than this [choice]."""
 _LIKELIER, _LIKELY = 0.5, 2.0
 """Stations are called exchanged when the other way round leaves less than this share of the squared residuals, and not
 many more in units of their spread than there are readings [choice]."""
-_TRIED = 6
+_TRIED = 5
 
 
 def require_one_room(bundle: Bundle) -> None:
@@ -113,5 +113,5 @@ def _cost(bundle: Bundle, rows: list[int], given: Expected) -> float:
     other = Bundle(bundle.shared, bundle.asked_rad, bundle.place_m[:, rows], bundle.turn[:, rows])
     at, damping, weight = other.start(), 1e-3, np.ones((*other.place_m.shape[:2], 2))
     for _ in range(_TRIED):
-        at, damping, _ = descended(other, at, given, weight, damping)
+        at, damping, _ = descended(other, at, other.normal(at, given, weight), given, weight, damping)
     return other.cost(at, given, weight)

@@ -21,7 +21,7 @@ LEAST_BESIDE, MOST_BESIDE = 0.1, 3.0
 """Trackers are nowhere within 3 mm, and nowhere beyond 9 cm, of where they are said to be [choice]."""
 TAIL = 4.0
 """Degrees of freedom of the readings' t distribution [choice]."""
-_ROUNDS, _SETTLED = 60, 1e-3
+_ROUNDS, _LEAST_ROUNDS, _SETTLED = 60, 3, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +48,13 @@ def fit(bundle: Bundle, place_m: float, turn_rad: float) -> Fit:
     given = Expected(START_MISS_RAD, 1.0, bundle.shared.flesh_m(at.bone_m), place_m, turn_rad)
     weight, damping = np.ones((*bundle.place_m.shape[:2], 2)), 1e-3
     for rounds in range(1, _ROUNDS + 1):
-        at, damping, moved = descended(bundle, at, given, weight, damping)
         normal = bundle.normal(at, given, weight)
-        covariance, own = normal.variances()
-        before, given = given, _spreads(bundle, at, given, covariance, own)
+        at, damping, gained = descended(bundle, at, normal, given, weight, damping)
+        # Of the solution before the step, which is the same in the end.
+        before, given = given, _spreads(bundle, at, given, *normal.variances())
         weight = _weights(bundle, at, given)
         change = abs(np.log(given.miss_rad / before.miss_rad)) + abs(np.log(given.beside / before.beside))
-        if rounds > 3 and change < _SETTLED and moved < _SETTLED:
+        if rounds > _LEAST_ROUNDS and change < _SETTLED and gained < _SETTLED:
             break
     normal = bundle.normal(at, given, weight)
     covariance, own = normal.variances()
@@ -63,11 +63,11 @@ def fit(bundle: Bundle, place_m: float, turn_rad: float) -> Fit:
 
 
 def descended(
-    bundle: Bundle, at: Solution, given: Expected, weight: Floats, damping: float
+    bundle: Bundle, at: Solution, normal: Normal, given: Expected, weight: Floats, damping: float
 ) -> tuple[Solution, float, float]:
     """One step of Levenberg and Marquardt, the damping for the next, and what the step gained, in squared units of
     the residuals."""
-    normal, cost = bundle.normal(at, given, weight), bundle.cost(at, given, weight)
+    cost = bundle.cost(at, given, weight)
     while damping < 1e8:
         tried = bundle.moved(at, normal.step(damping))
         if (then := bundle.cost(tried, given, weight)) < cost:

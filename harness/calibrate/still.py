@@ -23,7 +23,7 @@ SWAY_M, SWAY_RAD = 0.03, float(np.deg2rad(5.0))
 with arms held out; 5 deg is 3 cm at a third of a metre [choice]."""
 NOISE_WIDTHS = 5.0
 """On top of it, so many standard deviations of a single reading, as this very stream shows them [choice]."""
-_ROUNDS = 30
+_ROUNDS, _CONVERGED_RAD = 30, 1e-7
 
 
 class NotStanding(BadInput):
@@ -85,7 +85,10 @@ def median_rotation(turn: Floats) -> Floats:
     for _ in range(_ROUNDS):
         off = rotations.log(rotations.multiply(rotations.inverse(middle), turn))
         weight = 1.0 / np.maximum(np.linalg.norm(off, axis=1), 1e-6)
-        middle = rotations.multiply(middle, rotations.exp(weight @ off / weight.sum()))
+        step = weight @ off / weight.sum()
+        middle = rotations.multiply(middle, rotations.exp(step))
+        if np.abs(step).max() < _CONVERGED_RAD:
+            break
     return middle / np.linalg.norm(middle)
 
 

@@ -52,6 +52,7 @@ class Model:
     stations: tuple[str, ...] = SIX
     miss_rad: float = 0.0
     noise_m: float = 0.0
+    """Of each frame on each axis."""
     noise_rad: float = 0.0
     beside_m: float = 0.0
     yaw_rad: float = 0.7
@@ -104,21 +105,27 @@ class Model:
         kinematics.set(qpos)
         bones = [self.skeleton.index(bone) for bone in truth.bones]
         place_m, turn = kinematics.station_poses(bones, truth.mount_m, truth.bone_from_station)
-        rng = generator(self.seed, "noise", number)
-        place_m = place_m + self.noise_m * rng.normal(size=place_m.shape)
-        turn = rotations.multiply(rotations.exp(self.noise_rad * rng.normal(size=place_m.shape)), turn)
-        back = rotations.inverse(truth.world_from_tracker)
-        frame = TrackerFrame(
-            received_s=0.0,
-            measured_s=np.zeros(len(bones)),
-            position_m=rotations.rotate(back, place_m - truth.tracker_origin_m),
-            tracker_from_station=rotations.multiply(back, turn),
-            position_valid=np.ones(len(bones), dtype=bool),
-            orientation_valid=np.ones(len(bones), dtype=bool),
-            quality=np.ones(len(bones)),
-            suspect=np.zeros(len(bones), dtype=bool),
-        )
-        return [replace(frame, received_s=at_s) for at_s in np.linspace(0.0, SECONDS, FRAMES).tolist()]
+        rng, back = generator(self.seed, "noise", number), rotations.inverse(truth.world_from_tracker)
+        frames = []
+        for at_s in np.linspace(0.0, SECONDS, FRAMES).tolist():
+            noise_m, noise = (
+                self.noise_m * rng.normal(size=place_m.shape),
+                self.noise_rad * rng.normal(size=place_m.shape),
+            )
+            told = rotations.multiply(rotations.exp(noise), turn)
+            frames.append(
+                TrackerFrame(
+                    received_s=at_s,
+                    measured_s=np.full(len(bones), at_s),
+                    position_m=rotations.rotate(back, place_m + noise_m - truth.tracker_origin_m),
+                    tracker_from_station=rotations.multiply(back, told),
+                    position_valid=np.ones(len(bones), dtype=bool),
+                    orientation_valid=np.ones(len(bones), dtype=bool),
+                    quality=np.ones(len(bones)),
+                    suspect=np.zeros(len(bones), dtype=bool),
+                )
+            )
+        return frames
 
 
 def turned(held: Sequence[Sequence[TrackerFrame]], station: int, turn: Floats) -> list[list[TrackerFrame]]:
