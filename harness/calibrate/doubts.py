@@ -22,7 +22,8 @@ PECULIAR, PECULIAR_RAD = 2.0, float(np.deg2rad(5.0))
 _LIKELIER, _LIKELY = 0.5, 2.0
 """Stations are called exchanged when the other way round leaves less than this share of the squared residuals, and not
 many more in units of their spread than there are readings [choice]."""
-_TRIED = 5
+_GLANCE, _LIKELIEST, _TRIED = 1, 4, 5
+"""Each way round is looked at for a step, and the likeliest few for some more."""
 
 
 def require_one_room(bundle: Bundle) -> None:
@@ -91,15 +92,16 @@ def _require_sides(bundle: Bundle, found: Fit) -> None:
     bones = [mount.bone for mount in mounts]
     sides = [(bones.index(b), bones.index(f"r{b[1:]}")) for b in bones if b[0] == "l" and f"r{b[1:]}" in bones]
     given = Expected(MOST_MISS_RAD / 2.0, 1.0, found.expected.flesh_m, 0.005, np.deg2rad(1.0))
-    plain = _cost(bundle, everyone, given)
-    best, which = plain, sides
+    plain = _Tried(bundle, everyone, given)
+    tried = []
     for exchange in [*([pair] for pair in combinations(everyone, 2)), sides]:
         rows = list(everyone)
         for a, b in exchange:
             rows[a], rows[b] = b, a
-        if (cost := _cost(bundle, rows, given)) < best:
-            best, which = cost, exchange
-    if best > min(_LIKELIER * plain, _LIKELY * 6.0 * bundle.place_m[..., 0].size):
+        tried.append((_Tried(bundle, rows, given), exchange))
+    tried = sorted(tried, key=lambda each: each[0].cost(_GLANCE))[:_LIKELIEST]
+    best, which = min((each.cost(_TRIED), exchange) for each, exchange in tried)
+    if best > min(_LIKELIER * plain.cost(_TRIED), _LIKELY * 6.0 * bundle.place_m[..., 0].size):
         return
     told = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
     raise NotStanding(
@@ -108,10 +110,19 @@ def _require_sides(bundle: Bundle, found: Fit) -> None:
     )
 
 
-def _cost(bundle: Bundle, rows: list[int], given: Expected) -> float:
-    """Squared residuals that are left with the readings of these stations in the places of the others'."""
-    other = Bundle(bundle.shared, bundle.asked_rad, bundle.place_m[:, rows], bundle.turn[:, rows])
-    at, damping, weight = other.start(), 1e-3, np.ones((*other.place_m.shape[:2], 2))
-    for _ in range(_TRIED):
-        at, damping, _ = descended(other, at, other.normal(at, given, weight), given, weight, damping)
-    return other.cost(at, given, weight)
+class _Tried:
+    """A fit with the readings of these stations in the places of the others'."""
+
+    def __init__(self, bundle: Bundle, rows: list[int], given: Expected) -> None:
+        self._bundle = Bundle(bundle.shared, bundle.asked_rad, bundle.place_m[:, rows], bundle.turn[:, rows])
+        self._at, self._damping, self._given = self._bundle.start(), 1e-3, given
+        self._weight = np.ones((*bundle.place_m.shape[:2], 2))
+
+    def cost(self, steps: int) -> float:
+        """Squared residuals that are left after so many more steps."""
+        for _ in range(steps):
+            normal = self._bundle.normal(self._at, self._given, self._weight)
+            self._at, self._damping, _ = descended(
+                self._bundle, self._at, normal, self._given, self._weight, self._damping
+            )
+        return self._bundle.cost(self._at, self._given, self._weight)

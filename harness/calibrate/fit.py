@@ -21,7 +21,7 @@ LEAST_BESIDE, MOST_BESIDE = 0.1, 3.0
 """Trackers are nowhere within 3 mm, and nowhere beyond 9 cm, of where they are said to be [choice]."""
 TAIL = 4.0
 """Degrees of freedom of the readings' t distribution [choice]."""
-_ROUNDS, _LEAST_ROUNDS, _SETTLED = 60, 3, 1e-3
+_ROUNDS, _LEAST_ROUNDS, _SETTLED = 40, 3, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
