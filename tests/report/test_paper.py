@@ -216,7 +216,7 @@ def test_words_stand_on_the_left_of_their_column_and_numbers_on_the_right(tmp_pa
     rows = (("a", "1.2 ± 0.4 (8)", "8: one, two, three, four, five, six, seven"), ("b", "not measured", "none"))
     page = alone(tmp_path, replace(EMPTY, tables=(Table("Errors", ("a", "b", "c"), rows),)))
     words = re.findall(r'<span class="words"[^>]*>([^<]*)<', page.read_text(encoding="utf-8"))
-    assert words == ["c", rows[0][2], "none"]
+    assert words == ["a", "c", "a", rows[0][2], "b", "none"]
 
 
 def test_names_between_backticks_are_code(tmp_path: Path) -> None:
