@@ -52,6 +52,8 @@ def fit(bundle: Bundle, place_m: float, turn_rad: float) -> Fit:
         at, damping, gained = descended(bundle, at, normal, given, weight, damping)
         # Of the solution before the step, which is the same in the end.
         before, given = given, _spreads(bundle, at, given, *normal.variances())
+        if rounds <= _LEAST_ROUNDS:  # the body's size hardly changes any more
+            given = replace(given, flesh_m=bundle.shared.flesh_m(at.bone_m))
         weight = _weights(bundle, at, given)
         change = abs(np.log(given.miss_rad / before.miss_rad)) + abs(np.log(given.beside / before.beside))
         if rounds > _LEAST_ROUNDS and change < _SETTLED and gained < _SETTLED:
@@ -77,7 +79,7 @@ def descended(
 
 
 def _spreads(bundle: Bundle, at: Solution, given: Expected, covariance: Floats, own: Floats) -> Expected:
-    """Those under which the solution and its uncertainty are likeliest, and the flesh on its bones."""
+    """Those under which the solution and its uncertainty are likeliest."""
     missed = bundle.missed(at)[:, 2:] ** 2
     miss_rad = float(np.sqrt(np.sum(missed) / np.sum(_told(given, own))))
     residual, slope = bundle.shared.expected_mounts(at, given.beside, given.flesh_m)
@@ -87,7 +89,6 @@ def _spreads(bundle: Bundle, at: Solution, given: Expected, covariance: Floats, 
         given,
         miss_rad=float(np.clip(miss_rad, LEAST_MISS_RAD, MOST_MISS_RAD)),
         beside=float(np.clip(beside, LEAST_BESIDE, MOST_BESIDE)),
-        flesh_m=bundle.shared.flesh_m(at.bone_m),
     )
 
 
