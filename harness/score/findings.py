@@ -43,11 +43,16 @@ class Claim:
 
 @dataclass(frozen=True)
 class Table:
-    """Texts in rows."""
+    """Texts in rows; TypeError if one has not a text for each column."""
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise TypeError(f"{self.title}: a row of {len(row)} texts under {len(self.columns)} columns: {row}")
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """The page of a paper: what it opens on, what each claim shows, and what it must never do."""
 
+import json
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -260,6 +261,16 @@ def test_a_folder_without_findings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match=r"findings\.json"):
         write_paper(tmp_path)
     assert not list(tmp_path.iterdir())
+
+
+def test_a_table_that_is_none_is_refused(tmp_path: Path) -> None:
+    folder = write_study(tmp_path, liu())
+    text = (folder / "findings.json").read_text()
+    content = json.loads(text)
+    content["tables"][0]["rows"][0].append("one more")
+    (folder / "findings.json").write_text(json.dumps(content))
+    with pytest.raises(BadFile, match="a row of 3 texts under 2 columns"):
+        write_paper(folder)
 
 
 def test_the_sentence_counts_every_claim() -> None:

@@ -1,0 +1,62 @@
+"""The verdicts of a paper's page: how many there are of each, and every claim beside ours."""
+
+from collections.abc import Sequence
+
+from harness.report.markup import Markup, joined, tag
+from harness.report.paper_table import prose
+from harness.report.paper_verdicts import MARKS, MEANINGS, difference, interval, tally
+from harness.report.run import file_name
+from harness.score.findings import Claim, Experiment, Findings, Verdict
+
+
+def tally_list(found: list[Claim]) -> Markup:
+    """A number for each verdict, and what the verdict means."""
+    items = []
+    for kind, count in tally(found).items():
+        items.append(tag("li", tag("b", count), _verdict(kind), tag("span", MEANINGS[kind], class_="meaning")))
+    return tag("ul", *items, class_="tally")
+
+
+def _verdict(kind: Verdict) -> Markup:
+    mark = tag("span", MARKS[kind], aria_hidden="true", class_="mark")
+    return tag("span", mark, kind, class_=f"verdict {file_name(kind)}")
+
+
+def claims_table(findings: Findings) -> Markup:
+    """One table, a group of rows for each experiment."""
+    head = ("published statement", "published", "ours", "difference", "clips", "verdict")
+    top = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in head), role="row")
+    groups = []
+    for experiment in findings.experiments:
+        if experiment.claims:
+            link = tag("a", experiment.title, href=f"#{anchor(experiment)}")
+            title = tag("th", link, scope="rowgroup", colspan=len(head), role="rowheader")
+            rows = [_claim(claim, head) for claim in experiment.claims]
+            groups.append(tag("tbody", tag("tr", title, class_="group", role="row"), *rows, role="rowgroup"))
+    if not groups:
+        return Markup()
+    text = (
+        "Difference: the mean of paired differences over clips and its 95 % interval, positive on the published side. "
+        "Under a statement: why its verdict is what it is."
+    )
+    whole = tag(
+        "table", tag("thead", top, role="rowgroup"), *groups, class_="claims", role="table", aria_label="claims"
+    )
+    return joined(tag("p", text, class_="caption"), whole)
+
+
+def _claim(claim: Claim, head: Sequence[str]) -> Markup:
+    why = tag("small", prose(claim.why)) if claim.why else None
+    within = interval(claim)
+    distance = joined(difference(claim), tag("span", within, class_="spread under") if within else None)
+    cells = [claim.published, claim.ours, distance, claim.clips or "", _verdict(claim.verdict)]
+    named = [
+        tag("td", cell, data_label=name, role="cell", class_=None if cell else "empty")
+        for name, cell in zip(head[1:], cells, strict=True)
+    ]
+    return tag("tr", tag("th", claim.text, why, scope="row", role="rowheader"), *named, role="row")
+
+
+def anchor(experiment: Experiment) -> str:
+    """What links to its section name."""
+    return f"experiment-{file_name(experiment.name)}"
