@@ -37,21 +37,24 @@ def by_set(rows: Iterable[Row], metric: str = METRIC) -> dict[str, dict[str, flo
     return {name: by_clip(each, metric) for name, each in found.items()}
 
 
-def best_of_its_size(behaviour: str, suited: str, sets: Sets) -> Claim:
-    """That no other set of as many trackers serves better: held against the one among them that errs least."""
+def best_of_its_size(behaviour: str, suited: str, sets: Sets, why: str = "") -> Claim:
+    """That no other set of as many trackers serves better: held against the one among them that errs least.
+
+    `why` is what is known where that is not so.
+    """
     text = f"{behaviour}: of all sets of {size(suited)} trackers {suited} errs least"
     others = {name: errors for name, errors in sets.items() if size(name) == size(suited) and name != suited}
     rival = min(others, key=lambda name: _mean(others[name]), default="")
     claim = f"{text} (against the best other, {rival})" if rival else text
-    return errs_less(claim, sets.get(suited, {}), others.get(rival, {}), published="called suitable")
+    return errs_less(claim, sets.get(suited, {}), others.get(rival, {}), published="called suitable", why=why)
 
 
-def better_than_average(behaviour: str, suited: str, sets: Sets) -> Claim:
+def better_than_average(behaviour: str, suited: str, sets: Sets, why: str = "") -> Claim:
     """The same held against what the other sets of as many come to on average."""
     others = {name: errors for name, errors in sets.items() if size(name) == size(suited) and name != suited}
     average = averaged(others).get(size(suited), {})
     text = f"{behaviour}: {suited} errs less than the other sets of {size(suited)} trackers on average"
-    return errs_less(text, sets.get(suited, {}), average, published="called suitable")
+    return errs_less(text, sets.get(suited, {}), average, published="called suitable", why=why)
 
 
 def falls_with_each(behaviour: str, sets: Sets) -> Claim:
