@@ -6,7 +6,9 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +51,11 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def calibrated(recording: Path) -> Path:
-    path = recording.with_name("me.toml")
-    assert main(["calibrate", str(recording), "--out", str(path)]) == 0
+    """The file; beside it the report as text."""
+    path, said = recording.with_name("me.toml"), StringIO()
+    with redirect_stdout(said):
+        assert main(["calibrate", str(recording), "--out", str(path)]) == 0
+    path.with_suffix(".txt").write_text(said.getvalue())
     return path
 
 
@@ -79,17 +84,14 @@ def test_eight_poses_of_a_recording(
     assert np.rad2deg(turned_rad).max() < 4.0
 
 
-def test_the_report_has_a_row_for_each_bone_and_station(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["calibrate", str(recording), "--out", str(tmp_path / "me.toml")]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_the_report_has_a_row_for_each_bone_and_station(calibrated: Path) -> None:
+    lines = calibrated.with_suffix(".txt").read_text().splitlines()
     firsts = [line.split()[0] for line in lines if line]
     assert firsts[0] == "bone"
     assert firsts[1:25] == list(BONES)
     assert firsts[26:30] == list(STATIONS)
     assert "from the prior" in next(line for line in lines if line.startswith("head "))
-    assert lines[-2:] == [f"{tmp_path / 'me.toml'}: written", "pass"]
+    assert lines[-2:] == [f"{calibrated}: written", "pass"]
 
 
 def test_a_file_is_not_written_over_unasked(
@@ -128,6 +130,7 @@ def test_poses_that_are_missing_are_told_and_nothing_is_written(
         (["a.rec"], "--out is missing"),
         (["a.rec", "--out", "me.toml", "--port", "/dev/null"], "--port with recording. It is for live"),
         (["--simulate", "3", "--out", "me.toml"], "--out with simulate. It is for recording or live"),
+        (["--simulate", "3", "--kind", "tpose"], "--kind with simulate. It is for recording or live"),
         (["--simulate", "3", "--miss", "90"], "--miss 90"),
         (["--simulate", "3", "--noise", "loud"], "loud"),
         (["--simulate", "0"], "no positive whole number"),

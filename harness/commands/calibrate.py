@@ -28,8 +28,21 @@ if TYPE_CHECKING:
 
 _SOURCES = ("recording", "live", "simulate", "sheet")
 _OF = {
-    "recording": ("scenario", "stations", "clip", "out"),
-    "live": ("port", "scenario", "stations", "clip", "out", "rate", "items", "baud", "quality", "view", "pictures"),
+    "recording": ("scenario", "stations", "kind", "clip", "out"),
+    "live": (
+        "port",
+        "scenario",
+        "stations",
+        "kind",
+        "clip",
+        "out",
+        "rate",
+        "items",
+        "baud",
+        "quality",
+        "view",
+        "pictures",
+    ),
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }
@@ -52,7 +65,7 @@ def add_calibrate(verbs: Verbs) -> None:
     text = "how many of the scenario's stations, or their names (default: the first 4; of a recording: its own)"
     verb.add_argument("--stations", metavar="N|A,B", help=text)
     text = "poses: eight, for bones and mounts; tpose: the first alone, for mounts on a known body (default poses)"
-    verb.add_argument("--kind", choices=["poses", "tpose"], default="poses", help=text)
+    verb.add_argument("--kind", choices=["poses", "tpose"], help=text)
     verb.add_argument("--clip", help="of tpose: whose body that is (default: of the scenario's first clip)")
     verb.add_argument("--out", type=Path, metavar="FILE", help="the calibration to write, in TOML")
     verb.add_argument("--force", action="store_true", help="write over files that exist")
@@ -139,7 +152,7 @@ def _of_device(args: argparse.Namespace) -> "Found":
         if getattr(args, name) is None:
             raise BadInput(f"--live without --{name}.", "It takes both.")
     stations = tuple(chosen(load_scenario(args.scenario), stations_of(args)))
-    posing = Posing(args.scenario, stations, args.kind, args.clip, args.mocap)
+    posing = Posing(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
         show: Show | None = None
         if args.view is not None:
@@ -171,10 +184,10 @@ def _of_recording(args: argparse.Namespace) -> "Found":
             f"Nothing says how trackers are worn in {args.recording}.", "Name the scenario: --scenario NAME."
         )
     names = None if args.stations is None else names_of(args.stations)
-    posing = Posing(scenario, stations_in(stream, scenario, names), args.kind, clip, args.mocap)
+    posing = Posing(scenario, stations_in(stream, scenario, names), args.kind or "poses", clip, args.mocap)
     frames = iter(stream)
     collector = posing.held(frames, talk)
-    if args.kind == "poses":  # one more is one too many, or one before it was none
+    if args.kind != "tpose":  # one more is one too many, or one before it was none
         before = len(collector.passed)
         for frame in frames:
             collector.add(frame)

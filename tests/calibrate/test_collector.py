@@ -82,8 +82,7 @@ def collected(
     return collector, [number for number in said if number is not None]
 
 
-@pytest.mark.parametrize("blind", [False, True])
-@pytest.mark.parametrize("noise", ["clean", "default"])
+@pytest.mark.parametrize(("noise", "blind"), [("clean", False), ("default", True)])
 def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
     collector, said = collected(eight(noise), blind=blind)
     assert said == list(range(1, 9))
@@ -100,8 +99,7 @@ def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
             assert np.median(off_m.max(axis=1)) < 1e-4
 
 
-@pytest.mark.parametrize("miss_deg", [1.0, 5.0])
-@pytest.mark.parametrize("stations", [SIX, FOUR])
+@pytest.mark.parametrize(("stations", "miss_deg"), [(SIX, 5.0), (FOUR, 2.5), (FOUR, 5.0)])
 def test_poor_poses_of_other_people_are_taken(stations: tuple[str, ...], miss_deg: float) -> None:
     """Nothing is known of the performer."""
     clip = performer.generate("walking", "p3", 1, seed=1, duration_s=3.0)
