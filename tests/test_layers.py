@@ -31,7 +31,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     - {"bench", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
     "commands": EVERYTHING
-    | {"catalogue", "config", "doctor", "experiment", "posing", "progress", "recorded", "rehearsal"},
+    | {
+        "calibration_trial",
+        "catalogue",
+        "config",
+        "doctor",
+        "experiment",
+        "posing",
+        "progress",
+        "recorded",
+        "rehearsal",
+    },
 }
 TOP = {
     "calibrated",
