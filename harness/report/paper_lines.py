@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.report.figures import legend, thinned
 from harness.report.paper_numbers import known
-from harness.report.style import line_style
+from harness.report.style import INK, line_style
 from harness.score.findings import Lines
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def apart(wanted: Sequence[float], gap: float) -> list[float]:
 
 
 def _name_ends(axes: "Axes", ends: Sequence[tuple[float, str, str]]) -> None:
-    """Each name right of its line's end, in its colour, moved apart where they would meet."""
+    """Each name right of its line's end, led to by its colour, moved apart where they would meet."""
     low, high = axes.get_ylim()
     ends = sorted(ends)
     starts = [(value - low) / (high - low) for value, *_ in ends]
@@ -78,12 +78,12 @@ def _name_ends(axes: "Axes", ends: Sequence[tuple[float, str, str]]) -> None:
         axes.annotate(
             textwrap.shorten(name, _LETTERS, placeholder="…"),
             (1.0, start),
-            (1.03, place),
+            (1.04, place),
             xycoords=inside,
             textcoords=inside,
             va="center",
-            color=colour,
+            color=INK,
             fontsize=9.5,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.8, "shrinkA": 0.0, "shrinkB": 0.0},
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 2.0, "shrinkA": 2.0, "shrinkB": 0.0},
             annotation_clip=False,
         )

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
+from matplotlib.text import Annotation
 
 from harness.report.figures import drawn
 from harness.report.paper_bars import draw_bars, height_in, lies
@@ -93,7 +95,8 @@ def test_names_are_moved_apart_no_further_than_needed(wanted: list[float], gap: 
 def test_each_line_has_its_name_at_its_end_in_its_colour() -> None:
     axes = figure_of(curves(400)).axes[0]
     colours = {line.get_label(): line.get_color() for line in axes.lines}
-    assert {text.get_text(): text.get_color() for text in axes.texts} == colours
+    leaders = {text.get_text(): text.arrow_patch for text in axes.texts if isinstance(text, Annotation)}
+    assert {name: to_hex(leader.get_edgecolor()) for name, leader in leaders.items() if leader} == colours
     boxes = boxes_of(axes.get_figure(root=True), axes.texts)  # type: ignore[arg-type]
     assert not any(box.overlaps(other) for n, box in enumerate(boxes) for other in boxes[n + 1 :])
     assert min(box.x0 for box in boxes) >= axes.bbox.x1
