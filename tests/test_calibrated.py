@@ -170,26 +170,46 @@ def test_a_model_that_nobody_takes_for_one_fails_its_cells(tmp_path: Path) -> No
     assert all("T-pose" in text or "exchanged" in text for text in failures.values())
 
 
+def side_by_side(*clips: str, kinds: Sequence[str]) -> Scenario:
+    motion = replace(SMALL.motion, test=clips, behaviours=("moving",))
+    return replace(
+        SMALL, motion=motion, methods=("ik:previous",), calibrating=BESIDE, vary={"calibration": list(kinds)}
+    )
+
+
 def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
-    """And two workers agree with one, and a run goes on where it was."""
-    scenario = replace(SMALL, methods=("ik:previous",), calibrating=BESIDE, vary={"calibration": list(KINDS)})
-    assert experiment.run(scenario, tmp_path / "one") is Outcome.PASS
-    assert experiment.run(scenario, tmp_path / "two", jobs=2) is Outcome.PASS
-    one, two = (list(read_cells(tmp_path / name)) for name in ("one", "two"))
-    assert len(one) == len(two) == 2 * len(KINDS)
+    """And a run goes on where it was."""
+    scenario = side_by_side("walking_p1_01", kinds=KINDS)
+    assert experiment.run(scenario, tmp_path) is Outcome.PASS
+    cells = list(read_cells(tmp_path))
+    assert [cell.calibration for cell in cells] == list(KINDS)
+    for cell in cells:
+        assert bool(cell.calibration_errors) == (cell.calibration != "exact")
+        assert cell.calibration == cell.varied["calibration"]
+        assert (cell.estimate_bone_m == cell.bone_m).all() == (cell.calibration != "poses")
+        np.testing.assert_array_equal(cell.bone_m, cells[0].bone_m)
+        np.testing.assert_array_equal(cell.truth_qpos, cells[0].truth_qpos)
+    printed = table(read_summary(tmp_path))
+    assert f"calibration {', '.join(KINDS)}" in printed
+    assert all(f"calibration={kind}" in printed for kind in KINDS)
+    made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()}
+    experiment.run(scenario, tmp_path)
+    assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()} == made
+
+
+@pytest.mark.parametrize(
+    "kinds", [("exact", "tpose"), pytest.param(("poses",), marks=pytest.mark.slow)], ids=["tpose", "poses"]
+)
+def test_one_worker_or_two_are_told_the_same(tmp_path: Path, kinds: tuple[str, ...]) -> None:
+    scenario = side_by_side("walking_p1_01", "boxing_p2_01", kinds=kinds)
+    for jobs in (1, 2):
+        assert experiment.run(scenario, tmp_path / str(jobs), jobs=jobs) is Outcome.PASS
+    one, two = (list(read_cells(tmp_path / jobs)) for jobs in ("1", "2"))
+    assert len(one) == len(two) == 2 * len(kinds)
     for cell, other in zip(one, two, strict=True):
         np.testing.assert_array_equal(cell.estimate_qpos, other.estimate_qpos)
         np.testing.assert_array_equal(cell.estimate_bone_m, other.estimate_bone_m)
         assert (cell.clip, cell.calibration_errors) == (other.clip, other.calibration_errors)
-        assert bool(cell.calibration_errors) == (cell.calibration != "exact")
-        assert cell.calibration == cell.varied["calibration"]
-        assert (cell.estimate_bone_m == cell.bone_m).all() == (cell.calibration != "poses")
-    printed = table(read_summary(tmp_path / "one"))
-    assert f"calibration {', '.join(KINDS)}" in printed
-    assert all(f"calibration={kind}" in printed for kind in KINDS)
-    made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "one" / "cells").iterdir()}
-    experiment.run(scenario, tmp_path / "one")
-    assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "one" / "cells").iterdir()} == made
 
 
 def test_what_was_learnt_is_shared_while_the_body_is_the_same() -> None:
