@@ -22,7 +22,7 @@ from harness.setting import Setting
 from harness.study.study import Study
 from harness.trials import Trial
 
-SECONDS = 18.0
+SECONDS = 12.0
 """Of each held-out take, at most."""
 
 
