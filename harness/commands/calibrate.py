@@ -27,22 +27,10 @@ if TYPE_CHECKING:
     from harness.posing import Found
 
 _SOURCES = ("recording", "live", "simulate", "sheet")
+_WORN = ("scenario", "stations", "kind", "clip", "out")
 _OF = {
-    "recording": ("scenario", "stations", "kind", "clip", "out"),
-    "live": (
-        "port",
-        "scenario",
-        "stations",
-        "kind",
-        "clip",
-        "out",
-        "rate",
-        "items",
-        "baud",
-        "quality",
-        "view",
-        "pictures",
-    ),
+    "recording": _WORN,
+    "live": (*_WORN, "port", "rate", "items", "baud", "quality", "view", "pictures"),
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }
