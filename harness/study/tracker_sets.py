@@ -85,7 +85,7 @@ def falls_with_each(behaviour: str, sets: Sets) -> Claim:
     )
 
 
-def harder(text: str, hard: Errors, easy: Errors) -> Claim:
+def harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> Claim:
     """That other clips are harder: Welch's interval of the difference of means, since nothing pairs them."""
     if not hard or not easy:
         return Claim(text, "order", "not measured", "not run", "one of the two has no clips", unit="deg")
@@ -97,7 +97,8 @@ def harder(text: str, hard: Errors, easy: Errors) -> Claim:
     welch = stats.ttest_ind(list(hard.values()), list(easy.values()), equal_var=False).confidence_interval(LEVEL)
     low, high = float(welch.low), float(welch.high)
     judged = Paired(tuple(hard), difference, low, high)
-    return Claim(text, "order", ours, judged.verdict, judged.why, fewest, difference, low, high, "deg")
+    why = "" if judged.verdict == "reproduced" else "; ".join(filter(None, (judged.why, why_not)))
+    return Claim(text, "order", ours, judged.verdict, why, fewest, difference, low, high, "deg")
 
 
 def averaged(sets: Sets) -> dict[int, dict[str, float]]:
