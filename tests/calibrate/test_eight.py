@@ -73,9 +73,10 @@ def test_clean_poses_give_the_truth(number: int, own_directions: bool) -> None:
     ("miss_deg", "mount_mm", "mount_deg", "length_mm"), [(1.0, 8.0, 1.0, 8.0), (5.0, 25.0, 4.0, 9.5)]
 )
 def test_poses_that_are_missed(miss_deg: float, mount_mm: float, mount_deg: float, length_mm: float) -> None:
-    """Root mean squares over three performers: the miss is found, and everything is nearer than the mean skeleton."""
+    """Root mean squares over two performers: the miss is found, and everything is nearer than the mean
+    skeleton. Of twenty: tests/test_calibration_trial.py."""
     lengths, mean, mounts, turns, misses = [], [], [], [], []
-    for seed in range(3):
+    for seed in range(2):
         model = Model(somebody(seed), SIX, float(np.deg2rad(miss_deg)), 0.0015, 0.006, beside_m=0.01, seed=seed)
         found = found_of(model)
         lengths.append(found.skeleton.length_m - model.skeleton.length_m)
@@ -199,7 +200,7 @@ def test_exchanged_stations_are_named(rows: list[int], told: list[str]) -> None:
     assert all(words in message for words in told)
 
 
-@pytest.mark.parametrize(("pose", "instead", "name"), [(4, 0, "left leg up"), (2, 1, "arms down")])
+@pytest.mark.parametrize(("pose", "instead", "name"), [(4, 0, "left leg up")])
 def test_a_pose_that_was_not_held_is_named(pose: int, instead: int, name: str) -> None:
     model = Model(somebody(9), SIX, float(np.deg2rad(1.0)), 0.0015, 0.006)
     held = model.held()
