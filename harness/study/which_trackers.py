@@ -52,9 +52,9 @@ def sensors(study: Study) -> Experiment:
             ),
             falls_with_each(behaviour, sets),
         ]
-    whole = [angles[behaviour].get(ALL_FIVE, {}) for behaviour in ("walking", "boxing")]
+    walks, bouts = (angles[behaviour].get(ALL_FIVE, {}) for behaviour in ("walking", "boxing"))
     easy = _EASY_WALKS if study.motion == "cmu" else ""
-    claims.append(harder("with all five, walking is harder than boxing (which has more data)", *whole, easy))
+    claims.append(harder("with all five, walking is harder than boxing (which has more data)", walks, bouts, easy))
     return Experiment(
         name="sensors",
         title="Which trackers to wear",
