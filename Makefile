@@ -3,16 +3,16 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint clean
+.PHONY: demo test test-slow lint compiled clean
 
-demo: $(VENV)/.ready
+demo: compiled
 	$(BIN)/harness demo
 
-test: $(VENV)/.ready
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+test: compiled
+	$(BIN)/python -m pytest -n 2 --dist worksteal --durations 15
 
-test-slow: $(VENV)/.ready
-	$(BIN)/python -m pytest -m slow
+test-slow: compiled
+	$(BIN)/python -m pytest -m slow --hypothesis-profile=default
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -24,6 +24,11 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or later is needed: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet --constraint requirements.lock --editable '.[viz,test]'
+	touch $@
+
+compiled: $(VENV)/.compiled
+
+$(VENV)/.compiled: $(VENV)/.ready
 	@echo 'compiling the inner loops, once: about a minute'
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m harness.testing.compile_all
 	touch $@

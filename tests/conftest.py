@@ -5,8 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from harness.core.seeds import generator
+
+settings.register_profile("fixed", derandomize=True)
+settings.load_profile("fixed")
+"""The same examples in every run, so that a change is judged by what it changed; `--hypothesis-profile=default`, as
+`make test-slow` has it, seeks new ones."""
 
 
 @pytest.fixture

@@ -170,13 +170,18 @@ class DeviceError:
     st: int = 0
 
     def line(self) -> bytes:
-        said = re.sub(r"[^ -~]", "?", self.command)[:80]
+        said = _printable(self.command)
         return _sent(f"2 E*ERROR*{said}*ERROR* EC {self.code}*PS{self.ps}  *FL{self.fl} *ST{self.st}")
 
     @classmethod
     def parse(cls, text: str) -> "DeviceError | None":
         found = _ERROR.match(text)
-        return found and cls(found[1], *(int(found[k] or 0) for k in range(2, 6)))
+        return found and cls(_printable(found[1]), *(int(found[k] or 0) for k in range(2, 6)))
+
+
+def _printable(command: str) -> str:
+    """What a line may repeat of a command that was not understood."""
+    return re.sub(r"[^ -~]", "?", command)[:80]
 
 
 _ERROR = re.compile(
