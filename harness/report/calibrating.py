@@ -48,9 +48,13 @@ def text(summary: Mapping[str, Any]) -> list[str]:
     found = lines(summary.get("cells", []))
     if not found:
         return []
+    return [f"calibration: {_WHAT}; {_HOW}", _POSITIONS, "", *aligned(found), ""]
+
+
+def aligned(found: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table in columns, all to the left."""
     widths = [max(len(line[i]) for line in found) for i in range(len(found[0]))]
-    aligned = ["  ".join(word.ljust(width) for word, width in zip(line, widths, strict=True)) for line in found]
-    return [f"calibration: {_WHAT}; {_HOW}", _POSITIONS, "", *(line.rstrip() for line in aligned), ""]
+    return ["  ".join(word.ljust(width) for word, width in zip(line, widths, strict=True)).rstrip() for line in found]
 
 
 def section(cells: Sequence[Mapping[str, Any]]) -> Markup:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.report import calibrating, orders, recovery, tables, varied
+from harness.report import calibrating, calibration_cost, orders, recovery, tables, varied
 from harness.report.document import Section, document, embedded, pictured
 from harness.report.markup import Markup, folded, joined, scrolling, table, tag
 from harness.report.run import Run
@@ -67,11 +67,11 @@ def page(content: Content) -> str:
 def _sections(content: Content) -> list[Section]:
     run = content.run
     measured = bool(run.cells)
-    nothing = Markup()
+    nothing, cells = Markup(), run.whole["cells"]
     return [
         ("Varied", "varied", joined(*(pictured(chart, 3) for chart in content.varied), varied.tables(run))),
         ("Expected orders", "orders", orders.section(run.whole)),
-        ("Calibration", "calibration", calibrating.section(run.whole["cells"])),
+        ("Calibration", "calibration", joined(calibrating.section(cells), calibration_cost.section(cells))),
         ("Results", "results", tables.results(run) if measured else nothing),
         ("Recovery", "recovery", recovery.section(run.summary)),
         ("Coverage", "coverage", tables.coverage(run)),

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from harness.report import calibrating, orders, recovery
+from harness.report import calibrating, calibration_cost, orders, recovery
 from harness.score.cell import varied_text
 
 COLUMNS = (
@@ -38,6 +38,7 @@ def table(summary: Mapping[str, Any]) -> str:
             *_aligned(lines, text_columns=2 + len(_varying(cells))),
             "",
             *calibrating.text(summary),
+            *calibration_cost.text(summary),
             *recovery.text(summary),
             *orders.text(summary),
             finished,

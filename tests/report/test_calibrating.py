@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from harness.report import calibration_cost
 from harness.report.calibrating import section, text
 
 FOUND = {"mount_mm": 20.0, "mount_deg": 5.0, "length_mm": 0.0, "room_heading_deg": 3.0, "room_origin_mm": 30.0}
@@ -47,3 +48,27 @@ def test_a_run_whose_calibration_is_exact_says_nothing() -> None:
     assert text({"cells": CELLS[:2]}) == []
     assert text({}) == []
     assert section(CELLS[:2]) == ""
+
+
+def judged(kind: str, clip: str, error: float | None) -> dict[str, Any]:
+    same = {"behaviour": "walking", "performer": "", "inputs": "pos+ori", "joint_angle_mean_deg": error}
+    return cell(kind, clip) | same | {"mpjpe_pa_mm": error}
+
+
+def test_what_calibrating_costs_is_paired_by_clip() -> None:
+    clips = "abcdef"
+    exact = [judged("exact", clip, float(n)) for n, clip in enumerate(clips)]
+    cost = [judged("poses", clip, n + 0.5) for n, clip in enumerate(clips)]
+    few = [judged("tpose", clip, n + 1.0 if n else None) for n, clip in enumerate(clips)]
+    head, angle, place = calibration_cost.lines([*exact, *cost, *few])
+    assert head == ["behaviour", "method", "error", "exact", "poses", "tpose"]
+    assert angle[2:] == ["joint angle [deg]", "2.50", "+0.50 (+0.50 to +0.50)", "+1.00 (too few clips)"]
+    assert place[2:4] == ["mpjpe_pa [mm]", "2.5"]
+    assert "+0.50 to +0.50" in "\n".join(calibration_cost.text({"cells": [*exact, *cost]}))
+    assert "<td>+0.50 (+0.50 to +0.50)</td>" in calibration_cost.section([*exact, *cost])
+
+
+def test_no_cost_is_told_without_something_to_hold_it_against() -> None:
+    assert calibration_cost.lines([judged("poses", "a", 1.0)]) == []
+    assert calibration_cost.text({"cells": [judged("exact", "a", 1.0)]}) == []
+    assert calibration_cost.section([]) == ""

@@ -61,7 +61,7 @@ def test_names_and_numbers_do_not_overlap_and_stay_on_the_chart(shown: Bars) -> 
 def test_bars_are_as_long_as_their_values() -> None:
     shown = sets("walking")
     bars = figure_of(shown).axes[0].patches
-    assert [bar.get_width() for bar in bars] == pytest.approx(shown.series["kernel_cca"])  # type: ignore[attr-defined]
+    assert [bar.get_width() for bar in bars] == pytest.approx(shown.series["kernel_cca"])  # type: ignore[attr-defined]  # bars are patches to the stubs
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_each_line_has_its_name_at_its_end_in_its_colour() -> None:
     colours = {line.get_label(): line.get_color() for line in axes.lines}
     leaders = {text.get_text(): text.arrow_patch for text in axes.texts if isinstance(text, Annotation)}
     assert {name: to_hex(leader.get_edgecolor()) for name, leader in leaders.items() if leader} == colours
-    boxes = boxes_of(axes.get_figure(root=True), axes.texts)  # type: ignore[arg-type]
+    boxes = boxes_of(axes.get_figure(root=True), axes.texts)  # type: ignore[arg-type]  # no subfigure here
     assert not any(box.overlaps(other) for n, box in enumerate(boxes) for other in boxes[n + 1 :])
     assert min(box.x0 for box in boxes) >= axes.bbox.x1
 

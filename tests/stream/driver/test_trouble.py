@@ -386,7 +386,7 @@ def test_an_hour_of_random_trouble_is_overcome() -> None:
                     device_of(bench).receive(b"\x19", bench.now_s)
                 case 2:
                     noise = rng.bytes(200)
-                    bench.spoil = lambda data, noise=noise: noise[: len(data)]  # type: ignore[misc]
+                    bench.spoil = lambda data, noise=noise: noise[: len(data)]  # type: ignore[misc]  # the default binds it
                     bench.after(float(rng.exponential(2.0)), lambda: setattr(bench, "spoil", lambda data: data))
                 case _:
                     device_of(bench).receive(rng.bytes(30), bench.now_s)
