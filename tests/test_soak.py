@@ -25,6 +25,9 @@ AWAY = {"unplugged", "stalled", "silent", "reset", "wrong list", "refused"}
 EDGE_S, PATIENCE_S = 0.25, 2.0
 """What waits in a pipe that is closed is gone; what arrives does so within this."""
 
+BESIDE = 2
+"""So many messages before and after: in order, since a busy machine writes neighbours any time apart."""
+
 Reading = tuple[int, bytes]
 """Row of a station, and its position as bytes: no two of a lap are alike."""
 
@@ -82,7 +85,8 @@ def judge(seen: Soak) -> dict[str, int]:
     last_s = seen.sent[-1].written_s
     counts = dict.fromkeys(("records", "damaged", "undamaged", "while away", "missing", "beside damage"), 0)
     records = [sent for sent in seen.sent if sent.message.station and not sent.unread and sent.written_s > first_s]
-    hurt_s = np.array([sent.written_s for sent in seen.sent if sent.damage] or [np.inf])
+    hurt = [bool(sent.damage) for sent in seen.sent]
+    beside = {id(sent): any(hurt[max(n - BESIDE, 0) : n + BESIDE + 1]) for n, sent in enumerate(seen.sent)}
     for sent in records:
         counts["records"] += 1
         if sent.damage or len(sent.data) != kind.itemsize or sent.written_s > last_s - PATIENCE_S:
@@ -100,7 +104,7 @@ def judge(seen: Soak) -> dict[str, int]:
             counts["while away"] += 1
             continue
         counts["missing"] += 1
-        counts["beside damage"] += bool(np.abs(hurt_s - sent.written_s).min() < 0.02)
+        counts["beside damage"] += beside[id(sent)]
     return counts
 
 
