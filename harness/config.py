@@ -2,7 +2,7 @@
 
 import itertools
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -147,8 +147,9 @@ def load_scenario(path: Path | str) -> Scenario:
     return scenario
 
 
-def variants(scenario: Scenario) -> list[tuple[dict[str, Any], Scenario]]:
+def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
     """Every combination of the varied values and the scenario that it makes; one and nothing varied without any.
+    Only those at the places in `chosen`, if any are.
 
     UnknownName for a key that does not exist, BadInput for one that cannot be varied or a value that does not fit.
     """
@@ -159,7 +160,9 @@ def variants(scenario: Scenario) -> list[tuple[dict[str, Any], Scenario]]:
         if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
             raise BadInput(f"vary: {key} = {values!r} is no list of different values.", "For example: [0.0, 0.05].")
     found = []
-    for combination in itertools.product(*choices.values()):
+    for place, combination in enumerate(itertools.product(*choices.values())):
+        if chosen and place not in chosen:
+            continue
         varied = dict(zip(choices, combination, strict=True))
         made = replace(scenario, vary={})
         try:

@@ -18,10 +18,10 @@ from harness.calibrate.file import CalibrationFile
 from harness.calibrate.likeness import Likeness
 from harness.calibrate.poses import POSES, CalibrationPose, configuration
 from harness.calibrate.tpose import calibrate_tpose
+from harness.cells import source_of
 from harness.config import Scenario, load_scenario
 from harness.core.arrays import Floats
 from harness.core.protocol import Part
-from harness.experiment import source_of
 from harness.live.calibrate import HoldPoses, Say, Show
 from harness.rehearsal import chosen, rehearse
 from harness.setting import mounts_of

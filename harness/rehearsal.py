@@ -14,12 +14,12 @@ from harness.body.mounts import Mount
 from harness.calibrate.file import CalibrationFile
 from harness.calibrate.poses import POSES, configuration
 from harness.calibrated import Calibrated
+from harness.cells import check_names, source_of
 from harness.config import Scenario, load_scenario
 from harness.core.calibration import Calibration
 from harness.core.motion import Take
 from harness.core.protocol import Part
 from harness.errors import BadInput, UnknownName
-from harness.experiment import check_names, source_of
 from harness.setting import Setting, mounts_of, noise_of, tracker_of
 from harness.simulate.lap import lap
 from harness.simulate.simulate import Simulation, TrackerConfig

@@ -262,11 +262,12 @@ class Setting:
         return (*told, note + soles)
 
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
-        """Of a cell; the varied values count even where they change nothing for the method."""
+        """Of a cell; the varied values count even where they change nothing for the method, as does what the scenario
+        is called, for a cell says both."""
         if name not in self._sources:
             self._sources[name] = registry.source_hash(method)
         described = {"name": name, "options": repr(method), "source": self._sources[name]}
-        content = {**self.inputs_of(method, inputs), "varied": varied}
+        content = {**self.inputs_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
         return results.cell_key(content, described, manifest.source_hash())
 
     def _on_body(self, clip: Clip, body: humanoid.Body) -> Take:

@@ -13,6 +13,7 @@ from harness.body.humanoid import Body
 from harness.calibrate.bone_space import BoneSpace, bone_space
 from harness.calibrate.poses import POSES, configuration
 from harness.calibrated import Calibrated, TrackerSession, by_poses, by_tpose, errors_of
+from harness.cells import reconstruct
 from harness.config import Calibrating, Motion, Scenario, load_scenario
 from harness.core import rotations
 from harness.core.motion import Take
@@ -114,7 +115,7 @@ def test_exact_knows_where_trackers_really_sit() -> None:
     off_m = np.linalg.norm(known.mount_m - setting().calibrated.calibration.mount_m, axis=1)
     assert off_m.min() > 0.002
     fitted = made.fitted(PREVIOUS, "ik:previous")
-    qpos, _, _ = experiment.reconstruct(fitted, known, made.simulation, combination("pos+ori", known.stations))
+    qpos, _, _ = reconstruct(fitted, known, made.simulation, combination("pos+ori", known.stations))
     there_m = made.simulation.truth_qpos[made.simulation.frame_index][:, :3]
     assert np.linalg.norm(qpos[40:, :3] - there_m[40:], axis=1).mean() < 0.02
 

@@ -24,16 +24,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     # writes BVH as an export does; there is no truth in a live session that its wall would have to hide
     "live": {"stream", "calibrate", "reconstruct", "body", "mocap"},
     # the bench measures what the tables do
-    "bench": (EVERYTHING | {"config", "contest", "setting", "progress", "rehearsal", "trials"})
+    "bench": (EVERYTHING | {"cells", "config", "contest", "setting", "progress", "rehearsal", "trials"})
     - {"study", "testing", "commands"},
     # many runs and what they come to
-    "study": (EVERYTHING | {"config", "contest", "experiment", "progress", "setting", "trials"})
+    "study": (EVERYTHING | {"cells", "config", "contest", "experiment", "progress", "setting", "trials"})
     - {"bench", "testing", "commands"},
     "testing": EVERYTHING - {"study", "bench", "commands"},
     "commands": EVERYTHING
     | {
         "calibration_trial",
         "catalogue",
+        "cells",
         "config",
         "doctor",
         "experiment",
@@ -46,6 +47,7 @@ MAY_IMPORT: dict[str, set[str]] = {
 TOP = {
     "calibrated",
     "calibration_trial",
+    "cells",
     "cli",
     "catalogue",
     "config",

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.cells import reconstruct
 from harness.config import find_scenario
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
-from harness.experiment import reconstruct
 from harness.reconstruct import registry
 from harness.recorded import Judged, judge, rehearsal_of, table
 from harness.rehearsal import Rehearsal, rehearse

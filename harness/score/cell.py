@@ -37,8 +37,9 @@ IDENTITY = (
     "seed",
 )
 """What a row of the summary says about its cell first, in this order."""
-FURTHER = ("performer", "varied")
+FURTHER = ("scenario", "performer", "varied")
 """What it says besides."""
+_REST = (*FURTHER, "key", "source_hash", "health", "calibration_errors")
 _TEXTS = (
     *(*IDENTITY, *FURTHER, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
@@ -47,6 +48,7 @@ _FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "quality")
 _INTS = ("frame_index", "status")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
 _ERROR = "error."
+_ADVICE = "Delete the cell's folder and run again; finished cells are kept."
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +106,8 @@ class Cell:
     when there are no examples at all."""
     varied: Mapping[str, Any] = field(default_factory=dict)
     """Scenario key -> value, of the keys that the scenario varies."""
+    scenario: str = ""
+    """Its name."""
     calibration_errors: Mapping[str, float] = field(default_factory=dict)
     """How far what calibration found is from the truth, by name (see `harness.calibrated`); empty where it is exact."""
     estimate_bone_m: Floats = field(default_factory=lambda: np.empty((0, 3)))
@@ -174,12 +178,11 @@ def read_cell(folder: Path) -> Cell:
     """A finished cell; BadFile when a file of it is missing, cut or not what it should be."""
     text, frames = folder / "cell.json", folder / "frames.npz"
     content = read_json(text, "a cell of a run")
-    advice = "Delete the cell's folder and run again; finished cells are kept."
     try:
         with open(frames, "rb") as file, np.load(file, allow_pickle=False) as columns:
             arrays = {name: columns[name] for name in columns.files}
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise BadFile(frames, f"cannot be read ({error})", "the frames of a cell", advice) from error
+        raise BadFile(frames, f"cannot be read ({error})", "the frames of a cell", _ADVICE) from error
     try:
         per_frame = {name: arrays[_ERROR + name].astype(float) for name in FRAME_METRICS}
         scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"])
@@ -190,17 +193,26 @@ def read_cell(folder: Path) -> Cell:
         )
     except (KeyError, TypeError, ValueError) as error:
         found = f"no {error}" if isinstance(error, KeyError) else str(error)
-        raise BadFile(folder, found, "a cell of this version of the harness", advice) from error
+        raise BadFile(folder, found, "a cell of this version of the harness", _ADVICE) from error
     except ShapeError as error:
-        raise BadFile(frames, str(error), "arrays that agree", advice) from error
+        raise BadFile(frames, str(error), "arrays that agree", _ADVICE) from error
+
+
+def read_row(folder: Path) -> dict[str, Any]:
+    """The row of a finished cell, without its frames; BadFile."""
+    text = folder / "cell.json"
+    content = read_json(text, "a cell of a run")
+    try:
+        first, rest = ({name: content[name] for name in names} for names in (IDENTITY, _REST))
+        return {**first, **content["metrics"], **rest}
+    except (KeyError, TypeError) as error:
+        raise BadFile(text, f"no {error}", "a cell of this version of the harness", _ADVICE) from error
 
 
 def as_row(cell: Cell) -> dict[str, Any]:
     """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
-    row, further = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, FURTHER))
-    rest = {"key": cell.key, "source_hash": cell.source_hash, "health": plain(cell.health)}
-    rest["calibration_errors"] = plain(cell.calibration_errors)
-    return {**row, **cell.metrics, **further, **rest}
+    first, rest = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, _REST))
+    return {**first, **cell.metrics, **rest}
 
 
 def varied_text(varied: Mapping[str, Any]) -> str:

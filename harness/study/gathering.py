@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from harness import trials
+from harness.cells import source_of
 from harness.config import Scenario
 from harness.core.motion import Take
 from harness.core.protocol import Part
-from harness.experiment import source_of
 from harness.mocap.library import MotionLibrary
 from harness.reconstruct.database import MotionDatabase
 from harness.score import manifest

@@ -7,10 +7,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
+from harness.cells import Progress, source_of
 from harness.config import Scenario, load_scenario
 from harness.core.share import share_folder
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
-from harness.experiment import Progress, source_of
 from harness.score import manifest
 from harness.score.findings import Experiment, Findings, write_findings
 from harness.study.record import record

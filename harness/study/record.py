@@ -4,9 +4,9 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any
 
+from harness.cells import source_of
 from harness.config import Scenario
 from harness.core.protocol import Part, allowed_frames
-from harness.experiment import source_of
 from harness.reconstruct import registry
 from harness.score.cell import varied_text
 from harness.score.findings import Table

@@ -10,11 +10,11 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from harness import experiment
+from harness import cells, experiment
+from harness.cells import Progress
 from harness.config import Scenario, variants
 from harness.core.protocol import Part
 from harness.errors import BadInput, HarnessError, was_interrupted
-from harness.experiment import Progress
 from harness.score import manifest
 from harness.score.cell import Cell, cell_folder, read_cell
 from harness.score.files import TEMPORARY, plain, read_json, write_json
@@ -95,7 +95,7 @@ def check_runs(runs: Mapping[str, Scenario], folder: Path | None) -> None:
     for scenario in runs.values():
         parts = [Part.parse(text) for text in scenario.motion.test]
         for _, made in variants(scenario):
-            experiment.check_names(made, experiment.source_of(made.motion, folder, made.seed), parts)
+            cells.check_names(made, cells.source_of(made.motion, folder, made.seed), parts)
 
 
 def run_experiments(

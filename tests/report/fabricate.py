@@ -116,6 +116,7 @@ def make_cell(
         orientation_valid=valid[seen],
         suspect=np.zeros_like(valid)[seen],
         performer=plan.performers[(take - 1) % len(plan.performers)],
+        scenario="fabricated",
         varied=varied,
     )
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from harness.cells import check_names, source_of
 from harness.config import load_scenario, variants
 from harness.core.protocol import Part, allowed_frames
 from harness.core.share import share_folder
-from harness.experiment import check_names, source_of
 from harness.score.findings import Findings, read_findings, write_findings
 from harness.setting import Setting
 from harness.study.kim2012 import PAPER

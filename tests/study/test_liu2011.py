@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.cells import source_of
 from harness.config import load_scenario, shipped_scenarios
 from harness.core.protocol import Part
 from harness.core.seeds import generator
-from harness.experiment import source_of
 from harness.score.cell import Cell
 from harness.score.findings import Claim, Experiment
 from harness.study.frame_by_frame import frame_by_frame
