@@ -35,7 +35,7 @@ def table(summary: Mapping[str, Any]) -> str:
             _setting(cells),
             *_line(cells),
             "",
-            *_aligned(lines, text_columns=2 + len(_varying(cells))),
+            *aligned(lines, text_columns=2 + len(_varying(cells))),
             "",
             *calibrating.text(summary),
             *calibration_cost.text(summary),
@@ -84,7 +84,8 @@ def _figure(statistics: Mapping[str, Any], decimals: int) -> str:
     return f"{statistics['mean']:.{decimals}f}{spread}"
 
 
-def _aligned(lines: Sequence[Sequence[str]], text_columns: int) -> list[str]:
+def aligned(lines: Sequence[Sequence[str]], text_columns: int) -> list[str]:
+    """Words on the left of their columns, in the first `text_columns`, and figures on the right."""
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return [
         "  ".join(
