@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import gammaincinv
 
 from harness.body.anatomy import body_scale
 from harness.body.humanoid import Body, tpose
@@ -153,4 +153,5 @@ def _require_pose(fit: Fit, names: Sequence[str], body: Body) -> None:
 
 def _limit(stations: int) -> float:
     """The squared residual, in units of the model's spread, that a T-pose stays within."""
-    return float(chi2.ppf(CONFIDENCE, max(3 * stations - len(FREE), 1)))
+    degrees = max(3 * stations - len(FREE), 1)
+    return float(2.0 * gammaincinv(0.5 * degrees, CONFIDENCE))  # chi2.ppf without scipy.stats, which loads for a second

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
@@ -80,6 +80,8 @@ def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
         return float(values.mean()), float(values.mean())
     grain = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
     whole = grain * np.round(values / grain)  # their sums are exact in any order: what ties on paper ties here
+    from scipy import stats  # takes a second to load, and each worker loads this file
+
     found = stats.bootstrap(
         (whole,),
         np.mean,
@@ -93,5 +95,5 @@ def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
 
 def expanded(level: float, count: int) -> float:
     """The bootstrap's level whose interval is as wide as the t interval of `level` on `count` even values."""
-    t = stats.t.ppf(0.5 + 0.5 * level, count - 1)
-    return float(1.0 - 2.0 * stats.norm.cdf(-np.sqrt(count / (count - 1)) * t))
+    t = special.stdtrit(count - 1, 0.5 + 0.5 * level)
+    return float(1.0 - 2.0 * special.ndtr(-np.sqrt(count / (count - 1)) * t))
