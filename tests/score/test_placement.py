@@ -1,0 +1,54 @@
+"""A placement study's findings survive their file, and a damaged file is refused with the reason."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.errors import BadFile
+from harness.score.placement import is_placement, read_placement, write_placement
+from tests.report.fabricate_placement import made_up
+
+Damage = Callable[[dict[str, Any]], Any]
+
+
+def test_findings_come_back_as_they_were_written(tmp_path: Path) -> None:
+    findings, path = made_up(at_most=2), tmp_path / "findings.json"
+    write_placement(path, findings)
+    assert read_placement(path) == findings
+    assert is_placement(path)
+    first = path.read_bytes()
+    write_placement(path, read_placement(path))
+    assert path.read_bytes() == first
+
+
+def test_a_paper_is_no_placement(tmp_path: Path) -> None:
+    path = tmp_path / "findings.json"
+    path.write_text('{"paper": "liu2011", "schema": 1}')
+    assert not is_placement(path)
+    with pytest.raises(BadFile, match="no key in findings called 'paper'"):
+        read_placement(path)
+
+
+@pytest.mark.parametrize(
+    ("damage", "said"),
+    [
+        (lambda c: c.update(schema=2), "schema 2"),
+        (lambda c: c.pop("tried"), "missing tried"),
+        (lambda c: c.update(surprise=1), "surprise"),
+        (lambda c: c["tried"][0].update(mean="low"), r"tried\[0\].mean"),
+        (lambda c: c["rankings"][0].update(mode="guess"), "guess"),
+        (lambda c: c["best"][0].update(stations=["left_elbow"]), "left_elbow"),
+        (lambda c: c["worth"][0].update(candidate="nose"), "nose"),
+    ],
+)
+def test_damage_is_named(tmp_path: Path, damage: Damage, said: str) -> None:
+    path = tmp_path / "findings.json"
+    write_placement(path, made_up(at_most=2))
+    content = json.loads(path.read_text())
+    damage(content)
+    path.write_text(json.dumps(content))
+    with pytest.raises(BadFile, match=said):
+        read_placement(path)
