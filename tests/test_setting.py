@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from harness.cells import reconstruct
 from harness.config import Motion, Scenario, Station
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, standard_skeleton, unpack
@@ -14,11 +15,14 @@ from harness.core.motion import Clip
 from harness.core.protocol import Part
 from harness.errors import BadInput
 from harness.mocap.sources import open_source
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Method
 from harness.reconstruct.ik import PREVIOUS
 from harness.reconstruct.mean_pose import MeanPose
 from harness.setting import Setting
 from harness.simulate import noise
 from harness.simulate.components.white import White
+from harness.stream.inputs import combination
 
 SCENARIO = Scenario(
     name="small",
@@ -142,3 +146,28 @@ def test_a_part_is_warmed_up_on_what_comes_before_it() -> None:
     rate_hz = setting.whole.rate_hz
     assert len(setting.take) == len(block) + round(rate_hz)
     assert (setting.take.qpos[-1] == setting.whole.qpos[block.stop - 1]).all()
+
+
+def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
+    """Sets of trackers are compared on one motion with one fit, and come out as if each had been made anew."""
+    motion = replace(SCENARIO.motion, examples=("walking_p1_02",), body="common", longest_s=1.5)
+    scenario = replace(SCENARIO, motion=motion)
+    elsewhere = replace(scenario, stations={"torso": Station("thorax", 0.6, 30.0), "knee": Station("ltibia", 0.1)})
+    source, method = open_source("builtin", None, seed=1, rate_hz=None), registry.resolve("dynamic_map")
+    first = Setting(scenario, source, Part("walking_p1_01"), "walking")
+    results = [_estimated(first, method)]
+    shared = first.under(elsewhere)
+    assert shared is not None
+    assert shared.whole is first.whole
+    assert shared.fitted(method, "dynamic_map") is first.fitted(method, "dynamic_map")
+    results.append(_estimated(shared, method))
+    anew = Setting(elsewhere, source, Part("walking_p1_01"), "walking")
+    np.testing.assert_array_equal(results[1], _estimated(anew, method))
+    assert shared.inputs_of(method, "pos+ori") == anew.inputs_of(method, "pos+ori")
+    assert np.abs(results[0] - results[1]).max() > 1e-3
+
+
+def _estimated(setting: Setting, method: Method) -> Floats:
+    seen = combination("pos+ori", setting.simulation.stations)
+    fitted = setting.fitted(method, "dynamic_map")
+    return reconstruct(fitted, setting.calibrated.calibration, setting.simulation, seen)[0]
