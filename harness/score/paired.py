@@ -78,12 +78,10 @@ def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
     spread = float(np.ptp(values))
     if spread <= 1e-9 * float(np.abs(values).max()):  # all equal: nothing to resample, and BCa is undefined
         return float(values.mean()), float(values.mean())
-    grain = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
-    whole = grain * np.round(values / grain)  # their sums are exact in any order: what ties on paper ties here
     from scipy import stats  # takes a second to load, and each worker loads this file
 
     found = stats.bootstrap(
-        (whole,),
+        (grained(values),),
         np.mean,
         method="BCa",
         confidence_level=expanded(level, len(values)),
@@ -91,6 +89,14 @@ def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
         rng=generator(0, "paired"),
     ).confidence_interval
     return float(found.low), float(found.high)
+
+
+def grained(values: Floats) -> Floats:
+    """(n,) values, not all zero, rounded at 2^-40 of the largest: their sums are exact in any order, so that what ties
+    on paper ties here."""
+    grain = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
+    rounded: Floats = grain * np.round(values / grain)
+    return rounded
 
 
 def expanded(level: float, count: int) -> float:
