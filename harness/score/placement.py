@@ -77,6 +77,10 @@ class Ranked:
     high: float | None = None
     tied: bool = False
     """Nothing shows that it is worse than rank 1; also true of rank 1 itself."""
+    step: float | None = None
+    """Mean paired difference to the set of the rank before; 0 of rank 1."""
+    step_low: float | None = None
+    step_high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,18 @@ class Best:
     """Others of as many that nothing shows to be worse."""
     on_front: bool = True
     """No set of fewer or as many stations errs less (Pareto)."""
+    of: int = 0
+    """How many sets of so many stations it was chosen from."""
+    stays: float | None = None
+    """Share of resamples of the clips in which it is still the best of them."""
+    crossed: float | None = None
+    """Mean error on each clip of whichever set the other clips would have chosen: what choosing and judging on the same
+    clips flatters the best by is this less its mean."""
+    held_out: float | None = None
+    """Its mean error on the clips on which nothing was chosen."""
+    held_out_low: float | None = None
+    held_out_high: float | None = None
+    held_out_clips: int = 0
 
 
 @dataclass(frozen=True)
@@ -156,6 +172,8 @@ class Condition:
     means: tuple[float | None, ...]
     """Of each set of `PlacementFindings.compared`."""
     clips: int = 0
+    stays: float | None = None
+    """Share of resamples of the clips in which the best of the compared sets is still the best."""
 
 
 @dataclass(frozen=True)
