@@ -50,7 +50,7 @@ class Manifest:
 
     def differences(self, other: "Manifest") -> list[str]:
         """Names of the inputs in which two runs differ, such as "motion.test"; none for one and the same run."""
-        mine, theirs = _flat(plain(self.inputs)), _flat(plain(other.inputs))
+        mine, theirs = flat(plain(self.inputs)), flat(plain(other.inputs))
         return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
 
 
@@ -120,8 +120,9 @@ def _version(package: str) -> str:
         return "absent"
 
 
-def _flat(content: Any, prefix: str = "") -> dict[str, Any]:
+def flat(content: Any, prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one, with dotted names."""
     if not isinstance(content, dict) or not content:
         return {prefix: content}
-    parts = [_flat(value, f"{prefix}.{name}" if prefix else name) for name, value in content.items()]
+    parts = [flat(value, f"{prefix}.{name}" if prefix else name) for name, value in content.items()]
     return {name: value for part in parts for name, value in part.items()}

@@ -1,0 +1,77 @@
+"""Baselines: what a run or sweep measured, small enough to be kept under version control, to compare with later.
+
+`results/baselines/NAME` has manifest.json, summary.json (counts and what each method came to) and cells.json: identity
+and metrics of every cell, sorted; of what defines cells, what all share stands once, and the rest once for all the
+cells that it is the same for. No poses and no frames. The same run gives the same bytes.
+"""
+
+import os
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from harness.errors import BadInput
+from harness.score.files import TEMPORARY, content_key, plain, write_json
+from harness.score.judged import BASELINES, CELLS, SCHEMA, Judged, read_judged
+from harness.score.matching import PAIRED_ON
+from harness.score.results import read_summary
+
+_SUMMARISED = ("outcome", "cells_finished", "cells_planned", "methods")
+
+
+def save(run: Path, name: str, folder: Path = BASELINES, force: bool = False) -> Path:
+    """Keep what a finished run or sweep measured as baseline `name`; returns its folder.
+
+    BadInput for a name that is no plain one, for a run that is not whole (a reference with holes would gate nothing
+    there) and for a baseline that exists, unless `force` replaces it. BadFile for what is no run.
+    """
+    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", name):
+        raise BadInput(f"{name!r} is no name of a baseline.", "Letters, digits, - _ and . make one, such as main_2.")
+    if not run.is_dir():
+        raise BadInput(f"{run} is no folder.", "Name one that `harness run` or `harness sweep` wrote.")
+    judged, target = read_judged(run), folder / name
+    if missing := judged.planned - len(judged.cells):
+        raise BadInput(
+            f"{run} lacks {missing} of {judged.planned} cells.", "Give its command again until all are there."
+        )
+    if not judged.cells:
+        raise BadInput(f"{run} has no cells.", "A baseline needs some.")
+    if target.exists() and not force:
+        raise BadInput(
+            f"There is a baseline {name} already ({target}).", "Choose another name, or replace it with --force."
+        )
+    beside = folder / f"{TEMPORARY}{os.getpid()}-{name}"
+    shutil.rmtree(beside, ignore_errors=True)
+    beside.mkdir(parents=True)
+    summary = read_summary(run)
+    write_json(beside / "manifest.json", judged.manifest.as_dict())
+    write_json(beside / "summary.json", {kind: summary[kind] for kind in _SUMMARISED})
+    write_json(beside / CELLS, _packed(judged))
+    before = beside.with_name(f"{beside.name}-before")
+    if target.exists():
+        os.rename(target, before)
+    os.rename(beside, target)
+    shutil.rmtree(before, ignore_errors=True)
+    return target
+
+
+def _packed(judged: Judged) -> dict[str, Any]:
+    """What `judged.read_judged` reads back."""
+    cells = sorted(judged.cells, key=lambda cell: [str(plain(getattr(cell, name))) for name in PAIRED_ON])
+    definitions = [plain(cell.defined_by) for cell in cells]
+    first, *others = definitions
+    shared = {name: first[name] for name in first if all(_same(other, first, name) for other in others)}
+    parts, packed = {}, []
+    for cell, definition in zip(cells, definitions, strict=True):
+        rest = {name: definition[name] for name in sorted(definition) if name not in shared}
+        part = content_key(rest)[:12]
+        parts[part] = rest
+        packed.append({**{f.name: getattr(cell, f.name) for f in fields(cell) if f.name != "defined_by"}, "part": part})
+    return {"schema": SCHEMA, "planned": judged.planned, "shared": shared, "parts": parts, "cells": packed}
+
+
+def _same(one: Mapping[str, Any], other: Mapping[str, Any], name: str) -> bool:
+    return name in one and bool(one[name] == other[name])
