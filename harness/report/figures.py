@@ -143,14 +143,19 @@ def drawn(
     draw: Callable[["Figure"], None],
     height_in: float,
     *,
+    width_in: float = _WIDTH_IN,
+    layout: Literal["constrained"] | None = "constrained",
     raster: bool = False,
 ) -> Chart:
-    """What `draw` puts on a figure as wide as the page; with `raster` as a PNG too."""
+    """What `draw` puts on a figure as wide as the page; with `raster` as a PNG too.
+
+    Without a layout the axes stay where `draw` puts them, which is quicker.
+    """
     import matplotlib
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context(SETTINGS):
-        figure = Figure(figsize=(_WIDTH_IN, height_in), layout="constrained")
+        figure = Figure(figsize=(width_in, height_in), layout=layout)
         draw(figure)
         svg = to_svg(figure, name)
         figure.set_layout_engine("none")  # it is laid out now
