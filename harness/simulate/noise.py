@@ -8,6 +8,7 @@ from harness.simulate.components.displaced import Displaced
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
+from harness.simulate.components.loose import Loose
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
 from harness.simulate.components.session import Session
@@ -15,6 +16,7 @@ from harness.simulate.components.slow import Slow
 from harness.simulate.components.speed import Speed
 from harness.simulate.components.turned import Turned
 from harness.simulate.components.white import White
+from harness.simulate.components.wobble import Wobble
 from harness.simulate.sensed import Sensed
 
 LEVELS = ("clean", "noise", "default")
@@ -24,7 +26,9 @@ LEVELS = ("clean", "noise", "default")
 class Noise:
     """What goes wrong; None or () for what does not. Each component draws for itself, whatever else there is."""
 
+    wobble: Wobble | None = None
     mount: MountOffset | None = None
+    loose: Loose | None = None
     slip: tuple[MountSlip, ...] = ()
     speed: Speed | None = None
     session: Session | None = None
@@ -41,7 +45,9 @@ class Noise:
     def spoil(self, sensed: Sensed) -> None:
         """Let every component do its work, in the order of the fields: from the body outwards to the device."""
         for component in (
+            self.wobble,
             self.mount,
+            self.loose,
             *self.slip,
             self.speed,
             self.session,

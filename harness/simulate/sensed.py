@@ -10,6 +10,8 @@ from harness.core.arrays import Bools, Floats
 from harness.core.seeds import generator
 from harness.errors import UnknownName
 
+GRAVITY_M_S2 = 9.81
+
 
 @dataclass(eq=False)
 class Sensed:
@@ -26,6 +28,11 @@ class Sensed:
     """(N, S, 3) true velocity."""
     radius_m: Floats
     """(S,) from the axis of the bone to the station; the station's z points away from that axis, its x along it."""
+    flesh_m: Floats
+    """(S,) soft tissue between the bone and the skin that the station sits on."""
+    force_m_s2: Floats
+    """(N, S, 3) what a unit mass at the station bears beyond what it bears at rest in the rest pose: acceleration and
+    the pull of the Earth, along the station's own axes."""
     position_m: Floats
     """(N, S, 3)"""
     turn: Floats

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.body.flesh import thickness_m
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount, place
 from harness.core import rotations
@@ -14,8 +15,8 @@ from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.simulate.link import TrackerConfig, transmit
 from harness.simulate.noise import Noise
-from harness.simulate.sensed import Sensed
-from harness.simulate.trajectory import Trajectory
+from harness.simulate.sensed import GRAVITY_M_S2, Sensed
+from harness.simulate.trajectory import StationMotion, Trajectory
 from harness.stream.capture import Capture
 from harness.stream.frame import TrackerFrame
 from harness.stream.reader import FrameReader, WireFormat
@@ -149,6 +150,8 @@ def sense(
         rate_hz=tracker.rate_hz,
         velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
         radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
+        flesh_m=np.array([thickness_m(mount.bone, mount.along) for mount in mounts]),
+        force_m_s2=_force_m_s2(motion, calibration),
         position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
         quality=np.ones(time_s.shape),
@@ -157,6 +160,14 @@ def sense(
     )
     noise.spoil(sensed)
     return sensed
+
+
+def _force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
+    """(E, S, 3) what a unit mass at each station bears, along its axes, beyond what it does in the rest pose."""
+    up = np.array([0.0, 0.0, GRAVITY_M_S2])
+    borne = rotations.rotate(rotations.inverse(motion.world_from_station), motion.acceleration_m_s2 + up)
+    out: Floats = borne - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
+    return out
 
 
 def _transmitted(sensed: Sensed, wire_format: WireFormat, tracker: TrackerConfig) -> tuple[Bools, Capture]:

@@ -36,6 +36,8 @@ def still() -> Still:
             rate_hz=40.0,
             velocity_m_s=np.zeros((*time_s.shape, 3)),
             radius_m=np.full(stations, 0.05),
+            flesh_m=np.full(stations, 0.02),
+            force_m_s2=np.zeros((*time_s.shape, 3)),
             position_m=np.tile(places_m, (len(time_s), 1, 1)),
             turn=np.tile(turns, (len(time_s), 1, 1)),
             quality=np.ones(time_s.shape),
@@ -54,3 +56,9 @@ def worn(*stations: str) -> list[Mount]:
 def boxer() -> tuple[Body, Take]:
     """Twelve seconds of the built-in performer, on the performer's own body."""
     return retarget.to_own_body(performer.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
+
+
+@pytest.fixture(scope="session")
+def walker() -> tuple[Body, Take]:
+    """Five seconds of the built-in performer's walk, on the performer's own body."""
+    return retarget.to_own_body(performer.generate("walking", "p1", 1, seed=1, duration_s=5.0))

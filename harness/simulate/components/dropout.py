@@ -6,9 +6,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.simulate.limits import require
-from harness.simulate.sensed import Sensed
-
-GRAVITY_M_S2 = 9.81
+from harness.simulate.sensed import GRAVITY_M_S2, Sensed
 
 
 @dataclass(frozen=True)
