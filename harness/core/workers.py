@@ -3,8 +3,9 @@
 import os
 import signal
 import sys
+from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
@@ -19,21 +20,89 @@ def call_each(
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """`function(*task)` of every task, in fresh processes: which task, and what came of it, as each ends.
 
-    A caller that stops early, as Ctrl-C makes it, stops what runs at once. What workers print goes to stderr.
+    A worker that dies takes nothing with it but its task, see `keep_busy`. A caller that stops early, as Ctrl-C makes
+    it, stops what runs at once. What workers print goes to stderr.
     """
-    context = get_context("spawn")
-    theirs, ours = context.Pipe(duplex=False)
-    with ProcessPoolExecutor(workers, context, _start, (theirs,)) as pool:
+    theirs, ours = get_context("spawn").Pipe(duplex=False)
+    processes = [_Process(theirs) for _ in range(min(workers, len(tasks)))]
+
+    def submit(which: int) -> Future[R]:
+        return next(process for process in processes if process.idle).submit(function, *tasks[which])
+
+    try:
+        yield from keep_busy(submit, len(tasks), lambda: len(processes))
+        for process in processes:
+            process.pool.shutdown(wait=False)
+        for process in processes:
+            process.pool.shutdown()
+    finally:
+        ours.close()
+        for process in processes:
+            process.pool.shutdown(cancel_futures=True)
+        theirs.close()
+
+
+def keep_busy(
+    submit: Callable[[int], Future[R]], count: int, room: Callable[[], int], *, look_s: float | None = None
+) -> Generator[tuple[int, Future[R]], None, None]:
+    """Tasks 0 to `count` - 1, as many under way as there is room for: which, and what came of it, as each ends.
+
+    One that ends in BrokenExecutor, because its worker died, is begun once more when all others are done and with
+    nothing beside it: what a worker dies of may be too much at a time. What comes then is what came of it.
+    `room` is asked whenever a task ends, and every `look_s`.
+    """
+    first, again, alone = deque(range(count)), deque[int](), set[int]()
+    running: dict[Future[R], int] = {}
+    ended: deque[tuple[int, Future[R]]] = deque()
+    while first or again or running or ended:
+        places = room()
+        while first and len(running) < places:
+            which = first.popleft()
+            running[submit(which)] = which
+        if again and not (first or running):
+            which = again.popleft()
+            alone.add(which)
+            running[submit(which)] = which
+        while ended:  # when its worker has something to do; kept no longer than the caller keeps it
+            yield ended.popleft()
+        for future in wait(running, look_s, FIRST_COMPLETED).done:
+            which = running.pop(future)
+            if which not in alone and isinstance(future.exception(), BrokenExecutor):
+                again.append(which)
+            else:
+                ended.append((which, future))
+
+
+class _Process:
+    """A worker process, started when it is needed and anew when it died; a pool of one, which breaks alone."""
+
+    def __init__(self, alive: Connection) -> None:
+        self._alive = alive
+        self._last: Future[Any] | None = None
+        self.pool = self._fresh()
+
+    @property
+    def idle(self) -> bool:
+        return self._last is None or self._last.done()
+
+    def submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         try:
-            with ctrl_c_ignored():  # which processes inherit, so that they never see it, not even while they import
-                running = {pool.submit(function, *task): which for which, task in enumerate(tasks)}
-            for future in as_completed(running):
-                yield running.pop(future), future  # kept no longer than the caller keeps it
-            pool.shutdown()
-        finally:
-            ours.close()
-            pool.shutdown(cancel_futures=True)
-            theirs.close()
+            future = self._submit(function, *task)
+        except BrokenExecutor:  # of its last task, or while it had none
+            self.pool.shutdown()
+            self.pool, self._last = self._fresh(), None
+            future = self._submit(function, *task)
+        self._last = future
+        return future
+
+    def _submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
+        if self._last is not None:
+            return self.pool.submit(function, *task)
+        with ctrl_c_ignored():  # which the process inherits, so that it never sees it, not even while it imports
+            return self.pool.submit(function, *task)
+
+    def _fresh(self) -> ProcessPoolExecutor:
+        return ProcessPoolExecutor(1, get_context("spawn"), _start, (self._alive,))
 
 
 def _start(alive: Connection) -> None:
