@@ -27,6 +27,7 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.score import manifest, results
 from harness.score.cell import as_row, cell_folder, read_row, varied_text
+from harness.score.reference import EVERY, Reference
 from harness.score.score import score
 from harness.setting import Setting, mounts_of, noise_of
 from harness.simulate.simulate import Simulation
@@ -132,7 +133,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
     scenario, simulation = setting.scenario, setting.simulation
     seen = combination(planned.inputs, simulation.stations)
     known, fitted = setting.calibrated, setting.fitted(method, planned.method)
-    qpos, status, step_ms = reconstruct(fitted, known.calibration, simulation, seen)
+    qpos, status, step_ms, reference_ms = reconstruct(fitted, known.calibration, simulation, seen)
     scores = score(
         setting.body.skeleton,
         scenario.tracker.rate_hz,
@@ -141,6 +142,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         simulation.frame_index,
         status,
         step_ms,
+        reference_ms=reference_ms,
         estimate_skeleton=known.body.skeleton,
     )
     frames = simulation.frames
@@ -176,6 +178,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         frame_index=simulation.frame_index,
         status=status,
         step_ms=step_ms,
+        reference_ms=reference_ms,
         quality=np.array([f.quality for f in frames]),
         position_valid=np.array([f.position_valid for f in frames]),
         orientation_valid=np.array([f.orientation_valid for f in frames]),
@@ -185,18 +188,25 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
 
 def reconstruct(
     reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
-) -> tuple[Floats, Ints, Floats]:
-    """Estimates (F, 55), status (F,) and wall time of each step [ms] (F,); the truth stays on this side."""
-    session = reconstructor.begin(calibration)
-    qpos, status, step_ms = [], [], []
-    for frame in simulation.frames:
+) -> tuple[Floats, Ints, Floats, Floats]:
+    """Estimates (F, 55), status (F,), wall time of each step [ms] (F,) and of the reference [ms] (F,).
+
+    Reference work follows every so many steps. The step after it would find the method's data gone from the caches, and
+    is not timed, NaN: times are of steps that follow a step. The truth stays on this side.
+    """
+    session, work = reconstructor.begin(calibration), Reference()
+    qpos, status, step_ms, reference_ms = [], [], [], []
+    for index, frame in enumerate(simulation.frames):
         shown = inputs.masked(frame)
         start = time.perf_counter()
         estimate = session.step(shown)
         step_ms.append(1e3 * (time.perf_counter() - start))
         qpos.append(estimate.qpos)
         status.append(estimate.status)
-    return np.array(qpos), np.array(status), np.array(step_ms)
+        reference_ms.append(work.timed_ms() if index % EVERY == EVERY - 1 else np.nan)
+    times_ms = np.array(step_ms)
+    times_ms[EVERY::EVERY] = np.nan
+    return np.array(qpos), np.array(status), times_ms, np.array(reference_ms)
 
 
 def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:

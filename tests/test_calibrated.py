@@ -115,7 +115,7 @@ def test_exact_knows_where_trackers_really_sit() -> None:
     off_m = np.linalg.norm(known.mount_m - setting().calibrated.calibration.mount_m, axis=1)
     assert off_m.min() > 0.002
     fitted = made.fitted(PREVIOUS, "ik:previous")
-    qpos, _, _ = reconstruct(fitted, known, made.simulation, combination("pos+ori", known.stations))
+    qpos, *_ = reconstruct(fitted, known, made.simulation, combination("pos+ori", known.stations))
     there_m = made.simulation.truth_qpos[made.simulation.frame_index][:, :3]
     assert np.linalg.norm(qpos[40:, :3] - there_m[40:], axis=1).mean() < 0.02
 

@@ -87,7 +87,7 @@ def test_a_recording_scores_as_the_simulation_does(played: Rehearsal, simulated:
     simulation = played.simulation
     for one in judged:
         fitted = played.setting.fitted(registry.resolve(one.method), one.method)
-        qpos, status, step_ms = reconstruct(
+        qpos, status, step_ms, _ = reconstruct(
             fitted, simulation.calibration, simulation, combination("pos+ori", simulation.stations)
         )
         assert not (status == Status.LOST).all()

@@ -44,7 +44,7 @@ _TEXTS = (
     *(*IDENTITY, *FURTHER, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
 )
-_FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "quality")
+_FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "reference_ms", "quality")
 _INTS = ("frame_index", "status")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
 _ERROR = "error."
@@ -92,7 +92,7 @@ class Cell:
     status: Ints
     """(F,) see `core.estimate.Status`."""
     step_ms: Floats
-    """(F,) wall time [ms]."""
+    """(F,) wall time [ms]; NaN where not timed."""
     quality: Floats
     """(F, S) 0 lost to 1 best."""
     position_valid: Bools
@@ -108,6 +108,8 @@ class Cell:
     """Scenario key -> value, of the keys that the scenario varies."""
     scenario: str = ""
     """Its name."""
+    reference_ms: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) wall time of `score.reference` right after each step [ms]; NaN, as by default, where it was not timed."""
     calibration_errors: Mapping[str, float] = field(default_factory=dict)
     """How far what calibration found is from the truth, by name (see `harness.calibrated`); empty where it is exact."""
     estimate_bone_m: Floats = field(default_factory=lambda: np.empty((0, 3)))
@@ -117,8 +119,10 @@ class Cell:
         frames, stations = len(self.time_s), len(self.stations)
         if not len(self.estimate_bone_m):
             object.__setattr__(self, "estimate_bone_m", self.bone_m)
+        if not len(self.reference_ms):
+            object.__setattr__(self, "reference_ms", np.full(frames, np.nan))
         freeze(self, bone_m=("B", 3), estimate_bone_m=("B", 3))
-        freeze(self, time_s=(frames,), step_ms=(frames,), quality=(frames, stations))
+        freeze(self, time_s=(frames,), step_ms=(frames,), reference_ms=(frames,), quality=(frames, stations))
         freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
         freeze(self, np.int64, frame_index=(frames,), status=(frames,))
         freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))

@@ -42,6 +42,7 @@ def score(
     status: Ints,
     step_ms: Floats,
     *,
+    reference_ms: Floats | None = None,
     estimate_skeleton: Skeleton | None = None,
     warm_up_s: float = WARM_UP_S,
     floor: float = COVERAGE_FLOOR,
@@ -50,7 +51,8 @@ def score(
 
     The truth stands on `skeleton`, the estimate on the one that its method believed in: the same by default.
     `truth_qpos` (E, 55), `estimate_qpos` (F, 55), `frame_index` (F,) the true frame that each estimate is of,
-    strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed. Raises ShapeError and BadInput.
+    strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed, `reference_ms` any
+    number of wall times between them (see `score.reference`), NaN likewise. Raises ShapeError and BadInput.
     """
     frame_index, status, step_ms = _checked(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
     warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
@@ -77,7 +79,7 @@ def score(
     measured["root_drift_mm_s"] = positions.root_drift_mm_s(judged)
     measured["lag_ms"] = timing.lag_ms(truth.angles_rad, judged.estimate.angles_rad, judged.frame_index, rate_hz)
     timed = warm & (np.arange(len(step_ms)) > 0)
-    measured |= timing.step_times_ms(step_ms[timed])
+    measured |= timing.step_times_ms(step_ms[timed], reference_ms)
     measured["first_step_ms"] = float(step_ms[0]) if len(step_ms) else float("nan")
     counts: dict[str, float] = {
         "frames_matched": int(scored.sum()),

@@ -68,6 +68,7 @@ class _Group:
         self.sequences: list[dict[str, Any]] = []
         self.frames: dict[str, list[Floats]] = {name: [] for name in FRAME_METRICS}
         self.step_ms: list[Floats] = []
+        self.reference_ms: list[Floats] = []
 
     def add(self, cell: Cell) -> None:
         self.sequences.append(as_row(cell))
@@ -76,6 +77,7 @@ class _Group:
         for name, values in cell.scores.per_frame.items():
             self.frames[name].append(values[cell.scores.scored].astype(np.float32))
         self.step_ms.append(cell.step_ms[cell.scores.scored & (np.arange(len(cell)) > 0)])
+        self.reference_ms.append(cell.reference_ms)
 
     def named(self, fields: Iterable[str]) -> dict[str, Any]:
         """What all its cells share."""
@@ -106,7 +108,8 @@ class _Group:
             columns = [values.astype(float) for values in self.frames[name]]
             value = pooled(np.concatenate(columns), DEFINITIONS[name].pool) if columns else np.nan
         else:
-            times = step_times_ms(np.concatenate(self.step_ms)) if self.step_ms else {}
+            timed = self.step_ms and (np.concatenate(self.step_ms), np.concatenate(self.reference_ms))
+            times = step_times_ms(*timed) if timed else {}
             value = times.get(name, np.nan)
         return float(value) if np.isfinite(value) else None
 

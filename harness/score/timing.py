@@ -7,6 +7,7 @@ from harness.score.angles import wrapped
 
 LONGEST_LAG_S = 0.5
 _FEWEST_FRAMES = 20
+STEP_TIMES = ("step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps", "step_relative")
 
 
 def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: float) -> float:
@@ -34,17 +35,20 @@ def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: 
     return float(1e3 * (shifts[best] + share) / rate_hz)
 
 
-def step_times_ms(step_ms: Floats) -> dict[str, float]:
-    """Wall time of a step (batch of one): mean, p50, p95, p99 and frames per second; NaN of none."""
+def step_times_ms(step_ms: Floats, reference_ms: Floats | None = None) -> dict[str, float]:
+    """Wall time of a step (batch of one): mean, p50, p95, p99, frames per second, and p50 relative to the work of
+    `score.reference` where that was timed; NaN of none, and NaN where either was not timed."""
     known = step_ms[np.isfinite(step_ms)]
     if not len(known):
-        return dict.fromkeys(("step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps"), float("nan"))
+        return dict.fromkeys(STEP_TIMES, float("nan"))
     p50, p95, p99 = np.percentile(known, [50, 95, 99])
     mean = known.mean()
+    reference = np.empty(0) if reference_ms is None else reference_ms[np.isfinite(reference_ms)]
     return {
         "step_mean_ms": float(mean),
         "step_p50_ms": float(p50),
         "step_p95_ms": float(p95),
         "step_p99_ms": float(p99),
         "fps": float(1e3 / mean) if mean > 0.0 else float("nan"),
+        "step_relative": float(p50 / np.median(reference)) if len(reference) else float("nan"),
     }

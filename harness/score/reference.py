@@ -1,0 +1,44 @@
+"""The work that speed is measured against: what a method's step does, the same for ever.
+
+A step takes longer on a slower or busier computer, and so does this, timed between the steps of the same cell: their
+ratio is a method's cost. Half of it is a dense solve (the normal equations of 72 residuals and 54 unknowns), half is
+the overhead of small-array calls. Never change it: results in units of another reference are not comparable, so that
+whoever does raises the version of `step_relative`.
+"""
+
+import time
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.seeds import generator
+
+EVERY = 8
+"""Frames from one timing to the next: of a cell of 8 s at 40 Hz 40 are timed, for 3 % of what the quickest method takes
+with all that is done for its cell."""
+
+
+class Reference:
+    """0.15 ms of numpy on one core of a shared 2-core x86 machine."""
+
+    def __init__(self) -> None:
+        rng = generator(0, "reference")
+        self._slope, self._off = rng.normal(size=(72, 54)), rng.normal(size=72)
+        self._damping = 0.1 * np.eye(54)
+        self._turns, self._points = rng.normal(size=(24, 4)), rng.normal(size=(24, 3))
+        self.work()  # what is done but once is no part of it
+
+    def work(self) -> Floats:
+        """(54,) the same numbers every time."""
+        turns = self._turns / np.sqrt(np.sum(self._turns**2, axis=1, keepdims=True))
+        apart = np.sqrt(np.sum((self._points[:, None] - self._points) ** 2, axis=2))
+        weights = np.where(apart.mean(axis=1) > 2.0, 0.5, 1.0) * np.abs(turns[:, 0])
+        weighed = self._slope * np.repeat(weights, 3)[:, None]
+        step: Floats = np.linalg.solve(weighed.T @ self._slope + self._damping, weighed.T @ self._off)
+        return step
+
+    def timed_ms(self) -> float:
+        """Wall time of the work, now [ms]."""
+        start = time.perf_counter()
+        self.work()
+        return 1e3 * (time.perf_counter() - start)

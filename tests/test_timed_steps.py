@@ -1,0 +1,40 @@
+"""The wall times of a cell: of steps that follow a step, with reference work between them."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from harness.cells import reconstruct
+from harness.score.reference import EVERY
+
+
+class Diary:
+    """A method, its session and the inputs, who write down what is asked of them."""
+
+    def __init__(self) -> None:
+        self.seen: list[int] = []
+
+    def begin(self, calibration: Any) -> "Diary":
+        return self
+
+    def masked(self, frame: int) -> int:
+        return frame
+
+    def step(self, frame: int) -> SimpleNamespace:
+        self.seen.append(frame)
+        return SimpleNamespace(qpos=np.full(55, float(frame)), status=0)
+
+
+def test_reference_work_lies_between_steps_and_the_step_after_it_is_not_timed() -> None:
+    frames = 3 * EVERY + 2
+    diary: Any = Diary()
+    made: Any = SimpleNamespace(frames=range(frames))
+    qpos, status, step_ms, reference_ms = reconstruct(diary, diary, made, diary)
+    assert diary.seen == list(range(frames))
+    np.testing.assert_array_equal(qpos[:, 0], np.arange(frames))
+    assert len(status) == len(step_ms) == len(reference_ms) == frames
+    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(reference_ms)), [EVERY - 1, 2 * EVERY - 1, 3 * EVERY - 1])
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(step_ms)), [EVERY, 2 * EVERY, 3 * EVERY])
+    assert (step_ms[np.isfinite(step_ms)] > 0.0).all()
+    assert (reference_ms[np.isfinite(reference_ms)] > 0.0).all()
