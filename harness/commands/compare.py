@@ -1,0 +1,67 @@
+"""Verbs that tell whether something became worse: keep what a run measured, compare two of them."""
+
+import argparse
+from pathlib import Path
+
+from harness.commands.verb import Verbs, add_verb, say
+from harness.errors import BadInput, Outcome
+
+_SIDE = "folder of a run or sweep, or of a baseline, or a baseline's name"
+_EVERYTHING = "everything"
+
+
+def add_baseline(verbs: Verbs) -> None:
+    text = "keep what a finished run measured, to compare with later"
+    verb = add_verb(verbs, "baseline", text, save_baseline)
+    verb.add_argument("what", choices=["save"], help="the one thing there is to do")
+    verb.add_argument("name", metavar="NAME", help="of the baseline; it becomes results/baselines/NAME")
+    verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
+    verb.add_argument("--force", action="store_true", help="replace a baseline of that name")
+
+
+def save_baseline(args: argparse.Namespace) -> Outcome:
+    from harness.score.baseline import save
+
+    folder = save(args.run, args.name, force=args.force)
+    return say(args, {"baseline": str(folder)}, f"baseline: {folder}")
+
+
+def add_compare(verbs: Verbs) -> None:
+    text = "tell whether B is worse than A, or one method than another"
+    verb = add_verb(verbs, "compare", text, compare_sides)
+    verb.add_argument("a", metavar="A", help=f"the reference: {_SIDE}")
+    verb.add_argument("b", metavar="B", nargs="?", help="what is compared with it (default: A, with --methods)")
+    verb.add_argument("--methods", metavar="A,B", help="compare method A of A with method B of B, or one of both")
+    verb.add_argument("--metrics", metavar="M,N", help="what the outcome rests on (see `harness list`)")
+    text = "let these inputs differ, or coverage, or cells without a partner; without names, everything"
+    verb.add_argument("--allow", metavar="NAME,NAME", nargs="?", const=_EVERYTHING, help=text)
+    verb.add_argument("--html", metavar="FILE", type=Path, help="also write a page that shows it clip by clip")
+
+
+def compare_sides(args: argparse.Namespace) -> Outcome:
+    from dataclasses import asdict
+
+    from harness.core.options import split
+    from harness.report.comparison import text, write_page
+    from harness.score.comparison import compare
+    from harness.score.files import plain
+    from harness.score.judged import read_judged
+    from harness.score.margins import GATED
+
+    if args.b is None and not args.methods:
+        raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
+    methods = split(args.methods, ",") if args.methods else []
+    if len(methods) > 2:
+        raise BadInput(f"--methods {args.methods} names {len(methods)} methods.", "Name one or two.")
+    a = read_judged(args.a)
+    comparison = compare(
+        a,
+        a if args.b is None else read_judged(args.b),
+        methods=(methods[0], methods[-1]) if methods else None,
+        metrics=args.metrics.split(",") if args.metrics else GATED,
+        allow=args.allow.split(",") if args.allow else None,
+    )
+    page = write_page(comparison, args.html) if args.html else None
+    content = {**plain(asdict(comparison)), "page": page and str(page)}
+    lines = [text(comparison), *([f"page: {page}"] if page else [])]
+    return say(args, content, *lines, outcome=comparison.outcome)
