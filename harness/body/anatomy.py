@@ -9,6 +9,7 @@ Heads, hands and feet reach beyond their bones, whose far ends are joints (the b
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -70,6 +71,7 @@ def body_scale(skeleton: Skeleton) -> float:
     return _height_chain_m(skeleton) / _height_chain_m(humanoid24.standard_skeleton())
 
 
+@lru_cache(maxsize=64)
 def shapes(skeleton: Skeleton) -> tuple[Shape, ...]:
     """The geoms of the 24 bones and the root, in the order of the bodies."""
     scale = body_scale(skeleton)

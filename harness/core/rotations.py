@@ -14,17 +14,16 @@ IDENTITY: Floats = np.array([1.0, 0.0, 0.0, 0.0])
 
 def multiply(a_from_b: Floats, b_from_c: Floats) -> Floats:
     """Hamilton product, (..., 4)."""
-    w1, x1, y1, z1 = np.moveaxis(np.asarray(a_from_b, dtype=float), -1, 0)
-    w2, x2, y2, z2 = np.moveaxis(np.asarray(b_from_c, dtype=float), -1, 0)
-    return np.stack(
-        [
-            w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2,
-            w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2,
-            w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2,
-            w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2,
-        ],
-        axis=-1,
-    )
+    p, q = np.asarray(a_from_b, dtype=float), np.asarray(b_from_c, dtype=float)
+    w1, x1, y1, z1 = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
+    w2, x2, y2, z2 = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    w = w1 * w2 - x1 * x2 - y1 * y2 - z1 * z2
+    out = np.empty((*w.shape, 4))
+    out[..., 0] = w
+    out[..., 1] = w1 * x2 + x1 * w2 + y1 * z2 - z1 * y2
+    out[..., 2] = w1 * y2 - x1 * z2 + y1 * w2 + z1 * x2
+    out[..., 3] = w1 * z2 + x1 * y2 - y1 * x2 + z1 * w2
+    return out
 
 
 def inverse(a_from_b: Floats) -> Floats:
@@ -37,8 +36,21 @@ def rotate(a_from_b: Floats, v_b: Floats) -> Floats:
     """Vectors (..., 3) of frame b in frame a."""
     q, v = np.asarray(a_from_b, dtype=float), np.asarray(v_b, dtype=float)
     w, u = q[..., :1], q[..., 1:]
-    t = 2.0 * np.cross(u, v)
-    return v + w * t + np.cross(u, t)
+    t = 2.0 * _cross(u, v)
+    out: Floats = v + w * t + _cross(u, t)
+    return out
+
+
+def _cross(u: Floats, v: Floats) -> Floats:
+    """Products (..., 3), to the bit those of `np.cross`, which takes four times as long over few."""
+    x1, y1, z1 = u[..., 0], u[..., 1], u[..., 2]
+    x2, y2, z2 = v[..., 0], v[..., 1], v[..., 2]
+    x = y1 * z2 - z1 * y2
+    out = np.empty((*x.shape, 3))
+    out[..., 0] = x
+    out[..., 1] = z1 * x2 - x1 * z2
+    out[..., 2] = x1 * y2 - y1 * x2
+    return out
 
 
 def exp(rotation_vector_rad: Floats) -> Floats:
@@ -68,13 +80,13 @@ def angle_between_rad(p: Floats, q: Floats) -> Floats:
 
 def to_matrix(quaternion: Floats) -> Floats:
     """Rotation matrices (..., 3, 3)."""
-    w, x, y, z = np.moveaxis(np.asarray(quaternion, dtype=float), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    q = np.asarray(quaternion, dtype=float)
+    w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
+    out = np.empty((*w.shape, 3, 3))
+    out[..., 0, 0], out[..., 0, 1], out[..., 0, 2] = 1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)
+    out[..., 1, 0], out[..., 1, 1], out[..., 1, 2] = 2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)
+    out[..., 2, 0], out[..., 2, 1], out[..., 2, 2] = 2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)
+    return out
 
 
 def from_matrix(matrix: Floats) -> Floats:
