@@ -18,12 +18,12 @@ _WIDTH_IN, _ROW_IN, _FRAME_IN = 4.2, 0.34, 0.62
 _LETTERS, _MOST_ROWS = 18, 3
 """Before a row, in so many rows of text at most."""
 _LOOKS: Mapping[Verdict, dict[str, Any]] = {
-    "worse": {"color": COLOURS[0], "marker": ">"},
-    "better": {"color": COLOURS[1], "marker": "<"},
+    "worse": {"color": COLOURS[0]},
+    "better": {"color": COLOURS[1]},
     "same": {"color": INK, "marker": "o"},
     "cannot tell": {"color": FAINT, "marker": "o", "markerfacecolor": PAPER},
 }
-"""By shape as well as by colour."""
+"""What is worse or better has a triangle that points to where it went: by shape as well as by colour."""
 _WIDE = 12.0
 """So many times the median reach of a row, the longest row makes the axis symmetrically logarithmic."""
 
@@ -60,10 +60,11 @@ def _draw(figure: "Figure", lines: Sequence[Difference], names: Sequence[str]) -
     for row, line in enumerate(lines):
         margin = share(line, line.margin)
         axes.barh(row, 2.0 * margin, left=-margin, height=0.8, color=GRID, alpha=0.75)
+        look = {"marker": ">" if line.difference > 0.0 else "<", **_LOOKS[line.verdict]}
         if line.low is not None and line.high is not None:
             ends = [share(line, line.low), share(line, line.high)]
-            axes.plot(ends, [row, row], color=_LOOKS[line.verdict]["color"], linewidth=2.2, solid_capstyle="butt")
-        axes.plot(share(line, line.difference), row, markersize=6.5, linestyle="none", **_LOOKS[line.verdict])
+            axes.plot(ends, [row, row], color=look["color"], linewidth=2.2, solid_capstyle="butt")
+        axes.plot(share(line, line.difference), row, markersize=6.5, linestyle="none", **look)
         said = f"{percent(share(line, line.difference))} {line.verdict}"
         axes.annotate(said, (1.02, row), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
@@ -77,19 +78,25 @@ def _draw(figure: "Figure", lines: Sequence[Difference], names: Sequence[str]) -
 
 def _scale(axes: "Axes", lines: Sequence[Difference]) -> None:
     """The same to both sides; logarithmic beyond the middle where one line would flatten all others."""
-    from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
+    from matplotlib.ticker import FixedLocator, MaxNLocator
 
     reaches = sorted(_reach(line) for line in lines)
     middle, furthest = reaches[len(reaches) // 2], reaches[-1]
     end = 1.08 * furthest if furthest > 0.0 else 1.0
     if furthest > _WIDE * middle > 0.0:
         axes.set_xscale("symlog", linthresh=2.0 * middle, linscale=1.5)
-        axes.xaxis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=2.0 * middle))
-        end *= 1.3
+        axes.xaxis.set_major_locator(FixedLocator(_ticks(2.0 * middle, end)))
     else:
         axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.xaxis.set_major_formatter(lambda value, _: f"{value:+g}".replace("+0", "0").replace("-", "−"))
     axes.set_xlim(-end, end)
+
+
+def _ticks(linear: float, end: float) -> list[float]:
+    """Zero and powers of ten on both sides, beyond what is linear; so few that they do not meet."""
+    powers = [10.0**power for power in range(math.ceil(math.log10(linear)), math.floor(math.log10(end)) + 1)]
+    kept = [powers[0], powers[-1]] if len(powers) > 2 else powers[-1:] or [end]
+    return [*(-tick for tick in reversed(kept)), 0.0, *kept]
 
 
 def _reach(line: Difference) -> float:

@@ -21,6 +21,7 @@ from harness.report.markup import Markup, folded, joined, tag
 from harness.report.run import file_name
 from harness.report.style import Chart
 from harness.score.comparison import Comparison, Difference
+from harness.score.paired import FEWEST_CLIPS
 
 _MOST_OPEN, _MOST_NAMED = 24, 4
 """Pictures of slopes that are shown at once; names in a fact."""
@@ -67,7 +68,6 @@ def _facts(comparison: Comparison) -> Mapping[str, str]:
     facts = {
         "A, the reference": comparison.a,
         "B": comparison.b,
-        "Why": "" if comparison.why in sentence(comparison) else comparison.why,
         "Clips": f"{len(found)}: {listed(found, _MOST_NAMED)}" if found else "none",
         "Cells matched": f"{comparison.matched:,}",
         **{title: f"{len(texts):,}: {listed(texts, _MOST_NAMED)}" for title, texts in lists(comparison).items()},
@@ -88,12 +88,13 @@ def _slopes(lines: Sequence[Difference], charts: Sequence[Chart]) -> Markup:
     if not charts:
         return Markup()
     text = (
-        "Left, a thin line for each clip from A to B: orange and rising where the figure is higher in B, blue and "
-        "falling where it is lower; the thick line is the mean. Right, on a scale of its own, the difference of each "
-        "clip and their mean with its 95 % interval; the grey band is the margin."
+        "Left, a thin line for each clip from A to B, orange where B is worse and blue where it is better; the thick "
+        "line is the mean. Right, on a scale of its own, the difference of each clip and their mean with its 95 % "
+        "interval; the grey band is the margin. All but frames per second are better when they are lower."
     )
     varied = len({line.group for line in lines}) > 1
-    panels = [_panel(line, chart, varied) for line, chart in zip(lines, charts, strict=True)]
+    drawn = [line for line in lines if line.clips]
+    panels = [_panel(line, chart, varied) for line, chart in zip(drawn, charts, strict=True)]
     rest = panels[_MOST_OPEN:]
     more = folded(f"{len(rest)} more lines", tag("div", *rest, class_="panels")) if rest else None
     return joined(tag("p", text), tag("div", *panels[:_MOST_OPEN], class_="panels"), more)
@@ -110,7 +111,7 @@ def _intervals(pictures: Pictures) -> Markup:
         return Markup()
     text = (
         "The mean difference of each line in percent of A's mean with its 95 % interval, over the band of its margin. "
-        "Full circles are the same, triangles point to B's side where it is better or worse, empty circles cannot tell."
+        "Full circles are the same, triangles better or worse, empty circles cannot tell."
     )
     rest = folded("Metrics that are not gated", _grid(pictures.rest)) if pictures.rest else None
     return joined(tag("p", text), _grid(pictures.gated), rest)
@@ -143,8 +144,10 @@ def _verdicts(comparison: Comparison) -> Markup:
         "performers, protocols and choices of inputs are never pooled.",
         "The interval is the bias-corrected and accelerated bootstrap over clips, its level expanded for small "
         "numbers of them. p is that of a permutation test that flips the signs of the clips' differences, corrected "
-        "for all gated lines by Holm's method. With fewer than 6 clips nothing is told.",
-        "One gated line that is worse makes the outcome regressed; else one that cannot be told, cells without a "
-        "partner or inputs that differ make it not comparable; else it passes.",
+        "for all gated lines that differ in any clip by Holm's method. With fewer than "
+        f"{FEWEST_CLIPS} clips nothing is told.",
+        "Where inputs differ nothing is compared. One gated line that is worse makes the outcome regressed; else "
+        "failed cells make it incomplete; else cells without a partner, unequal coverage or a gated line that cannot "
+        "be told make it not comparable; else it passes.",
     ]
     return joined(*(tag("p", text) for text in texts), tag("ul", *items, class_="notes"), margins(comparison))

@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.report.comparison_words import clip_steps, direction, interval, mean, percent, share, signed, title
+from harness.report.comparison_words import (
+    clip_steps,
+    direction,
+    interval,
+    mean,
+    percent,
+    rise_is_worse,
+    share,
+    signed,
+    title,
+)
 from harness.report.figures import drawn
 from harness.report.style import COLOURS, FAINT, GRID, INK, PAPER, Chart
 from harness.score.comparison import Difference
@@ -19,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SIZE_IN = (3.3, 2.5)
-UP, DOWN = COLOURS[0], COLOURS[1]
+WORSE, BETTER = COLOURS[0], COLOURS[1]
 _SLOPES, _DIFFERENCES = (0.145, 0.17, 0.42, 0.72), (0.725, 0.17, 0.26, 0.72)
 """Where the two axes are on the picture: left, bottom, width, height."""
 _FAINT_FROM = 20
@@ -55,7 +65,7 @@ def _slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
 
     ends = np.stack([np.stack([np.zeros_like(a), a], axis=1), np.stack([np.ones_like(b), b], axis=1)], axis=1)
     many = len(a) >= _FAINT_FROM
-    axes.add_collection(LineCollection(list(ends), colors=_colours(b - a), linewidths=0.7 if many else 1.1, alpha=0.65))
+    axes.add_collection(LineCollection(list(ends), colors=_colours(line), linewidths=0.7 if many else 1.1, alpha=0.65))
     axes.plot([0.0, 1.0], [line.mean_a, line.mean_b], "o-", color=INK, linewidth=2.6, markersize=5.5, zorder=4)
     axes.set_xlim(-0.12, 1.12)
     means = (mean(line, value) for value in (line.mean_a, line.mean_b))
@@ -74,7 +84,7 @@ def _differences(axes: "Axes", line: Difference, difference: Floats) -> None:
 
     axes.axhspan(-line.margin, line.margin, color=GRID, linewidth=0, alpha=0.75)
     axes.axhline(0.0, color=FAINT, linewidth=0.9)
-    axes.scatter(_beside(difference), difference, s=9, color=_colours(difference), linewidths=0, alpha=0.75)
+    axes.scatter(_beside(difference), difference, s=9, color=_colours(line), linewidths=0, alpha=0.75)
     if line.low is not None and line.high is not None:
         axes.plot([1.0, 1.0], [line.low, line.high], color=INK, linewidth=2.0, solid_capstyle="butt")
     axes.plot([1.0], [line.difference], "D", color=PAPER, markeredgecolor=INK, markeredgewidth=1.6, markersize=5.5)
@@ -87,9 +97,10 @@ def _differences(axes: "Axes", line: Difference, difference: Floats) -> None:
     axes.spines["left"].set_visible(False)
 
 
-def _colours(difference: Floats) -> list[str]:
-    """Of clips that go up, down or nowhere: which way is seen as well."""
-    return [UP if step > 0.0 else DOWN if step < 0.0 else FAINT for step in difference]
+def _colours(line: Difference) -> list[str]:
+    """Of clips that are worse in B, better or neither; up and down are seen besides."""
+    worse = 1.0 if rise_is_worse(line.metric) else -1.0
+    return [WORSE if worse * step > 0.0 else BETTER if step else FAINT for _, step in clip_steps(line)]
 
 
 def _beside(values: Floats) -> Floats:

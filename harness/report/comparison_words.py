@@ -8,6 +8,7 @@ from typing import get_args
 from harness.errors import Outcome
 from harness.report.paper_verdicts import MINUS
 from harness.score.comparison import Comparison, Difference, Verdict
+from harness.score.margins import MARGINS
 
 KINDS: tuple[Verdict, ...] = get_args(Verdict)
 MARKS: Mapping[Verdict, str] = {"worse": "✗", "cannot tell": "?", "better": "✓", "same": "="}
@@ -23,6 +24,7 @@ BIG: Mapping[Outcome, str] = {
     Outcome.PASS: "Pass",
     Outcome.REGRESSED: "Regressed",
     Outcome.NOT_COMPARABLE: "Not comparable",
+    Outcome.INCOMPLETE: "Incomplete",
 }
 _MOST_NAMED, _MOST_DECIMALS = 3, 6
 
@@ -128,6 +130,11 @@ def p_value(value: float | None) -> str:
 def clip_steps(line: Difference) -> list[tuple[str, float]]:
     """B - A of each clip."""
     return [(clip, b - a) for clip, a, b in zip(line.clips, line.a, line.b, strict=True)]
+
+
+def rise_is_worse(metric: str) -> bool:
+    """As of an error; frames per second are another matter."""
+    return metric not in MARGINS or MARGINS[metric].rise_is_worse
 
 
 def direction(line: Difference) -> tuple[int, int, int]:

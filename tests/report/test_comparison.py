@@ -1,0 +1,273 @@
+"""A comparison shown: every verdict in text and on the page, nothing left out, nothing that a name could break."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from harness.errors import Outcome
+from harness.report import comparison as report
+from harness.report.comparison import text, write_page
+from harness.report.comparison_intervals import _draw as draw_intervals
+from harness.report.comparison_page import Pictures, comparison_page
+from harness.report.comparison_slopes import BETTER, WORSE, slopes
+from harness.report.comparison_slopes import _draw as draw_slopes
+from harness.report.comparison_words import BIG, MARKS, MEANINGS, direction, interval, percent, sentence, signed, tally
+from harness.report.figures import drawn
+from harness.report.style import Chart
+from harness.score.comparison import Comparison, Difference
+from tests.report.fabricate_comparison import CIRCUMSTANCES, GROUP, METRICS, comparison, line, whole
+from tests.report.reading import read, text_of
+
+HOSTILE = "<script>alert(1)</script>&\"'$x^2$\n <!-- -->"
+ONE = line("local_pca", "mpjpe_mm", 24, 0.05)
+
+
+def told(lines: Sequence[Difference], **changes: object) -> Comparison:
+    return replace(whole(lines), **changes)  # type: ignore[arg-type]  # of names that it has
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_page(comparison(), tmp_path_factory.mktemp("comparison") / "deep" / "page.html")
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where matplotlib is not: for tests that look at no picture."""
+    monkeypatch.setattr(report, "find_spec", lambda name: None)
+
+
+def test_the_first_line_is_the_verdict() -> None:
+    first, a, b = text(comparison()).splitlines()[:3]
+    (worse,) = (found for found in comparison().differences if found.verdict == "worse")
+    share = percent(100.0 * worse.difference / worse.mean_a)
+    assert first == f"B is worse than A in 1 of 6 gated lines on 24 clips: local_pca mpjpe_mm {share}."
+    assert (a, b) == ("A: baseline gate", "B: results/gate")
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(
+    ("shown", "said"),
+    [
+        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A: of 4 gated lines on 24 clips"),
+        (comparison(3), "Whether B is worse than A cannot be told: 7 lines were judged."),
+        (told([], outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik"), "missing: A: ik."),
+        (told([], why="no cell of A has a partner in B"), "cannot be told: no cell of A has a partner in B."),
+    ],
+)
+def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
+    assert said in sentence(shown)
+    found = text_of(write_page(shown, tmp_path / "page.html"))
+    assert f"{BIG[shown.outcome]} {sentence(shown)}" in found
+    assert "nan" not in found.lower().split()
+
+
+def test_every_outcome_has_its_word() -> None:
+    assert {Outcome.PASS, Outcome.REGRESSED, Outcome.NOT_COMPARABLE, Outcome.INCOMPLETE} == set(BIG)
+
+
+def test_every_line_has_its_figures_in_both(page: Path) -> None:
+    printed, shown = text(comparison()), text_of(page)
+    assert {found.verdict for found in comparison().differences} == set(MARKS)
+    for found in comparison().differences:
+        for word in (found.method, found.metric, signed(found, found.difference), interval(found)):
+            assert word in printed
+            assert word in shown
+        row = next(row for row in printed.splitlines()[3:] if f" {found.method} " in row and f" {found.metric} " in row)
+        assert row.startswith(f"{MARKS[found.verdict]} {found.verdict} ")
+    assert printed.index("✗ worse") < printed.index("? cannot tell") < printed.index("✓ better")
+    assert printed.index("= same") < printed.index("not gated") < printed.rindex("jitter_m_s3")
+
+
+def test_columns_stand_under_their_titles() -> None:
+    head, *rows = text(comparison()).splitlines()[4:11]
+    for title in ("A", "B", "B − A", "95 % interval", "p (Holm)", "margin"):
+        end = head.index(f" {title} ") + 1 + len(title)
+        assert all(row[end - 1] != " " and row[end] == " " for row in rows[:-1]), title
+
+
+def test_the_page_opens_on_the_verdict_then_the_slopes(page: Path) -> None:
+    raw = page.read_text(encoding="utf-8")
+    places = [raw.index(part) for part in ('class="big regressed"', 'class="tally"', "<nav", 'id="slopes"')]
+    assert places == sorted(places)
+    places = [raw.index(f'id="{name}"') for name in ("slopes", "intervals", "figures", "differs", "verdicts")]
+    assert places == sorted(places)
+    counts = re.findall(r'<li><b>(\d+)</b><span class="verdict (\w+)">', raw)
+    assert [(int(count), name) for count, name in counts] == [
+        (count, kind.replace(" ", "_")) for kind, count in tally(comparison().differences[:-1]).items()
+    ]
+    assert all(meaning in text_of(page) for meaning in MEANINGS.values())
+
+
+def test_every_picture_is_told_in_words(page: Path) -> None:
+    images = [attributes for tag, attributes in read(page).found if tag == "img"]
+    assert len(images) == 6 + 2 + 1
+    for found in comparison().differences[:-1]:
+        (alt,) = (str(i["alt"]) for i in images if str(i["alt"]).startswith(f"{found.method} {found.metric}:"))
+        assert f"{signed(found, found.difference)} ({interval(found)})" in alt
+        assert f": {found.verdict}. 24 clips" in alt
+
+
+def test_a_slope_goes_from_a_to_b_beside_the_margin() -> None:
+    figure = Figure(figsize=(3.3, 2.5))
+    draw_slopes(figure, ONE)
+    left, right = figure.axes
+    (lines,) = left.collections
+    ends = [segment[:, 1] for segment in lines.get_segments()]  # type: ignore[attr-defined]  # a LineCollection
+    assert [(a, b) for a, b in ends] == list(zip(ONE.a, ONE.b, strict=True))
+    assert right.get_ylim()[0] <= -ONE.margin < ONE.margin <= right.get_ylim()[1]
+
+
+def test_a_slope_is_coloured_by_what_it_means() -> None:
+    """All clips rise: errors are worse then, frames per second better."""
+    rising = line("local_pca", "mpjpe_mm", 8, 0.3)
+    error, speed = slopes(rising, 1).svg, slopes(replace(rising, metric="fps", unit="frames/s"), 1).svg
+    assert direction(rising) == (8, 0, 0)
+    assert [colour in error for colour in (WORSE, BETTER)] == [True, False]
+    assert [colour in speed for colour in (WORSE, BETTER)] == [False, True]
+
+
+@pytest.mark.parametrize("clips", [1, 6, 60])
+def test_words_of_a_picture_do_not_meet_and_stay_on_it(clips: int) -> None:
+    made: list[Figure] = []
+
+    def draw(figure: Figure) -> None:
+        draw_slopes(figure, line("ik", "mpjpe_mm", clips, 0.3))
+        made.append(figure)
+
+    drawn("slopes", "", "", "", draw, 2.5, width_in=3.3, layout=None)
+    _apart(made[0])
+
+
+def test_names_of_an_interval_chart_do_not_meet() -> None:
+    names = ["ik", "dynamic_map[neigh…\nlong,\npos, new", "x\ny"]
+    lines = [line(f"m{n}", "mpjpe_mm", 8, change) for n, change in enumerate((0.01, 3.0, -0.2))]
+    made: list[Figure] = []
+
+    def draw(figure: Figure) -> None:
+        draw_intervals(figure, lines, names)
+        made.append(figure)
+
+    drawn("intervals", "", "", "", draw, 2.2, width_in=4.2)
+    _apart(made[0])
+
+
+def _apart(figure: Figure) -> None:
+    texts = [t for axes in figure.axes for t in (*_ticks(axes.xaxis), *_ticks(axes.yaxis), *axes.texts)]
+    boxes = [t.get_window_extent() for t in texts if t.get_text()]
+    assert len(boxes) > 5
+    for n, box in enumerate(boxes):
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
+        assert not any(box.overlaps(other) for other in boxes[n + 1 :])
+
+
+def _ticks(axis: Axis) -> list[Text]:
+    """Labels that are drawn: those within the limits."""
+    low, high = sorted(axis.get_view_interval())
+    return [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]
+
+
+@pytest.mark.parametrize("clips", [0, 1, 5])
+def test_too_few_clips_are_shown_and_not_told(clips: int, tmp_path: Path) -> None:
+    shown = whole([line("ik", "mpjpe_mm", clips, 0.05)])
+    said = text_of(write_page(shown, tmp_path / "page.html"))
+    assert f"too few clips: {clips}, of at least 6" in said
+    assert f"cannot tell, too few clips: {clips}, of at least 6: ik mpjpe_mm" in text(shown)
+    assert "nan" not in said.lower().split()
+
+
+def test_sixty_clips_are_drawn_and_listed(tmp_path: Path) -> None:
+    shown = whole([line("ik", "mpjpe_mm", 60, 0.05)])
+    said = text_of(write_page(shown, tmp_path / "page.html"))
+    assert "60 clips: " in said
+    assert all(said.count(clip) for clip in shown.differences[0].clips)
+    assert len(slopes(shown.differences[0], 1).svg) < 80_000
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_differs_is_named_and_long_lists_are_counted(tmp_path: Path) -> None:
+    cells = tuple(f"ik on walking_{n}" for n in range(500))
+    shown = told([], only_a=cells, only_b=cells[:2], inputs_that_differ=("tracker.rate_hz: 40 against 60",), why="x")
+    printed, said = text(shown), text_of(write_page(shown, tmp_path / "page.html"))
+    for found in (printed, said):
+        assert "tracker.rate_hz: 40 against 60" in found
+        assert "ik on walking_0, ik on walking_1" in found
+        assert all(name in found for name, _, _ in CIRCUMSTANCES)
+    assert "cells in a alone: 500 (ik on walking_0, ik on walking_1, ik on walking_2 and 497 more)" in printed
+    assert "and 300 more" in said
+    assert max(map(len, printed.splitlines())) < 200
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_equal_sides_are_the_same_and_nothing_differs(tmp_path: Path) -> None:
+    shown = told([line("ik", metric, 6, 0.0) for metric in METRICS], circumstances=())
+    assert shown.outcome is Outcome.PASS
+    assert "6 clips: 6 unchanged." in slopes(shown.differences[0], 1).alt
+    said = text_of(write_page(shown, tmp_path / "page.html"))
+    assert "Nothing: same inputs, same circumstances, the same cells." in said
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_groups_are_told_apart_where_there_are_several(tmp_path: Path) -> None:
+    lines = [line("ik", "mpjpe_mm", 6, 0.05, group) for group in (GROUP, "pos, subject, new")]
+    assert text(whole(lines)).count("pos, subject, new") == 1
+    assert text_of(write_page(whole(lines), tmp_path / "page.html")).count("pos, subject, new") == 2
+    assert "pos, subject, new" not in text(whole(lines[:1]))
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_lines_stand_worst_first(tmp_path: Path) -> None:
+    lines = [line(f"m{n}", "mpjpe_mm", 6, 0.0) for n in range(30)] + [line("bad", "mpjpe_mm", 6, 0.4)]
+    raw = write_page(whole(lines), tmp_path / "page.html").read_text(encoding="utf-8")
+    assert re.findall(r'<th scope="row">(\w+)<', raw)[:2] == ["bad", "m0"]
+
+
+def test_of_many_slopes_the_rest_is_folded() -> None:
+    lines = [line(f"m{n}", "mpjpe_mm", 6, 0.0) for n in range(30)]
+    charts = [Chart(f"slopes_{n}", "", "", "", "<svg></svg>") for n in range(30)]
+    raw = comparison_page(whole(lines), Pictures(charts), [])
+    assert raw.index('alt=""') < raw.index("<summary>6 more lines</summary>")
+    assert raw.count('class="panel"') == 30
+
+
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
+    lines = [
+        replace(
+            line("ik", "mpjpe_mm", 6, 0.3), method=HOSTILE, group=group, unit=HOSTILE, why=HOSTILE, clips=(HOSTILE,) * 6
+        )
+        for group in (GROUP, HOSTILE)
+    ]
+    lists = dict.fromkeys(("only_a", "only_b", "inputs_that_differ", "allowed", "coverage", "failed"), (HOSTILE,))
+    shown = told(lines, a=HOSTILE, b=HOSTILE, why=HOSTILE, circumstances=((HOSTILE,) * 3,), **lists)
+    page = write_page(shown, tmp_path / "page.html")
+    raw = page.read_text(encoding="utf-8")
+    assert "<script" not in raw
+    assert read(page).text.count(HOSTILE) > 20
+    assert not re.search(r"(?:src|href)=\"(?!data:|#)", raw)
+    assert HOSTILE.splitlines()[0] in text(shown)
+
+
+def test_a_mean_of_zero_has_no_share(tmp_path: Path) -> None:
+    zero = replace(line("ik", "mpjpe_mm", 6, 0.3), a=(0.0,) * 6, mean_a=0.0)
+    said = text_of(write_page(whole([zero]), tmp_path / "page.html"))
+    assert "nan" not in said.lower()
+    assert "nan" not in text(whole([zero])).lower()
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_without_matplotlib_the_figures_stay(tmp_path: Path) -> None:
+    page = write_page(comparison(), tmp_path / "page.html")
+    assert "Charts: matplotlib is not installed; their numbers are in the tables" in text_of(page)
+    assert "<img" not in page.read_text(encoding="utf-8")
+
+
+def test_the_same_comparison_gives_the_same_bytes(tmp_path: Path) -> None:
+    shown = whole([ONE])
+    one, other = (write_page(shown, tmp_path / name).read_bytes() for name in ("a.html", "b.html"))
+    assert one == other

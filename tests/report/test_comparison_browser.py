@@ -1,0 +1,22 @@
+"""A comparison's page in a browser: whole at the width of a desktop and of a phone, and quiet."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.report.comparison import write_page
+from tests.report.fabricate_comparison import comparison
+from tests.report.watching import is_whole_and_quiet
+
+
+@pytest.fixture(scope="module")
+def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_page(comparison(7), tmp_path_factory.mktemp("browser") / "page.html")
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_is_whole_and_quiet(browser: Any, page_file: Path, width: int) -> None:
+    images, first = is_whole_and_quiet(browser, page_file, width)
+    assert images == 9
+    assert "Regressed" in first
