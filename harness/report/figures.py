@@ -198,7 +198,8 @@ def _boxes(axes: "Axes", values: Floats, colour: str) -> None:
 def legend(figure: "Figure", axes: "Axes") -> None:
     """What the lines of `axes` are called, above the chart; it grows by the rows that do not fit into the first."""
     handles, names = axes.get_legend_handles_labels()
-    columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= _LETTERS), 1)
+    room = _LETTERS * figure.get_figwidth() / _WIDTH_IN
+    columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= room), 1)
     figure.legend(handles, names, loc="outside upper left", ncols=columns)
     further_rows = max(math.ceil(len(names) / columns) - 1, 0)
     figure.set_figheight(figure.get_figheight() + _ROW_IN * further_rows)

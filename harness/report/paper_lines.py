@@ -46,7 +46,7 @@ def draw_lines(canvas: "Figure", lines: Lines, places: Mapping[str, int]) -> Non
     if heights and 0.0 <= min(heights) < 0.5 * max(heights):
         axes.set_ylim(bottom=0.0)
     if len(ends) <= _MOST_NAMED:
-        _name_ends(axes, ends)
+        name_ends(axes, ends)
     else:
         legend(canvas, axes)
 
@@ -68,8 +68,11 @@ def apart(wanted: Sequence[float], gap: float) -> list[float]:
     return [place - too_high for place in places]
 
 
-def _name_ends(axes: "Axes", ends: Sequence[tuple[float, str, str]]) -> None:
-    """Each name right of its line's end, led to by its colour, moved apart where they would meet."""
+def name_ends(axes: "Axes", ends: Sequence[tuple[float, str, str]]) -> None:
+    """Each name right of its line's end, led to by its colour, moved apart where they would meet.
+
+    `ends` are the last value, name and colour of each line.
+    """
     low, high = axes.get_ylim()
     ends = sorted(ends)
     starts = [(value - low) / (high - low) for value, *_ in ends]
