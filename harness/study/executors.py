@@ -8,6 +8,7 @@ a local one listens on loopback alone, any other is used only where it is named.
 import asyncio
 import logging
 import os
+import signal
 import sys
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -29,7 +30,7 @@ ANSWER_S = 5.0
 LOOK_S = 1.0
 """How often it is asked whether it is there and how many workers it has."""
 LOCAL = {
-    "distributed.scheduler.allowed-failures": 1,  # as a pool has it: a task is begun twice, see `keep_busy`
+    "distributed.scheduler.allowed-failures": 1,  # of workers that die with a task; then `keep_busy` has it tried alone
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
     "distributed.worker.profile.enabled": False,  # it would slow the steps that are timed
@@ -116,7 +117,14 @@ def _scheduler(address: str, workers: int | None) -> Iterator[Any]:
                 silence_logs=logging.CRITICAL,
             )
         with cluster:
-            yield cluster
+            try:
+                yield cluster
+            except BaseException:  # such as Ctrl-C: Dask would give what runs some seconds to end
+                for nanny in cluster.workers.values():
+                    nanny.auto_restart = False
+                    if nanny.pid:
+                        os.kill(nanny.pid, signal.SIGKILL)
+                raise
 
 
 async def _answers(address: str) -> None:
@@ -154,7 +162,8 @@ def _each(
 
 
 class _Room:
-    """How many tasks a scheduler is given at a time: one for each worker and one more, so that none waits for us."""
+    """How many tasks a scheduler is given at a time: one for each worker, for those that wait in one that dies are
+    suspected too."""
 
     def __init__(self, client: Any) -> None:
         self._client, self._asked_s, self._places = client, -LOOK_S, 1
@@ -164,7 +173,7 @@ class _Room:
         if self._client.status != "running":
             raise OSError(self._client.status)
         if time.monotonic() - self._asked_s >= LOOK_S:
-            self._places = len(self._client.nthreads()) + 1
+            self._places = max(1, len(self._client.nthreads()))
             self._asked_s = time.monotonic()
         return self._places
 

@@ -1,8 +1,12 @@
 """Worker processes: every task once, failures where they belong, an early end for all."""
 
 import os
+import signal
 import time
+from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
+from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -25,6 +29,39 @@ def test_an_error_is_the_tasks_own() -> None:
 def test_a_worker_that_dies_is_told() -> None:
     ((_, future),) = call_each(os._exit, [(3,)], 1)
     assert isinstance(future.exception(), BrokenExecutor)
+
+
+def dies(times: int, there: Path) -> str:
+    """Kill the worker that many times, then say which tasks were under way beside this one."""
+    begun = sum(1 for name in there.iterdir() if name.suffix == ".begun")
+    if begun < times:
+        (there / f"{begun}.begun").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return " ".join(sorted(path.name for path in there.iterdir() if path.suffix == ".running"))
+
+
+def takes_long(there: Path) -> str:
+    mark = there / f"{os.getpid()}.running"
+    mark.touch()
+    time.sleep(0.3)
+    mark.unlink()
+    return "done"
+
+
+def test_a_worker_that_dies_takes_nothing_with_it_but_its_task_which_is_begun_once_more_alone(tmp_path: Path) -> None:
+    (once := tmp_path / "once").mkdir()
+    (always := tmp_path / "always").mkdir()
+    tasks: list[tuple[Any, ...]] = [(dies, 1, once), (dies, 2, always), (takes_long, once), (takes_long, always)]
+    ended = list(call_each(_call, tasks, 2))
+    assert sorted(which for which, _ in ended[:2]) == [2, 3]
+    came = dict(ended)
+    assert came[2].result() == came[3].result() == "done"
+    assert came[0].result() == ""  # nothing ran beside it
+    assert isinstance(came[1].exception(), BrokenExecutor)
+
+
+def _call(function: Callable[..., str], *task: Any) -> str:
+    return function(*task)
 
 
 def test_stopping_early_stops_what_runs() -> None:
