@@ -1,10 +1,11 @@
 """Everything that can be named on the command line or in a scenario, with a line about each."""
 
-from harness.config import Scenario, load_scenario, shipped_scenarios, variants
+from harness.config import Scenario, load_scenario, shipped_placements, shipped_scenarios, variants
 from harness.mocap import performer
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
 from harness.stream.inputs import COMBINATIONS
+from harness.study.placement_study import load_study
 
 
 def catalogue() -> dict[str, dict[str, str]]:
@@ -12,6 +13,7 @@ def catalogue() -> dict[str, dict[str, str]]:
     return {
         "methods": {name: _method(name) for name in registry.methods()},
         "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
+        "placement studies": {path.stem: load_study(path).title for path in shipped_placements()},
         f"motion of the {performer.SOURCE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
         "inputs": dict(COMBINATIONS),
         "noise": {

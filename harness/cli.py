@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import calibrate, compare, emulate, live, motion, paper, record, runs, trust
+from harness.commands import calibrate, compare, emulate, live, motion, paper, placement, record, runs, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -72,6 +72,7 @@ def build_parser() -> argparse.ArgumentParser:
         record.add_record,
         record.add_replay,
         paper.add_paper,
+        placement.add_placement,
         compare.add_compare,
         compare.add_baseline,
     ):

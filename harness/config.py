@@ -136,6 +136,8 @@ def load_scenario(path: Path | str) -> Scenario:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise BadFile(path, f"not TOML: {error}", "a scenario", "`harness list` names the shipped ones.") from error
+    if content.get("kind") == "placement":
+        raise BadFile(path, "a placement study", "a scenario", "`harness placement` does it.")
     content.setdefault("name", path.stem)
     try:
         scenario = build(Scenario, content, "scenario")
@@ -153,7 +155,7 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
 
     UnknownName for a key that does not exist, BadInput for one that cannot be varied or a value that does not fit.
     """
-    choices = dict(_leaves(scenario.vary))
+    choices = dict(leaves(scenario.vary))
     for key, values in choices.items():
         if key.split(".")[0] in _FIXED or key in ("motion.test", "motion.behaviours"):
             raise BadInput(f"vary: {key} cannot be varied.", "Lists of methods, inputs and clips say it themselves.")
@@ -177,11 +179,11 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
     return found
 
 
-def _leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys, whether TOML read them as one text or as tables inside tables."""
     for key, value in table.items():
         if isinstance(value, Mapping):
-            yield from _leaves(value, f"{before}{key}.")
+            yield from leaves(value, f"{before}{key}.")
         else:
             yield f"{before}{key}", value
 
@@ -191,7 +193,7 @@ def find_scenario(path: Path | str) -> Path:
     given = Path(path)
     if given.is_file():
         return given
-    shipped = {p.stem: p for p in shipped_scenarios()}
+    shipped = {p.stem: p for p in (*shipped_scenarios(), *shipped_placements())}
     if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
@@ -200,7 +202,13 @@ def find_scenario(path: Path | str) -> Path:
 
 
 def shipped_scenarios() -> list[Path]:
-    return sorted(share_folder("scenarios").glob("*.toml"))
+    studies = shipped_placements()
+    return sorted(path for path in share_folder("scenarios").glob("*.toml") if path not in studies)
+
+
+def shipped_placements() -> list[Path]:
+    """Studies of where trackers go, which lie among the scenarios."""
+    return sorted(share_folder("scenarios").glob("placement_*.toml"))
 
 
 def check_scenario(path: Path, scenario: Scenario) -> None:

@@ -134,6 +134,11 @@ class Search:
     steps: tuple[Step, ...]
     ended: str = ""
     """Why it ended."""
+    held_out: float | None = None
+    """What the last set saves against the first on clips on which nothing was chosen; None where it was not judged."""
+    held_out_low: float | None = None
+    held_out_high: float | None = None
+    held_out_clips: int = 0
 
 
 @dataclass(frozen=True)

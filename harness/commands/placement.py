@@ -1,0 +1,36 @@
+"""The verb that finds out where trackers go."""
+
+import argparse
+import sys
+from contextlib import redirect_stdout
+from pathlib import Path
+
+from harness.commands.runs import this_command
+from harness.commands.verb import Verbs, add_verb, positive, say
+from harness.errors import Outcome
+from harness.progress import ProgressBar
+
+
+def add_placement(verbs: Verbs) -> None:
+    text = "find out which trackers to wear and where: sets of candidates, ranked; resumes what was interrupted"
+    verb = add_verb(verbs, "placement", text, place_trackers, "out", "mocap")
+    verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as placement_walking")
+    verb.add_argument("--jobs", type=positive, default=2, metavar="N", help="clips at the same time (default 2)")
+
+
+def place_trackers(args: argparse.Namespace) -> Outcome:
+    from dataclasses import asdict
+
+    from harness.report.placement_text import text
+    from harness.score.files import plain
+    from harness.study.executors import processes
+    from harness.study.placement import FINDINGS, placement
+
+    out = args.out or Path("results") / Path(args.study).stem
+    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+        each = processes(args.jobs)
+        findings, outcome = placement(
+            args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
+        )
+    content = {**plain(asdict(findings)), "out": str(out)}
+    return say(args, content, text(findings), "", f"findings: {out / FINDINGS}", outcome=outcome)

@@ -1,0 +1,123 @@
+"""What a placement study will do: its scenarios, its candidates, the sets known from the beginning, all checked.
+
+Everything that does not exist, cannot be worn, or would be absurdly much is refused here, before anything is written.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from harness.cells import check_names, source_of
+from harness.config import Scenario
+from harness.core.protocol import Part
+from harness.errors import BadInput
+from harness.score.margins import margin_of
+from harness.score.placement import Place
+from harness.study import search, suffices
+from harness.study.candidates import Unit, Worn, worn
+from harness.study.placement_study import PlacementStudy, base_scenario, find_study, load_study
+from harness.study.ranking import Costs
+from harness.study.search import stations
+from harness.study.trying import Asked, rate_hz
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One study, ready to be done."""
+
+    study: PlacementStudy
+    units: tuple[Unit, ...]
+    scenario: Scenario
+    """With the clips on which everything is chosen."""
+    held_out: Scenario | None
+    """The same with the clips on which nothing is."""
+    elsewhere: Mapping[str, Scenario]
+    """Condition -> its scenario."""
+    motion: str
+
+    @property
+    def sign(self) -> float:
+        """Costs are errors times this: the less the better."""
+        return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        return tuple(dict.fromkeys(place for unit in self.units for place in unit))
+
+    def asked(self, scenario: Scenario, sets: Iterable[Worn]) -> Asked:
+        return Asked(scenario, tuple(dict.fromkeys(sets)), self.study.link)
+
+    def rate_hz(self, size: int) -> float:
+        """Of so many stations."""
+        return rate_hz(self.scenario, size, self.study.link)
+
+    def known_sets(self) -> list[Worn]:
+        """That will be tried whatever comes out: asked for at once they keep all workers busy."""
+        study, found = self.study, list[Worn]()
+        if study.ablate:
+            full, less = search.ablated(study.ablate, self.units)
+            found += [full, *less.values()]
+        if study.add:
+            base, more = search.added(study.add, self.units)
+            found += [*([base] if base else []), *more.values()]
+        if study.exhaustive:
+            found += search.every_set(study.exhaustive, self.units)
+        for claim in study.claim:
+            suited, others, whole = suffices.sets_of(claim, self.units)
+            found += [suited, *others, whole]
+        return list(dict.fromkeys(found))
+
+    def compared(self, tried: Iterable[Worn]) -> list[Worn]:
+        """The sets that every condition ranks, those of `exhaustive` if there are; none without another condition."""
+        if not self.elsewhere and len(self.study.methods) < 2:
+            return []
+        alike = search.every_set(self.study.exhaustive, self.units) if self.study.exhaustive else tried
+        return [one for one in alike if len(one) == self.study.condition_size and not moved(one)]
+
+    def link(self, sizes: Sequence[int]) -> str:
+        """In words."""
+        if not self.study.link:
+            return ""
+        tracker = self.scenario.tracker
+        rates = ", ".join(f"{size} at {self.rate_hz(size):.4g} Hz" for size in sizes)
+        return f"a line of {tracker.baud} baud carries {rates} (at most {tracker.rate_hz:g} Hz)"
+
+    def costs(self, errors: Costs) -> dict[str, float | None]:
+        """The other way round as well."""
+        return {clip: None if value is None else self.sign * value for clip, value in errors.items()}
+
+
+def moved(one: Worn) -> bool:
+    """Whether `refine` moved any of them."""
+    return any(place.moved_from for place in one)
+
+
+def plan(path: Path | str, folder: Path | None) -> Plan:
+    """Of a study's TOML file; BadFile, BadInput, UnknownName."""
+    file = find_study(path)
+    study = load_study(file)
+    scenario = base_scenario(study, file.parent)
+    elsewhere = {one.name: base_scenario(study, file.parent, one) for one in study.condition}
+    held_out = _held_out(study, scenario)
+    source = source_of(scenario.motion, folder, scenario.seed)
+    made = Plan(study, study.units(), scenario, held_out, elsewhere, source.title)
+    for one in filter(None, (scenario, held_out, *elsewhere.values())):
+        alone = replace(one, worn=stations(worn(made.units[:1], made.units)))
+        parts = [Part.parse(text) for text in one.motion.test]
+        check_names(alone, source_of(one.motion, folder, one.seed), parts)
+    if study.exhaustive:
+        search.refuse_absurd(study.exhaustive, made.units, len(scenario.motion.test) * len(scenario.methods))
+    for size in {len(one) for one in made.known_sets()}:
+        made.rate_hz(size)
+    return made
+
+
+def _held_out(study: PlacementStudy, scenario: Scenario) -> Scenario | None:
+    motion = scenario.motion
+    if not study.held_out:
+        return None
+    if both := sorted(set(study.held_out) & set(motion.test)):
+        raise BadInput(f"held_out: {', '.join(both)} is also chosen on.", "Remove it from one of the two.")
+    if len(set(motion.behaviours)) > 1:
+        raise BadInput("held_out beside test clips of several behaviours.", "Hold out in a study of one behaviour.")
+    return replace(scenario, motion=replace(motion, test=study.held_out, behaviours=motion.behaviours[:1]))
