@@ -133,7 +133,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
     scenario, simulation = setting.scenario, setting.simulation
     seen = combination(planned.inputs, simulation.stations)
     known, fitted = setting.calibrated, setting.fitted(method, planned.method)
-    qpos, status, step_ms, reference_ms = reconstruct(fitted, known.calibration, simulation, seen)
+    qpos, status, step_ms, cpu_ms = reconstruct(fitted, known.calibration, simulation, seen)
     scores = score(
         setting.body.skeleton,
         scenario.tracker.rate_hz,
@@ -142,7 +142,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         simulation.frame_index,
         status,
         step_ms,
-        reference_ms=reference_ms,
+        cpu_ms=cpu_ms,
         estimate_skeleton=known.body.skeleton,
     )
     frames = simulation.frames
@@ -178,7 +178,8 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
         frame_index=simulation.frame_index,
         status=status,
         step_ms=step_ms,
-        reference_ms=reference_ms,
+        step_cpu_ms=cpu_ms[0],
+        reference_cpu_ms=cpu_ms[1],
         quality=np.array([f.quality for f in frames]),
         position_valid=np.array([f.position_valid for f in frames]),
         orientation_valid=np.array([f.orientation_valid for f in frames]),
@@ -188,25 +189,26 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
 
 def reconstruct(
     reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
-) -> tuple[Floats, Ints, Floats, Floats]:
-    """Estimates (F, 55), status (F,), wall time of each step [ms] (F,) and of the reference [ms] (F,).
+) -> tuple[Floats, Ints, Floats, tuple[Floats, Floats]]:
+    """Estimates (F, 55), status (F,), wall time of each step [ms] (F,), CPU time of each and of the reference [ms] (F,).
 
-    Reference work follows every so many steps. The step after it would find the method's data gone from the caches, and
-    is not timed, NaN: times are of steps that follow a step. The truth stays on this side.
+    Reference work follows every so many steps. The step after it finds the method's data gone from the caches and is not
+    timed, NaN: times are of steps that follow a step. The truth stays on this side.
     """
     session, work = reconstructor.begin(calibration), Reference()
-    qpos, status, step_ms, reference_ms = [], [], [], []
+    qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
     for index, frame in enumerate(simulation.frames):
         shown = inputs.masked(frame)
-        start = time.perf_counter()
+        start_cpu, start = time.process_time(), time.perf_counter()
         estimate = session.step(shown)
         step_ms.append(1e3 * (time.perf_counter() - start))
+        cpu_ms.append(1e3 * (time.process_time() - start_cpu))
         qpos.append(estimate.qpos)
         status.append(estimate.status)
-        reference_ms.append(work.timed_ms() if index % EVERY == EVERY - 1 else np.nan)
-    times_ms = np.array(step_ms)
-    times_ms[EVERY::EVERY] = np.nan
-    return np.array(qpos), np.array(status), times_ms, np.array(reference_ms)
+        reference_ms.append(work.cpu_ms() if index % EVERY == EVERY - 1 else np.nan)
+    times_ms = np.array([step_ms, cpu_ms, reference_ms])
+    times_ms[:2, EVERY::EVERY] = np.nan
+    return np.array(qpos), np.array(status), times_ms[0], (times_ms[1], times_ms[2])
 
 
 def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:

@@ -44,7 +44,7 @@ _TEXTS = (
     *(*IDENTITY, *FURTHER, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
 )
-_FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "reference_ms", "quality")
+_FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "step_cpu_ms", "reference_cpu_ms", "quality")
 _INTS = ("frame_index", "status")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
 _ERROR = "error."
@@ -108,8 +108,10 @@ class Cell:
     """Scenario key -> value, of the keys that the scenario varies."""
     scenario: str = ""
     """Its name."""
-    reference_ms: Floats = field(default_factory=lambda: np.empty(0))
-    """(F,) wall time of `score.reference` right after each step [ms]; NaN, as by default, where it was not timed."""
+    step_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) CPU time of each step [ms]; NaN, as by default, where not timed."""
+    reference_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
+    """(F,) CPU time of the work of `score.reference` right after each step [ms]; NaN, as by default, where not done."""
     calibration_errors: Mapping[str, float] = field(default_factory=dict)
     """How far what calibration found is from the truth, by name (see `harness.calibrated`); empty where it is exact."""
     estimate_bone_m: Floats = field(default_factory=lambda: np.empty((0, 3)))
@@ -119,10 +121,12 @@ class Cell:
         frames, stations = len(self.time_s), len(self.stations)
         if not len(self.estimate_bone_m):
             object.__setattr__(self, "estimate_bone_m", self.bone_m)
-        if not len(self.reference_ms):
-            object.__setattr__(self, "reference_ms", np.full(frames, np.nan))
+        for name in ("step_cpu_ms", "reference_cpu_ms"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full(frames, np.nan))
         freeze(self, bone_m=("B", 3), estimate_bone_m=("B", 3))
-        freeze(self, time_s=(frames,), step_ms=(frames,), reference_ms=(frames,), quality=(frames, stations))
+        freeze(self, time_s=(frames,), quality=(frames, stations))
+        freeze(self, step_ms=(frames,), step_cpu_ms=(frames,), reference_cpu_ms=(frames,))
         freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
         freeze(self, np.int64, frame_index=(frames,), status=(frames,))
         freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))

@@ -112,7 +112,9 @@ DEFINITIONS: dict[str, Definition] = {
     "step_p99_ms": Definition("ms", "99th percentile of the same"),
     "first_step_ms": Definition("ms", "wall time of the first step"),
     "fps": Definition("frames/s", "1000 / step_mean_ms"),
-    "step_relative": Definition("x", "step_p50_ms / median of a fixed piece of work, timed between the same steps"),
+    "step_relative": Definition(
+        "x", "median CPU time of a step / that of a fixed piece of work done between the steps"
+    ),
 }
 
 VERSIONS: dict[str, int] = {name: definition.version for name, definition in DEFINITIONS.items()}

@@ -42,7 +42,7 @@ def score(
     status: Ints,
     step_ms: Floats,
     *,
-    reference_ms: Floats | None = None,
+    cpu_ms: tuple[Floats, Floats] | None = None,
     estimate_skeleton: Skeleton | None = None,
     warm_up_s: float = WARM_UP_S,
     floor: float = COVERAGE_FLOOR,
@@ -51,8 +51,8 @@ def score(
 
     The truth stands on `skeleton`, the estimate on the one that its method believed in: the same by default.
     `truth_qpos` (E, 55), `estimate_qpos` (F, 55), `frame_index` (F,) the true frame that each estimate is of,
-    strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed, `reference_ms` any
-    number of wall times between them (see `score.reference`), NaN likewise. Raises ShapeError and BadInput.
+    strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed, `cpu_ms` (F,) of
+    the steps and (F,) of the reference (see `timing.step_relative`), NaN likewise. Raises ShapeError and BadInput.
     """
     frame_index, status, step_ms = _checked(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
     warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
@@ -79,7 +79,8 @@ def score(
     measured["root_drift_mm_s"] = positions.root_drift_mm_s(judged)
     measured["lag_ms"] = timing.lag_ms(truth.angles_rad, judged.estimate.angles_rad, judged.frame_index, rate_hz)
     timed = warm & (np.arange(len(step_ms)) > 0)
-    measured |= timing.step_times_ms(step_ms[timed], reference_ms)
+    measured |= timing.step_times_ms(step_ms[timed])
+    measured["step_relative"] = float("nan") if cpu_ms is None else timing.step_relative(cpu_ms[0][timed], cpu_ms[1])
     measured["first_step_ms"] = float(step_ms[0]) if len(step_ms) else float("nan")
     counts: dict[str, float] = {
         "frames_matched": int(scored.sum()),

@@ -16,7 +16,7 @@ from harness.score.cell import FURTHER, IDENTITY, Cell, as_row, varied_text
 from harness.score.files import plain
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import pooled
-from harness.score.timing import step_times_ms
+from harness.score.timing import step_relative, step_times_ms
 
 FIRST_METRICS = (
     "frames_matched",
@@ -68,7 +68,7 @@ class _Group:
         self.sequences: list[dict[str, Any]] = []
         self.frames: dict[str, list[Floats]] = {name: [] for name in FRAME_METRICS}
         self.step_ms: list[Floats] = []
-        self.reference_ms: list[Floats] = []
+        self.cpu_ms: list[Floats] = []
 
     def add(self, cell: Cell) -> None:
         self.sequences.append(as_row(cell))
@@ -76,8 +76,9 @@ class _Group:
             return
         for name, values in cell.scores.per_frame.items():
             self.frames[name].append(values[cell.scores.scored].astype(np.float32))
-        self.step_ms.append(cell.step_ms[cell.scores.scored & (np.arange(len(cell)) > 0)])
-        self.reference_ms.append(cell.reference_ms)
+        timed = cell.scores.scored & (np.arange(len(cell)) > 0)
+        self.step_ms.append(cell.step_ms[timed])
+        self.cpu_ms.append(np.array([np.where(timed, cell.step_cpu_ms, np.nan), cell.reference_cpu_ms]))
 
     def named(self, fields: Iterable[str]) -> dict[str, Any]:
         """What all its cells share."""
@@ -108,10 +109,14 @@ class _Group:
             columns = [values.astype(float) for values in self.frames[name]]
             value = pooled(np.concatenate(columns), DEFINITIONS[name].pool) if columns else np.nan
         else:
-            timed = self.step_ms and (np.concatenate(self.step_ms), np.concatenate(self.reference_ms))
-            times = step_times_ms(*timed) if timed else {}
-            value = times.get(name, np.nan)
+            value = self._times().get(name, np.nan)
         return float(value) if np.isfinite(value) else None
+
+    def _times(self) -> dict[str, float]:
+        if not self.step_ms:
+            return {}
+        relative = step_relative(*np.concatenate(self.cpu_ms, axis=1))
+        return {**step_times_ms(np.concatenate(self.step_ms)), "step_relative": relative}
 
 
 def _text(value: Any) -> str:

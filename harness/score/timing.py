@@ -7,7 +7,6 @@ from harness.score.angles import wrapped
 
 LONGEST_LAG_S = 0.5
 _FEWEST_FRAMES = 20
-STEP_TIMES = ("step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps", "step_relative")
 
 
 def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: float) -> float:
@@ -35,20 +34,29 @@ def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: 
     return float(1e3 * (shifts[best] + share) / rate_hz)
 
 
-def step_times_ms(step_ms: Floats, reference_ms: Floats | None = None) -> dict[str, float]:
-    """Wall time of a step (batch of one): mean, p50, p95, p99, frames per second, and p50 relative to the work of
-    `score.reference` where that was timed; NaN of none, and NaN where either was not timed."""
+def step_times_ms(step_ms: Floats) -> dict[str, float]:
+    """Wall time of a step (batch of one): mean, p50, p95, p99 and frames per second; NaN of none, or where not timed."""
     known = step_ms[np.isfinite(step_ms)]
     if not len(known):
-        return dict.fromkeys(STEP_TIMES, float("nan"))
+        return dict.fromkeys(("step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps"), float("nan"))
     p50, p95, p99 = np.percentile(known, [50, 95, 99])
     mean = known.mean()
-    reference = np.empty(0) if reference_ms is None else reference_ms[np.isfinite(reference_ms)]
     return {
         "step_mean_ms": float(mean),
         "step_p50_ms": float(p50),
         "step_p95_ms": float(p95),
         "step_p99_ms": float(p99),
         "fps": float(1e3 / mean) if mean > 0.0 else float("nan"),
-        "step_relative": float(p50 / np.median(reference)) if len(reference) else float("nan"),
     }
+
+
+def step_relative(step_cpu_ms: Floats, reference_cpu_ms: Floats) -> float:
+    """How often the work of `score.reference` fits into a step, by medians of CPU time; NaN where either was not timed.
+
+    CPU time, since wall time is no measure of the method on a busy computer: whoever is sent to wait in every step takes
+    several times as long, while work as short as the reference seldom is.
+    """
+    steps, work = (times[np.isfinite(times)] for times in (step_cpu_ms, reference_cpu_ms))
+    if not len(steps) or not len(work) or np.median(work) <= 0.0:  # a clock may be too coarse for it
+        return float("nan")
+    return float(np.median(steps) / np.median(work))

@@ -302,15 +302,17 @@ def test_status_is_counted_and_steps_are_timed(truth_qpos: Floats) -> None:
     status[50:60], status[60:65] = Status.HELD, Status.LOST
     step_ms = np.r_[500.0, np.linspace(1.0, 3.0, FRAMES - 1)]
     scored = SKELETON, RATE_HZ, truth_qpos, truth_qpos, np.arange(FRAMES), status, step_ms
-    reference_ms = np.r_[0.5, np.nan, 0.4, 9.0, np.nan]
-    found = score(*scored, reference_ms=reference_ms, warm_up_s=0.0).metrics
+    cpu_ms = 0.5 * step_ms, np.full(FRAMES, np.nan)
+    cpu_ms[0][2], cpu_ms[1][:3] = np.nan, (0.5, 0.4, 9.0)
+    found = score(*scored, cpu_ms=cpu_ms, warm_up_s=0.0).metrics
     assert (found["frames_held"], found["frames_lost"]) == (10, 5)
     assert found["first_step_ms"] == 500.0
     assert found["step_p50_ms"] == pytest.approx(2.0)
     assert found["step_p99_ms"] == pytest.approx(2.98)
     assert found["fps"] == pytest.approx(500.0)
-    assert found["step_relative"] == pytest.approx(4.0)
-    assert score(*scored, warm_up_s=0.0).metrics["step_relative"] is None
+    assert found["step_relative"] == pytest.approx(2.0, rel=0.01)
+    for untimed in (None, (cpu_ms[0], np.full(FRAMES, np.nan)), (cpu_ms[0], np.zeros(FRAMES))):
+        assert score(*scored, cpu_ms=untimed, warm_up_s=0.0).metrics["step_relative"] is None
 
 
 def test_input_that_makes_no_sense_is_refused(truth_qpos: Floats) -> None:
