@@ -18,28 +18,58 @@ R = TypeVar("R")
 def call_each(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], workers: int
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    """`function(*task)` of every task, in fresh processes: which task, and what came of it, as each ends.
-
-    A worker that dies takes nothing with it but its task, see `keep_busy`. A caller that stops early, as Ctrl-C makes
-    it, stops what runs at once. What workers print goes to stderr.
-    """
-    theirs, ours = get_context("spawn").Pipe(duplex=False)
-    processes = [_Process(theirs) for _ in range(min(workers, len(tasks)))]
-
-    def submit(which: int) -> Future[R]:
-        return next(process for process in processes if process.idle).submit(function, *tasks[which])
-
+    """`function(*task)` of every task, in fresh processes: which, and what came of it, as each ends; see `Pool`."""
+    pool = Pool(workers)
     try:
-        yield from keep_busy(submit, len(tasks), lambda: len(processes))
-        for process in processes:
-            process.pool.shutdown(wait=False)
-        for process in processes:
-            process.pool.shutdown()
+        yield from pool(function, tasks)
     finally:
-        ours.close()
-        for process in processes:
+        pool.close()
+
+
+class Pool:
+    """So many worker processes, which are started when first needed and then stay for the next call.
+
+    They end with this pool, or with this process. A worker that dies takes nothing with it but its task, see
+    `keep_busy`. What workers print goes to stderr.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self._workers = workers
+        self._begin()
+
+    def __call__(
+        self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]]
+    ) -> Generator[tuple[int, Future[R]], None, None]:
+        """As `call_each`. A caller that stops early, as Ctrl-C makes it, stops what runs at once."""
+
+        def submit(which: int) -> Future[R]:
+            return next(process for process in self._processes if process.idle).submit(function, *tasks[which])
+
+        whole = False
+        try:
+            yield from keep_busy(submit, len(tasks), lambda: self._workers)
+            whole = True
+        finally:
+            if not whole:
+                self._stop()
+                self._begin()
+
+    def close(self) -> None:
+        for process in self._processes:
+            process.pool.shutdown(wait=False)
+        for process in self._processes:
+            process.pool.shutdown()
+        self._stop()
+
+    def _begin(self) -> None:
+        self._theirs, self._ours = get_context("spawn").Pipe(duplex=False)
+        self._processes = [_Process(self._theirs) for _ in range(self._workers)]
+
+    def _stop(self) -> None:
+        self._ours.close()
+        for process in self._processes:
             process.pool.shutdown(cancel_futures=True)
-        theirs.close()
+        self._theirs.close()
 
 
 def keep_busy(

@@ -19,7 +19,7 @@ from importlib.util import find_spec
 from threading import Lock
 from typing import Any, Protocol, TypeVar
 
-from harness.core.workers import call_each, ctrl_c_ignored, keep_busy
+from harness.core.workers import Pool, ctrl_c_ignored, keep_busy
 from harness.errors import BadInput, MissingExtra
 from harness.score.manifest import source_hash
 
@@ -51,14 +51,14 @@ class Each(Protocol):
 
 
 def processes(jobs: int) -> Each:
-    """So many worker processes; a single job needs none and is done in this one."""
-    return here if jobs == 1 else partial(_pool, jobs)
+    """So many worker processes, which stay for the next call; a single job needs none and is done in this one."""
+    return here if jobs == 1 else partial(_pooled, Pool(jobs))
 
 
-def _pool(
-    jobs: int, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
+def _pooled(
+    pool: Pool, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    yield from call_each(_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks], jobs)
+    return pool(_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks])
 
 
 def here(

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from harness.core.workers import call_each
+from harness.core.workers import Pool, call_each
 
 
 def test_every_task_is_called_once_in_another_process() -> None:
@@ -62,6 +62,19 @@ def test_a_worker_that_dies_takes_nothing_with_it_but_its_task_which_is_begun_on
 
 def _call(function: Callable[..., str], *task: Any) -> str:
     return function(*task)
+
+
+def test_a_pool_keeps_its_workers_for_the_next_call_and_starts_no_more_than_it_needs() -> None:
+    pool = Pool(3)
+    ((_, first),) = pool(os.getpid, [()])
+    ((_, again),) = pool(os.getpid, [()])
+    assert first.result() == again.result()
+    calls = pool(time.sleep, [(0.0,), (600.0,)])
+    assert next(calls)[0] == 0
+    calls.close()  # stops all that runs, and is no end of the pool
+    ((_, anew),) = pool(os.getpid, [()])
+    assert anew.result() != first.result()
+    pool.close()
 
 
 def test_stopping_early_stops_what_runs() -> None:
