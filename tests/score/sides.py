@@ -1,0 +1,96 @@
+"""Sides of comparisons made up in memory and as folders; no figure in here was ever measured."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.seeds import generator
+from harness.score.files import content_key, plain
+from harness.score.judged import Judged, JudgedCell
+from harness.score.manifest import Manifest
+from harness.score.metrics import DEFINITIONS, VERSIONS
+
+SIZES = {"joint_angle_mean_deg": 2.0, "mpjpe_mm": 12.0, "jitter_m_s3": 700.0}
+
+
+def manifest(**circumstances: Any) -> Manifest:
+    return Manifest({"name": "made_up", "seed": 1}, VERSIONS, {"commit": "abc", **circumstances})
+
+
+def cell(clip: str = "walk_01", method: str = "ik", times: float = 1.0, **fields: Any) -> JudgedCell:
+    """Errors that belong to the clip, `times` as large; other fields by name, inputs that define it in `defined_by`."""
+    size = float(np.exp(generator(1, "made up", clip).normal(0.0, 0.3)))
+    metrics: dict[str, Any] = dict.fromkeys(DEFINITIONS)
+    metrics |= {name: times * size * of_it for name, of_it in SIZES.items()}
+    metrics |= {"frames_matched": 200, "frames_expected": 200, **fields.pop("metrics", {})}
+    content: dict[str, Any] = {
+        "scenario": "demo",
+        "clip": clip,
+        "seed": 1,
+        "method": method,
+        "inputs": "pos+ori",
+        "protocol": "sequence",
+        "noise": "default",
+        "varied": {},
+        "behaviour": "walking",
+        "performer": "known",
+        **fields,
+    }
+    defined_by = {
+        "clip": clip,
+        "seed": content["seed"],
+        "inputs": content["inputs"],
+        "tracker": {"rate_hz": 40.0, "items": [40, 2]},
+        "examples": {} if content["protocol"] == "none" else {f"walk_{n}": f"digest {n}" for n in range(6)},
+        "withheld": [],
+        "metric_versions": VERSIONS,
+        **content.pop("defined_by", {}),
+    }
+    return JudgedCell(defined_by=defined_by, metrics=metrics, **content)
+
+
+def side(
+    title: str = "A",
+    methods: Mapping[str, float | Sequence[float]] | None = None,
+    clips: int = 8,
+    failed: Sequence[str] = (),
+    **fields: Any,
+) -> Judged:
+    """Method -> how many times as large its errors are as made up, on all clips or on each."""
+    cells = []
+    for method, times in (methods or {"ik": 1.0}).items():
+        each = [times] * clips if isinstance(times, int | float) else times
+        cells += [cell(f"walk_{n:02}", method, float(t), **fields) for n, t in enumerate(each)]
+    return Judged(title, manifest(), tuple(cells), len(cells) + len(failed), tuple(failed))
+
+
+def write_run(out: Path, judged: Judged) -> Path:
+    """As far as comparisons read one."""
+    out.mkdir(parents=True)
+    rows = []
+    for cell in judged.cells:
+        identity = {name: value for name, value in vars(cell).items() if name not in ("metrics", "defined_by")}
+        key = content_key(identity)
+        (out / "cells" / key).mkdir(parents=True)
+        _write(out / "cells" / key / "cell.json", {"defined_by": cell.defined_by})
+        rows.append({**identity, **cell.metrics, "key": key})
+    _write(out / "manifest.json", judged.manifest.as_dict())
+    summary = {
+        "outcome": "incomplete" if judged.failed else "pass",
+        "cells_finished": len(rows),
+        "cells_planned": judged.planned,
+        "failures": dict.fromkeys(judged.failed, "Traceback: no pose"),
+        "methods": [],
+        "behaviours": [],
+        "cells": rows,
+    }
+    _write(out / "summary.json", summary)
+    return out
+
+
+def _write(path: Path, content: Mapping[str, Any]) -> None:
+    """Without the flush to the disk that a run waits for."""
+    path.write_text(json.dumps(plain(content)))

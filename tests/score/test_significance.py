@@ -1,0 +1,137 @@
+"""Sign flips, Holm's correction and verdicts: laws, cases worked out by hand, and what few clips can show."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from harness.core.arrays import Floats
+from harness.core.seeds import generator
+from harness.score import significance
+from harness.score.significance import Judgement, holm, judge, least_p, sign_flip_p
+
+
+def by_hand(difference: Floats) -> float:
+    """Every flip, one after another."""
+    flips = itertools.product((-1.0, 1.0), repeat=len(difference))
+    means = [abs(sum(sign * value for sign, value in zip(flip, difference, strict=True))) for flip in flips]
+    return float(np.mean([mean >= abs(difference.sum()) - 1e-9 for mean in means]))
+
+
+@pytest.mark.parametrize("count", [1, 2, 6, 9])
+def test_p_is_the_share_of_flips_as_far_from_zero(count: int, rng: np.random.Generator) -> None:
+    for shift in (0.0, 0.5, 3.0):
+        difference = rng.normal(size=count) + shift
+        assert sign_flip_p(difference) == pytest.approx(by_hand(difference), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("difference", "p"),
+    [
+        ([0.1] * 6, 2 / 64),  # none but all of one sign
+        ([0.1, 0.2, 0.3, 0.4, 0.5, 0.6], 2 / 64),
+        ([0.1, 0.1, 0.1, 0.1, 0.1, -0.1], 14 / 64),  # seven ways each to have at most one of the other sign
+        ([0.0, 0.0, 0.3, 0.3, 0.3, 0.3], 2 / 16),  # zeros have no sign
+        ([0.0] * 6, 1.0),
+    ],
+)
+def test_ties_count_as_found(difference: list[float], p: float) -> None:
+    assert sign_flip_p(np.array(difference)) == pytest.approx(p, abs=1e-12)
+
+
+@pytest.mark.parametrize("count", [8, 16, 17, 24])
+def test_p_does_not_know_sides_units_or_order(count: int, rng: np.random.Generator) -> None:
+    difference = rng.normal(0.3, 1.0, count)
+    assert sign_flip_p(-difference) == sign_flip_p(difference) == sign_flip_p(1e-3 * difference)
+    if count <= 16:
+        assert sign_flip_p(difference[::-1]) == sign_flip_p(difference)
+
+
+def test_many_clips_are_drawn_as_exactly_as_few_are_counted(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lines = [rng.normal(shift, 1.0, 15) for shift in (0.1, 0.4, 0.7)]
+    exact = [sign_flip_p(line) for line in lines]
+    monkeypatch.setattr(significance, "_EXACT_CLIPS", 10)
+    significance._signs.cache_clear()
+    drawn = [sign_flip_p(line) for line in lines]
+    significance._signs.cache_clear()
+    np.testing.assert_allclose(drawn, exact, atol=4.0 * np.sqrt(0.25 / 20_000))
+    assert sign_flip_p(np.ones(40)) == 1 / 20_001
+
+
+def test_least_p_is_that_of_all_on_one_side(rng: np.random.Generator) -> None:
+    difference = rng.normal(size=9)
+    assert least_p(difference) == sign_flip_p(np.abs(difference)) == 2 / 2**9
+    assert least_p(difference) <= sign_flip_p(difference)
+
+
+def test_holm_by_hand() -> None:
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.5]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+def test_holm_keeps_the_order_and_lies_between_p_and_bonferroni(rng: np.random.Generator) -> None:
+    for count in (1, 3, 20):
+        p = rng.random(count) ** 3
+        corrected = np.array(holm(p.tolist()))
+        assert (np.diff(corrected[np.argsort(p)]) >= 0.0).all()
+        assert (corrected >= p).all()
+        assert (corrected <= np.minimum(1.0, count * p) + 1e-15).all()
+
+
+SCATTER = generator(1, "scatter").normal(size=12)
+SCATTER -= SCATTER.mean()
+
+
+def told(difference: Floats, margin: float, beside: int = 0) -> Judgement:
+    """Of a line that is judged beside so many others in which nothing is found."""
+    others = [np.array([1.0, -1.0] * 4)] * beside
+    return judge([difference, *others], [margin, *[9.0] * beside])[0]
+
+
+@pytest.mark.parametrize(
+    ("difference", "verdict", "why"),
+    [
+        (0.5 + 0.1 * SCATTER, "worse", "more than the margin"),
+        (-0.5 + 0.1 * SCATTER, "better", "more than the margin"),
+        (0.02 * SCATTER, "same", "within the margin"),
+        (np.zeros(12), "same", "within the margin"),
+        (0.1 + 0.01 * SCATTER, "same", "within the margin"),  # surely a difference, of no importance
+        (0.18 + 0.1 * SCATTER, "cannot tell", "perhaps by more"),
+        (0.5 * SCATTER, "cannot tell", "holds zero"),
+        (0.5 + 0.01 * SCATTER[:5], "cannot tell", "too few clips: 5, of at least 6"),
+        (np.zeros(0), "cannot tell", "too few clips: 0"),
+    ],
+)
+def test_verdicts(difference: Floats, verdict: str, why: str) -> None:
+    found = told(difference, margin=0.2)
+    assert (found.verdict, found.p is None) == (verdict, len(difference) < 6)
+    assert why in found.why
+
+
+def test_six_clips_can_show_nothing_among_many_lines() -> None:
+    clear = 1.0 + 0.01 * np.arange(6)
+    assert told(clear, 0.1).verdict == "worse"
+    found = told(clear, 0.1, beside=1)
+    assert (found.verdict, found.p_holm) == ("cannot tell", 2 * 2 / 64)
+    assert "6 can show nothing among 2 lines" in found.why
+
+
+def test_lines_without_any_difference_do_not_count_for_the_others() -> None:
+    clear = 1.0 + 0.01 * np.arange(6)
+    found = judge([clear, np.zeros(6), np.zeros(8)], [0.1] * 3)
+    assert [line.verdict for line in found] == ["worse", "same", "same"]
+    assert [line.p_holm for line in found] == [2 / 64, 1.0, 1.0]
+
+
+def test_sides_exchanged_give_the_opposite_verdict(rng: np.random.Generator) -> None:
+    opposite = {"worse": "better", "better": "worse"}
+    lines = [rng.normal(shift, 0.1, 9) for shift in (-0.4, -0.1, 0.0, 0.4)]
+    there, back = judge(lines, [0.05] * 4), judge([-line for line in lines], [0.05] * 4)
+    for one, other in zip(there, back, strict=True):
+        assert other.verdict == opposite.get(one.verdict, one.verdict)
+        assert one.low == pytest.approx(-(other.high or 0.0))
+        assert one.p_holm == other.p_holm
+    assert {"worse", "better"} < {line.verdict for line in there}
