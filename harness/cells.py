@@ -9,7 +9,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -100,15 +100,12 @@ class Ended:
 
 def run_job(job: Job, out: Path, stop: Path | None = None) -> Iterator[Ended]:
     """Every cell of one clip, in order; a failure is reported in its place. It ends early once the file `stop` is."""
-    setting: Setting | None = None
     for cell in job.cells():
         if stop is not None and stop.exists():
             return
         start = time.perf_counter()
         try:
-            if setting is None or setting.scenario != cell.scenario:
-                setting = (setting and setting.under(cell.scenario)) or _setting(job, cell.scenario)
-            method = registry.resolve(cell.method)
+            setting, method = _setting(job, cell.scenario), _method(cell.method)
             key = setting.key(method, cell.method, cell.inputs, cell.varied)
             if results.has_cell(out, key):
                 yield Ended(str(cell), key, row=read_row(cell_folder(out, key)))
@@ -124,8 +121,24 @@ def run_job(job: Job, out: Path, stop: Path | None = None) -> Iterator[Ended]:
             yield Ended(str(cell), failure=traceback.format_exc())
 
 
+_last: list[Setting] = []
+"""What this process worked at, for the next job may be of the same clip."""
+
+
 def _setting(job: Job, scenario: Scenario) -> Setting:
-    return Setting(scenario, source_of(scenario.motion, job.folder, scenario.seed), job.part, job.behaviour)
+    """Shares with the one before what may be shared."""
+    source, now = source_of(scenario.motion, job.folder, scenario.seed), None
+    for last in _last:
+        if last.source is source and (last.part, last.behaviour) == (job.part, job.behaviour):
+            now = last if last.scenario == scenario else last.under(scenario)
+    _last[:] = [now or Setting(scenario, source, job.part, job.behaviour)]
+    return _last[0]
+
+
+@cache
+def _method(name: str) -> Method:
+    """Whatever package it is of: to look through all that are installed takes longer than to write a cell."""
+    return registry.resolve(name)
 
 
 def judge(setting: Setting, method: Method, planned: Planned, key: str, command: str) -> results.Cell:
@@ -219,6 +232,8 @@ def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:
 def forget_motion() -> None:
     """Whoever begins a run calls this: files may have changed since the last one."""
     _opened.cache_clear()
+    _method.cache_clear()
+    _last.clear()
 
 
 @lru_cache(maxsize=2)

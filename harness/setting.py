@@ -67,9 +67,10 @@ class Setting:
         self._sources: dict[str, str] = {}
 
     def under(self, scenario: Scenario) -> "Setting | None":
-        """The same under other errors of the tracker, with other stations, or calibrated otherwise, sharing motion and,
-        on the same body, what was learnt, which knows of none of these; None if more differs."""
+        """The same under other errors of the tracker, with other stations, calibrated otherwise or for other methods,
+        sharing motion and, on the same body, what was learnt, which knows of none of these; None if more differs."""
         free = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
+        free += ("methods", "inputs", "vary")
         if replace(self.scenario, **{name: getattr(scenario, name) for name in free}) != scenario:
             return None
         other = copy.copy(self)

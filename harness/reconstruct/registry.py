@@ -11,7 +11,8 @@ import importlib
 import importlib.util
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, cast
@@ -148,17 +149,23 @@ def source_hash(method: Method) -> str:
         file = inspect.getsourcefile(type(inner))
         if file is None or not Path(file).is_file():
             raise BadInput(f"The source of {method.name} cannot be found.", "Define the method in a file.")
-        for part in [Path(file), *_sources(type(inner).__module__, Path(file))]:
-            digest.update(part.name.encode() + b"\0" + part.read_bytes())
+        top = sys.modules.get(type(inner).__module__.partition(".")[0])
+        package = tuple(top.__path__) if top is not None and hasattr(top, "__path__") else ()
+        digest.update(
+            Path(file).name.encode() + b"\0" + (_package_hash(package) if package else _lone_hash(Path(file)))
+        )
         inner = getattr(inner, "method", None)
     return digest.hexdigest()
 
 
-def _sources(module: str, file: Path) -> list[Path]:
-    """A method's file and its own others: all of its package, or what a lone file imports from its folder."""
-    top = sys.modules.get(module.partition(".")[0])
-    if top is not None and hasattr(top, "__path__"):
-        return sorted(part for folder in top.__path__ for part in Path(folder).rglob("*.py"))
+@cache
+def _package_hash(folders: tuple[str, ...]) -> bytes:
+    """Of all of a method's package, read once: hundreds of files."""
+    return _hash_of(part for folder in folders for part in Path(folder).rglob("*.py"))
+
+
+def _lone_hash(file: Path) -> bytes:
+    """Of a method's file and what it imports from its folder."""
     found, waiting = set(), [file]
     while waiting:
         if (part := waiting.pop()) not in found:
@@ -168,7 +175,14 @@ def _sources(module: str, file: Path) -> list[Path]:
             names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
             beside = [part.parent / f"{name.partition('.')[0]}.py" for name in names]
             waiting += [other for other in beside if other.is_file()]
-    return sorted(found)
+    return _hash_of(found)
+
+
+def _hash_of(files: Iterable[Path]) -> bytes:
+    digest = hashlib.blake2b(digest_size=16)
+    for file in sorted(files):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.digest()
 
 
 def _exists(module: str) -> bool:

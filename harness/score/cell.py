@@ -39,7 +39,8 @@ IDENTITY = (
 """What a row of the summary says about its cell first, in this order."""
 FURTHER = ("scenario", "performer", "varied")
 """What it says besides."""
-_REST = (*FURTHER, "key", "source_hash", "health", "calibration_errors")
+CARRIED = (*FURTHER, "key", "source_hash", "health", "calibration_errors")
+"""What a row has after the metrics."""
 _TEXTS = (
     *(*IDENTITY, *FURTHER, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
@@ -211,7 +212,7 @@ def read_row(folder: Path) -> dict[str, Any]:
     text = folder / "cell.json"
     content = read_json(text, "a cell of a run")
     try:
-        first, rest = ({name: content[name] for name in names} for names in (IDENTITY, _REST))
+        first, rest = ({name: content[name] for name in names} for names in (IDENTITY, CARRIED))
         return {**first, **content["metrics"], **rest}
     except (KeyError, TypeError) as error:
         raise BadFile(text, f"no {error}", "a cell of this version of the harness", _ADVICE) from error
@@ -219,7 +220,7 @@ def read_row(folder: Path) -> dict[str, Any]:
 
 def as_row(cell: Cell) -> dict[str, Any]:
     """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
-    first, rest = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, _REST))
+    first, rest = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, CARRIED))
     return {**first, **cell.metrics, **rest}
 
 
