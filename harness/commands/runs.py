@@ -77,7 +77,7 @@ def report_run(args: argparse.Namespace) -> Outcome:
     from harness.report.paper import FINDINGS
 
     if (args.run / FINDINGS).is_file():
-        return _report_paper(args)
+        return _report_findings(args)
     if args.readme:
         raise BadInput(
             f"--readme with {args.run}, where no {FINDINGS} is.", "Name the folder that `harness paper` wrote."
@@ -86,6 +86,19 @@ def report_run(args: argparse.Namespace) -> Outcome:
 
     with ProgressBar("movies") as bar:
         page = write_report(args.run, movie=args.movie, progress=bar)
+    return say(args, {"report": str(page)}, f"report: {page}")
+
+
+def _report_findings(args: argparse.Namespace) -> Outcome:
+    from harness.report.paper import FINDINGS
+    from harness.report.placement import write_placement_page
+    from harness.score.placement import is_placement
+
+    if not is_placement(args.run / FINDINGS):
+        return _report_paper(args)
+    if args.movie or args.readme:
+        raise BadInput(f"--movie or --readme with {args.run}, a placement study.", "They are of runs and of papers.")
+    page = write_placement_page(args.run)
     return say(args, {"report": str(page)}, f"report: {page}")
 
 

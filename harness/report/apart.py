@@ -76,7 +76,7 @@ class Rendering:
                 self._process.communicate()
                 self._reason = "the renderer did not finish in time"
             else:
-                self._reason = "" if self._process.returncode == 0 else _why(self._process.returncode, said)
+                self._reason = "" if self._process.returncode == 0 else why_ended(self._process.returncode, said)
         self.close()
         return self._reason
 
@@ -103,12 +103,16 @@ class Rendering:
                 title=np.array(job.title),
                 output=np.array(str(job.output.resolve())),
             )
-        command = [sys.executable, "-m", "harness.report.studio", *files]
-        environment = dict(os.environ)
-        if sys.platform == "linux" and not environment.get("DISPLAY"):
-            environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-        none = subprocess.DEVNULL
-        return subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=subprocess.PIPE, text=True)
+        return started("harness.report.studio", files)
+
+
+def started(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
+    """A process that renders, where there is no screen too; what it says of its end goes to stderr."""
+    environment = dict(os.environ)
+    if sys.platform == "linux" and not environment.get("DISPLAY"):
+        environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
+    command, none = [sys.executable, "-m", module, *arguments], subprocess.DEVNULL
+    return subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=subprocess.PIPE, text=True)
 
 
 def _missing(jobs: Sequence[Job]) -> str:
@@ -119,7 +123,7 @@ def _missing(jobs: Sequence[Job]) -> str:
     return ""
 
 
-def _why(code: int, said: str) -> str:
+def why_ended(code: int, said: str) -> str:
     """What ended the renderer, in one line."""
     if code < 0:
         name = signal.Signals(-code).name

@@ -8,6 +8,8 @@ from harness.report.paper_verdicts import MARKS, MEANINGS, difference, interval,
 from harness.report.run import file_name
 from harness.score.findings import Claim, Experiment, Findings, Verdict
 
+_HEAD = ("published statement", "published", "ours", "difference", "clips", "verdict")
+
 
 def tally_list(found: list[Claim]) -> Markup:
     """A number for each verdict, and what the verdict means."""
@@ -24,17 +26,24 @@ def _verdict(kind: Verdict) -> Markup:
 
 def claims_table(findings: Findings) -> Markup:
     """One table, a group of rows for each experiment."""
-    head = ("published statement", "published", "ours", "difference", "clips", "verdict")
-    top = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in head), role="row")
     groups = []
     for experiment in findings.experiments:
         if experiment.claims:
             link = tag("a", experiment.title, href=f"#{anchor(experiment)}")
-            title = tag("th", link, scope="rowgroup", colspan=len(head), role="rowheader")
-            rows = [_claim(claim, head) for claim in experiment.claims]
+            title = tag("th", link, scope="rowgroup", colspan=len(_HEAD), role="rowheader")
+            rows = [_claim(claim) for claim in experiment.claims]
             groups.append(tag("tbody", tag("tr", title, class_="group", role="row"), *rows, role="rowgroup"))
-    if not groups:
-        return Markup()
+    return _whole(groups) if groups else Markup()
+
+
+def claims_list(found: Sequence[Claim]) -> Markup:
+    """The same table of a few claims that belong to no experiment."""
+    rows = [_claim(claim) for claim in found]
+    return _whole([tag("tbody", *rows, role="rowgroup")]) if rows else Markup()
+
+
+def _whole(groups: Sequence[Markup]) -> Markup:
+    top = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in _HEAD), role="row")
     text = (
         "Difference: the mean of paired differences over clips and its 95 % interval, positive on the published side. "
         "Under a statement: why its verdict is what it is."
@@ -45,14 +54,14 @@ def claims_table(findings: Findings) -> Markup:
     return joined(tag("p", text, class_="caption"), whole)
 
 
-def _claim(claim: Claim, head: Sequence[str]) -> Markup:
+def _claim(claim: Claim) -> Markup:
     why = tag("small", prose(claim.why)) if claim.why else None
     within = interval(claim)
     distance = joined(difference(claim), tag("span", within, class_="spread under") if within else None)
     cells = [claim.published, claim.ours, distance, claim.clips or "", _verdict(claim.verdict)]
     named = [
         tag("td", cell, data_label=name, role="cell", class_=None if cell else "empty")
-        for name, cell in zip(head[1:], cells, strict=True)
+        for name, cell in zip(_HEAD[1:], cells, strict=True)
     ]
     return tag("tr", tag("th", claim.text, why, scope="row", role="rowheader"), *named, role="row")
 

@@ -32,12 +32,14 @@ def text_tables(findings: Findings) -> str:
 
 def _experiment(experiment: Experiment, differences: Sequence[str]) -> list[str]:
     lines = [_wrapped(f"{experiment.name}: {experiment.title}")]
-    lines += _table(experiment.claims) if experiment.claims else [f"{_INDENT}no statement to hold a figure against"]
+    lines += (
+        claims_text(experiment.claims) if experiment.claims else [f"{_INDENT}no statement to hold a figure against"]
+    )
     lines += [_wrapped(f"different here: {text}", _INDENT) for text in differences]
     return lines
 
 
-def _table(found: Sequence[Claim]) -> list[str]:
+def claims_text(found: Sequence[Claim]) -> list[str]:
     """A row for each claim, and under it why its verdict is what it is."""
     rows = [list(map(_plain, _HEAD)), *([_plain(cell) for cell in _cells(claim)] for claim in found)]
     used = [i for i in range(len(_HEAD)) if i == 0 or any(row[i] for row in rows[1:])]

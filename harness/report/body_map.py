@@ -1,0 +1,195 @@
+"""The body heat map: skin coloured by what a station there is worth, from ahead and from behind, with a colour bar.
+
+Skin takes the colour of places on its own bone alone; a bone on which nothing was tried stays grey. The body is
+rendered in a process of its own; letters, lines and colour bar are drawn around it and follow the reader's screen.
+"""
+
+import math
+import subprocess
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.errors import MissingExtra
+from harness.report.apart import started, why_ended
+from harness.report.figures import drawn
+from harness.report.paper_lines import apart
+from harness.report.placement_words import plain_name, signed
+from harness.report.style import FAINT, INK, Chart
+from harness.score.placement import Place
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS = "viridis"
+_PATIENCE_S = 120.0
+_HEIGHT_IN, _MOST_NAMED, _GAP = 4.9, 18, 0.048
+"""Of the chart; places with names, those worth most; between two names, as a share of the picture's height."""
+_TOP, _ARMS, _TRUNK, _OUTER = 0.04, (0.145, 0.34), 0.12, 0.25
+_NECK = 0.17
+"""Shares of the picture: the first name from above, what lies above and below the arms; half of the trunk's width, and
+how far from the edge hands and forearms are."""
+Values = Mapping[str, float | None]
+"""Candidate -> what it is worth; None where that was not measured."""
+
+
+def body_map(places: Sequence[Place], values: Values, *, unit: str, what: str) -> tuple[Chart | None, str]:
+    """The chart, or None and why there is none.
+
+    `what` says in words what the values are. Without matplotlib or pyvista, or where nothing can be rendered, the
+    reason is in one line, as the report lists it.
+    """
+    known = [value for place in places if (value := values.get(place.name)) is not None]
+    if not known:
+        return None, "no candidate has a value"
+    for package in ("matplotlib", "pyvista"):
+        if find_spec(package) is None:
+            return None, str(MissingExtra("A rendered picture", package, "viz"))
+    low, high = min(0.0, *known), max(0.0, *known)
+    high = high if high > low else low + 1.0
+    views, reason = _rendered(places, values, low, high)
+    if views is None:
+        return None, reason
+    return _chart(places, values, views, (low, high), unit, what), ""
+
+
+def _rendered(
+    places: Sequence[Place], values: Values, low: float, high: float
+) -> tuple[dict[str, np.ndarray] | None, str]:
+    """The pictures of both sides and where the places are on them (see `body_scene`), or why there are none."""
+    from matplotlib import colormaps
+
+    found = [values.get(place.name) for place in places]
+    shares = [0.0 if value is None else (value - low) / (high - low) for value in found]
+    with TemporaryDirectory(prefix="harness-report-") as folder:
+        job, output = Path(folder) / "job.npz", Path(folder) / "views.npz"
+        np.savez(
+            job,
+            bone=np.array([place.bone for place in places]),
+            along=np.array([place.along for place in places]),
+            around_rad=np.deg2rad([place.around_deg for place in places]),
+            stand_off_m=np.zeros(len(places)),
+            colour=colormaps[_COLOURS](shares)[:, :3],
+            known=np.array([value is not None for value in found]),
+        )
+        process = started("harness.report.body_scene", [str(job), str(output)])
+        try:
+            _, said = process.communicate(timeout=_PATIENCE_S)
+        except subprocess.TimeoutExpired:
+            return None, "the renderer did not finish in time"
+        finally:
+            if process.poll() is None:
+                process.kill()
+                process.communicate()
+        if process.returncode != 0 or not output.exists():
+            return None, why_ended(process.returncode, said)
+        with np.load(output, allow_pickle=False) as content:
+            return {name: content[name] for name in content.files}, ""
+
+
+def _chart(
+    places: Sequence[Place],
+    values: Values,
+    views: Mapping[str, np.ndarray],
+    ends: tuple[float, float],
+    unit: str,
+    what: str,
+) -> Chart:
+    order = sorted(
+        (n for n, place in enumerate(places) if values.get(place.name) is not None),
+        key=lambda n: -(values[places[n].name] or 0.0),
+    )
+    named = order[:_MOST_NAMED]
+
+    def draw(canvas: "Figure") -> None:
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.colors import Normalize
+
+        grid = canvas.add_gridspec(2, 2, height_ratios=(1.0, 0.035))
+        for side, title in enumerate(("from ahead", "from behind")):
+            axes = canvas.add_subplot(grid[0, side])
+            axes.imshow(views["picture"][side], interpolation="none")
+            axes.set_axis_off()
+            axes.text(0.5, 0.0, title, transform=axes.transAxes, ha="center", va="top", color=FAINT)
+            other = 1 - side
+            here = [n for n in named if views["at"][side, n, 2] > views["at"][other, n, 2] + 1e-6 * (side - 0.5)]
+            texts = {n: f"{plain_name(places[n].name)} {signed(values[places[n].name])}" for n in here}
+            _name(axes, views["at"][side], texts, views["picture"].shape[1:3])
+        bar = canvas.add_subplot(grid[1, :])
+        canvas.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
+        bar.set_xlabel(f"{what} [{unit}]")
+        bar.grid(False)
+
+    absent = [plain_name(p.name) for p in places if values.get(p.name) is None]
+    grey = f" Without a value: {', '.join(absent)}." if absent else ""
+    most = f" Names: the {_MOST_NAMED} of {len(order)} places worth most." if len(order) > _MOST_NAMED else ""
+    said = ", ".join(f"{plain_name(places[n].name)} {signed(values[places[n].name])}" for n in order)
+    return drawn(
+        "body_map",
+        "What a tracker is worth, over the body",
+        f"Colour: {what} [{unit}]; balls are the places that were tried, skin between places of one bone is "
+        f"interpolated, grey bones had none.{most}{grey} Seen from ahead, the performer's left is on the right.",
+        f"The body coloured by {what}: {said} {unit}.",
+        draw,
+        _HEIGHT_IN,
+        raster=True,
+    )
+
+
+def _name(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
+    """A name for each place with a line to its ball: over the arms, and in columns beside the rest of the body."""
+    height, width = size
+    line = {"arrowstyle": "-", "color": FAINT, "linewidth": 0.8, "shrinkA": 1.0, "shrinkB": 5.0}
+    for right in (False, True):
+        members = [n for n in texts if bool(at[n, 0] > 0.5 * width) is right]
+        arms = [n for n in members if abs(at[n, 0] / width - 0.5) > _TRUNK and at[n, 1] < _ARMS[1] * height]
+        arms.sort(key=lambda n: -abs(at[n, 0] - 0.5 * width))
+        # From the edge of the picture inwards: hands have their names at the edge, upper arms end theirs a bit inwards.
+        inwards = [0.5 - abs(float(at[n, 0]) / width - 0.5) for n in arms]
+        ends = {
+            n: (max(u - 0.05, 0.01) if u < _OUTER else u + 0.06, _ARMS[0] - _GAP * k)
+            for k, (n, u) in enumerate(zip(arms, inwards, strict=True))
+        }
+        rest = sorted((n for n in members if n not in arms), key=lambda n: (at[n, 1], at[n, 0]))
+        above = [n for n in rest if at[n, 1] < _NECK * height]
+        below = [n for n in rest if n not in above]
+        for column, top in ((above, _TOP), (below, _ARMS[1])):
+            wanted = [max(float(at[n, 1]) / height, top + _GAP * k) for k, n in enumerate(column)]
+            places = apart(wanted, _GAP) if column is below else [top + _GAP * k for k in range(len(column))]
+            ends |= {n: (0.01, share) for n, share in zip(column, places, strict=True)}
+        for n, (across, down) in ends.items():
+            axes.annotate(
+                texts[n],
+                (float(at[n, 0]), float(at[n, 1])),
+                ((1.0 - across if right else across) * width, down * height),
+                arrowprops=line,
+                ha="right" if right is (across < _OUTER) else "left",
+                va="center",
+                fontsize=8.5,
+                color=INK,
+                annotation_clip=False,
+            )
+
+
+def best_known(worth: Sequence[Any]) -> tuple[Values, str]:
+    """Which values to show: those of the mode that knows most candidates, and what they are in words."""
+    groups: dict[tuple[str, tuple[str, ...]], dict[str, float | None]] = {}
+    for each in worth:
+        groups.setdefault((each.mode, each.base), {})[each.candidate] = each.difference
+    if not groups:
+        return {}, ""
+    (mode, base), values = max(
+        groups.items(), key=lambda g: sum(v is not None and math.isfinite(v) for v in g[1].values())
+    )
+    words = {
+        "ablate": f"error without it, of {len(base)} trackers, less error with it",
+        "add": "what it takes off the error when added" if base else "what it takes off the error alone",
+        "exhaustive": "error of sets without it less error of sets with it, on average",
+    }
+    return values, words[mode]

@@ -1,0 +1,42 @@
+"""The report of a placement study, written from its findings alone."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from harness.report.body_map import best_known, body_map
+from harness.report.placement_charts import charts
+from harness.report.placement_page import PlacementContent, placement_page
+from harness.report.style import Chart
+from harness.score.files import write_text
+from harness.score.placement import PlacementFindings, read_placement
+
+FINDINGS = "findings.json"
+"""In the folder of a study."""
+
+
+def write_placement_page(folder: Path) -> Path:
+    """Write FOLDER/plots and FOLDER/report.html of the study in `folder`; returns the page.
+
+    What cannot be drawn here is said on the page, which then has tables instead. BadFile when there are no findings.
+    """
+    findings = read_placement(folder / FINDINGS)
+    plots = folder / "plots"
+    plots.mkdir(exist_ok=True)
+    for old in (*plots.glob("*.svg"), *plots.glob("*.png")):
+        old.unlink()
+    shown, missing = _drawn(findings)
+    for chart in (chart for found in shown.values() for chart in found):
+        chart.write(plots)
+    path = folder / "report.html"
+    write_text(path, placement_page(PlacementContent(findings, shown, missing)))
+    return path
+
+
+def _drawn(findings: PlacementFindings) -> tuple[dict[str, list[Chart]], list[str]]:
+    """Section -> charts, and what is missing."""
+    if find_spec("matplotlib") is None:
+        return {}, ["Figures: matplotlib is not installed (extra viz); their numbers are tables"]
+    values, what = best_known(findings.worth)
+    body, reason = body_map(findings.candidates, values, unit=findings.unit, what=what)
+    gap = f"The body in colours: {reason}"
+    return {"body": [body] if body else [], **charts(findings)}, [gap] if body is None else []

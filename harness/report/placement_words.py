@@ -1,0 +1,134 @@
+"""A placement study in words: what to wear in one sentence, sets by short names, figures with decimals enough."""
+
+import math
+from collections.abc import Sequence
+
+from harness.report.paper_verdicts import MINUS
+from harness.score.paired import FEWEST_CLIPS, paired
+from harness.score.placement import Best, PlacementFindings, Stations, Tried
+
+_PAIRED = ("left_", "right_")
+_IRREGULAR = {"foot": "feet", "calf": "calves", "humerus": "humeri", "femur": "femora", "tibia": "tibiae"}
+_MOST_DECIMALS = 4
+
+
+def named(stations: Stations) -> str:
+    """ "both ankles + pelvis": pairs first, then the others, in the order of the set."""
+    left, right = ({n.removeprefix(side) for n in stations if n.startswith(side)} for side in _PAIRED)
+    parts = []
+    for name in stations:
+        bare = name.removeprefix(_PAIRED[0]).removeprefix(_PAIRED[1])
+        if bare not in left & right:
+            parts.append(plain_name(name))
+        elif name.startswith(_PAIRED[0]):
+            parts.append(f"both {_plural(plain_name(bare))}")
+    return " + ".join(sorted(parts, key=lambda part: not part.startswith("both "))) or "none"
+
+
+def plain_name(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _plural(name: str) -> str:
+    *before, last = name.split(" ")
+    return " ".join([*before, _IRREGULAR.get(last, f"{last}s")])
+
+
+def sentence(findings: PlacementFindings) -> str:
+    """What to wear: the fewest stations that nothing shows to be worse than the best set of any size."""
+    chosen = enough(findings)
+    if chosen is None:
+        return "No set of stations was measured."
+    tried = findings.of(chosen.stations)
+    ties = _ties(chosen)
+    return f"{_opening(findings, chosen)}: {named(chosen.stations)}, {error(findings, tried)}{ties}."
+
+
+def _opening(findings: PlacementFindings, chosen: Best) -> str:
+    """How many, and how that was found."""
+    count = len(chosen.stations)
+    most = max(len(best.stations) for best in findings.best)
+    noun = f"{count} tracker{'s'[: count != 1]}"
+    clips = max((len(measured(tried)) for tried in findings.tried), default=0)
+    if clips < FEWEST_CLIPS:
+        return f"The least error came with {noun}, on too few clips ({clips}) to tell it from others"
+    if count == most:
+        return f"Of 1 to {most} trackers {count} err least" if count > 1 else "One tracker"
+    return f"{noun[0].upper() + noun[1:]} {'serve' if count != 1 else 'serves'} as well as up to {most}"
+
+
+def _ties(best: Best) -> str:
+    if not best.ties:
+        return ""
+    others = "another set" if len(best.ties) == 1 else f"{len(best.ties)} other sets"
+    return f"; nothing tells it from {others} of as many"
+
+
+def enough(findings: PlacementFindings) -> Best | None:
+    """The smallest set among the best of each size that nothing shows to be worse than the best of them all."""
+    found = [
+        (best, tried) for best in findings.best if (tried := findings.of(best.stations)) and tried.mean is not None
+    ]
+    if not found:
+        return None
+    sign = 1.0 if findings.better == "lower" else -1.0
+    best, top = min(found, key=lambda each: sign * (each[1].mean or 0.0))
+    for other, tried in found:
+        behind = paired(tried.errors, top.errors)
+        ends = (behind.low, behind.high) if sign > 0 else (behind.high, behind.low)
+        if other is best or (ends[0] is not None and sign * ends[0] <= 0.0):
+            return other
+    return best
+
+
+def measured(tried: Tried) -> dict[str, float]:
+    """Clip -> error, of clips on which there is one."""
+    return {clip: value for clip, value in tried.errors.items() if value is not None}
+
+
+def error(findings: PlacementFindings, tried: Tried | None) -> str:
+    """ "1.90 deg (1.78 to 2.02)"."""
+    if tried is None or tried.mean is None:
+        return "not measured"
+    text = f"{figure(tried.mean)} {findings.unit}".rstrip()
+    return f"{text} ({figure(tried.low)} to {figure(tried.high)})" if tried.low is not None else text
+
+
+def difference(mean: float | None, low: float | None, high: float | None) -> str:
+    """ "+0.30 (0.21 to 0.38)", with as many decimals as the smallest of the three needs."""
+    if mean is None:
+        return "not measured"
+    decimals = needed(mean, low, high)
+    within = "" if low is None else f" ({signed(low, decimals)} to {signed(high, decimals)})"
+    return f"{signed(mean, decimals)}{within}"
+
+
+def signed(value: float | None, decimals: int = 2) -> str:
+    if value is None:
+        return "not measured"
+    text = f"{value:+.{decimals}f}"
+    return (text if text.strip("+-0.") else text.lstrip("+-")).replace("-", MINUS)
+
+
+def figure(value: float | None, decimals: int = 2) -> str:
+    """Two decimals, more for what would read 0.00, none for large ones."""
+    if value is None:
+        return "not measured"
+    decimals = 0 if abs(value) >= 1000.0 else 1 if abs(value) >= 100.0 else max(decimals, needed(value))
+    return f"{value:,.{decimals}f}".replace("-", MINUS)
+
+
+def needed(*values: float | None) -> int:
+    """Decimals, 2 at least, so that none that is not zero reads 0.00."""
+    finest = min((abs(v) for v in values if v), default=1.0)
+    return min(max(math.ceil(-math.log10(finest)), 2), _MOST_DECIMALS)
+
+
+def ranks(rank_low: int, rank_high: int) -> str:
+    return str(rank_low) if rank_low == rank_high else f"{rank_low} to {rank_high}"
+
+
+def listed(sets: Sequence[Stations], most: int = 3) -> str:
+    """A few sets by name, and how many more."""
+    names = [named(stations) for stations in sets[:most]]
+    return "; ".join([*names, *([f"{len(sets) - most} more"] if len(sets) > most else [])])
