@@ -1,0 +1,119 @@
+"""The page of a sweep, written from its index: what was found, what was varied, what failed, and where the table is."""
+
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from harness.report.comparison_words import listed
+from harness.report.document import Section, document, embedded
+from harness.report.markup import Markup, folded, joined, tag
+from harness.report.style import Chart
+from harness.report.sweep import HEADLINE, METRICS, SECOND, Key, Sweep, read_sweep
+from harness.report.sweep_charts import MOST_INTERVALS, MOST_SCENARIOS, MOST_SERIES, Curve, chart, curves, varying
+from harness.report.sweep_tables import by_scenario, by_value, failures
+from harness.report.sweep_words import effect, sentence, values
+from harness.score.files import write_text
+from harness.score.index import INDEX
+
+_EXAMPLE = (
+    "SELECT scenario, method, count(*), avg(joint_angle_mean_deg) FROM cells GROUP BY scenario, method ORDER BY 4"
+)
+
+
+def write_sweep(out: Path) -> Path:
+    """Write OUT/report.html of the sweep in `out` and return it; BadFile when there is none.
+
+    Without matplotlib it has the tables alone.
+    """
+    path = out / "report.html"
+    write_text(path, sweep_page(read_sweep(out)))
+    return path
+
+
+def sweep_page(sweep: Sweep) -> str:
+    """The whole file."""
+    draw, missing = find_spec("matplotlib") is not None, []
+    wanted = min(len(sweep.series), MOST_SERIES) * sum(
+        len(key.texts) * len(varying(sweep, key)[:MOST_SCENARIOS]) for key in sweep.keys
+    )
+    ends = wanted <= MOST_INTERVALS
+    if sweep.keys and not draw:
+        missing.append("Charts: matplotlib is not installed; their numbers are tables")
+    if not ends:
+        missing.append(
+            f"Intervals: {wanted:,} would take too long; sweeps of fewer values, scenarios or methods have them"
+        )
+    varied = [_varied(sweep, key, ends=ends, draw=draw) for key in sweep.keys]
+    sections: list[Section] = [
+        ("What was varied", "varied", joined(*varied)),
+        ("Methods by scenario", "scenarios", _scenarios(sweep)),
+        ("Failures", "failures", failures(sweep)),
+        ("The whole table", "table", _files(sweep)),
+    ]
+    return document(
+        title=f"{sweep.name}: harness sweep",
+        kicker=f"harness sweep · {sweep.name}",
+        heading=sentence(sweep),
+        facts=_facts(sweep),
+        missing=missing,
+        sections=sections,
+    )
+
+
+def _facts(sweep: Sweep) -> Mapping[str, str]:
+    facts = {
+        "Scenarios": listed(sweep.scenarios, 8),
+        "Clips": f"{len(sweep.clips):,}",
+        "Methods": listed(sweep.series, 12),
+        **{f"Varied: {key.name}": f"{values(key)}: {effect(sweep, key)}" for key in sweep.keys},
+        "Made by": sweep.command,
+    }
+    return {title: text for title, text in facts.items() if text}
+
+
+def _varied(sweep: Sweep, key: Key, *, ends: bool, draw: bool) -> Markup:
+    """One key: a chart for each scenario that varies it, and the figures folded."""
+    scenarios = varying(sweep, key)
+    shown = scenarios[:MOST_SCENARIOS]
+    found = {scenario: curves(sweep, key, scenario, ends=ends) for scenario in shown}
+    charts = [_figure(chart(sweep, key, n, those)) for n, those in found.items() if those] if draw else []
+    some = f" Shown are {len(shown)} of {len(scenarios)} scenarios." if len(shown) < len(scenarios) else ""
+    text = f"Mean {HEADLINE} over clips, each averaged over what else is varied; bars: 95 % interval.{some}"
+    tables = [_tables(sweep, key, n, those) for n, those in found.items()]
+    return joined(
+        tag("h3", key.name),
+        tag("p", text),
+        tag("div", *charts, class_="panels broad") if charts else None,
+        folded("Its figures", *tables) if charts else joined(*tables),
+    )
+
+
+def _tables(sweep: Sweep, key: Key, scenario: int, found: Sequence[Curve]) -> Markup:
+    second = curves(sweep, key, scenario, SECOND, ends=False)
+    return joined(*(by_value(sweep, key, scenario, those, m) for those, m in ((found, HEADLINE), (second, SECOND))))
+
+
+def _figure(drawn: Chart) -> Markup:
+    image = tag("img", src=embedded(drawn.for_screen().encode(), "image/svg+xml"), alt=drawn.alt)
+    return tag("figure", tag("h3", drawn.title), image, tag("figcaption", drawn.caption), class_="panel")
+
+
+def _scenarios(sweep: Sweep) -> Markup:
+    if not len(sweep):
+        return Markup()
+    first, further = METRICS[:2], METRICS[2:]
+    more = folded("More metrics", *(by_scenario(sweep, metric) for metric in further))
+    return joined(*(by_scenario(sweep, metric) for metric in first), more)
+
+
+def _files(sweep: Sweep) -> Markup:
+    def file(name: str) -> Markup:
+        return tag("code", name)
+
+    items: list[Any] = [
+        joined(file("table.csv"), f": {len(sweep):,} rows in planned order, with every metric."),
+        joined(file(INDEX), ": the same for questions, and more, such as how long each cell took:"),
+    ]
+    query = tag("pre", tag("code", f'sqlite3 {INDEX} "{_EXAMPLE}"'))
+    return joined(tag("ul", *(tag("li", item) for item in items), class_="notes"), query)
