@@ -21,6 +21,7 @@ def add_placement(verbs: Verbs) -> None:
 def place_trackers(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
+    from harness.report.placement import write_placement_page
     from harness.report.placement_text import text
     from harness.score.files import plain
     from harness.study.executors import processes
@@ -32,5 +33,7 @@ def place_trackers(args: argparse.Namespace) -> Outcome:
         findings, outcome = placement(
             args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
         )
-    content = {**plain(asdict(findings)), "out": str(out)}
-    return say(args, content, text(findings), "", f"findings: {out / FINDINGS}", outcome=outcome)
+    page = write_placement_page(out)
+    content = {**plain(asdict(findings)), "out": str(out), "report": str(page)}
+    lines = (text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}")
+    return say(args, content, *lines, outcome=outcome)

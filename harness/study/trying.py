@@ -6,60 +6,20 @@ whichever mode asks, in this run or the next.
 """
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from harness.cells import Ended, Job, Progress, run_job
-from harness.config import Scenario
-from harness.core.protocol import Part
+from harness.cells import Progress
+from harness.config import Scenario, variants
 from harness.errors import BadInput
 from harness.score.files import content_key, plain
 from harness.study.candidates import Worn, station_name
 from harness.study.executors import Each
-
-
-@dataclass(frozen=True)
-class Cells:
-    """What came of the cells of several scenarios."""
-
-    rows: tuple[Mapping[str, Any], ...]
-    failures: Mapping[str, str]
-    planned: int
-
-
-def run_cells(
-    scenarios: Sequence[Scenario], out: Path, *, folder: Path | None, each: Each, command: str, progress: Progress
-) -> Cells:
-    """Every cell that is not finished yet; what was is kept."""
-    jobs = [
-        Job(scenario, Part.parse(text), behaviour, folder, command)
-        for scenario in scenarios
-        for text, behaviour in zip(
-            scenario.motion.test,
-            scenario.motion.behaviours * (len(scenario.motion.test) // len(scenario.motion.behaviours)),
-            strict=True,
-        )
-    ]
-    planned, done = sum(len(job.cells()) for job in jobs), 0
-    rows, failures = list[Mapping[str, Any]](), dict[str, str]()
-    for which, future in each(_all_of, [(job, out) for job in jobs]):
-        for ended in future.result():
-            done += 1
-            progress(ended.cell, done, planned)
-            if ended.row is None:
-                failures[f"{jobs[which].scenario.name}: {ended.cell}"] = ended.failure
-            else:
-                rows.append({**ended.row, "scenario": jobs[which].scenario.name})
-    return Cells(tuple(rows), failures, planned)
-
-
-def _all_of(job: Job, out: Path) -> list[Ended]:
-    return list(run_job(job, out))
-
+from harness.study.sweep import Cells, planned_cells, run_cells
 
 FASTEST_HZ = 180.0
 """Of an IS-900 (docs/is900.md)."""
@@ -109,7 +69,6 @@ class Trying:
     """Cell -> why it has no result."""
     planned: int = 0
     """Cells that were asked for."""
-    finished: int = 0
     _rows: dict[tuple[str, str, str, str], Mapping[str, Any]] = field(default_factory=dict)
     """(scenario, what is varied, method, clip) -> row."""
     _known: dict[str, set[str]] = field(default_factory=dict)
@@ -130,19 +89,15 @@ class Trying:
             key = "worn" if not scenario.worn else "stations"
             scenarios.append(replace(scenario, vary={key: list(values[name].values())}))
             self._known.setdefault(name, set()).update(values[name])
-        if scenarios:
-            self._take(
-                self.run(
-                    scenarios,
-                    self.out,
-                    folder=self.folder,
-                    each=self.each,
-                    command=self.command,
-                    progress=lambda last, done, planned: self.progress(
-                        last, self.finished + done, self.finished + planned
-                    ),
-                )
-            )
+        if not scenarios:
+            return
+        before = self.planned
+
+        def told(last: str, done: int, planned: int) -> None:
+            self.progress(last, before + done, before + planned)
+
+        asked_for = {"folder": self.folder, "each": self.each, "command": self.command, "progress": told}
+        self._take(scenarios, self.run(scenarios, self.out, **asked_for))
 
     def errors(self, asked: Asked, metric: str, methods: tuple[str, ...] = ()) -> dict[Worn, dict[str, float | None]]:
         """Of each set, by clip: the mean over the scenario's methods, or over some of them; None where one of them was
@@ -162,12 +117,21 @@ class Trying:
             found[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
         return found
 
-    def _take(self, cells: Cells) -> None:
+    def _take(self, scenarios: Iterable[Scenario], cells: Cells) -> None:
+        """Rows come in planned order, without those of cells that failed."""
+        rows = iter(cells.rows)
+        for scenario in scenarios:
+            each = [
+                (scenario.name, _text(varied), method, clip)
+                for varied, made in variants(scenario)
+                for clip in made.motion.test
+                for method in made.methods
+            ]
+            for cell, called in zip(each, planned_cells(scenario), strict=True):
+                if called not in cells.failures:
+                    self._rows[cell] = next(rows)
         self.planned += cells.planned
-        self.finished += cells.planned
         self.failures |= cells.failures
-        for row in cells.rows:
-            self._rows[row["scenario"], _text(row["varied"]), row["method"], row["clip"]] = row
 
     def _as_varied(self, asked: Asked, worn: Worn) -> tuple[Scenario, dict[str, Any]]:
         """The scenario that the set is a variant of, and what makes it that: which candidates are worn, or, for places
@@ -180,7 +144,7 @@ class Trying:
         }
         if moved:
             scenario = replace(scenario, worn=tuple(names))
-        called = f"{scenario.name}_{content_key(asdict(scenario))[:8]}"  # rows tell by it what they are of
+        called = f"{scenario.name}_{content_key(asdict(scenario))[:8]}"  # no two of other content may have one name
         return replace(scenario, name=called), {"stations": moved} if moved else {"worn": names}
 
 
