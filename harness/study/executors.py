@@ -129,14 +129,15 @@ def _scheduler(address: str, workers: int | None) -> Iterator[Any]:
 
 async def _answers(address: str) -> None:
     """BadInput unless a scheduler does: a client of Dask's would wait for one that is mute."""
-    from distributed import rpc
+    from distributed import Security, rpc
 
     advice = "Start one with `dask scheduler`, which prints its address, or take --dask local."
     try:
-        async with asyncio.timeout(ANSWER_S), rpc(address) as asked:
+        keys = Security().get_connection_args("client")  # of Dask's own configuration, where there are any
+        async with asyncio.timeout(ANSWER_S), rpc(address, connection_args=keys) as asked:
             kind = (await asked.identity())["type"]
     except Exception as error:  # whatever a stranger may answer
-        said = str(error) or f"no answer in {ANSWER_S:g} s"
+        said = str(error).rstrip(".") or f"no answer in {ANSWER_S:g} s"
         raise BadInput(f"No Dask scheduler at {address}: {said}.", advice) from error
     if kind != "Scheduler":
         raise BadInput(f"No Dask scheduler at {address}, but a {kind.lower()}.", advice)
