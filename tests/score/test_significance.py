@@ -81,7 +81,7 @@ def test_holm_keeps_the_order_and_lies_between_p_and_bonferroni(rng: np.random.G
         assert (corrected <= np.minimum(1.0, count * p) + 1e-15).all()
 
 
-SCATTER = generator(1, "scatter").normal(size=12)
+SCATTER: Floats = generator(1, "scatter").normal(size=12)
 SCATTER -= SCATTER.mean()
 
 
@@ -112,7 +112,7 @@ def test_verdicts(difference: Floats, verdict: str, why: str) -> None:
 
 
 def test_six_clips_can_show_nothing_among_many_lines() -> None:
-    clear = 1.0 + 0.01 * np.arange(6)
+    clear: Floats = 1.0 + 0.01 * np.arange(6.0)
     assert told(clear, 0.1).verdict == "worse"
     found = told(clear, 0.1, beside=1)
     assert (found.verdict, found.p_holm) == ("cannot tell", 2 * 2 / 64)
@@ -120,7 +120,7 @@ def test_six_clips_can_show_nothing_among_many_lines() -> None:
 
 
 def test_lines_without_any_difference_do_not_count_for_the_others() -> None:
-    clear = 1.0 + 0.01 * np.arange(6)
+    clear: Floats = 1.0 + 0.01 * np.arange(6.0)
     found = judge([clear, np.zeros(6), np.zeros(8)], [0.1] * 3)
     assert [line.verdict for line in found] == ["worse", "same", "same"]
     assert [line.p_holm for line in found] == [2 / 64, 1.0, 1.0]
