@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _COLOURS = "viridis"
+_NEAR_M = 0.02
+"""As large as a ball: nearer than this a place does not count more."""
 _PATIENCE_S = 120.0
 _HEIGHT_IN, _MOST_NAMED, _GAP = 4.9, 18, 0.048
 """Of the chart; places with names, those worth most; between two names, as a share of the picture's height."""
@@ -175,6 +177,15 @@ def _name(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, i
                 color=INK,
                 annotation_clip=False,
             )
+
+
+def blended(points_m: Floats, places_m: Floats, colours: Floats) -> Floats:
+    """(P, 3) colours of points on a skin (P, 3) [m], of places on it (N, 3) that have colours (N, 3): nearer places
+    count more, by the inverse square of the distance (Shepard 1968, Proc. ACM National Conference)."""
+    gap_m = np.linalg.norm(points_m[:, None] - places_m, axis=2)
+    weight = 1.0 / (gap_m**2 + _NEAR_M**2)
+    out: Floats = (weight / weight.sum(axis=1, keepdims=True)) @ colours
+    return out
 
 
 def best_known(worth: Sequence[Any]) -> tuple[Values, str]:

@@ -19,6 +19,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton, unpack
 from harness.core.skeleton import Skeleton, forward
+from harness.report.body_map import blended
 
 SIZE = (760, 740)
 """Of one view, width and height in pixels."""
@@ -26,7 +27,8 @@ _FINER = 2
 """Times so many are rendered and averaged, for a picture without background is not smoothed."""
 NEUTRAL = (0.74, 0.76, 0.79)
 """Skin of bones on which no place was tried."""
-_TALL_M, _NEAR_M = 1.86, 0.02
+_TALL_M = 1.86
+"""Of what a view shows."""
 _BALLS = ((0.030, "#16191d"), (0.026, "#ffffff"))
 """Radius [m] and colour of the rims around a ball."""
 _BALL_M = 0.019
@@ -85,7 +87,7 @@ def _places(skeleton: Skeleton, standing: _Standing, mounts: list[Mount]) -> tup
 def _painted(
     standing: _Standing, shape: Shape, bones: list[str], at_m: Floats, colour: Floats, known: Floats
 ) -> "pv.PolyData":
-    """One part of the body, each point in the colour of the places of its bone, nearer ones more (Shepard 1968)."""
+    """One part of the body, each point in the colour of the places of its bone."""
     mesh = _mesh(shape)
     mesh.points = np.asarray(mesh.points) @ rotations.to_matrix(shape.bone_from_shape).T + shape.centre_m
     start_m, turn = standing.of(shape.bone)
@@ -94,9 +96,7 @@ def _painted(
     mine = np.array([n for n, bone in enumerate(bones) if bone in carriers and known[n]], dtype=int)
     mesh["colour"] = np.tile(NEUTRAL, (mesh.n_points, 1))
     if len(mine):
-        gap_m = np.linalg.norm(np.asarray(mesh.points)[:, None] - at_m[mine], axis=2)
-        weight = 1.0 / (gap_m**2 + _NEAR_M**2)
-        mesh["colour"] = (weight / weight.sum(axis=1, keepdims=True)) @ colour[mine]
+        mesh["colour"] = blended(np.asarray(mesh.points, dtype=float), at_m[mine], colour[mine])
     return mesh
 
 

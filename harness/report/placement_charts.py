@@ -138,7 +138,6 @@ def ranking(findings: PlacementFindings, found: Ranking, number: int) -> Chart:
         f"{found.title}: {named(first.stations)} first, {ties} tied with it.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),
-        raster=True,
     )
 
 
@@ -164,12 +163,11 @@ def worth(findings: PlacementFindings, found: Sequence[Worth], number: int) -> C
     said = ", ".join(f"{plain_name(row.candidate)} {signed(row.difference)}" for row in rows)
     return drawn(
         f"worth_{number}_{file_name(found[0].mode)}",
-        f"What each is worth: {title}",
+        f"{title[0].upper()}{title[1:]}",
         "Blue: wearing it helps; orange: it harms; grey: nothing shows either. Whiskers: 95 % interval over clips.",
         f"Worth of candidates {title}: {said}.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),
-        raster=True,
     )
 
 
@@ -201,7 +199,6 @@ def path(findings: PlacementFindings, found: Search) -> Chart:
         f"{found.mode}, {found.title}: {said} {findings.unit}.",
         draw,
         _FRAME_IN + 1.3 * _ROW_IN * len(known),
-        raster=True,
     )
 
 
@@ -245,7 +242,6 @@ def stability(findings: PlacementFindings) -> Chart:
         f"Kendall's tau between conditions: {said}.",
         draw,
         1.1 + 0.36 * len(names),
-        raster=True,
     )
 
 

@@ -73,12 +73,16 @@ def enough(findings: PlacementFindings) -> Best | None:
         return None
     sign = 1.0 if findings.better == "lower" else -1.0
     best, top = min(found, key=lambda each: sign * (each[1].mean or 0.0))
-    for other, tried in found:
-        behind = paired(tried.errors, top.errors)
-        ends = (behind.low, behind.high) if sign > 0 else (behind.high, behind.low)
-        if other is best or (ends[0] is not None and sign * ends[0] <= 0.0):
-            return other
-    return best
+    smaller = (each for each in found if len(each[0].stations) < len(best.stations))
+    return next((other for other, tried in smaller if not _worse(tried, top, sign)), best)
+
+
+def _worse(tried: Tried, top: Tried, sign: float) -> bool:
+    """Whether its paired interval lies on the bad side of `top` as a whole; with too few clips it counts as worse."""
+    behind = paired(tried.errors, top.errors)
+    if behind.low is None or behind.high is None:
+        return True
+    return min(sign * behind.low, sign * behind.high) > 0.0
 
 
 def measured(tried: Tried) -> dict[str, float]:

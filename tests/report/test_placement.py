@@ -1,0 +1,303 @@
+"""A placement study shown: the answer first, every figure beside its interval, and nothing told apart that is a tie."""
+
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.cli import main
+from harness.report import body_map as body
+from harness.report import placement
+from harness.report.apart import started
+from harness.report.body_map import best_known, blended, body_map
+from harness.report.placement import write_placement_page
+from harness.report.placement_charts import charts
+from harness.report.placement_text import text
+from harness.report.placement_words import difference, enough, figure, named, sentence
+from harness.score.placement import Best, PlacementFindings, Stations, Tried
+from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
+
+NO_PICTURE = "the renderer was ended by SIGABRT"
+ANSWER = "Of 1 to 3 trackers 3 err least: both ankles + pelvis, 2.40 deg (2.01 to 2.79)."
+
+
+@pytest.fixture(scope="module")
+def findings() -> PlacementFindings:
+    return made_up()
+
+
+@pytest.fixture
+def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a machine that cannot render: quick, and the page has to say so."""
+    monkeypatch.setattr(placement, "body_map", lambda *args, **options: (None, NO_PICTURE))
+
+
+class _Reader(HTMLParser):
+    """Complains of elements that are not closed in order; gathers the text."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.text: list[str] = []
+        self.feed(page.read_text(encoding="utf-8"))
+        assert self.open == []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in ("meta", "br", "img"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open[-1:] != ["style"]:
+            self.text.append(data)
+
+
+def text_of(page: Path) -> str:
+    return re.sub(r"\s+", " ", " ".join(_Reader(page).text))
+
+
+def study_of(errors: dict[Stations, list[float | None]], better: str = "lower") -> PlacementFindings:
+    """Of these sets, in the order of their size, each the best of its own."""
+    tried = [
+        Tried(stations, 40.0, dict(zip(CLIPS, values, strict=False)), _mean(values))
+        for stations, values in errors.items()
+    ]
+    best = tuple(Best(t.stations) for t in tried)
+    whole = replace(made_up(at_most=1), tried=tuple(tried), best=best, rankings=(), searches=(), worth=())
+    return replace(whole, compared=(), conditions=(), agreements=(), better="higher" if better == "higher" else "lower")
+
+
+def _mean(values: list[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None
+
+
+def test_pairs_have_one_name() -> None:
+    assert named(("head", "left_ankle", "right_ankle", "pelvis")) == "both ankles + head + pelvis"
+    assert named(("left_foot", "right_foot", "left_hand")) == "both feet + left hand"
+    assert named(()) == "none"
+
+
+def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
+    two, three = ("left_ankle", "right_ankle"), ("pelvis", "left_ankle", "right_ankle")
+    base = [2.0, 2.1, 1.9, 2.2, 1.8, 2.0, 2.05, 1.95]
+    wiggle = [0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1, -0.12]
+    alike = study_of({two: [b + w for b, w in zip(base, wiggle, strict=True)], three: [b - 0.01 for b in base]})
+    chosen = enough(alike)
+    assert chosen is not None
+    assert chosen.stations == two
+    assert sentence(alike).startswith("2 trackers serve as well as up to 3: both ankles, 2.00 deg")
+    apart = study_of({two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
+    assert sentence(apart).startswith("Of 1 to 3 trackers 3 err least: both ankles + pelvis")
+    fps = study_of({two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher")
+    chosen = enough(fps)
+    assert chosen is not None
+    assert chosen.stations == three
+
+
+def test_too_few_clips_are_said_to_be_too_few() -> None:
+    few = study_of({("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
+    assert "on too few clips (3) to tell it from others: head + pelvis" in sentence(few)
+
+
+def test_where_nothing_was_measured_nothing_is_recommended() -> None:
+    nothing = study_of({("pelvis",): [None] * 8})
+    assert sentence(nothing) == "No set of stations was measured."
+    assert "not measured" in text(nothing)
+    assert charts(nothing)["pareto"] == []
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ((0.3, 0.21, 0.38), "+0.30 (+0.21 to +0.38)"),
+        ((-0.3, None, None), "−0.30"),
+        ((0.02, -0.003, 0.04), "+0.020 (−0.003 to +0.040)"),
+        ((0.0, 0.0, 0.0), "0.00 (0.00 to 0.00)"),
+        ((None, None, None), "not measured"),
+    ],
+)
+def test_differences_have_a_sign_and_no_zero_that_is_none(
+    values: tuple[float | None, float | None, float | None], said: str
+) -> None:
+    assert difference(*values) == said
+
+
+def test_figures_have_decimals_that_suit_their_size() -> None:
+    assert [figure(value) for value in (0.004, 2.345, 123.45, 12345.6)] == ["0.004", "2.35", "123.5", "12,346"]
+
+
+def test_the_text_opens_on_the_answer_and_has_every_table(findings: PlacementFindings) -> None:
+    lines = text(findings).splitlines()
+    assert lines[0] == ANSWER
+    whole = "\n".join(lines)
+    for part in (
+        "3         both ankles + pelvis  2.40 deg (2.01 to 2.79)",
+        "reproduced",
+        "exhaustive: 3 of 11 places",
+        "and 8 more",
+        "+ pelvis       both ankles + pelvis  head",
+        "left out of all 11",
+        "behaviour: boxing",
+        "Kendall's tau 0.31 (0.22 to 0.40)",
+        "FAILED ik on p3_walking_3 (worn=head): ValueError: <b>no</b>",
+    ):
+        assert part in whole, part
+    assert max(map(len, lines)) <= 170
+
+
+def test_ties_are_called_ties(findings: PlacementFindings) -> None:
+    first, *others = findings.rankings[0].rows
+    level = replace(others[0], tied=True, difference=0.001, low=-0.01, high=0.012)
+    ranking = replace(findings.rankings[0], rows=(first, level))
+    best = replace(findings.best[1], ties=(level.stations,))
+    tied = replace(findings, rankings=(ranking,), best=(findings.best[0], best))
+    row = next(line for line in text(tied).splitlines() if line.startswith("2 ("))
+    assert " tie " in row
+    assert "+0.001 (−0.010 to +0.012)" in row
+    assert named(level.stations) in next(line for line in text(tied).splitlines() if line.startswith("2  "))
+
+
+@pytest.mark.usefixtures("unseen")
+def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, findings: PlacementFindings) -> None:
+    hostile = "<script>alert(1)</script>"
+    shown = replace(findings, notes=(hostile,), rankings=findings.rankings[1:], worth=findings.worth[:11])
+    page = write_placement_page(write_made_up(tmp_path, shown))
+    content, said = page.read_text(encoding="utf-8"), text_of(page)
+    assert f"<h1>{ANSWER}</h1>" in content
+    assert content.index("<h1>") < content.index('aria-label="best sets"') < content.index("<nav")
+    assert f"The body in colours: {NO_PICTURE}" in said
+    assert hostile not in content
+    assert hostile in said
+    for place in PLACES:
+        assert place.name.replace("_", " ") in said
+    for part in (
+        "called suitable",
+        "not run",
+        "both thighs + left ankle",
+        "+0.37 (+0.30 to +0.44)",
+        "ValueError",
+    ):
+        assert part in said, part
+    assert len(re.findall("<img", content)) == 5
+    assert "http://" not in content.replace("http://www.w3.org", "")
+    assert {file.suffix for file in (tmp_path / "plots").iterdir()} == {".svg", ".png"}
+
+
+def test_without_matplotlib_there_are_tables(
+    tmp_path: Path, findings: PlacementFindings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(placement, "find_spec", lambda name: None)
+    page = write_placement_page(write_made_up(tmp_path, findings))
+    said = text_of(page)
+    assert "matplotlib is not installed" in said
+    assert "<img" not in page.read_text(encoding="utf-8")
+    assert "exhaustive: 3 of 11 places" in said
+    assert "both ankles + right thigh" in said
+
+
+@pytest.mark.usefixtures("unseen")
+def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = write_made_up(tmp_path, replace(made_up(at_most=1), worth=()))
+    first = write_placement_page(folder).read_bytes()
+    assert main(["report", str(folder), "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said == {"report": str(folder / "report.html"), "outcome": "pass"}
+    assert (folder / "report.html").read_bytes() == first
+    assert main(["report", str(folder), "--movie"]) == 2
+    assert "a placement study" in capsys.readouterr().err
+
+
+def test_the_mode_that_knows_most_candidates_colours_the_body(findings: PlacementFindings) -> None:
+    values, what = best_known(findings.worth)
+    assert len(values) == len(PLACES)
+    assert what == "error without it, of 11 trackers, less error with it"
+    assert best_known(()) == ({}, "")
+
+
+def test_skin_has_the_colours_of_its_places_nearer_ones_more(rng: np.random.Generator) -> None:
+    places, colours = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    found = blended(np.array([[0.0, 0.0, 0.0], [0.2, 0.1, 0.0], [0.4, 0.0, 0.0]]), places, colours)
+    assert found[0, 0] > 0.99
+    np.testing.assert_allclose(found[1], [0.5, 0.5, 0.0], atol=1e-12)
+    assert found[2, 1] > 0.99
+    points = rng.normal(size=(50, 3))
+    np.testing.assert_allclose(blended(points, places, colours).sum(axis=1), 1.0)
+    np.testing.assert_allclose(blended(points, places[:1], colours[:1]), np.tile(colours[0], (50, 1)))
+
+
+def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
+    """Drawn around a picture that nobody rendered: every place has its name and value, none upon another."""
+    height, width = 74, 76
+    at = np.stack([rng.uniform(0.05, 0.95, len(PLACES)) * width, rng.uniform(0.1, 0.95, len(PLACES)) * height], axis=1)
+    facing = rng.choice([-1.0, 1.0], len(PLACES))
+    views = {
+        "picture": np.full((2, height, width, 4), 200, np.uint8),
+        "at": np.array([np.column_stack([at, sign * facing]) for sign in (1.0, -1.0)]),
+    }
+    monkeypatch.setattr(body, "_rendered", lambda *args: (views, ""))
+    values = {place.name: 0.1 * n for n, place in enumerate(PLACES)}
+    chart, missing = body_map(PLACES, values, unit="deg", what="worth")
+    assert chart is not None
+    assert missing == ""
+    for n, place in enumerate(PLACES):
+        said = f"{place.name.replace('_', ' ')} +{0.1 * n:.2f}" if n else f"{place.name} 0.00"
+        assert said in chart.svg, said
+        assert said in chart.alt
+    assert "worth [deg]" in chart.svg
+
+
+def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(body, "started", lambda module, arguments: started("harness.report.not_there", []))
+    chart, missing = body_map(PLACES, {"head": 0.1}, unit="deg", what="worth")
+    assert chart is None
+    assert missing.startswith("the renderer failed")
+
+
+def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert body_map(PLACES, {"head": None}, unit="deg", what="worth") == (None, "no candidate has a value")
+    monkeypatch.setattr(body, "find_spec", lambda name: None if name == "pyvista" else True)
+    chart, missing = body_map(PLACES, {"head": 0.1}, unit="deg", what="worth")
+    assert chart is None
+    assert "viz" in missing
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("renders")
+def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Yellow where worth is largest, purple where none is, grey where nothing was tried; places where they are."""
+    kept: dict[str, np.ndarray] = {}
+
+    def keep(places: object, values: object, views: dict[str, np.ndarray], *rest: object) -> None:
+        kept.update(views)
+
+    monkeypatch.setattr(body, "_chart", keep)
+    values: dict[str, float | None] = {place.name: None for place in PLACES}
+    values |= {"head": 0.0, "left_ankle": 0.5}
+    assert body_map(PLACES, values, unit="deg", what="worth")[1] == ""
+    picture, at = kept["picture"].astype(float), kept["at"]
+    names = [place.name for place in PLACES]
+
+    def skin(name: str, view: int, beside: tuple[int, int]) -> list[float]:
+        across, down = at[view, names.index(name), :2].astype(int) + beside
+        red, green, blue, opaque = picture[view, down, across]
+        assert opaque == 255.0, f"{name} is on the body"
+        return [float(red), float(green), float(blue)]
+
+    red, green, blue = skin("left_ankle", 0, (-25, 0))
+    assert min(red, green) > 2.0 * blue, "yellow"
+    red, green, blue = skin("head", 0, (0, 25))
+    assert min(red, blue) > 2.0 * green, "purple"
+    grey = skin("sternum", 0, (40, 0))
+    assert np.ptp(grey) < 25.0
+    heights = {name: at[0, names.index(name), 1] for name in names}
+    assert heights["head"] < heights["sternum"] < heights["pelvis"] < heights["left_thigh"] < heights["left_ankle"]
+    assert at[0, names.index("left_hand"), 0] > at[0, names.index("right_hand"), 0], "the left is on the right"
+    assert at[1, names.index("left_hand"), 0] < at[1, names.index("right_hand"), 0]
+    assert at[0, names.index("pelvis"), 2] < 0.0 < at[1, names.index("pelvis"), 2], "the sacrum is seen from behind"
