@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from harness.errors import BadInput
-from harness.score.files import TEMPORARY, content_key, plain, write_json
+from harness.score.files import TEMPORARY, content_key, plain, read_json, write_json
 from harness.score.judged import BASELINES, CELLS, SCHEMA, Judged, read_judged
 from harness.score.matching import PAIRED_ON
-from harness.score.results import read_summary
 
-_SUMMARISED = ("outcome", "cells_finished", "cells_planned", "methods")
+_SUMMARISED = ("outcome", "cells_finished", "cells_planned", "methods", "groups")
+"""What is kept of a summary: a run's says what each method came to, a sweep's what each group of cells did."""
 
 
 def save(run: Path, name: str, folder: Path = BASELINES, force: bool = False) -> Path:
@@ -46,9 +46,9 @@ def save(run: Path, name: str, folder: Path = BASELINES, force: bool = False) ->
     beside = folder / f"{TEMPORARY}{os.getpid()}-{name}"
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir(parents=True)
-    summary = read_summary(run)
+    summary = read_json(run / "summary.json", "the summary of a run or sweep")
     write_json(beside / "manifest.json", judged.manifest.as_dict())
-    write_json(beside / "summary.json", {kind: summary[kind] for kind in _SUMMARISED})
+    write_json(beside / "summary.json", {kind: summary[kind] for kind in _SUMMARISED if kind in summary})
     write_json(beside / CELLS, _packed(judged))
     before = beside.with_name(f"{beside.name}-before")
     if target.exists():

@@ -188,7 +188,7 @@ def _alone(matched: Matched) -> list[str]:
 
 def _failed(side: str, judged: Judged, method: str | None) -> tuple[str, ...]:
     """Of one method, where only that is compared."""
-    names = [name for name in judged.failed if method is None or name.startswith(f"{method} on ")]
+    names = [name for name in judged.failed if method is None or f": {method} on " in f": {name}"]
     unfinished = judged.planned - len(judged.cells) - len(judged.failed)
     return (
         *(f"{side}: {name}" for name in names),

@@ -9,6 +9,7 @@ from typing import Any
 from harness.errors import BadFile, UnknownName
 from harness.score.cell import cell_folder
 from harness.score.files import read_json
+from harness.score.index import INDEX, CellIndex
 from harness.score.manifest import Manifest
 from harness.score.metrics import DEFINITIONS
 from harness.score.results import read_summary
@@ -72,21 +73,32 @@ def read_judged(where: Path | str) -> Judged:
         if str(where) not in known:
             raise UnknownName("folder or baseline", str(where), known)
         folder = BASELINES / folder
-    return _of_baseline(folder) if (folder / CELLS).is_file() else _of_run(folder, str(where))
+    if (folder / CELLS).is_file():
+        return _of_baseline(folder)
+    return _of_sweep(folder, str(where)) if (folder / INDEX).is_file() else _of_run(folder, str(where))
 
 
 def _of_run(folder: Path, title: str) -> Judged:
     manifest, summary = Manifest.read(folder / "manifest.json"), read_summary(folder)
-    cells = []
-    for row in summary["cells"]:
-        if not row.get("scenario"):
-            found, advice = "cells that name no scenario", "An older version wrote it: run again with another --out."
-            raise BadFile(folder, found, "a run of this version of the harness", advice)
-        path = cell_folder(folder, row["key"]) / "cell.json"
-        defined_by = read_json(path, "a cell of a run").get("defined_by")
-        metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
-        cells.append(_cell(path, {**row, "defined_by": defined_by, "metrics": metrics}))
-    return Judged(title, manifest, tuple(cells), int(summary["cells_planned"]), tuple(summary["failures"]))
+    cells = tuple(_of_row(folder, row) for row in summary["cells"])
+    return Judged(title, manifest, cells, int(summary["cells_planned"]), tuple(summary["failures"]))
+
+
+def _of_sweep(folder: Path, title: str) -> Judged:
+    manifest = Manifest.read(folder / "manifest.json")
+    with CellIndex(folder, read_only=True) as index:
+        cells = tuple(_of_row(folder, row) for row in index.rows())
+        return Judged(title, manifest, cells, index.counts().planned, tuple(index.failures()))
+
+
+def _of_row(folder: Path, row: Mapping[str, Any]) -> JudgedCell:
+    if not row.get("scenario"):
+        found, advice = "cells that name no scenario", "An older version wrote it: run again with another --out."
+        raise BadFile(folder, found, "a run of this version of the harness", advice)
+    path = cell_folder(folder, row["key"]) / "cell.json"
+    defined_by = read_json(path, "a cell of a run").get("defined_by")
+    metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
+    return _cell(path, {**row, "defined_by": defined_by, "metrics": metrics})
 
 
 def _of_baseline(folder: Path) -> Judged:

@@ -11,7 +11,9 @@ import pytest
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.score import results
 from harness.score.baseline import save
+from harness.score.cell import CARRIED, IDENTITY
 from harness.score.comparison import compare
+from harness.score.index import CellIndex
 from harness.score.judged import Judged, JudgedCell, read_judged
 from tests.score.sides import manifest, side, write_run
 
@@ -69,6 +71,25 @@ def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: C
     assert found.cells[0].metrics == cells[0].metrics
     assert found.cells[0].defined_by == cells[0].defined_by
     assert (found.planned, found.failed, found.manifest) == (3, ("ik on walk_3",), content)
+
+
+def test_a_sweep_is_a_side_and_makes_a_baseline(run: Path, baselines: Path) -> None:
+    rows = json.loads((run / "summary.json").read_text())["cells"]
+    with CellIndex(run) as index:
+        index.add({**dict.fromkeys((*IDENTITY, *CARRIED)), **row} for row in rows)
+        index.expect([f"demo seed 1: {row['method']} on {row['clip']}" for row in rows])
+        index.ended((f"demo seed 1: {row['method']} on {row['clip']}", row["key"], "") for row in rows)
+    changed(run / "summary.json", cells=None, groups=[{"method": "ik"}])
+    assert kept(read_judged(run)) == kept(side(methods=METHODS))
+    summary = json.loads((save(run, "main") / "summary.json").read_text())
+    assert (summary["groups"], kept(read_judged("main"))) == ([{"method": "ik"}], kept(read_judged(run)))
+    with CellIndex(run) as index:
+        index.ended([("demo seed 1: ik on walk_00", "", "no pose")])
+    found = read_judged(run)
+    assert (found.planned, len(found.cells), found.failed) == (16, 15, ("demo seed 1: ik on walk_00",))
+    run_itself = compare(found, found, methods=("mean_pose", "mean_pose"), metrics=["mpjpe_mm"])
+    assert run_itself.outcome == Outcome.PASS, "another method's failure"
+    assert compare(found, found, methods=("ik", "ik"), metrics=["mpjpe_mm"]).outcome == Outcome.INCOMPLETE
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "../out", "a/b", "/elsewhere", ".hidden", "a b", "-f", "a\n", "a\\b"])
