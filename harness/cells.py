@@ -248,7 +248,7 @@ def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> 
     for name in {part.clip for part in parts} | set(scenario.motion.examples) | withheld:
         source.check(name)
     for name in scenario.methods:
-        registry.resolve(name)
+        _method(name)
     for name in scenario.inputs:
         combination(name, tuple(scenario.wearing))
     WireFormat(tuple(scenario.wearing), scenario.tracker.rate_hz, scenario.tracker.items)

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import calibrate, compare, emulate, live, motion, paper, placement, record, runs, trust
+from harness.commands import calibrate, compare, emulate, live, motion, paper, placement, record, runs, sweep, trust
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -72,6 +72,8 @@ def build_parser() -> argparse.ArgumentParser:
         record.add_record,
         record.add_replay,
         paper.add_paper,
+        sweep.add_sweep,
+        sweep.add_status,
         placement.add_placement,
         compare.add_compare,
         compare.add_baseline,

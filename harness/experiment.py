@@ -13,6 +13,7 @@ from harness.errors import BadInput, Outcome
 from harness.reconstruct import registry
 from harness.score import manifest, results
 from harness.score.cell import varied_text
+from harness.score.running import at_work
 
 
 def run(
@@ -45,15 +46,17 @@ def run(
     results.open_run(out, described)
     planned = _in_order(todo)
     ended: dict[str, Ended] = {}
-    try:
-        for cell in _cells(todo, out, jobs):
-            ended[cell.cell] = cell
-            progress(cell.cell, len(ended), len(planned))
-    finally:
-        in_order = [ended[cell] for cell in planned if cell in ended]
-        failed = {cell.cell: cell.failure for cell in in_order if cell.failure}
-        keys = [cell.key for cell in in_order if not cell.failure]
-        summary = results.write_summary(out, keys=keys, planned=len(planned), failures=failed, orders=scenario.order)
+    with at_work(out, alone=False):
+        try:
+            for cell in _cells(todo, out, jobs):
+                ended[cell.cell] = cell
+                progress(cell.cell, len(ended), len(planned))
+        finally:
+            in_order = [ended[cell] for cell in planned if cell in ended]
+            failed = {cell.cell: cell.failure for cell in in_order if cell.failure}
+            keys = [cell.key for cell in in_order if not cell.failure]
+            orders = scenario.order
+            summary = results.write_summary(out, keys=keys, planned=len(planned), failures=failed, orders=orders)
     if failed and all(cell.refused for cell in in_order):
         raise BadInput(f"Nothing could be run. {next(iter(failed.values()))}", "")
     if failed:

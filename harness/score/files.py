@@ -4,7 +4,7 @@ import hashlib
 import json
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -54,9 +54,14 @@ def digest(*arrays: NDArray[Any]) -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Write beside, flush to the disk, rename: readers see the old file or the new one."""
+    write_whole(path, [text])
+
+
+def write_whole(path: Path, texts: Iterable[str]) -> None:
+    """The same with a text that comes in parts."""
     beside = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
     with open(beside, "w", encoding="utf-8", newline="") as file:
-        file.write(text)
+        file.writelines(texts)
         file.flush()
         os.fsync(file.fileno())
     os.replace(beside, path)

@@ -133,7 +133,7 @@ def work(
                 broken.append(task)
                 continue
             _keep(index, task, cells, ended, progress, len(names))
-        alone = [one for task in broken for one in _one_by_one(task)]  # but one of them may be to blame
+        alone = [one for task in broken for one in one_by_one(task)]  # but one of them may be to blame
         for task, cells in _done(alone, out, stop, each):
             if isinstance(cells, BrokenExecutor):
                 cells = [Ended(str(cell), failure="a worker process died") for cell in task.job.cells()]
@@ -150,6 +150,8 @@ def _keep(
     for name, cell in found.items():
         ended[name] = replace(cell, row=None)  # it is in the index
         progress(name, len(ended), planned)
+    made = sum(cell.seconds > 0.0 for cell in cells)
+    index.note(made=index.facts()["made"] + made, seen_s=time.time())
 
 
 def _done(
@@ -188,7 +190,8 @@ def _session() -> str:
     return f"{os.getpid()} {time.time_ns()}"
 
 
-def _one_by_one(task: Task) -> list[Task]:
+def one_by_one(task: Task) -> list[Task]:
+    """A task for each of its cells."""
     job = task.job
     chosen = job.chosen or range(len(variants(job.scenario)))
     return [
