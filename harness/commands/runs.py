@@ -64,8 +64,10 @@ def this_command() -> str:
 
 
 def add_report(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "report", "write the page and plots of a finished run or paper again", report_run)
-    verb.add_argument("run", type=Path, help="folder written by `harness run` or `harness paper`")
+    verb = add_verb(
+        verbs, "report", "write the page and plots of a finished run, sweep, study or paper again", report_run
+    )
+    verb.add_argument("run", type=Path, help="folder written by `harness run`, `sweep`, `placement` or `paper`")
     verb.add_argument(
         "--movie", action="store_true", help="also write an mp4 of the worst cell of each method of a run"
     )
@@ -75,6 +77,7 @@ def add_report(verbs: Verbs) -> None:
 
 def report_run(args: argparse.Namespace) -> Outcome:
     from harness.report.paper import FINDINGS
+    from harness.score.index import INDEX
 
     if (args.run / FINDINGS).is_file():
         return _report_findings(args)
@@ -82,10 +85,21 @@ def report_run(args: argparse.Namespace) -> Outcome:
         raise BadInput(
             f"--readme with {args.run}, where no {FINDINGS} is.", "Name the folder that `harness paper` wrote."
         )
+    if (args.run / INDEX).is_file():
+        return _report_sweep(args)
     from harness.report.report import write_report
 
     with ProgressBar("movies") as bar:
         page = write_report(args.run, movie=args.movie, progress=bar)
+    return say(args, {"report": str(page)}, f"report: {page}")
+
+
+def _report_sweep(args: argparse.Namespace) -> Outcome:
+    from harness.report.sweep_page import write_sweep
+
+    if args.movie:
+        raise BadInput(f"--movie with {args.run}, a sweep.", "Movies are made of the runs of `harness run`.")
+    page = write_sweep(args.run)
     return say(args, {"report": str(page)}, f"report: {page}")
 
 

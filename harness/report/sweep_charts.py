@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 MOST_SERIES, MOST_SCENARIOS, MOST_INTERVALS = 10, 12, 600
 """In one chart; that have a chart for a key; that are worked out for one page, for each takes a moment."""
 _WIDTH_IN, _LINES_IN, _ROW_IN, _LETTER_IN = 4.2, 2.7, 0.085, 0.165
-_LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS = 18, 3, 8, 44
-"""Of a name beside an axis; rows of it; lines that have their names at their ends; letters of a name in a legend."""
+_LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 3, 8, 44, 5
+"""Of a name beside an axis; rows of it; lines that have their names at their ends; letters of a name in a legend;
+values that a logarithmic axis names."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _WIDE = 30.0
 """Positive values that reach so many times as far as the first have a logarithmic axis."""
@@ -125,6 +126,9 @@ def _lines(axes: "Axes", key: Key, shown: Sequence[Curve]) -> list[tuple[float, 
                 axes.plot([key.numbers[n]] * 2, [low, high], color=style["color"], linewidth=1.1, alpha=0.7)
     if key.numbers[0] > 0.0 and key.numbers[-1] > _WIDE * key.numbers[0]:
         axes.set_xscale("log")
+        every = -(-len(key.numbers) // _MOST_TICKS)
+        axes.set_xticks(key.numbers[::every], key.texts[::every])
+        axes.set_xticks([], minor=True)
     axes.set_xlabel(key.name)
     axes.set_ylabel(f"joint angle error [{unit_of(HEADLINE)}]")
     low, high = axes.get_ylim()

@@ -6,9 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.text import Text
 
 from harness.errors import Outcome
 from harness.report import comparison as report
@@ -21,6 +19,7 @@ from harness.report.comparison_words import BIG, MARKS, MEANINGS, direction, int
 from harness.report.figures import drawn
 from harness.report.style import Chart
 from harness.score.comparison import Comparison, Difference
+from tests.report.drawing import texts_apart
 from tests.report.fabricate_comparison import CIRCUMSTANCES, GROUP, METRICS, comparison, line, whole
 from tests.report.reading import read, text_of
 
@@ -142,7 +141,7 @@ def test_words_of_a_picture_do_not_meet_and_stay_on_it(clips: int) -> None:
         made.append(figure)
 
     drawn("slopes", "", "", "", draw, 2.5, width_in=3.3, layout=None)
-    _apart(made[0])
+    texts_apart(made[0])
 
 
 def test_names_of_an_interval_chart_do_not_meet() -> None:
@@ -155,22 +154,7 @@ def test_names_of_an_interval_chart_do_not_meet() -> None:
         made.append(figure)
 
     drawn("intervals", "", "", "", draw, 2.2, width_in=4.2)
-    _apart(made[0])
-
-
-def _apart(figure: Figure) -> None:
-    texts = [t for axes in figure.axes for t in (*_ticks(axes.xaxis), *_ticks(axes.yaxis), *axes.texts)]
-    boxes = [t.get_window_extent() for t in texts if t.get_text()]
-    assert len(boxes) > 5
-    for n, box in enumerate(boxes):
-        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1
-        assert not any(box.overlaps(other) for other in boxes[n + 1 :])
-
-
-def _ticks(axis: Axis) -> list[Text]:
-    """Labels that are drawn: those within the limits."""
-    low, high = sorted(axis.get_view_interval())
-    return [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]
+    texts_apart(made[0])
 
 
 @pytest.mark.parametrize("clips", [0, 1, 5])

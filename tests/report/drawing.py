@@ -1,0 +1,24 @@
+"""What every small chart is held to."""
+
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+
+def texts_apart(figure: Figure) -> None:
+    """No tick, note or legend entry meets another, and all are on the picture."""
+    figure.draw_without_rendering()  # sizes were those of the file that it was written to
+    texts = [text for axes in figure.axes for text in (*_ticks(axes.xaxis), *_ticks(axes.yaxis), *axes.texts)]
+    texts += [text for legend in figure.legends for text in legend.get_texts()]
+    boxes = [(text.get_text(), text.get_window_extent()) for text in texts if text.get_text()]
+    assert len(boxes) > 5
+    for n, (text, box) in enumerate(boxes):
+        assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1, text
+        assert figure.bbox.y0 <= box.y0 <= box.y1 <= figure.bbox.y1, text
+        assert [other for other, place in boxes[n + 1 :] if box.overlaps(place)] == [], text
+
+
+def _ticks(axis: Axis) -> list[Text]:
+    """Labels that are drawn: those within the limits."""
+    low, high = sorted(axis.get_view_interval())
+    return [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]

@@ -1,0 +1,238 @@
+"""The page and the text of a sweep: what they open on, that they add up, and that they stay small."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from harness.cli import main
+from harness.errors import BadFile
+from harness.report import sweep_page
+from harness.report.figures import drawn
+from harness.report.sweep import HEADLINE, METRICS, Key, Statistic, gathered, read_sweep
+from harness.report.sweep_charts import MOST_SERIES, Curve, _dots_in, _draw, curves, shown_of, varying
+from harness.report.sweep_page import write_sweep
+from harness.report.sweep_text import text
+from harness.report.sweep_words import effect, faults, sentence
+from harness.score.index import CellIndex
+from harness.score.paired import interval
+from tests.report.drawing import texts_apart
+from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
+from tests.report.reading import read, text_of
+from tests.report.watching import is_whole_and_quiet
+
+HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- -->"
+RATE, NOISE = "tracker.rate_hz", "noise"
+VARIED = Plan(vary={RATE: (120, 20, 60), NOISE: ("clean", "default")}, failing=("local_pca",), to_come=5)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """With its page."""
+    out = fabricate_sweep(tmp_path_factory.mktemp("sweep") / "out", VARIED)
+    write_sweep(out)
+    return out
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where matplotlib is not: for tests that look at no picture."""
+    monkeypatch.setattr(sweep_page, "find_spec", lambda name: None)
+
+
+def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
+    sweep = read_sweep(folder)
+    said = sentence(sweep)
+    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to come. dynamic_map errs least: ")
+    assert "mean joint-angle error over 14 clips; next ik with" in said
+    raw = (folder / "report.html").read_text(encoding="utf-8")
+    assert f"<h1>{said}</h1>" in raw
+    places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
+    assert places == sorted(places)
+    assert text(sweep).startswith(said)
+
+
+def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
+    """Whatever is averaged, by hand."""
+    sweep = read_sweep(folder)
+    with CellIndex(folder, read_only=True) as index:
+        cells = list(index.columns("scenario", "method", "varied", "clip", HEADLINE))
+    rows = [row for row in cells if row[:2] == ("walking", "ik") and json.loads(row[2])[RATE] == 60]
+    means = [np.mean([error for *_, name, error in rows if name == clip]) for clip in sorted({row[3] for row in rows})]
+    series, value = sweep.series.index("ik"), next(k for k in sweep.keys if k.name == RATE).texts.index("60")
+    found = sweep.statistic(HEADLINE, sweep.where(0, series, **{RATE: value}), ends=True)
+    assert (found.clips, len(rows)) == (7, 14)
+    assert found.mean == pytest.approx(np.mean(means))
+    assert found.sd == pytest.approx(np.std(means, ddof=1))
+    assert (found.low, found.high) == pytest.approx(interval(np.array(means)))
+
+
+def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> None:
+    rate, noise = read_sweep(folder).keys
+    assert (rate.texts, rate.numbers) == (("20", "60", "120"), (20.0, 60.0, 120.0))
+    assert (noise.texts, noise.numbers) == (("clean", "default"), ())
+
+
+def test_what_a_key_does_is_told(folder: Path) -> None:
+    """Errors rise by tenths in the order 120, 20, 60 of the plan."""
+    sweep = read_sweep(folder)
+    assert re.fullmatch(r"[\d.]+ deg at 120, [\d.]+ deg at 60 \(\+\d+ %\)", effect(sweep, sweep.keys[0]))
+    for shown in (text_of(folder / "report.html"), text(sweep)):
+        assert effect(sweep, sweep.keys[0]) in shown
+
+
+def test_each_key_has_a_chart_for_each_scenario_told_in_words(folder: Path) -> None:
+    alts = [str(attributes["alt"]) for tag, attributes in read(folder / "report.html").found if tag == "img"]
+    assert len(alts) == 4
+    for alt, key in zip(alts, (RATE, RATE, NOISE, NOISE), strict=True):
+        assert alt.startswith(f"{HEADLINE} [deg] against {key}: ik ")
+        assert "local_pca" not in alt, "all its cells failed"
+
+
+def test_methods_stand_beside_each_other_in_every_scenario(folder: Path) -> None:
+    sweep, said = read_sweep(folder), text_of(folder / "report.html")
+    for scenario in range(2):
+        for series in range(len(sweep.series)):
+            found = sweep.statistic(HEADLINE, sweep.where(scenario, series))
+            assert f"{found.mean:.2f} ± {found.sd:.2f}" in said
+            assert f"{found.mean:.2f} ± {found.sd:.2f}" in text(sweep)
+    assert "walking n 7 boxing n 7 all n 14" in said.replace("\u00a0", " ").replace("  ", " ")
+
+
+def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folder: Path) -> None:
+    (fault,) = faults(read_sweep(folder))
+    assert (len(fault.cells), fault.line) == (84, "ValueError: <b>no</b> pose & no plan")
+    said = text_of(folder / "report.html")
+    assert "84 cells : ValueError: <b>no</b> pose & no plan" in said
+    assert "and 64 more" in said
+    assert said.count("Traceback (most recent call last)") == 1
+    assert said.count(COMMAND) == 2
+    assert "FAILED 84, such as walking seed 1: local_pca on walking_p1_01" in text(read_sweep(folder))
+
+
+def test_the_query_on_the_page_works(folder: Path) -> None:
+    query = re.search(r'sqlite3 index\.sqlite "([^"]+)"', text_of(folder / "report.html"))
+    assert query
+    with CellIndex(folder, read_only=True) as index:
+        assert len(index._db.execute(query[1]).fetchall()) == 4
+
+
+@pytest.mark.usefixtures("undrawn")
+@pytest.mark.parametrize(
+    ("plan", "said"),
+    [
+        (Plan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
+        (Plan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")), "6 of 6 cells finished. Nothing was measured."),
+        (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to come."),
+        (Plan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
+        (Plan(performers=("known", "new")), "dynamic_map (known) errs least: "),
+        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map errs least: "),
+    ],
+)
+def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path) -> None:
+    page = write_sweep(fabricate_sweep(tmp_path, plan))
+    shown = text_of(page)
+    assert said in shown
+    assert said in text(read_sweep(tmp_path))
+    assert "nan" not in shown.lower().split()
+
+
+def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
+    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
+    assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
+    assert sentence(sweep).count("errs least") == 2
+
+
+def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
+    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), seeds=(1, 2, 3))))
+    assert len(sweep) == 63
+    assert sweep.statistic(HEADLINE, sweep.where(0, 0)).clips == 7
+
+
+def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
+    sweep = read_sweep(fabricate_sweep(tmp_path, Plan(clips=5, vary={NOISE: ("clean", "default")})))
+    points = [point for curve in curves(sweep, sweep.keys[0], 0) for point in curve.points]
+    assert len(points) == 6
+    assert all(point.mean is not None and point.low is None for point in points)
+
+
+def test_a_scenario_that_does_not_vary_a_key_has_no_chart_of_it() -> None:
+    def cells() -> Any:
+        for scenario, varied in (("a", '{"n":1}'), ("a", '{"n":2}'), ("b", "{}"), ("c", '{"n":1}')):
+            yield (scenario, "clip", "ik", "pos", "none", "", varied, *([1.0] * len(METRICS)))
+
+    sweep = gathered(cells(), name="x", planned=4, failures={})
+    assert varying(sweep, sweep.keys[0]) == [0]
+
+
+def test_hostile_names_stay_text(tmp_path: Path) -> None:
+    plan = Plan(
+        scenarios=(HOSTILE,), methods={HOSTILE: 1.0, "ik": 2.0}, vary={HOSTILE: (HOSTILE, "b")}, failing=("ik",)
+    )
+    page = write_sweep(fabricate_sweep(tmp_path, plan))
+    raw = page.read_text(encoding="utf-8")
+    assert "<script" not in raw
+    assert read(page).text.count(HOSTILE) > 5
+    assert not re.search(r"(?:src|href)=\"(?!data:|#)", raw)
+    assert HOSTILE in text(read_sweep(tmp_path))
+
+
+def test_names_and_values_on_a_chart_do_not_meet() -> None:
+    names = [f"method_{n}[neighbours={n}]" for n in range(12)]
+    found = [
+        Curve(name, n, (Statistic(1.0 + 0.1 * n, 7, 0.1, 0.9, 1.3), Statistic(None, 0), Statistic(1.2, 7)))
+        for n, name in enumerate(names)
+    ]
+    shown = shown_of(found)
+    assert len(shown) == MOST_SERIES
+    words = Key("worn", ("head+torso+left_hand+right_hand+left_ankle+right_ankle+sternum", "a", "b"))
+    for key in (words, Key("n", ("1", "20", "400"), (1.0, 20.0, 400.0))):
+        made: list[Figure] = []
+
+        def draw(figure: Figure, key: Key = key, made: list[Figure] = made) -> None:
+            _draw(figure, key, shown)
+            made.append(figure)
+
+        drawn("chart", "", "", "", draw, 2.7 if key.numbers else _dots_in(key, len(shown)), width_in=4.2)
+        texts_apart(made[0])
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_many_cells_give_a_page_no_larger_than_few() -> None:
+    def cells(count: int) -> Any:
+        values = np.random.default_rng(1).uniform(1.0, 2.0, count)
+        for n in range(count):
+            method, clip = f"m{n % 5}", f"clip_{n // 20 % 30}"
+            yield ("walking", clip, method, "pos", "none", "", f'{{"n":{n // 5 % 4}}}', *([values[n]] * len(METRICS)))
+
+    failures = {f"cell {n}": "ValueError: the same" for n in range(5_000)}
+    few, many = (
+        sweep_page.sweep_page(gathered(cells(count), name="x", planned=count + 5_000, failures=failures))
+        for count in (1_000, 20_000)
+    )
+    assert len(many) < 1.05 * len(few) < 60_000
+
+
+def test_the_verb_report_writes_the_same_page_again(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = (folder / "report.html").read_bytes()
+    assert main(["report", str(folder)]) == 0
+    assert (folder / "report.html").read_bytes() == before
+    assert "report.html" in capsys.readouterr().out
+    assert main(["report", str(folder), "--movie"]) == 2
+
+
+def test_a_folder_that_is_no_sweep_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="index of a sweep"):
+        write_sweep(tmp_path)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_is_whole_and_quiet(browser: Any, folder: Path, width: int) -> None:
+    images, first = is_whole_and_quiet(browser, folder / "report.html", width)
+    assert images == 4
+    assert first.startswith("168 of 257 cells finished")
