@@ -14,7 +14,6 @@ from harness.reconstruct.dynamic_map import LITERAL, DynamicMap
 from harness.reconstruct.local_pca import LocalPca
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import exact_frames, without
-from harness.testing.method_checks import check_method
 
 from .conftest import Scene, moved
 
@@ -59,11 +58,6 @@ def test_the_same_frames_give_the_same_bytes(walk: Scene, method: Method) -> Non
     one, two = fitted.begin(walk.calibration), fitted.begin(walk.calibration)
     for frame in walk.frames[:30]:
         assert one.step(frame).qpos.tobytes() == two.step(frame).qpos.tobytes()
-
-
-@pytest.mark.parametrize("method", BOTH)
-def test_the_contract(method: Method) -> None:
-    check_method(method)
 
 
 @pytest.mark.parametrize("method", BOTH)

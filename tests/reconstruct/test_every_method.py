@@ -14,12 +14,17 @@ from harness.body.kinematics import joint_centres_m
 from harness.body.retarget import to_common_body
 from harness.core.estimate import Status
 from harness.core.motion import Take
+from harness.core.workers import call_each
 from harness.mocap import performer
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.score.angles import wrapped
+from harness.testing import method_checks
 from harness.testing.frames import exact_frames
 from harness.testing.method_checks import check_method
+from harness.testing.rules.sameness import answers, bears_another_process
+from harness.testing.rules.seen import same
+from harness.testing.trial import make_trial
 
 from .conftest import Scene, moved, scene
 
@@ -107,5 +112,18 @@ def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> N
 
 
 @pytest.mark.parametrize("name", [*NAMES, *ALSO])
-def test_the_contract_is_kept(name: str) -> None:
+def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All but the rule that is the next test's."""
+    rules = {rule: check for rule, check in method_checks.RULES.items() if check is not bears_another_process}
+    assert len(rules) == len(method_checks.RULES) - 1
+    monkeypatch.setattr(method_checks, "RULES", rules)
     check_method(registry.resolve(name))
+
+
+def test_what_was_fitted_may_go_to_another_process() -> None:
+    """One for all methods, as a process takes seconds to start."""
+    trials = [make_trial(registry.resolve(name)) for name in (*NAMES, *ALSO)]
+    tasks = [(trial.fitted(), trial.calibration, trial.frames) for trial in trials]
+    there = {which: future.result() for which, future in call_each(answers, tasks, 1)}
+    for which, task in enumerate(tasks):
+        same(answers(*task), there[which])

@@ -70,8 +70,8 @@ def bears_threads(trial: Trial) -> str:
 def bears_another_process(trial: Trial) -> str:
     """What was fitted is sent to another process, where it answers as it does here."""
     task = trial.fitted(), trial.calibration, trial.frames
-    ((_, there),) = call_each(_answers, [task], 1)
-    return same(_answers(*task), there.result())
+    ((_, there),) = call_each(answers, [task], 1)
+    return same(answers(*task), there.result())
 
 
 def is_causal(trial: Trial) -> str:
@@ -96,6 +96,6 @@ def is_causal(trial: Trial) -> str:
     return same(np.array(spoken), plain, "changed after they were given")
 
 
-def _answers(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
+def answers(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
     """(F, 55) of a new session."""
     return qpos_of(told(fitted.begin(calibration), frames))
