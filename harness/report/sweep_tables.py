@@ -1,6 +1,7 @@
 """The tables of a sweep's page: methods by scenario, methods by the values of a key, and what failed."""
 
 import math
+import shlex
 from collections.abc import Sequence
 from typing import Any
 
@@ -51,23 +52,25 @@ def _grid(
 
 
 def failures(sweep: Sweep) -> Markup:
-    """Each kind of failure once, with its cells and the first one's traceback, and how they are tried again."""
+    """Each kind of failure once, with its cells, the first one's traceback, and how they are tried again."""
     found = faults(sweep)
     if not found:
         return Markup()
     more = len(found) - _MOST_FAULTS
     rest = tag("p", f"And {more:,} more kinds; failures.json has them all.") if more > 0 else None
-    text = "Finished cells are kept. This tries the failed ones again:"
+    text = "Finished cells are kept. This tries all failed ones again:"
     again = joined(tag("p", text), tag("pre", tag("code", sweep.command))) if sweep.command else None
-    return joined(again, tag("ul", *map(_fault, found[:_MOST_FAULTS]), class_="notes"), rest)
+    items = (_fault(fault, sweep.command) for fault in found[:_MOST_FAULTS])
+    return joined(again, tag("ul", *items, class_="notes"), rest)
 
 
-def _fault(fault: Fault) -> Markup:
+def _fault(fault: Fault, command: str) -> Markup:
     cells = [tag("li", cell) for cell in fault.cells[:_MOST_CELLS]]
     if (more := len(fault.cells) - _MOST_CELLS) > 0:
         cells.append(tag("li", f"and {more:,} more"))
     title = joined(tag("b", f"{len(fault.cells):,} cell{'s'[: len(fault.cells) != 1]}"), f": {fault.line}")
-    return tag("li", folded(title, tag("ul", *cells), tag("pre", fault.text)))
+    alone = tag("pre", tag("code", f"{command} --cell {shlex.quote(fault.cells[0])}")) if command else None
+    return tag("li", folded(title, tag("ul", *cells), tag("p", "The first one's:"), tag("pre", fault.text), alone))
 
 
 def _least(column: Sequence[Statistic], metric: str) -> Statistic | None:

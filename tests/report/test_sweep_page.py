@@ -2,6 +2,7 @@
 
 import json
 import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -110,7 +111,8 @@ def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folde
     assert "84 cells : ValueError: <b>no</b> pose & no plan" in said
     assert "and 64 more" in said
     assert said.count("Traceback (most recent call last)") == 1
-    assert said.count(COMMAND) == 2
+    assert said.count(COMMAND) == 3
+    assert f"{COMMAND} --cell {shlex.quote(fault.cells[0])}" in said
     assert "FAILED 84, such as walking seed 1: local_pca on walking_p1_01" in text(read_sweep(folder))
 
 
