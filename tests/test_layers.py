@@ -29,7 +29,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     # many runs and what they come to
     "study": (EVERYTHING | {"cells", "config", "contest", "experiment", "progress", "setting", "trials"})
     - {"bench", "testing", "commands"},
-    "testing": EVERYTHING - {"study", "bench", "commands"},
+    # runs a method where a baseline was measured
+    "testing": (EVERYTHING | {"config", "experiment"}) - {"study", "bench", "commands"},
     "commands": EVERYTHING
     | {
         "calibration_trial",
@@ -57,6 +58,7 @@ TOP = {
     "experiment",
     "posing",
     "progress",
+    "pytest",
     "recorded",
     "rehearsal",
     "setting",
