@@ -4,13 +4,13 @@ Skin takes the colour of places on its own bone alone; a bone on which nothing w
 rendered in a process of its own; letters, lines and colour bar are drawn around it and follow the reader's screen.
 """
 
-import math
 import subprocess
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from harness.report.figures import drawn
 from harness.report.paper_lines import apart
 from harness.report.placement_words import plain_name, signed
 from harness.report.style import FAINT, INK, Chart
-from harness.score.placement import Place
+from harness.score.placement import Place, Stations, Worth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,33 +41,45 @@ Values = Mapping[str, float | None]
 """Candidate -> what it is worth; None where that was not measured."""
 
 
-def body_map(places: Sequence[Place], values: Values, *, unit: str, what: str) -> tuple[Chart | None, str]:
+@dataclass(frozen=True)
+class Shown:
+    """One map: what each candidate is worth in one way of asking."""
+
+    values: Values
+    what: str
+    """The same in words."""
+    worn: Stations = ()
+    """What is worn already: it has no value, and a dark ball."""
+
+
+def body_map(places: Sequence[Place], shown: Shown, *, unit: str, number: int = 1) -> tuple[Chart | None, str]:
     """The chart, or None and why there is none.
 
-    `what` says in words what the values are. Without matplotlib or pyvista, or where nothing can be rendered, the
-    reason is in one line, as the report lists it.
+    Places that have no value and are not worn are left out. Without matplotlib or pyvista, or where nothing can be
+    rendered, the reason is in one line, as the report lists it.
     """
-    known = [value for place in places if (value := values.get(place.name)) is not None]
+    here = [place for place in places if place.name in shown.worn or shown.values.get(place.name) is not None]
+    known = [value for place in here if (value := shown.values.get(place.name)) is not None]
     if not known:
         return None, "no candidate has a value"
     for package in ("matplotlib", "pyvista"):
         if find_spec(package) is None:
             return None, str(MissingExtra("A rendered picture", package, "viz"))
     low, high = min(0.0, *known), max(0.0, *known)
-    high = high if high > low else low + 1.0
-    views, reason = _rendered(places, values, low, high)
+    ends = (low, high if high > low else low + 1.0)
+    views, reason = _rendered(here, shown.values, ends)
     if views is None:
         return None, reason
-    return _chart(places, values, views, (low, high), unit, what), ""
+    return _chart(here, shown, views, ends, unit, number), ""
 
 
 def _rendered(
-    places: Sequence[Place], values: Values, low: float, high: float
+    places: Sequence[Place], values: Values, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """The pictures of both sides and where the places are on them (see `body_scene`), or why there are none."""
     from matplotlib import colormaps
 
-    found = [values.get(place.name) for place in places]
+    found, (low, high) = [values.get(place.name) for place in places], ends
     shares = [0.0 if value is None else (value - low) / (high - low) for value in found]
     with TemporaryDirectory(prefix="harness-report-") as folder:
         job, output = Path(folder) / "job.npz", Path(folder) / "views.npz"
@@ -97,47 +109,44 @@ def _rendered(
 
 def _chart(
     places: Sequence[Place],
-    values: Values,
+    shown: Shown,
     views: Mapping[str, np.ndarray],
     ends: tuple[float, float],
     unit: str,
-    what: str,
+    number: int,
 ) -> Chart:
-    order = sorted(
-        (n for n, place in enumerate(places) if values.get(place.name) is not None),
-        key=lambda n: -(values[places[n].name] or 0.0),
-    )
-    named = order[:_MOST_NAMED]
+    values = {n: value for n, place in enumerate(places) if (value := shown.values.get(place.name)) is not None}
+    order = sorted(values, key=lambda n: -values[n])
+    texts = {n: f"{plain_name(places[n].name)} {signed(values[n])}" for n in order[:_MOST_NAMED]}
+    texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
 
     def draw(canvas: "Figure") -> None:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
         grid = canvas.add_gridspec(2, 2, height_ratios=(1.0, 0.035))
+        at = views["at"]
         for side, title in enumerate(("from ahead", "from behind")):
             axes = canvas.add_subplot(grid[0, side])
             axes.imshow(views["picture"][side], interpolation="none")
             axes.set_axis_off()
             axes.text(0.5, 0.0, title, transform=axes.transAxes, ha="center", va="top", color=FAINT)
-            other = 1 - side
-            here = [n for n in named if views["at"][side, n, 2] > views["at"][other, n, 2] + 1e-6 * (side - 0.5)]
-            texts = {n: f"{plain_name(places[n].name)} {signed(values[places[n].name])}" for n in here}
-            _name(axes, views["at"][side], texts, views["picture"].shape[1:3])
+            here = [n for n in texts if (at[1, n, 2] > at[0, n, 2] + 1e-6) == bool(side)]
+            _name(axes, at[side], {n: texts[n] for n in here}, views["picture"].shape[1:3])
         bar = canvas.add_subplot(grid[1, :])
         canvas.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
-        bar.set_xlabel(f"{what} [{unit}]")
+        bar.set_xlabel(f"{shown.what} [{unit}]")
         bar.grid(False)
 
-    absent = [plain_name(p.name) for p in places if values.get(p.name) is None]
-    grey = f" Without a value: {', '.join(absent)}." if absent else ""
     most = f" Names: the {_MOST_NAMED} of {len(order)} places worth most." if len(order) > _MOST_NAMED else ""
-    said = ", ".join(f"{plain_name(places[n].name)} {signed(values[places[n].name])}" for n in order)
+    worn = " Dark balls: worn already." if len(values) < len(places) else ""
+    said = ", ".join(f"{plain_name(places[n].name)} {signed(values[n])}" for n in order)
     return drawn(
-        "body_map",
-        "What a tracker is worth, over the body",
-        f"Colour: {what} [{unit}]; balls are the places that were tried, skin between places of one bone is "
-        f"interpolated, grey bones had none.{most}{grey} Seen from ahead, the performer's left is on the right.",
-        f"The body coloured by {what}: {said} {unit}.",
+        f"body_map_{number}",
+        f"{shown.what[0].upper()}{shown.what[1:]}",
+        f"Balls: places that were tried, with what they are worth [{unit}]. Skin has the colour of the places on its "
+        f"own bone, nearer ones more; grey bones had none.{worn}{most} From ahead the performer's left is on the right.",
+        f"The body coloured by {shown.what}: {said} {unit}.",
         draw,
         _HEIGHT_IN,
         raster=True,
@@ -188,19 +197,20 @@ def blended(points_m: Floats, places_m: Floats, colours: Floats) -> Floats:
     return out
 
 
-def best_known(worth: Sequence[Any]) -> tuple[Values, str]:
-    """Which values to show: those of the mode that knows most candidates, and what they are in words."""
-    groups: dict[tuple[str, tuple[str, ...]], dict[str, float | None]] = {}
+def maps(worth: Sequence[Worth]) -> list[Shown]:
+    """What there is to show: candidates among each other, as many as can be, and what one more is worth."""
+    groups: dict[tuple[str, Stations], dict[str, float | None]] = {}
     for each in worth:
         groups.setdefault((each.mode, each.base), {})[each.candidate] = each.difference
-    if not groups:
-        return {}, ""
-    (mode, base), values = max(
-        groups.items(), key=lambda g: sum(v is not None and math.isfinite(v) for v in g[1].values())
-    )
     words = {
-        "ablate": f"error without it, of {len(base)} trackers, less error with it",
-        "add": "what it takes off the error when added" if base else "what it takes off the error alone",
+        "ablate": "error without it, of {count} trackers, less error with it",
+        "add": "what one more takes off the error",
         "exhaustive": "error of sets without it less error of sets with it, on average",
     }
-    return values, words[mode]
+    found = [
+        Shown(values, words[mode].format(count=len(base)), base if mode == "add" else ())
+        for (mode, base), values in sorted(groups.items(), key=lambda group: group[0][0] != "exhaustive")
+        if any(value is not None for value in values.values())
+    ]
+    among, more = [one for one in found if not one.worn], [one for one in found if one.worn]
+    return [max(kind, key=lambda one: len(one.values)) for kind in (among, more) if kind]

@@ -27,6 +27,8 @@ _FINER = 2
 """Times so many are rendered and averaged, for a picture without background is not smoothed."""
 NEUTRAL = (0.74, 0.76, 0.79)
 """Skin of bones on which no place was tried."""
+_WORN = "#3a4250"
+"""Balls that have no value: what is worn already."""
 _TALL_M = 1.86
 """Of what a view shows."""
 _BALLS = ((0.030, "#16191d"), (0.026, "#ffffff"))
@@ -130,7 +132,7 @@ def _view(
             for radius, rim in _BALLS:
                 ball = pv.Sphere(radius=radius, center=centre)
                 plotter.add_mesh(ball, color=rim, culling="front", lighting=False)
-            plotter.add_mesh(pv.Sphere(radius=_BALL_M, center=centre), color=shade if there else NEUTRAL, **look)
+            plotter.add_mesh(pv.Sphere(radius=_BALL_M, center=centre), color=shade if there else _WORN, **look)
         towards = np.array([1.0 if ahead else -1.0, 0.0, 0.0])
         middle = np.array([0.0, 0.0, 0.5 * (max(m.bounds[5] for m in body) + min(m.bounds[4] for m in body))])
         camera = plotter.camera

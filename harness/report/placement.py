@@ -3,7 +3,7 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from harness.report.body_map import best_known, body_map
+from harness.report.body_map import body_map, maps
 from harness.report.placement_charts import charts
 from harness.report.placement_page import PlacementContent, placement_page
 from harness.report.style import Chart
@@ -36,7 +36,9 @@ def _drawn(findings: PlacementFindings) -> tuple[dict[str, list[Chart]], list[st
     """Section -> charts, and what is missing."""
     if find_spec("matplotlib") is None:
         return {}, ["Figures: matplotlib is not installed (extra viz); their numbers are tables"]
-    values, what = best_known(findings.worth)
-    body, reason = body_map(findings.candidates, values, unit=findings.unit, what=what)
-    gap = f"The body in colours: {reason}"
-    return {"body": [body] if body else [], **charts(findings)}, [gap] if body is None else []
+    pictures = [
+        body_map(findings.candidates, shown, unit=findings.unit, number=number)
+        for number, shown in enumerate(maps(findings.worth), start=1)
+    ]
+    gaps = dict.fromkeys(f"The body in colours: {reason}" for chart, reason in pictures if chart is None)
+    return {"body": [chart for chart, _ in pictures if chart], **charts(findings)}, list(gaps)

@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.core.seeds import generator
 from harness.report.figures import drawn
-from harness.report.placement_words import error, figure, named, plain_name, ranks, signed
+from harness.report.placement_words import error, figure, named, plain_name, ranks, saved, signed, way
 from harness.report.run import file_name
 from harness.report.style import COLOURS, FAINT, INK, PAPER, Chart, bare
 from harness.score.placement import Agreement, PlacementFindings, Ranking, Search, Tried, Worth
@@ -22,11 +22,6 @@ if TYPE_CHECKING:
 _BEST, _OTHER = COLOURS[1], COLOURS[0]
 _ROW_IN, _FRAME_IN, _MOST_ROWS, _LETTERS = 0.24, 0.9, 20, 96
 """Height of a row, of what is around rows; rows that are shown; letters under all best sets together."""
-_TITLES = {
-    "ablate": "left out of {base}",
-    "add": "added to {base}",
-    "exhaustive": "with it against without it, over all sets",
-}
 
 
 def pareto(findings: PlacementFindings) -> Chart:
@@ -144,9 +139,7 @@ def ranking(findings: PlacementFindings, found: Ranking, number: int) -> Chart:
 def worth(findings: PlacementFindings, found: Sequence[Worth], number: int) -> Chart:
     """What each candidate is worth in one mode, the most first."""
     rows = sorted((w for w in found if w.difference is not None), key=lambda w: -(w.difference or 0.0))[:40]
-    base = found[0].base
-    whole = f"all {len(base)}" if len(base) == len(findings.candidates) else named(base)
-    title = _TITLES[found[0].mode].format(base=whole)
+    title = way(findings, found[0])
 
     def draw(canvas: "Figure") -> None:
         axes = canvas.subplots()
@@ -191,6 +184,7 @@ def path(findings: PlacementFindings, found: Search) -> Chart:
 
     said = "; ".join(f"{step.changed or 'start'}: {figure(tried.mean)}" for _, step, tried in known)
     ended = f" It ended: {found.ended}." if found.ended else ""
+    ended += f" {held}." if (held := saved(found, findings.unit)) else ""
     return drawn(
         f"path_{file_name(found.mode)}_{file_name(found.title)}",
         f"{found.mode}: {found.title}",

@@ -1,10 +1,23 @@
 """A placement study as text for the terminal: what to wear first, then every ranking, and how far it can be trusted."""
 
 import textwrap
-from collections.abc import Sequence
 
 from harness.report.paper_text import WIDTH, claims_text
-from harness.report.placement_words import difference, error, figure, listed, named, plain_name, ranks, sentence
+from harness.report.placement_words import (
+    difference,
+    error,
+    figure,
+    given,
+    held_out,
+    listed,
+    named,
+    plain_name,
+    ranks,
+    saved,
+    sentence,
+    share,
+    way,
+)
 from harness.report.text import aligned
 from harness.score.placement import MODES, PlacementFindings, Ranking, Search
 
@@ -27,22 +40,26 @@ def _about(findings: PlacementFindings) -> list[str]:
     link = f"; {findings.link}" if findings.link else ""
     return [
         textwrap.fill(f"{what}, {findings.motion}, noise {findings.noise}, seed {findings.seed}{link}", WIDTH),
-        f"{len(findings.candidates)} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
+        f"{len(given(findings))} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
         f"{len(findings.failures)} failed; mean over clips with its 95 % interval",
     ]
 
 
 def _best(findings: PlacementFindings) -> list[str]:
     """The best set of each size."""
-    head = ["trackers", "best set", "error", "", "rate", "as good"]
+    head = ["trackers", "best set", "", "error", "held out", "rate", "best of", "stays best", "as good"]
     rows = []
     for best in findings.best:
         tried = findings.of(best.stations)
         rate = f"{tried.rate_hz:g} Hz" if tried else ""
         front = "" if best.on_front else "fewer do better"
         ties = listed(best.ties, 2) if best.ties else "none"
-        rows.append([str(len(best.stations)), named(best.stations), error(findings, tried), front, rate, ties])
-    return aligned([head, *rows], text_columns=4) if rows else []
+        kept = [str(best.of or ""), share(best.stays), ties]
+        errors = [error(findings, tried), held_out(findings, best)]
+        rows.append([str(len(best.stations)), named(best.stations), front, *errors, rate, *kept])
+    used = [i for i in range(len(head)) if any(row[i] for row in rows)]
+    lines = [[row[i] for i in used] for row in (head, *rows)]
+    return aligned(lines, text_columns=used.index(3)) if rows else []
 
 
 def _ranking(findings: PlacementFindings, ranking: Ranking) -> list[str]:
@@ -70,29 +87,23 @@ def _search(findings: PlacementFindings, search: Search) -> list[str]:
         mean = figure(tried.mean if tried else None)
         rows.append([plain_name(step.changed) or "start", named(step.stations), also, mean, gain])
     ended = [f"ended: {search.ended}"] if search.ended else []
+    ended += [held] if (held := saved(search, findings.unit)) else []
     return [f"{search.mode}: {search.title}", *aligned([head, *rows], text_columns=3), *ended]
 
 
 def _worth(findings: PlacementFindings) -> list[str]:
     """What each candidate is worth in every mode."""
-    modes = list(dict.fromkeys((worth.mode, worth.base) for worth in findings.worth))
-    if not modes:
+    ways = list(dict.fromkeys(way(findings, worth) for worth in findings.worth))
+    if not ways:
         return []
-    found = {(w.candidate, w.mode, w.base): difference(w.difference, w.low, w.high) for w in findings.worth}
-    names = {"ablate": "left out of", "add": "added to", "exhaustive": "with it against without it"}
-    head = ["candidate", *(f"{names[mode]} {_all(findings, base)}".strip() for mode, base in modes)]
+    found = {(w.candidate, way(findings, w)): difference(w.difference, w.low, w.high) for w in findings.worth}
     rows = [
-        [plain_name(place.name), *(found.get((place.name, *mode), "") for mode in modes)]
+        [plain_name(place.name), *(found.get((place.name, one), "") for one in ways)]
         for place in findings.candidates
-        if any((place.name, *mode) in found for mode in modes)
+        if any((place.name, one) in found for one in ways)
     ]
-    return [f"what each is worth [{findings.unit}]: error without it less error with it", *aligned([head, *rows], 1)]
-
-
-def _all(findings: PlacementFindings, base: Sequence[str]) -> str:
-    if not base:
-        return ""
-    return f"all {len(base)}" if len(base) == len(findings.candidates) else named(tuple(base))
+    title = f"what each is worth [{findings.unit}]: error without it less error with it"
+    return [title, *aligned([["candidate", *ways], *rows], text_columns=1)]
 
 
 def _stability(findings: PlacementFindings) -> list[str]:
@@ -100,9 +111,13 @@ def _stability(findings: PlacementFindings) -> list[str]:
     if not findings.conditions:
         return []
     sizes = sorted({int(size) for condition in findings.conditions for size in condition.best})
-    head = ["condition", *(f"best of {size}" for size in sizes)]
+    head = ["condition", *(f"best of {size}" for size in sizes), "clips", "stays best"]
     rows = [
-        [f"{c.kind}: {c.name}", *(named(c.best[str(size)]) if str(size) in c.best else "" for size in sizes)]
+        [
+            f"{c.kind}: {c.name}",
+            *(named(c.best[str(size)]) if str(size) in c.best else "" for size in sizes),
+            *(str(c.clips), share(c.stays)),
+        ]
         for c in findings.conditions
     ]
     lines = ["elsewhere", *aligned([head, *rows], text_columns=1 + len(sizes))]

@@ -5,11 +5,12 @@ from collections.abc import Sequence
 
 from harness.report.paper_verdicts import MINUS
 from harness.score.paired import FEWEST_CLIPS, paired
-from harness.score.placement import Best, PlacementFindings, Stations, Tried
+from harness.score.placement import Best, Place, PlacementFindings, Search, Stations, Tried, Worth
 
 _PAIRED = ("left_", "right_")
 _IRREGULAR = {"foot": "feet", "calf": "calves", "humerus": "humeri", "femur": "femora", "tibia": "tibiae"}
 _MOST_DECIMALS = 4
+_WORTH = {"ablate": "left out of", "add": "added to", "exhaustive": "with it against without it, over all sets"}
 
 
 def named(stations: Stations) -> str:
@@ -23,6 +24,18 @@ def named(stations: Stations) -> str:
         elif name.startswith(_PAIRED[0]):
             parts.append(f"both {_plural(plain_name(bare))}")
     return " + ".join(sorted(parts, key=lambda part: not part.startswith("both "))) or "none"
+
+
+def given(findings: PlacementFindings) -> list[Place]:
+    """The candidates that the study names, without those that it moved."""
+    return [place for place in findings.candidates if not place.moved_from]
+
+
+def way(findings: PlacementFindings, worth: Worth) -> str:
+    """In which way a candidate's worth was found: "left out of all 5"."""
+    whole = len(worth.base) == len(given(findings))
+    base = "" if not worth.base else f"all {len(worth.base)}" if whole else named(worth.base)
+    return f"{_WORTH[worth.mode]} {base}".strip()
 
 
 def plain_name(name: str) -> str:
@@ -41,7 +54,9 @@ def sentence(findings: PlacementFindings) -> str:
         return "No set of stations was measured."
     tried = findings.of(chosen.stations)
     ties = _ties(chosen)
-    return f"{_opening(findings, chosen)}: {named(chosen.stations)}, {error(findings, tried)}{ties}."
+    held = held_out(findings, chosen)
+    elsewhere = f", and {held} on {chosen.held_out_clips} clips on which nothing was chosen" if held else ""
+    return f"{_opening(findings, chosen)}: {named(chosen.stations)}, {error(findings, tried)}{elsewhere}{ties}."
 
 
 def _opening(findings: PlacementFindings, chosen: Best) -> str:
@@ -94,8 +109,28 @@ def error(findings: PlacementFindings, tried: Tried | None) -> str:
     """ "1.90 deg (1.78 to 2.02)"."""
     if tried is None or tried.mean is None:
         return "not measured"
-    text = f"{figure(tried.mean)} {findings.unit}".rstrip()
-    return f"{text} ({figure(tried.low)} to {figure(tried.high)})" if tried.low is not None else text
+    return bounded(findings, tried.mean, tried.low, tried.high)
+
+
+def held_out(findings: PlacementFindings, best: Best) -> str:
+    """Its error on the clips that were held out, "" where there are none."""
+    if best.held_out is None:
+        return ""
+    return bounded(findings, best.held_out, best.held_out_low, best.held_out_high)
+
+
+def bounded(findings: PlacementFindings, mean: float, low: float | None, high: float | None) -> str:
+    """ "1.90 deg (1.78 to 2.02)"."""
+    text = f"{figure(mean)} {findings.unit}".rstrip()
+    return f"{text} ({figure(low)} to {figure(high)})" if low is not None else text
+
+
+def saved(search: Search, unit: str) -> str:
+    """What a search is worth where nothing was chosen, "" where that was not judged."""
+    if search.held_out is None:
+        return ""
+    gain = difference(search.held_out, search.held_out_low, search.held_out_high)
+    return f"On {search.held_out_clips} clips on which nothing was chosen the last set saves {gain} {unit}".rstrip()
 
 
 def difference(mean: float | None, low: float | None, high: float | None) -> str:
@@ -126,6 +161,11 @@ def needed(*values: float | None) -> int:
     """Decimals, 2 at least, so that none that is not zero reads 0.00."""
     finest = min((abs(v) for v in values if v), default=1.0)
     return min(max(math.ceil(-math.log10(finest)), 2), _MOST_DECIMALS)
+
+
+def share(value: float | None) -> str:
+    """In per cent, "" of none."""
+    return "" if value is None else f"{100.0 * value:.0f} %"
 
 
 def ranks(rank_low: int, rank_high: int) -> str:

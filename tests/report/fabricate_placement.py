@@ -80,7 +80,7 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
         command="harness placement scenarios/placement_walking.toml",
         candidates=PLACES,
         tried=tuple(tried),
-        best=tuple(Best(s, _ties(s, sets, errors)) for s in best),
+        best=tuple(_best(s, _ties(s, sets, errors), errors) for s in best),
         circumstances={"harness": "0.1.0", "commit": "0123456789abcdef", "dirty": False, "python": "3.11.2"},
         rankings=rankings,
         searches=(_greedy(best, errors),),
@@ -158,13 +158,22 @@ def _ties(best: Stations, sets: Sequence[Stations], errors: Errors) -> tuple[Sta
     return tuple(stations for stations, behind in rivals if behind.low is None or behind.low <= 0.0)
 
 
+def _best(stations: Stations, ties: tuple[Stations, ...], errors: Errors) -> Best:
+    """Judged on clips that were held out, a little worse there."""
+    of, there = sum(len(other) == len(stations) for other in errors), 1.05 * _mean(errors[stations])
+    return Best(
+        stations, ties, True, of, 0.83, there, held_out=there, held_out_low=there - 0.4, held_out_high=there + 0.4,
+        held_out_clips=6,
+    )  # fmt: skip
+
+
 def _greedy(path: Sequence[Stations], errors: Errors) -> Search:
     steps = [Step(path[0], f"+ {path[0][0]}")]
     for before, now in itertools.pairwise(path):
         gain = _paired(errors[before], errors[now])
         new = next(iter(set(now) - set(before)))
         steps.append(Step(now, f"+ {new}", gain.mean, gain.low, gain.high, ("head",)))
-    return Search("greedy", "from none", tuple(steps), "as many as were asked for")
+    return Search("greedy", "from none", tuple(steps), "as many as were asked for", 1.2, 0.9, 1.6, 6)
 
 
 def _worth(name: str, mode: str, base: Stations, less: Mapping[str, float], more: Mapping[str, float]) -> Worth:

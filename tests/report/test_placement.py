@@ -13,7 +13,7 @@ from harness.cli import main
 from harness.report import body_map as body
 from harness.report import placement
 from harness.report.apart import started
-from harness.report.body_map import best_known, blended, body_map
+from harness.report.body_map import Shown, blended, body_map, maps
 from harness.report.placement import write_placement_page
 from harness.report.placement_charts import charts
 from harness.report.placement_text import text
@@ -22,7 +22,10 @@ from harness.score.placement import Best, PlacementFindings, Stations, Tried
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
 
 NO_PICTURE = "the renderer was ended by SIGABRT"
-ANSWER = "Of 1 to 3 trackers 3 err least: both ankles + pelvis, 2.40 deg (2.01 to 2.79)."
+ANSWER = (
+    "Of 1 to 3 trackers 3 err least: both ankles + pelvis, 2.40 deg (2.01 to 2.79), and 2.52 deg (2.12 to 2.92) on 6 "
+    "clips on which nothing was chosen."
+)
 
 
 @pytest.fixture(scope="module")
@@ -138,7 +141,8 @@ def test_the_text_opens_on_the_answer_and_has_every_table(findings: PlacementFin
     assert lines[0] == ANSWER
     whole = "\n".join(lines)
     for part in (
-        "3         both ankles + pelvis  2.40 deg (2.01 to 2.79)",
+        "3         both ankles + pelvis  2.40 deg (2.01 to 2.79)  2.52 deg (2.12 to 2.92)",
+        "On 6 clips on which nothing was chosen the last set saves +1.20 (+0.90 to +1.60) deg",
         "reproduced",
         "exhaustive: 3 of 11 places",
         "and 8 more",
@@ -214,11 +218,14 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
     assert "a placement study" in capsys.readouterr().err
 
 
-def test_the_mode_that_knows_most_candidates_colours_the_body(findings: PlacementFindings) -> None:
-    values, what = best_known(findings.worth)
-    assert len(values) == len(PLACES)
-    assert what == "error without it, of 11 trackers, less error with it"
-    assert best_known(()) == ({}, "")
+def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
+    among, more = maps(findings.worth)
+    assert len(among.values) == len(PLACES)
+    assert among.what == "error without it, of 11 trackers, less error with it"
+    assert among.worn == ()
+    assert more.worn == ("pelvis", "left_ankle", "right_ankle")
+    assert set(more.values) == {place.name for place in PLACES} - set(more.worn)
+    assert maps(()) == []
 
 
 def test_skin_has_the_colours_of_its_places_nearer_ones_more(rng: np.random.Generator) -> None:
@@ -242,28 +249,30 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
         "at": np.array([np.column_stack([at, sign * facing]) for sign in (1.0, -1.0)]),
     }
     monkeypatch.setattr(body, "_rendered", lambda *args: (views, ""))
-    values = {place.name: 0.1 * n for n, place in enumerate(PLACES)}
-    chart, missing = body_map(PLACES, values, unit="deg", what="worth")
+    values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
+    chart, missing = body_map(PLACES, Shown(values, "worth", ("right_ankle",)), unit="deg")
     assert chart is not None
     assert missing == ""
-    for n, place in enumerate(PLACES):
+    assert "right ankle (worn)" in chart.svg
+    for n, place in enumerate(PLACES[:-1]):
         said = f"{place.name.replace('_', ' ')} +{0.1 * n:.2f}" if n else f"{place.name} 0.00"
         assert said in chart.svg, said
         assert said in chart.alt
     assert "worth [deg]" in chart.svg
+    assert "Dark balls: worn already." in chart.caption
 
 
 def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(body, "started", lambda module, arguments: started("harness.report.not_there", []))
-    chart, missing = body_map(PLACES, {"head": 0.1}, unit="deg", what="worth")
+    chart, missing = body_map(PLACES, Shown({"head": 0.1}, "worth"), unit="deg")
     assert chart is None
     assert missing.startswith("the renderer failed")
 
 
 def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert body_map(PLACES, {"head": None}, unit="deg", what="worth") == (None, "no candidate has a value")
+    assert body_map(PLACES, Shown({"head": None}, "worth"), unit="deg") == (None, "no candidate has a value")
     monkeypatch.setattr(body, "find_spec", lambda name: None if name == "pyvista" else True)
-    chart, missing = body_map(PLACES, {"head": 0.1}, unit="deg", what="worth")
+    chart, missing = body_map(PLACES, Shown({"head": 0.1}, "worth"), unit="deg")
     assert chart is None
     assert "viz" in missing
 
@@ -274,13 +283,13 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     """Yellow where worth is largest, purple where none is, grey where nothing was tried; places where they are."""
     kept: dict[str, np.ndarray] = {}
 
-    def keep(places: object, values: object, views: dict[str, np.ndarray], *rest: object) -> None:
+    def keep(places: object, shown: Shown, views: dict[str, np.ndarray], *rest: object) -> None:
         kept.update(views)
 
     monkeypatch.setattr(body, "_chart", keep)
-    values: dict[str, float | None] = {place.name: None for place in PLACES}
-    values |= {"head": 0.0, "left_ankle": 0.5}
-    assert body_map(PLACES, values, unit="deg", what="worth")[1] == ""
+    values = {"head": 0.0, "left_ankle": 0.5}
+    worn = tuple(place.name for place in PLACES if place.name not in values)
+    assert body_map(PLACES, Shown(values, "worth", worn), unit="deg")[1] == ""
     picture, at = kept["picture"].astype(float), kept["at"]
     names = [place.name for place in PLACES]
 
