@@ -38,7 +38,12 @@ Z = float(stats.norm.isf(ODDS / 2))
 
 def errors(true: Sensed, seen: Sensed) -> tuple[Floats, Floats]:
     """Position error (N, S, 3) and the small rotation (N, S, 3) about the tracker's axes."""
-    return seen.position_m - true.position_m, rotations.log(rotations.multiply(seen.turn, rotations.inverse(true.turn)))
+    return shifted(true, seen), rotations.log(rotations.multiply(seen.turn, rotations.inverse(true.turn)))
+
+
+def shifted(true: Sensed, seen: Sensed) -> Floats:
+    """Position error (N, S, 3) alone: of hours, rotations take long."""
+    return seen.position_m - true.position_m
 
 
 def assert_sd(samples: Floats, sd: float) -> None:
@@ -104,7 +109,7 @@ def test_slow_is_stationary_from_the_start(still: Still) -> None:
     for seed in range(60):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
         Slow().spoil(seen)
-        first.append(errors(true, seen)[0][0])
+        first.append(shifted(true, seen)[0])
     assert_sd(np.array(first), Slow().position_m)
 
 
@@ -118,7 +123,7 @@ def test_session(still: Still) -> None:
         scales.append(ratio[0, 0, 0])
         seen = still(0.1, seed=seed)
         Session(scale=0.0, station_offset_m=0.001).spoil(seen)
-        moved = rotations.rotate(rotations.inverse(true.turn), errors(true, seen)[0])
+        moved = rotations.rotate(rotations.inverse(true.turn), shifted(true, seen))
         assert np.ptp(moved, axis=0).max() < 1e-12
         offsets.append(moved[0])
     assert_sd(np.array(scales), 0.002)
@@ -160,7 +165,7 @@ def test_excursion(still: Still) -> None:
 def test_excursions_that_meet_stay_below_the_largest_size(still: Still) -> None:
     true, seen = still(600.0), still(600.0)
     Excursion(onsets_per_min=60.0).spoil(seen)
-    size_m = np.linalg.norm(errors(true, seen)[0], axis=2)
+    size_m = np.linalg.norm(shifted(true, seen), axis=2)
     assert 0.0299 < size_m.max() <= 0.03 + 1e-12
 
 
@@ -225,7 +230,7 @@ def test_dropout(still: Still) -> None:
     assert 0.1 - 1.0 / rate_hz <= lengths_s.min()
     assert np.quantile(lengths_s, 0.98) <= 0.5 + 1.0 / rate_hz, "one gap in 600 touches the next"
     assert abs(lengths_s.mean() - 0.3) < Z * np.sqrt((0.4**2 + 1.0 / rate_hz**2) / 12.0 / len(lengths_s)) + 0.01
-    shift, _ = errors(true, seen)
+    shift = shifted(true, seen)
     coasts = 0
     for s, a, _ in gaps:
         before = slice(a - 20, a)
@@ -255,7 +260,7 @@ def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coas
     true, seen = still(400.0, 2), still(400.0, 2)
     Dropout(share=0.005, coast_s=coast_s, tilt_rad=np.deg2rad(tilt_deg)).spoil(seen)
     alone = ~seen.hits["lost"]
-    worst_cm = 100.0 * np.linalg.norm(errors(true, seen)[0], axis=2)[alone].max()
+    worst_cm = 100.0 * np.linalg.norm(shifted(true, seen), axis=2)[alone].max()
     law_cm = 100.0 * 0.5 * 9.81 * np.sin(np.deg2rad(tilt_deg)) * coast_s**2
     assert law_cm == pytest.approx(error_cm, abs=0.5 if error_cm > 10.0 else 0.05)
     assert law_cm * (1.0 - 0.026 / coast_s) ** 2 < worst_cm <= law_cm, "the last reading is up to 25 ms before the gap"
@@ -319,7 +324,7 @@ def test_speed(still: Still, rng: np.random.Generator) -> None:
     true, seen = still(1.0), still(1.0)
     seen.velocity_m_s = rng.normal(size=seen.velocity_m_s.shape)
     Speed(ahead_s=0.002).spoil(seen)
-    np.testing.assert_allclose(errors(true, seen)[0], 0.002 * seen.velocity_m_s, atol=1e-15)
+    np.testing.assert_allclose(shifted(true, seen), 0.002 * seen.velocity_m_s, atol=1e-15)
 
 
 def test_mount_offset(still: Still) -> None:
@@ -327,7 +332,7 @@ def test_mount_offset(still: Still) -> None:
     for seed in range(200):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
         MountOffset(position_m=0.004, orientation_rad=0.03).spoil(seen)
-        shift = rotations.rotate(rotations.inverse(true.turn), errors(true, seen)[0])
+        shift = rotations.rotate(rotations.inverse(true.turn), shifted(true, seen))
         turn = rotations.log(rotations.multiply(rotations.inverse(true.turn), seen.turn))
         assert max(np.ptp(shift, axis=0).max(), np.ptp(turn, axis=0).max()) < 1e-12
         moved.append(shift[0])
@@ -344,10 +349,10 @@ def test_mount_slip_takes_its_time_and_stays(still: Still, over_s: float) -> Non
     time_s = seen.time_s[:, 1]
     share = np.where(time_s < 3.0, 0.0, np.minimum((time_s - 3.0) / over_s, 1.0) if over_s else 1.0)
     np.testing.assert_allclose(own[:, 1], 0.4 * share[:, None] * [1.0, 0.0, 0.0], atol=1e-9)
-    shift = rotations.rotate(rotations.inverse(true.turn), errors(true, seen)[0])[:, 1]
+    shift = rotations.rotate(rotations.inverse(true.turn), shifted(true, seen))[:, 1]
     np.testing.assert_allclose(shift[:, 0], -0.02 * share, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(shift[:, 1:], axis=1), 2 * 0.05 * np.sin(0.2 * share), atol=1e-12)
-    assert np.abs(np.delete(errors(true, seen)[0], 1, axis=1)).max() == 0.0
+    assert np.abs(np.delete(shifted(true, seen), 1, axis=1)).max() == 0.0
 
 
 def test_clock(still: Still) -> None:

@@ -1,6 +1,7 @@
 """The whole stream, from true motion to decoded frames."""
 
 import dataclasses
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,7 @@ OVERLOADED = TrackerConfig(rate_hz=60.0)
 """Six stations at 60 Hz are a fifth more than 115200 baud can carry."""
 
 
+@cache
 def seen(boxer: Boxer, noise: Noise | str = "clean", tracker: TrackerConfig | None = None, seed: int = 1) -> Simulation:
     chosen = level(noise) if isinstance(noise, str) else noise
     return simulate(*boxer, worn(), tracker or TrackerConfig(), chosen, seed=seed)
@@ -54,16 +56,16 @@ def error_m(boxer: Boxer, simulation: Simulation, tracker: TrackerConfig) -> tup
     trajectory, kinematics, known = Trajectory(body, take), Kinematics(body), simulation.calibration
     times_s = sampling_times_s(trajectory.duration_s, tracker, len(known.stations))
     bones = [body.skeleton.index(bone) for bone in known.bones]
-    far, turned = np.full((2, len(simulation.frames), len(bones)), np.nan)
-    for f, (frame, index) in enumerate(zip(simulation.frames, simulation.frame_index, strict=True)):
+    shape = len(simulation.frames), len(bones)
+    at_m, world_from_station = np.empty((*shape, 3)), np.empty((*shape, 4))
+    for f, index in enumerate(simulation.frame_index):
         for s, qpos in enumerate(trajectory.qpos(times_s[index])):
             kinematics.set(qpos)
-            at_m, world_from_station = kinematics.station_poses(bones, known.mount_m, known.bone_from_station)
-            told_m = known.tracker_origin_m + rotations.rotate(known.world_from_tracker, frame.position_m[s])
-            told = rotations.multiply(known.world_from_tracker, frame.tracker_from_station[s])
-            far[f, s] = np.linalg.norm(told_m - at_m[s])
-            turned[f, s] = rotations.angle_between_rad(told, world_from_station[s])
-    return far, turned
+            there_m, turn = kinematics.station_poses(bones, known.mount_m, known.bone_from_station)
+            at_m[f, s], world_from_station[f, s] = there_m[s], turn[s]
+    told_m = known.tracker_origin_m + rotations.rotate(known.world_from_tracker, column(simulation, "position_m"))
+    told = rotations.multiply(known.world_from_tracker, column(simulation, "tracker_from_station"))
+    return np.linalg.norm(told_m - at_m, axis=2), rotations.angle_between_rad(told, world_from_station)
 
 
 def test_clean_frames_are_the_truth_but_for_float32(boxer: Boxer) -> None:
