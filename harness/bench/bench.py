@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
 
+from harness.bench.gate import bench_gate
 from harness.bench.index import bench_index
 from harness.bench.load import bench_load
 from harness.bench.rows import Row
@@ -39,6 +40,7 @@ BENCHMARKS: dict[str, Callable[[int, bool], list[Row]]] = {
     "ik": _ik,
     "index": lambda seed, large: bench_index(seed),
     "methods": _methods,
+    "gate": lambda seed, large: bench_gate(seed),
 }
 
 

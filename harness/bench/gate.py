@@ -21,7 +21,7 @@ from harness.score.margins import margin_of
 from harness.score.paired import interval
 from harness.score.significance import SIGNIFICANCE, holm, judge, sign_flip_p
 
-STUDIES, CHANGED, COVERED = 1000, 200, 200
+STUDIES, CHANGED, COVERED = 1000, 200, 60
 CHANGE = 0.03
 Draw = Callable[[Population, int, np.random.Generator], Floats]
 """Errors (M, K, n, 2) of a study of n clips."""

@@ -57,7 +57,7 @@ def run_check(args: argparse.Namespace) -> Outcome:
 
 def add_bench(verbs: Verbs) -> None:
     verb = add_verb(verbs, "bench", "measure speed: ratios and medians of one run on this machine", run_bench, "seed")
-    verb.add_argument("what", nargs="*", help="methods, ik, index, wire, stream, load, startup (default: all)")
+    verb.add_argument("what", nargs="*", help="methods, ik, index, wire, stream, load, gate, startup (default: all)")
     verb.add_argument("--large", action="store_true", help="methods: a million frames too; wire: ten minutes a line")
 
 
