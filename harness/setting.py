@@ -69,8 +69,8 @@ class Setting:
     def under(self, scenario: Scenario) -> "Setting | None":
         """The same under other errors of the tracker, with other stations, calibrated otherwise or for other methods,
         sharing motion and, on the same body, what was learnt, which knows of none of these; None if more differs."""
-        free = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
-        free += ("methods", "inputs", "vary")
+        world = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
+        free = (*world, "methods", "inputs", "vary")
         if replace(self.scenario, **{name: getattr(scenario, name) for name in free}) != scenario:
             return None
         other = copy.copy(self)
@@ -79,7 +79,7 @@ class Setting:
             other._fitted = {}
             other._retargeted = {name: r for name, r in self._retargeted.items() if name == self.clip.name}
             other.__dict__.pop("examples", None)
-        for own in ("session", "calibrated", "simulation", "_worn"):
+        for own in ("session", "calibrated", "simulation", "_worn", "_same_for_all"):
             other.__dict__.pop(own, None)
         return other
 
@@ -207,6 +207,17 @@ class Setting:
         Device and noise stand as numbers, motion, body and mounts as digests of theirs: names and defaults mean
         what the code of their day made of them.
         """
+        learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}
+        return {
+            **self._same_for_all,
+            "examples": learnt,
+            "withheld": sorted(str(part) for part in self.closed[1:] if part.clip in learnt),
+            "inputs": inputs,
+        }
+
+    @cached_property
+    def _same_for_all(self) -> dict[str, object]:
+        """Of the inputs, what all methods share."""
         scenario = self.scenario
         content = asdict(scenario)
         for many in ("methods", "inputs", "name", "components", "vary", "order", "left_out", "fault", "worn"):
@@ -216,7 +227,6 @@ class Setting:
         del content["motion"]["withheld"]
         if scenario.calibration == "exact":
             del content["calibrating"]  # nobody stands model, and where trackers sit is in the digest of the mounts
-        learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}
         return {
             **content,
             "tracker": asdict(tracker_of(scenario)),
@@ -226,9 +236,6 @@ class Setting:
             "motion_digest": _motion_digest(self.clip),
             **self._worn,
             **({"people_digest": self._people_digest} if scenario.calibration == "poses" else {}),
-            "examples": learnt,
-            "withheld": sorted(str(part) for part in self.closed[1:] if part.clip in learnt),
-            "inputs": inputs,
             "metric_versions": VERSIONS,
         }
 

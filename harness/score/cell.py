@@ -18,7 +18,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.errors import BadFile, ShapeError
-from harness.score.files import TEMPORARY, plain, read_json, write_json
+from harness.score.files import TEMPORARY, as_json, plain, read_json
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
 
@@ -165,15 +165,15 @@ def write_cell(out: Path, cell: Cell) -> Path:
     beside.mkdir(parents=True)
     content = {name: getattr(cell, name) for name in _TEXTS}
     content |= {"metrics": cell.scores.metrics, "per_joint": cell.scores.per_joint, "metric_versions": VERSIONS}
-    write_json(beside / "cell.json", content)
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
     columns |= {_ERROR + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
-    packed = io.BytesIO()  # first, for a file that is closed under an archive complains
-    np.savez_compressed(packed, allow_pickle=False, scored=cell.scores.scored, **columns)
-    with open(beside / "frames.npz", "wb") as file:
-        file.write(packed.getbuffer())
-        file.flush()
-        os.fsync(file.fileno())
+    columns["scored"] = cell.scores.scored
+    whole = {"cell.json": as_json(content).encode(), "frames.npz": _packed(columns)}
+    for name, data in whole.items():
+        (beside / name).write_bytes(data)
+    for name in whole:  # when both are written: the disk is asked once for most of it
+        with open(beside / name, "rb") as file:
+            os.fsync(file.fileno())
     try:
         os.rename(beside, folder)
     except OSError:
@@ -181,6 +181,19 @@ def write_cell(out: Path, cell: Cell) -> Path:
             raise
         shutil.rmtree(beside)  # another process finished the same cell first
     return folder
+
+
+def _packed(columns: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
+    """As `np.savez` has it. Only what is no measured number is compressed: of those deflate saves a tenth, in ten times
+    the time of all the rest of writing a cell."""
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w") as archive:
+        for name, values in columns.items():
+            one = io.BytesIO()
+            np.lib.format.write_array(one, values, allow_pickle=False)
+            how = zipfile.ZIP_STORED if values.dtype.kind == "f" else zipfile.ZIP_DEFLATED
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), one.getbuffer(), how)
+    return packed.getvalue()
 
 
 def read_cell(folder: Path) -> Cell:

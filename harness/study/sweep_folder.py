@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.cells import Progress, forget_motion, source_of
-from harness.config import Scenario
+from harness.config import Scenario, leaves
 from harness.errors import BadInput, Outcome
 from harness.reconstruct import registry
 from harness.score import manifest, results
@@ -92,7 +92,7 @@ def _write(index: CellIndex, out: Path, sweep: Sweep, scenarios: Sequence[Scenar
             "cells_planned": counts.planned,
             "failures": failures,
             "scenarios": [called(scenario) for scenario in scenarios],
-            "vary": sweep.vary,
+            "vary": dict(leaves(sweep.vary)),
             "groups": groups(index),
         },
     )
