@@ -42,7 +42,7 @@ def rank(mode: Mode, title: str, sets: Mapping[Stations, Costs], base: Stations 
     """Best first; sets that were not measured on every clip are left out (see `complete`)."""
     whole, _ = complete(sets)
     order = in_order(whole)
-    better, worse = _surely(order, whole)
+    better, worse = surely(order, whole)
     rows = []
     for at, worn in enumerate(order):
         to_best = paired(whole[worn], whole[order[0]])
@@ -74,7 +74,7 @@ def mean(costs: Mapping[str, float]) -> float:
     return math.fsum(costs.values()) / len(costs)
 
 
-def _surely(
+def surely(
     order: Sequence[Stations], whole: Mapping[Stations, Mapping[str, float]]
 ) -> tuple[list[set[int]], list[set[int]]]:
     """For each set the places in the order of those that are surely better, and surely worse."""

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
@@ -13,7 +12,7 @@ from harness.score.paired import FEWEST_CLIPS, LEVEL
 from harness.score.placement import Agreement, Condition, Stations
 from harness.study.ranking import Costs, complete, in_order, mean, stays
 
-_RESAMPLES = 500
+_RESAMPLES = 2000
 
 
 @dataclass(frozen=True)
@@ -51,15 +50,18 @@ def agreements(each: Sequence[Elsewhere], compared: Sequence[Stations]) -> tuple
             continue
         same_clips = list(sides[0][shared[0]]) == list(sides[1][shared[0]])
         low, high = _interval(tables, same_clips)
-        tau = _tau(tables[0].mean(axis=1), tables[1].mean(axis=1))
-        found.append(Agreement(a.name, b.name, tau, len(shared), low, high))
+        tau = float(tau_b(tables[0].mean(axis=1), tables[1].mean(axis=1)))
+        found.append(Agreement(a.name, b.name, tau if np.isfinite(tau) else None, len(shared), low, high))
     return tuple(found)
 
 
-def _tau(a: Floats, b: Floats) -> float | None:
-    """Kendall's tau-b; None where one side has all alike."""
-    value = float(stats.kendalltau(a, b, variant="b").statistic)
-    return value if np.isfinite(value) else None
+def tau_b(a: Floats, b: Floats) -> Floats:
+    """Kendall's tau-b of (..., n) and (..., n) values, over the last axis; NaN where one side has all alike."""
+    first, second = np.triu_indices(a.shape[-1], 1)
+    up_a, up_b = (np.sign(side[..., first] - side[..., second]) for side in (a, b))
+    with np.errstate(invalid="ignore"):
+        out: Floats = np.sum(up_a * up_b, axis=-1) / np.sqrt(np.sum(up_a**2, axis=-1) * np.sum(up_b**2, axis=-1))
+    return out
 
 
 def _interval(tables: Sequence[Floats], same_clips: bool) -> tuple[float | None, float | None]:
@@ -68,14 +70,10 @@ def _interval(tables: Sequence[Floats], same_clips: bool) -> tuple[float | None,
     if min(counts) < FEWEST_CLIPS:
         return None, None
     rng = generator(0, "placement", "tau")
-    found = []
-    for _ in range(_RESAMPLES):
-        first = rng.integers(0, counts[0], counts[0])
-        second = first if same_clips else rng.integers(0, counts[1], counts[1])
-        tau = _tau(tables[0][:, first].mean(axis=1), tables[1][:, second].mean(axis=1))
-        if tau is not None:
-            found.append(tau)
-    if not found:
+    first = rng.integers(0, counts[0], (_RESAMPLES, counts[0]))
+    second = first if same_clips else rng.integers(0, counts[1], (_RESAMPLES, counts[1]))
+    found = tau_b(*(table[:, draws].mean(axis=2).T for table, draws in zip(tables, (first, second), strict=True)))
+    if np.isnan(found).all():
         return None, None
-    low, high = np.quantile(found, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
+    low, high = np.nanquantile(found, [(1.0 - LEVEL) / 2.0, (1.0 + LEVEL) / 2.0])
     return float(low), float(high)

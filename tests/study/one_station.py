@@ -1,0 +1,49 @@
+"""A method that uses one station and no other: what is needed and what is useless is known beforehand."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.body.humanoid import Body, tpose
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate, Status
+from harness.core.motion import Take
+from harness.stream.frame import TrackerFrame
+
+NEEDED = "pelvis"
+
+
+@dataclass(frozen=True)
+class OneStation:
+    """The T-pose, turned as the pelvis is; without a tracker there, always turned alike."""
+
+    name: str = "one_station"
+    summary: str = "reads the pelvis alone"
+    needs_examples: bool = False
+
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Fitted":
+        return Fitted(tpose(body.skeleton))
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    qpos: Floats
+
+    def begin(self, calibration: Calibration) -> "Session":
+        return Session(self.qpos, calibration)
+
+
+class Session:
+    def __init__(self, qpos: Floats, calibration: Calibration) -> None:
+        self.qpos, self.calibration = np.array(qpos), calibration
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        known = self.calibration
+        if NEEDED in known.stations:
+            row = known.stations.index(NEEDED)
+            turn = rotations.multiply(known.world_from_tracker, frame.tracker_from_station[row])
+            self.qpos[3:7] = rotations.multiply(turn, rotations.inverse(known.bone_from_station[row]))
+        return Estimate(self.qpos, Status.SOLVED)

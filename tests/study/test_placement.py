@@ -1,0 +1,313 @@
+"""Placement studies from their file to their findings, with a method of which the answer is known."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.config import load_scenario, shipped_placements
+from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
+from harness.score.placement import PlacementFindings, read_placement
+from harness.simulate.link import TrackerConfig
+from harness.study.placement import FINDINGS, placement
+from harness.study.placement_plan import plan
+from harness.study.placement_study import load_study
+from harness.study.study import open_study
+from harness.study.trying import rate_hz
+
+SCENARIO = """
+schema = 1
+methods = ["ik"]
+noise = "clean"
+[motion]
+source = "builtin"
+body = "common"
+behaviours = ["walking"]
+longest_s = 1.5
+test = []
+[tracker]
+rate_hz = 20.0
+[stations]
+torso = { bone = "thorax" }
+"""
+STUDY = """
+schema = 1
+kind = "placement"
+title = "Which one does it read?"
+scenario = "walk"
+methods = ["tests.study.one_station:OneStation"]
+metric = "root_angle_deg"
+[[candidate]]
+name = "hand"
+bone = "rhand"
+along = 1.0
+around_deg = 90.0
+pair = "each"
+[[candidate]]
+name = "pelvis"
+bone = "lhipjoint"
+along = 0.0
+around_deg = 165.0
+"""
+
+
+SEVEN = """test = [
+    "walking_p1_01@0.20-0.25", "walking_p1_01@0.30-0.35", "walking_p1_01@0.40-0.45", "walking_p1_01@0.50-0.55",
+    "walking_p1_01@0.60-0.65", "walking_p1_01@0.70-0.75", "walking_p1_01@0.80-0.85",
+]
+"""
+FEW = 'test = ["walking_p1_01@0.20-0.25", "walking_p1_01@0.30-0.35"]\n'
+
+
+def written(folder: Path, *tables: str, study: str = STUDY, clips: str = FEW) -> Path:
+    """The file of a study, and beside it its scenario."""
+    (folder / "walk.toml").write_text(SCENARIO.replace("test = []\n", clips))
+    path = folder / "which.toml"
+    path.write_text("\n".join([study, *tables]))
+    return path
+
+
+ALL_MODES = """
+[ablate]
+[add]
+base = ["hand"]
+[greedy]
+most = 3
+[exhaustive]
+most = 3
+[[claim]]
+text = "the hands suffice"
+source = "nobody"
+set = ["hand"]
+[[condition]]
+name = "at the usual noise"
+changes = { noise = "default" }
+"""
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, PlacementFindings]:
+    """A study with every mode but `refine`."""
+    folder = tmp_path_factory.mktemp("study")
+    path = written(folder, "[ablate]", clips=SEVEN, study=STUDY.replace("metric =", "condition_size = 1\nmetric ="))
+    placement(path, folder / "out")  # of one mode first
+    path.write_text(path.read_text().replace("[ablate]", ALL_MODES))
+    findings, outcome = placement(path, folder / "out")
+    assert outcome is Outcome.PASS
+    return path, folder / "out", findings
+
+
+def test_every_mode_finds_the_one_station_that_is_read(done: tuple[Path, Path, PlacementFindings]) -> None:
+    _, _, findings = done
+    rankings = {(ranking.mode, ranking.title): ranking for ranking in findings.rankings}
+    ablated, added, ones, twos, _ = rankings.values()
+    assert [row.stations for row in ablated.rows][-1] == ("right_hand", "left_hand")
+    assert (ablated.rows[-1].rank_low, ablated.rows[-1].rank_high) == (3, 3)
+    assert [row.stations for row in added.rows] == [("right_hand", "left_hand", "pelvis")]
+    assert ones.rows[0].stations == ("pelvis",)
+    assert [row.tied for row in ones.rows] == [True, False, False]
+    assert {row.stations for row in twos.rows if row.tied} == {("left_hand", "pelvis"), ("right_hand", "pelvis")}
+    (search,) = findings.searches
+    assert search.steps[0].changed == "+ pelvis"
+    assert [step.difference for step in search.steps[1:]] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
+def test_what_is_necessary_is_worth_much_and_what_is_useless_nothing(
+    done: tuple[Path, Path, PlacementFindings],
+) -> None:
+    _, _, findings = done
+    for worth in findings.worth:
+        if worth.candidate == "pelvis":
+            assert worth.low is not None
+            assert worth.low > 0.5
+        else:
+            assert worth.difference == pytest.approx(0.0, abs=1e-12)
+    needed = findings.of(("pelvis",))
+    assert needed is not None
+    assert needed.mean == pytest.approx(0.0, abs=1e-3)  # float32 on the wire
+
+
+def test_modes_share_their_cells(done: tuple[Path, Path, PlacementFindings]) -> None:
+    """Seven sets of three candidates on seven clips, and three of them at another noise: not one cell more."""
+    path, out, findings = done
+    cells = {folder.name: folder.stat().st_mtime_ns for folder in (out / "cells").iterdir()}
+    assert len(cells) == 7 * 7 + 7 * 3
+    again, _ = placement(path, out)
+    assert {folder.name: folder.stat().st_mtime_ns for folder in (out / "cells").iterdir()} == cells
+    assert read_placement(out / FINDINGS) == again
+    assert replace(again, circumstances={}) == replace(findings, circumstances={})
+
+
+def test_a_study_that_was_killed_goes_on_to_the_same_findings(done: tuple[Path, Path, PlacementFindings]) -> None:
+    path, out, findings = done
+    (out / FINDINGS).unlink()
+    cells = sorted((out / "cells").iterdir())
+    for folder in cells[::20]:
+        shutil.rmtree(folder)
+    again, outcome = placement(path, out)
+    assert outcome is Outcome.PASS
+    assert sorted((out / "cells").iterdir()) == cells
+    assert replace(again, circumstances={}) == replace(findings, circumstances={})
+
+
+def test_a_set_that_does_not_suffice_is_said_so(done: tuple[Path, Path, PlacementFindings]) -> None:
+    _, _, findings = done
+    assert [claim.verdict for claim in findings.claims] == ["not reproduced", "not reproduced"]
+    assert "pelvis" in findings.claims[0].text
+    assert all("judged on the clips on which the best other was chosen" in claim.why for claim in findings.claims)
+
+
+def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings]) -> None:
+    _, _, findings = done
+    own, noisy = findings.conditions
+    assert own.best == noisy.best == {"1": ("pelvis",)}
+    assert (own.kind, noisy.kind) == ("own", "noise")
+    assert findings.compared == (("right_hand",), ("left_hand",), ("pelvis",))
+    assert own.stays == 1.0
+    assert len(findings.agreements) == 1
+
+
+def test_what_was_chosen_is_judged_on_clips_that_chose_nothing(tmp_path: Path) -> None:
+    study = STUDY.replace("metric =", 'held_out = ["walking_p1_01@0.10-0.15", "walking_p1_01@0.90-0.95"]\nmetric =')
+    findings, outcome = placement(written(tmp_path, "[exhaustive]\nmost = 1", study=study), tmp_path / "out")
+    assert outcome is Outcome.PASS
+    (best,) = findings.best
+    assert (best.held_out_clips, best.of) == (2, 3)
+    assert best.held_out == pytest.approx(0.0, abs=1e-3)
+    assert all(set(tried.errors) == set(load_scenario(tmp_path / "walk.toml").motion.test) for tried in findings.tried)
+    assert len(list((tmp_path / "out" / "cells").iterdir())) == 2 * 3 + 2
+
+
+def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
+    changes = '[exhaustive]\nmost = 2\n[changes.components]\nslip = [{ station = "pelvis" }]'  # nobody else has it
+    findings, outcome = placement(written(tmp_path, changes), tmp_path / "out")
+    assert outcome is Outcome.INCOMPLETE
+    assert len(findings.failures) == 2 * 3  # sets without a pelvis
+    assert {row.stations for ranking in findings.rankings for row in ranking.rows} == {
+        ("pelvis",),
+        ("right_hand", "pelvis"),
+        ("left_hand", "pelvis"),
+    }
+    assert any(note.startswith("not ranked: right_hand was measured on 0 of 2") for note in findings.notes)
+
+
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ([""], "nothing to try"),
+        (["[exhaustive]\nmost = 13"], "1 to 12 stations"),
+        (["[exhaustive]\nmost = 2\nmost_cells = 11"], "6 sets of up to 2 of 3 trackers are 12 cells"),
+        (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base names 'knee'"),
+        (["[refine]\nset = ['pelvis']\nalong = []"], "as many of both"),
+        (["[refine]\nset = ['pelvis']\nalong = [0.1, 0.0]"], "steps above 0"),
+        (["[ablate]\n[changes]\nmethods = ['ik']"], "The study has its own"),
+        (["[ablate]\n[changes]\nnoise = 'loud'"], "loud"),
+        (["[ablate]\n[[condition]]\nname = 'a'\n[[condition]]\nname = 'a'"], "names of their own"),
+        (["[ablate]\n[[claim]]\ntext = 't'\nsource = 's'\nset = ['knee']"], "names 'knee'"),
+        (["[[candidate]]\nname = 'far'\nbone = 'head'\nalong = 2.0\n[ablate]"], "far .along = 2"),
+        (["[[candidate]]\nname = 'x'\nbone = 'headd'\n[ablate]"], "Did you mean 'head'"),
+        (["[abblate]"], "Did you mean 'ablate'"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_before_anything_is_written(
+    tables: list[str], said: str, tmp_path: Path
+) -> None:
+    with pytest.raises(HarnessError, match=said):
+        placement(written(tmp_path, *tables), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ('kind = "sweep"', "kind = 'sweep'"),
+        ("schema = 2", "schema 2"),
+        ('metric = "mpjpe"', "no metric called 'mpjpe'"),
+        ('metric = "lag_ms"', "says how good an estimate is"),
+        ('held_out = ["walking_p1_01@0.20-0.25"]', "also chosen on"),
+        ('held_out = ["walking_p9_01"]', "walking_p9_01"),
+        ("methods = []", "no methods"),
+        ('methods = ["nobody"]', "nobody"),
+        ('scenario = "runs"', "runs"),
+    ],
+)
+def test_a_wrong_line_is_named(line: str, said: str, tmp_path: Path) -> None:
+    key = line.partition(" ")[0]
+    lines = [old for old in STUDY.splitlines() if not old.startswith(f"{key} ")]
+    with pytest.raises(HarnessError, match=said):
+        placement(written(tmp_path, "[ablate]", study="\n".join([line, *lines])), tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_more_stations_run_at_the_rate_that_the_line_carries() -> None:
+    """A record of 38 bytes takes 380 bits: 303.2 of them go through 115200 baud (docs/is900.md 2)."""
+    base = replace(load_scenario("demo"), tracker=TrackerConfig(rate_hz=200.0))
+    rates = [rate_hz(base, stations, link=True) for stations in (1, 2, 3, 4, 5)]
+    assert rates == pytest.approx([180.0, 151.579, 101.053, 75.789, 60.632], abs=1e-3)
+    assert rate_hz(base, 5, link=False) == 200.0
+    slow = replace(base, tracker=TrackerConfig(rate_hz=40.0, baud=9600))
+    assert rate_hz(slow, 5, link=True) == pytest.approx(9600 / 380 / 5)
+    assert rate_hz(replace(base, tracker=TrackerConfig(rate_hz=40.0)), 5, link=True) == 40.0
+    with pytest.raises(BadInput, match=r"carries 12 stations at 0\.26 Hz"):
+        rate_hz(replace(base, tracker=TrackerConfig(baud=1200)), 12, link=True)
+
+
+def test_the_rate_of_a_set_is_that_of_its_size(tmp_path: Path) -> None:
+    study = STUDY.replace("metric =", "link = true\nmetric =")
+    changes = "[exhaustive]\nmost = 3\n[changes.tracker]\nbaud = 19200"
+    findings, _ = placement(written(tmp_path, changes, study=study), tmp_path / "out")
+    rates = {len(tried.stations): tried.rate_hz for tried in findings.tried}
+    assert rates == pytest.approx({1: 20.0, 2: 20.0, 3: 19200 / 380 / 3})
+    assert "3 at 16.84 Hz" in findings.link
+    frames = {}
+    for folder in (tmp_path / "out" / "cells").iterdir():
+        cell = json.loads((folder / "cell.json").read_text())
+        frames[len(cell["stations"])] = cell["rate_hz"]
+    assert frames == pytest.approx(rates)
+
+
+@pytest.mark.parametrize("path", shipped_placements(), ids=lambda path: path.stem)
+def test_every_shipped_study_is_ready_to_be_done(path: Path) -> None:
+    ready = plan(path.stem, None)
+    assert ready.study == load_study(path)
+    assert ready.held_out is not None
+    assert len(ready.held_out.motion.test) >= 6
+    with pytest.raises(BadFile, match="a placement study; expected a scenario"):
+        load_scenario(path.stem)
+
+
+def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'placement_walking'"):
+        load_study("placement_walkin")
+    with pytest.raises(BadFile, match="no such file"):
+        load_study(tmp_path / "none.toml")
+    with pytest.raises(BadFile, match="kind = 'scenario'"):
+        load_study("scenarios/demo.toml")
+
+
+def test_a_folder_of_another_study_is_left_alone(tmp_path: Path) -> None:
+    open_study(tmp_path / "out", {"placement": "another", "motion": "x", "seed": 1})
+    before = (tmp_path / "out" / "study.json").read_bytes()
+    with pytest.raises(BadInput, match="holds another study"):
+        placement(written(tmp_path, "[ablate]"), tmp_path / "out")
+    assert (tmp_path / "out" / "study.json").read_bytes() == before
+
+
+def test_the_verb_prints_what_came_out_and_names_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = written(tmp_path, "[exhaustive]\nmost = 1")
+    words = ["placement", str(path), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    assert main(words) == 0
+    printed = capsys.readouterr().out
+    assert "pelvis" in printed
+    assert printed.rstrip().endswith("pass")
+    for line in ("findings: ", "report: "):
+        (file,) = [text.removeprefix(line) for text in printed.splitlines() if text.startswith(line)]
+        assert Path(file).is_file()
+    assert main([*words, "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert (content["outcome"], content["best"][0]["stations"]) == ("pass", ["pelvis"])
+    path.write_text(path.read_text().replace("[exhaustive]", "[exhausting]"))
+    assert main(words) == 2
