@@ -30,6 +30,13 @@ def test_null_methods_bound_the_scale(truth_qpos: Floats) -> None:
     assert found["frozen_pose"]["lag_ms"] is None  # what does not move cannot be late
 
 
+@pytest.fixture
+def _without_evo(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which takes seconds to start and has a test of its own."""
+    monkeypatch.setattr(doctor, "evo_program", lambda: None)
+
+
+@pytest.mark.usefixtures("_without_evo")
 def test_the_doctor_finds_these_scores_sound(take: Take) -> None:
     checks = doctor.check_scores([take])
     assert all(check.ok for check in checks), [c for c in checks if not c.ok]
@@ -37,6 +44,7 @@ def test_the_doctor_finds_these_scores_sound(take: Take) -> None:
     assert set(checks[0].as_dict()) == {"name", "ok", "detail"}
 
 
+@pytest.mark.usefixtures("_without_evo")
 @pytest.mark.parametrize(
     ("name", "fails"),
     [
@@ -55,8 +63,8 @@ def test_the_doctor_finds_a_wrong_metric(take: Take, name: str, fails: str, monk
     assert any(fails in failure for failure in failed), failed
 
 
-def test_evo_is_asked_only_where_it_is_installed(take: Take, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "evo_program", lambda: None)
+@pytest.mark.usefixtures("_without_evo")
+def test_evo_is_asked_only_where_it_is_installed(take: Take) -> None:
     (check,) = [c for c in doctor.check_scores([take]) if "evo" in c.name]
     assert check.ok
     assert "not installed" in check.detail
