@@ -11,7 +11,7 @@ from harness.report.figures import drawn, legend
 from harness.report.paper_lines import name_ends
 from harness.report.run import file_name
 from harness.report.style import COLOURS, GRID, Chart, line_style
-from harness.report.sweep import HEADLINE, Key, Statistic, Sweep, unit_of
+from harness.report.sweep_statistics import HEADLINE, Key, Statistic, Sweep, unit_of
 from harness.report.tables import number
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from harness.report.comparison_words import listed
 from harness.report.document import Section, document, embedded
 from harness.report.markup import Markup, folded, joined, tag
 from harness.report.style import Chart
-from harness.report.sweep import HEADLINE, METRICS, SECOND, Key, Sweep, read_sweep
+from harness.report.sweep import read_sweep
 from harness.report.sweep_charts import MOST_INTERVALS, MOST_SCENARIOS, MOST_SERIES, Curve, chart, curves, varying
+from harness.report.sweep_statistics import HEADLINE, METRICS, SECOND, Key, Sweep
 from harness.report.sweep_tables import by_scenario, by_value, failures
 from harness.report.sweep_words import effect, sentence, values
 from harness.score.files import write_text

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from harness.report.markup import Markup, folded, joined, table, tag
-from harness.report.sweep import Key, Statistic, Sweep, unit_of
 from harness.report.sweep_charts import Curve
+from harness.report.sweep_statistics import Key, Statistic, Sweep, unit_of
 from harness.report.sweep_words import Fault, faults
 from harness.report.tables import NOT_MEASURED, count, number
 from harness.score.metrics import DEFINITIONS

@@ -1,6 +1,6 @@
 """A sweep on a terminal: how far it came and what it found, methods by scenario, what each key does, what failed."""
 
-from harness.report.sweep import HEADLINE, SECOND, Statistic, Sweep, unit_of
+from harness.report.sweep_statistics import HEADLINE, SECOND, Statistic, Sweep, unit_of
 from harness.report.sweep_words import effect, faults, sentence
 from harness.report.tables import number
 from harness.report.text import aligned

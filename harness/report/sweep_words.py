@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.report.comparison_words import listed, percent
-from harness.report.sweep import HEADLINE, Key, Sweep, unit_of
+from harness.report.sweep_statistics import HEADLINE, Key, Sweep, unit_of
 from harness.report.tables import number
 
 

@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +16,7 @@ from harness.report.paper_page import inside
 from harness.report.paper_verdicts import MARKS, sentence, tally
 from harness.score.findings import Bars, Claim, Experiment, Findings, Lines, Table
 from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
+from tests.report.reading import read, text_of
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- end of paper --> ```"
 EMPTY = Experiment("empty", "Nothing", "", ())
@@ -30,39 +30,6 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "leave_one_out" / "report.html").write_text("a run's page")
     write_paper(folder)
     return folder
-
-
-class _Reader(HTMLParser):
-    """Complains of elements that are not closed in order; gathers text and attributes."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.text: list[str] = []
-        self.found: list[tuple[str, dict[str, str | None]]] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.found.append((tag, dict(attrs)))
-        if tag not in ("meta", "br", "img"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if self.open[-1:] != ["style"]:
-            self.text.append(data)
-
-
-def read(page: Path) -> _Reader:
-    reader = _Reader()
-    reader.feed(page.read_text(encoding="utf-8"))
-    assert reader.open == []
-    return reader
-
-
-def text_of(page: Path) -> str:
-    return re.sub(r"\s+", " ", " ".join(read(page).text))
 
 
 def alone(folder: Path, *experiments: Experiment) -> Path:

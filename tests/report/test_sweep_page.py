@@ -14,9 +14,10 @@ from harness.cli import main
 from harness.errors import BadFile
 from harness.report import sweep_page
 from harness.report.figures import drawn
-from harness.report.sweep import HEADLINE, METRICS, Key, Statistic, gathered, read_sweep
+from harness.report.sweep import gathered, read_sweep
 from harness.report.sweep_charts import MOST_SERIES, Curve, _dots_in, _draw, curves, shown_of, varying
 from harness.report.sweep_page import write_sweep
+from harness.report.sweep_statistics import HEADLINE, METRICS, Key, Statistic
 from harness.report.sweep_text import text
 from harness.report.sweep_words import effect, faults, sentence
 from harness.score.index import CellIndex
