@@ -145,7 +145,7 @@ def _chart(
         f"body_map_{number}",
         f"{shown.what[0].upper()}{shown.what[1:]}",
         f"Balls: places that were tried, with what they are worth [{unit}]. Skin has the colour of the places on its "
-        f"own bone, nearer ones more; grey bones had none.{worn}{most} From ahead the performer's left is on the right.",
+        f"own bone, nearer ones more; grey bones had none.{worn}{most} From ahead the performer's left is right.",
         f"The body coloured by {shown.what}: {said} {unit}.",
         draw,
         _HEIGHT_IN,

@@ -54,7 +54,7 @@ def main(job: str, output: str) -> None:
     at_m, outward = _places(skeleton, standing, mounts)
     bones = [mount.bone for mount in mounts]
     body = [_painted(standing, shape, bones, at_m, colour, known) for shape in shapes(skeleton)]
-    views = [_view(body, at_m, outward, colour, known, ahead) for ahead in (True, False)]
+    views = _views(body, at_m, outward, colour, known)
     beside = Path(output).with_name(f".unfinished-{Path(output).name}")
     with open(beside, "wb") as file:
         np.savez(file, picture=np.array([p for p, _ in views]), at=np.array([a for _, a in views]))
@@ -106,12 +106,12 @@ def _mesh(shape: Shape) -> "pv.PolyData":
     """A capsule along z, or an ellipsoid, with points close enough to take colours."""
     half = float(shape.size_m[1]) if shape.kind == "capsule" else 0.0
     radii = np.full(3, shape.size_m[0]) if shape.kind == "capsule" else shape.size_m
-    turn, rise = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 50), np.linspace(0.0, 1.0, 25 if half else 1)
-    around = np.linspace(0.0, 2.0 * np.pi, 61)
+    turn, rise = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 32), np.linspace(0.0, 1.0, 16 if half else 1)
+    around = np.linspace(0.0, 2.0 * np.pi, 45)
     # The lower cap, what lies between, and the upper cap: how wide it is there, and how high.
-    wide = np.concatenate([np.cos(turn[:25]), np.ones(len(rise)), np.cos(turn[25:])])
+    wide = np.concatenate([np.cos(turn[:16]), np.ones(len(rise)), np.cos(turn[16:])])
     high = np.concatenate(
-        [radii[2] * np.sin(turn[:25]) - half, half * (2.0 * rise - 1.0), radii[2] * np.sin(turn[25:]) + half]
+        [radii[2] * np.sin(turn[:16]) - half, half * (2.0 * rise - 1.0), radii[2] * np.sin(turn[16:]) + half]
     )
     x, y = (radii[k] * np.outer(wide, swing(around)) for k, swing in enumerate((np.cos, np.sin)))
     surface = pv.StructuredGrid(x, y, np.outer(high, np.ones_like(around))).extract_surface(algorithm=None)
@@ -119,42 +119,49 @@ def _mesh(shape: Shape) -> "pv.PolyData":
     return mesh
 
 
-def _view(
-    body: "list[pv.PolyData]", at_m: Floats, outward: Floats, colour: Floats, known: Floats, ahead: bool
-) -> tuple[np.ndarray, Floats]:
-    """One picture and where the places are on it."""
+def _views(
+    body: "list[pv.PolyData]", at_m: Floats, outward: Floats, colour: Floats, known: Floats
+) -> list[tuple[np.ndarray, Floats]]:
+    """The picture from ahead and the one from behind, each with where the places are on it."""
     plotter: Any = pv.Plotter(off_screen=True, window_size=[_FINER * side for side in SIZE], lighting="none")
+    whole = body[0].append_polydata(*body[1:])
+    low, high = whole.bounds[4:6]
+    middle = np.array([0.0, 0.0, 0.5 * (low + high)])
     try:
         look = {"ambient": 0.62, "diffuse": 0.45, "specular": 0.0, "smooth_shading": True}
-        plotter.add_mesh(body[0].append_polydata(*body[1:]), scalars="colour", rgb=True, **look)
+        plotter.add_mesh(whole, scalars="colour", rgb=True, **look)
         for at, way, shade, there in zip(at_m, outward, colour, known, strict=True):
             centre = at + 0.5 * _BALL_M * way
             for radius, rim in _BALLS:
                 ball = pv.Sphere(radius=radius, center=centre)
                 plotter.add_mesh(ball, color=rim, culling="front", lighting=False)
             plotter.add_mesh(pv.Sphere(radius=_BALL_M, center=centre), color=shade if there else _WORN, **look)
-        towards = np.array([1.0 if ahead else -1.0, 0.0, 0.0])
-        middle = np.array([0.0, 0.0, 0.5 * (max(m.bounds[5] for m in body) + min(m.bounds[4] for m in body))])
-        camera = plotter.camera
-        camera.focal_point, camera.position, camera.up = tuple(middle), tuple(middle + 6.0 * towards), (0.0, 0.0, 1.0)
         plotter.enable_parallel_projection()
-        camera.parallel_scale = 0.5 * _TALL_M
-        for direction, strength in (((1.0, 0.5, 1.0), 0.9), ((1.0, -0.8, 0.2), 0.4)):
-            light = pv.Light(light_type="scene light", intensity=strength, positional=False)
-            light.position = tuple(10.0 * np.array(direction) * [towards[0], towards[0], 1.0])
-            light.focal_point = (0.0, 0.0, 0.0)
-            plotter.add_light(light)
-        plotter.reset_camera_clipping_range()
-        picture = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
+        plotter.camera.parallel_scale = 0.5 * _TALL_M
+        return [_view(plotter, middle, at_m, outward, towards) for towards in (1.0, -1.0)]
     finally:
         plotter.close()
+
+
+def _view(plotter: Any, middle: Floats, at_m: Floats, outward: Floats, towards: float) -> tuple[np.ndarray, Floats]:
+    """From so far ahead, looking at the middle; RuntimeError when OpenGL is there but draws nothing."""
+    camera, eye = plotter.camera, np.array([towards, 0.0, 0.0])
+    camera.focal_point, camera.position, camera.up = tuple(middle), tuple(middle + 6.0 * eye), (0.0, 0.0, 1.0)
+    plotter.remove_all_lights()
+    for direction, strength in (((1.0, 0.5, 1.0), 0.9), ((1.0, -0.8, 0.2), 0.4)):
+        light = pv.Light(light_type="scene light", intensity=strength, positional=False)
+        light.position = tuple(10.0 * np.array(direction) * [towards, towards, 1.0])
+        light.focal_point = (0.0, 0.0, 0.0)
+        plotter.add_light(light)
+    plotter.reset_camera_clipping_range()
+    plotter.render()
+    picture = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
     if picture[..., :3].std() == 0.0:
         raise RuntimeError("OpenGL is there but draws nothing")
-    picture = _averaged(picture)
     scale = SIZE[1] / _TALL_M
-    across = SIZE[0] / 2 + scale * towards[0] * (at_m[:, 1] - middle[1])
+    across = SIZE[0] / 2 + scale * towards * (at_m[:, 1] - middle[1])
     down = SIZE[1] / 2 - scale * (at_m[:, 2] - middle[2])
-    return picture, np.stack([across, down, outward @ towards], axis=1)
+    return _averaged(picture), np.stack([across, down, outward @ eye], axis=1)
 
 
 def _averaged(picture: np.ndarray) -> np.ndarray:
