@@ -9,6 +9,7 @@ from harness.bench.load import bench_load
 from harness.bench.rows import Row
 from harness.bench.startup import bench_startup
 from harness.bench.stream import bench_stream
+from harness.bench.sweep import bench_sweep
 from harness.bench.wire import bench_wire
 from harness.errors import MissingExtra, UnknownName
 
@@ -41,6 +42,7 @@ BENCHMARKS: dict[str, Callable[[int, bool], list[Row]]] = {
     "index": lambda seed, large: bench_index(seed),
     "methods": _methods,
     "gate": lambda seed, large: bench_gate(seed),
+    "sweep": lambda seed, large: bench_sweep(seed),
 }
 
 

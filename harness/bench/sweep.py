@@ -1,0 +1,197 @@
+"""Sweeps: what the machinery costs a cell, what a second worker is worth, and how long 100,000 cells take to read.
+
+The command line does the work, in processes of its own, as a user's would. What a cell costs without it is measured
+beside: the same cells judged one after another in this process, and written nowhere. The 100,000 are made up: real
+rows of one small sweep in the index, each with a folder that holds links to the files of a real cell.
+"""
+
+import csv
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from harness.bench.rows import Row
+from harness.cells import Job, judge, source_of
+from harness.config import Scenario, load_scenario
+from harness.core.protocol import Part
+from harness.reconstruct import registry
+from harness.score.index import CellIndex
+from harness.score.table import TIMES, groups, write_table
+from harness.setting import Setting
+
+MANY = 100_000
+SMALL = 200
+"""Cells whose overhead is measured."""
+REPEATS = 3
+"""The quickest counts: whatever else the computer does only ever adds."""
+CLIPS = ("walking_p1_01", "boxing_p1_01", "jumping_p1_01", "golf_p1_01")
+SHARED = f"""
+schema = 1
+scenarios = ["demo"]
+clips = {json.dumps(CLIPS)}
+methods = ["ik", "local_pca", "dynamic_map"]
+
+[vary]
+components.echo.share = {[0.01 * n for n in range(4)]}
+"""
+"""What one worker and two do: half a minute's work for one."""
+
+
+def bench_sweep(seed: int = 1, *, cells: int = SMALL, many: int = MANY) -> list[Row]:
+    with tempfile.TemporaryDirectory(prefix="harness-sweep-") as folder:
+        return [*_overhead(Path(folder), seed, cells), *_jobs(Path(folder), seed), *_many(Path(folder), many)]
+
+
+def _overhead(folder: Path, seed: int, cells: int) -> list[Row]:
+    """A sweep of many small cells beside one of a single cell, and beside judging them."""
+    one, all_of_them = _study(folder, 1), _study(folder, cells)
+    scenario = replace(_small(cells), seed=seed)
+    seconds: dict[str, list[float]] = {"one": [], "all": [], "judged": []}
+    for repeat in range(REPEATS):
+        seconds["one"].append(_swept(one, folder / f"one-{repeat}", seed))
+        seconds["all"].append(_swept(all_of_them, folder / f"all-{repeat}", seed))
+        seconds["judged"].append(_judged_s(scenario))
+    took = {name: min(of) for name, of in seconds.items()}
+    each_ms = 1e3 * (took["all"] - took["one"] - took["judged"]) / (cells - 1)
+    again_ms = 1e3 * (_swept(all_of_them, folder / "all-0", seed) - took["one"]) / (cells - 1)
+    beside = f"{1e3 * took['judged'] / (cells - 1):.0f} ms to judge one, {took['one']:.1f} s for a sweep of one"
+    return [
+        Row("a sweep's overhead for each cell", each_ms, "ms", beside, "<= 20"),
+        Row("going on with a sweep, for each finished cell", again_ms, "ms", f"{cells} cells", ""),
+    ]
+
+
+def _study(folder: Path, cells: int) -> Path:
+    path = folder / f"cells-{cells}.toml"
+    shares = json.dumps(_shares(cells))
+    path.write_text(
+        f'schema = 1\nscenarios = ["demo"]\nclips = ["{CLIPS[0]}"]\nmethods = ["mean_pose"]\n'
+        f"vary.motion.longest_s = [2.0]\nvary.components.echo.share = {shares}\n"
+    )
+    return path
+
+
+def _shares(cells: int) -> list[float]:
+    return [0.001 * n for n in range(cells)]
+
+
+def _small(cells: int) -> Scenario:
+    """What the study of so many cells comes to."""
+    scenario = load_scenario("demo")
+    motion = replace(scenario.motion, test=CLIPS[:1], behaviours=("walking",), longest_s=2.0)
+    return replace(scenario, motion=motion, methods=("mean_pose",), vary={"components.echo.share": _shares(cells)})
+
+
+def _judged_s(scenario: Scenario) -> float:
+    """All cells but the first, which also makes what the others share [s]."""
+    job = Job(scenario, Part.parse(scenario.motion.test[0]), scenario.motion.behaviours[0], None, "")
+    method, setting, start = registry.resolve(scenario.methods[0]), None, time.perf_counter()
+    for place, cell in enumerate(job.cells()):
+        if setting is None:
+            source = source_of(cell.scenario.motion, None, scenario.seed)
+            setting = Setting(cell.scenario, source, job.part, job.behaviour)
+        setting = setting.under(cell.scenario) or setting
+        judge(setting, method, cell, "key", "")
+        if place == 0:
+            start = time.perf_counter()
+    return time.perf_counter() - start
+
+
+def _jobs(folder: Path, seed: int) -> list[Row]:
+    """The same sweep by one worker and by two, in turns."""
+    study = folder / "shared.toml"
+    study.write_text(SHARED)
+    seconds: dict[int, list[float]] = {1: [], 2: []}
+    for repeat in range(REPEATS - 1):
+        for jobs in seconds:
+            seconds[jobs].append(_swept(study, folder / f"jobs-{jobs}-{repeat}", seed, jobs))
+    one, two = (min(of) for of in seconds.values())
+    differing = _differing(folder / "jobs-1-0" / "table.csv", folder / "jobs-2-0" / "table.csv")
+    return [
+        Row("two jobs against one", one / two, "x", f"{one:.1f} s by one, on {os.cpu_count()} cores", ">= 1.7"),
+        Row("lines of the table that differ between them", float(differing), "", "times apart", "0"),
+    ]
+
+
+def _differing(one: Path, two: Path) -> int:
+    lines = [list(_lines(path)) for path in (one, two)]
+    return sum(a != b for a, b in zip(*lines, strict=True))
+
+
+def _lines(table: Path) -> Iterator[Mapping[str, str]]:
+    with open(table, newline="", encoding="utf-8") as file:
+        for line in csv.DictReader(file):
+            yield {name: text for name, text in line.items() if name not in TIMES}
+
+
+def _many(folder: Path, count: int) -> list[Row]:
+    """How far such a folder is, what is in it, and its page."""
+    out = folder / "many"
+    _make_up(folder / "jobs-1-0", out, count)
+    status = _seconds(lambda: _harness("status", str(out), "--json"))
+    summed = _seconds(lambda: _summed(out))
+    page = _seconds(lambda: _harness("report", str(out), "--json"))
+    what = f"{count:,} finished cells"
+    beside = "made up of a real sweep's rows, a folder of linked files for each"
+    return [
+        Row(f"{what}: harness status", status, "s", beside, "<= 10"),
+        Row(f"{what}: table.csv and summary", summed, "s", beside, "<= 10"),
+        Row(f"{what}: harness report", page, "s", beside, "<= 10"),
+    ]
+
+
+def _summed(out: Path) -> None:
+    with CellIndex(out) as index:
+        write_table(index, out / "table.csv")
+        groups(index)
+
+
+def _make_up(real: Path, out: Path, count: int) -> None:
+    """Every row of a real sweep again and again, under other latencies and as other seeds."""
+    (out / "cells").mkdir(parents=True)
+    for name in ("study.json", "manifest.json", "summary.json"):
+        shutil.copyfile(real / name, out / name)
+    with CellIndex(real, read_only=True) as index:
+        rows, facts = list(index.rows()), index.facts()
+    rows = [row for row in rows if row["method"] != "ik"]
+    files = list((real / "cells" / rows[0]["key"]).iterdir())
+    made = [(f"{n:032x}", _changed(rows[n % len(rows)], *divmod(n // len(rows), 20))) for n in range(count)]
+    with CellIndex(out) as index:
+        index.note(**facts)
+        index.expect([key for key, _ in made])
+        index.add({**row, "key": key} for key, row in made)
+        index.ended((key, key, "") for key, _ in made)
+    for key, _ in made:
+        folder = out / "cells" / key
+        folder.mkdir()
+        for file in files:
+            os.link(file, folder / file.name)
+
+
+def _changed(row: Mapping[str, Any], seed: int, latency_ms: int) -> dict[str, Any]:
+    return {**row, "seed": seed, "varied": {**row["varied"], "tracker.latency_s": 0.001 * latency_ms}}
+
+
+def _swept(study: Path, out: Path, seed: int, jobs: int = 1) -> float:
+    asked = ("sweep", str(study), "--out", str(out), "--jobs", str(jobs), "--seed", str(seed), "--json")
+    return _seconds(lambda: _harness(*asked))
+
+
+def _harness(*words: str) -> None:
+    done = subprocess.run([sys.executable, "-m", "harness.cli", *words], capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"harness {' '.join(words)}: {done.stderr.strip()[-2000:]}")
+
+
+def _seconds(work: Callable[[], Any]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
