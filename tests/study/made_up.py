@@ -1,0 +1,79 @@
+"""Cells that are judged in no time, by made-up errors; everything around them is real."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness import cells
+from harness.cells import Planned
+from harness.core.seeds import generator
+from harness.reconstruct.contract import Method
+from harness.score.cell import Cell
+from harness.score.score import Scores
+from harness.setting import Setting
+from tests.report.fabricate import Plan, make_cell
+
+FAILING = "ik:gaussian"
+"""Cells of this method fail, while the file `broken` lies where the process works."""
+
+
+@cache
+def template() -> Cell:
+    return make_cell("walking", 1, "ik", 2.0, "pos+ori", Plan(duration_s=1.5), {})
+
+
+def judge(setting: Setting, method: Method, planned: Planned, key: str, command: str) -> Cell:
+    if planned.method == FAILING and Path("broken").exists():
+        raise ZeroDivisionError("on purpose")
+    found = template()
+    error = float(generator(planned.scenario.seed, str(planned)).uniform(1.0, 5.0))
+    metrics = {**found.metrics, "joint_angle_mean_deg": error, "mpjpe_mm": 5.0 * error, "step_p50_ms": 0.1}
+    return replace(
+        found,
+        key=key,
+        method=planned.method,
+        clip=str(setting.part),
+        behaviour=setting.behaviour,
+        inputs=planned.inputs,
+        seed=planned.scenario.seed,
+        noise=planned.scenario.noise,
+        varied=planned.varied,
+        scenario=planned.scenario.name,
+        scores=Scores(metrics, found.scores.per_frame, found.scores.per_joint, found.scores.scored),
+    )
+
+
+@pytest.fixture
+def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
+    """Where tests work; what is judged there is made up."""
+    monkeypatch.setattr(cells, "judge", judge)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+SWEEP = """
+schema = 1
+name = "tiny"
+scenarios = ["demo"]
+clips = ["walking_p1_01", "boxing_p1_01"]
+methods = ["ik:previous", "ik:gaussian"]
+
+[vary]
+noise = ["clean", "default"]
+tracker.rate_hz = [20.0, 40.0]
+"""
+
+
+def sweep_file(folder: Path, text: str = SWEEP, **changes: Any) -> Path:
+    """The sweep, with some of its lines changed."""
+    lines = []
+    for line in text.strip().splitlines():
+        key = line.partition(" = ")[0]
+        lines.append(f"{key} = {changes.pop(key)}" if key in changes else line)
+    first = [f"{key} = {value}" for key, value in changes.items()]
+    path = folder / "tiny.toml"
+    path.write_text("\n".join([*first, *lines]))
+    return path
