@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MOST_SERIES, MOST_SCENARIOS, MOST_INTERVALS = 10, 12, 600
 """In one chart; that have a chart for a key; that are worked out for one page, for each takes a moment."""
 _WIDTH_IN, _LINES_IN, _ROW_IN, _LETTER_IN = 4.2, 2.7, 0.085, 0.165
-_LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 3, 8, 44, 5
+_LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 4, 8, 44, 5
 """Of a name beside an axis; rows of it; lines that have their names at their ends; letters of a name in a legend;
 values that a logarithmic axis names."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
@@ -77,7 +77,7 @@ def chart(sweep: Sweep, key: Key, scenario: int, found: Sequence[Curve]) -> Char
     name = f"{file_name(key.name)}_{file_name(sweep.scenarios[scenario])}"
     return drawn(
         f"varied_{name}",
-        sweep.scenarios[scenario],
+        f"{key.name}, {sweep.scenarios[scenario]}" if len(sweep.scenarios) > 1 else key.name,
         caption,
         f"{HEADLINE} [{unit_of(HEADLINE)}] against {key.name}: {told}.",
         lambda figure: _draw(figure, key, shown),
@@ -94,8 +94,12 @@ def _dots_in(key: Key, series: int) -> float:
 
 def _names(key: Key) -> list[str]:
     """Values in several rows, broken after a plus where they can be."""
-    rows = (textwrap.wrap(text.replace("+", "+ "), _LETTERS)[:_MOST_ROWS] for text in key.texts)
-    return ["\n".join(row.replace("+ ", "+") for row in each) for each in rows]
+    out = []
+    for text in key.texts:
+        rows = [row.replace("+ ", "+") for row in textwrap.wrap(text.replace("+", "+ "), _LETTERS)]
+        more = "…" if len(rows) > _MOST_ROWS else ""
+        out.append("\n".join(rows[:_MOST_ROWS]) + more)
+    return out
 
 
 def _draw(figure: "Figure", key: Key, shown: Sequence[Curve]) -> None:
@@ -131,9 +135,7 @@ def _lines(axes: "Axes", key: Key, shown: Sequence[Curve]) -> list[tuple[float, 
         axes.set_xticks([], minor=True)
     axes.set_xlabel(key.name)
     axes.set_ylabel(f"joint angle error [{unit_of(HEADLINE)}]")
-    low, high = axes.get_ylim()
-    if 0.0 < low < 0.5 * high:
-        axes.set_ylim(bottom=0.0)
+    axes.set_ylim(bottom=0.0)
     return ends
 
 
@@ -153,9 +155,7 @@ def _dots(axes: "Axes", key: Key, shown: Sequence[Curve]) -> None:
     axes.set_yticks(range(len(key.texts)), _names(key))
     axes.set_ylim(len(key.texts) - 0.5, -0.5)
     axes.set_xlabel(f"joint angle error [{unit_of(HEADLINE)}]")
-    low, high = axes.get_xlim()
-    if 0.0 < low < 0.5 * high:
-        axes.set_xlim(left=0.0)
+    axes.set_xlim(left=0.0)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
     for edge in range(1, len(key.texts)):

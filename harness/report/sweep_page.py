@@ -16,10 +16,9 @@ from harness.report.sweep_tables import by_scenario, by_value, failures
 from harness.report.sweep_words import effect, sentence, values
 from harness.score.files import write_text
 from harness.score.index import INDEX
+from harness.score.paired import FEWEST_CLIPS
 
-_EXAMPLE = (
-    "SELECT scenario, method, count(*), avg(joint_angle_mean_deg) FROM cells GROUP BY scenario, method ORDER BY 4"
-)
+_EXAMPLE = "SELECT scenario, method, avg(mpjpe_mm) FROM cells GROUP BY scenario, method"
 
 
 def write_sweep(out: Path) -> Path:
@@ -45,9 +44,8 @@ def sweep_page(sweep: Sweep) -> str:
         missing.append(
             f"Intervals: {wanted:,} would take too long; sweeps of fewer values, scenarios or methods have them"
         )
-    varied = [_varied(sweep, key, ends=ends, draw=draw) for key in sweep.keys]
     sections: list[Section] = [
-        ("What was varied", "varied", joined(*varied)),
+        ("What was varied", "varied", _varied(sweep, ends=ends, draw=draw)),
         ("Methods by scenario", "scenarios", _scenarios(sweep)),
         ("Failures", "failures", failures(sweep)),
         ("The whole table", "table", _files(sweep)),
@@ -73,21 +71,25 @@ def _facts(sweep: Sweep) -> Mapping[str, str]:
     return {title: text for title, text in facts.items() if text}
 
 
-def _varied(sweep: Sweep, key: Key, *, ends: bool, draw: bool) -> Markup:
-    """One key: a chart for each scenario that varies it, and the figures folded."""
-    scenarios = varying(sweep, key)
-    shown = scenarios[:MOST_SCENARIOS]
-    found = {scenario: curves(sweep, key, scenario, ends=ends) for scenario in shown}
-    charts = [_figure(chart(sweep, key, n, those)) for n, those in found.items() if those] if draw else []
-    some = f" Shown are {len(shown)} of {len(scenarios)} scenarios." if len(shown) < len(scenarios) else ""
-    text = f"Mean {HEADLINE} over clips, each averaged over what else is varied; bars: 95 % interval.{some}"
-    tables = [_tables(sweep, key, n, those) for n, those in found.items()]
-    return joined(
-        tag("h3", key.name),
-        tag("p", text),
-        tag("div", *charts, class_="panels broad") if charts else None,
-        folded("Its figures", *tables) if charts else joined(*tables),
+def _varied(sweep: Sweep, *, ends: bool, draw: bool) -> Markup:
+    """For each key a chart for each scenario that varies it, and the figures folded."""
+    if not sweep.keys:
+        return Markup()
+    text = (
+        f"Mean {HEADLINE} over clips, each averaged over what else is varied. Bars: 95 % interval, where there "
+        f"are {FEWEST_CLIPS} clips at least."
     )
+    charts: list[Markup] = []
+    tables: list[Markup] = []
+    for key in sweep.keys:
+        scenarios = varying(sweep, key)
+        found = {scenario: curves(sweep, key, scenario, ends=ends) for scenario in scenarios[:MOST_SCENARIOS]}
+        charts += [_figure(chart(sweep, key, n, those)) for n, those in found.items() if those and draw]
+        if (more := len(scenarios) - len(found)) > 0:
+            text += f" Of {key.name} {more:,} more scenarios are in the table alone."
+        figures = [_tables(sweep, key, n, those) for n, those in found.items()]
+        tables.append(folded(f"Figures: {key.name}", *figures) if draw else joined(tag("h3", key.name), *figures))
+    return joined(tag("p", text), tag("div", *charts, class_="panels broad") if charts else None, *tables)
 
 
 def _tables(sweep: Sweep, key: Key, scenario: int, found: Sequence[Curve]) -> Markup:

@@ -9,6 +9,7 @@ from harness.core.arrays import Floats
 from harness.report.comparison_words import listed, percent
 from harness.report.sweep_statistics import HEADLINE, Key, Sweep, unit_of
 from harness.report.tables import number
+from harness.score.paired import FEWEST_CLIPS, interval
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,20 @@ def _best_of(found: Mapping[str, Floats]) -> str:
     errors = {name: float(means[shared].mean()) for name, means in found.items()}
     first, *others = sorted(errors, key=lambda name: errors[name])
     start = f"{first}{' errs least' if others else ''}: {_figure(errors[first])} mean joint-angle error {over}"
-    return f"{start}; next {others[0]} with {_figure(errors[others[0]])}." if others else f"{start}."
+    if not others:
+        return f"{start}."
+    apart = _apart(found[others[0]][shared] - found[first][shared])
+    return f"{start}; next {others[0]} with {_figure(errors[others[0]])}, {apart}."
+
+
+def _apart(difference: Floats) -> str:
+    """Whether clips tell the second from the first."""
+    if len(difference) < FEWEST_CLIPS:
+        return "which so few clips cannot tell apart"
+    low, high = interval(difference)
+    if low <= 0.0 <= high:
+        return "which these clips cannot tell apart"
+    return f"worse by {number(low, unit_of(HEADLINE))} to {_figure(high)} (95 %)"
 
 
 def effect(sweep: Sweep, key: Key) -> str:

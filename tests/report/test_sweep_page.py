@@ -50,7 +50,7 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to come. dynamic_map errs least: ")
-    assert "mean joint-angle error over 14 clips; next ik with" in said
+    assert re.search(r"error over 14 clips; next ik with [\d.]+ deg, worse by [\d.]+ to [\d.]+ deg \(95 %\)\.$", said)
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -154,6 +154,13 @@ def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), seeds=(1, 2, 3))))
     assert len(sweep) == 63
     assert sweep.statistic(HEADLINE, sweep.where(0, 0)).clips == 7
+
+
+def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
+    few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
+    alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
+    assert sentence(read_sweep(few)).endswith("which so few clips cannot tell apart.")
+    assert sentence(read_sweep(alike)).endswith("which these clips cannot tell apart.")
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
