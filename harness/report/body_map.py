@@ -156,31 +156,38 @@ def _chart(
 def _name(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
     """A name for each place with a line to its ball: over the arms, and in columns beside the rest of the body."""
     height, width = size
-    line = {"arrowstyle": "-", "color": FAINT, "linewidth": 0.8, "shrinkA": 1.0, "shrinkB": 5.0}
     for right in (False, True):
         members = [n for n in texts if bool(at[n, 0] > 0.5 * width) is right]
-        arms = [n for n in members if abs(at[n, 0] / width - 0.5) > _TRUNK and at[n, 1] < _ARMS[1] * height]
-        arms.sort(key=lambda n: -abs(at[n, 0] - 0.5 * width))
-        # From the edge of the picture inwards: hands have their names at the edge, upper arms end theirs a bit inwards.
-        inwards = [0.5 - abs(float(at[n, 0]) / width - 0.5) for n in arms]
-        ends = {
-            n: (max(u - 0.05, 0.01) if u < _OUTER else u + 0.06, _ARMS[0] - _GAP * k)
-            for k, (n, u) in enumerate(zip(arms, inwards, strict=True))
-        }
+        inwards = {n: 0.5 - abs(float(at[n, 0]) / width - 0.5) for n in members}
+        arms = [n for n in members if inwards[n] < 0.5 - _TRUNK and at[n, 1] < _ARMS[1] * height]
+        ends: dict[int, tuple[float, float, bool, float]] = {}
+        """How far from the edge of the picture, how far down, whether it begins there, where in it its line begins."""
+        for k, n in enumerate(sorted(arms, key=lambda n: -inwards[n])):
+            down, outer = _ARMS[0] - _GAP * k, inwards[n] < _OUTER
+            ends[n] = (
+                (max(inwards[n] - 0.05, 0.01), down, True, 0.12) if outer else (inwards[n] + 0.09, down, False, 0.7)
+            )
         rest = sorted((n for n in members if n not in arms), key=lambda n: (at[n, 1], at[n, 0]))
         above = [n for n in rest if at[n, 1] < _NECK * height]
         below = [n for n in rest if n not in above]
-        for column, top in ((above, _TOP), (below, _ARMS[1])):
-            wanted = [max(float(at[n, 1]) / height, top + _GAP * k) for k, n in enumerate(column)]
-            places = apart(wanted, _GAP) if column is below else [top + _GAP * k for k in range(len(column))]
-            ends |= {n: (0.01, share) for n, share in zip(column, places, strict=True)}
-        for n, (across, down) in ends.items():
+        highest = min([_TOP, *(down - _GAP for _, down, *_ in ends.values())])
+        wanted = [max(float(at[n, 1]) / height, _ARMS[1] + _GAP * k) for k, n in enumerate(below)]
+        heights = [highest - _GAP * k for k in range(len(above))][::-1] + apart(wanted, _GAP)
+        ends |= {n: (0.01, down, True, 1.0) for n, down in zip((*above, *below), heights, strict=True)}
+        for n, (across, down, begins, start) in ends.items():
             axes.annotate(
                 texts[n],
                 (float(at[n, 0]), float(at[n, 1])),
                 ((1.0 - across if right else across) * width, down * height),
-                arrowprops=line,
-                ha="right" if right is (across < _OUTER) else "left",
+                arrowprops={
+                    "arrowstyle": "-",
+                    "color": FAINT,
+                    "linewidth": 0.8,
+                    "shrinkA": 1.0,
+                    "shrinkB": 5.0,
+                    "relpos": (1.0 - start if right else start, 0.0 if n in arms else 0.5),
+                },
+                ha="right" if right is begins else "left",
                 va="center",
                 fontsize=8.5,
                 color=INK,
