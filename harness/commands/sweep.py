@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from harness.study.status import Status
 
 _MOST_FAILURES = 10
+_OF_A_CLUSTER = 64
+"""Workers for whom the cells are shared out when those of a scheduler may come and go."""
 
 
 def add_sweep(verbs: Verbs) -> None:
@@ -48,7 +50,7 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
         stack.enter_context(ended_by_sigterm())
         bar = stack.enter_context(ProgressBar("cells"))
         stack.enter_context(redirect_stdout(sys.stderr))  # what a method prints is talk
-        workers = args.jobs or (os.cpu_count() or 1 if args.dask else 1)
+        workers = args.jobs or {None: 1, "local": os.cpu_count() or 1}.get(args.dask, _OF_A_CLUSTER)
         outcome = run(
             sweep,
             scenarios,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import pairwise
 from pathlib import Path
+from platform import node
 from typing import Any, TypeVar
 
 from harness.cells import Ended, Job, Planned, Progress, forget_motion, run_job
@@ -173,7 +174,9 @@ def _done(
 
 
 def run_task(session: str, job: Job, out: Path, stop: Path) -> list[Ended]:
-    """In a worker."""
+    """In a worker; BadInput when it is on a computer that does not have the folder."""
+    if not (out / "cells").is_dir():
+        raise BadInput(f"A worker on {node()} does not see {out}.", "Name a folder with --out that all workers share.")
     _begin(session)
     return list(run_job(job, out, stop))
 
@@ -205,7 +208,8 @@ def one_by_one(task: Task) -> list[Task]:
 def _jobs(scenario: Scenario, folder: Path | None, command: str) -> list[Job]:
     parts = [Part.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
-    return [Job(scenario, part, b, folder, command) for part, b in zip(parts, behaviours, strict=True)]
+    where = folder and folder.absolute()  # workers may be anywhere
+    return [Job(scenario, part, b, where, command) for part, b in zip(parts, behaviours, strict=True)]
 
 
 def _width(scenario: Scenario) -> int:

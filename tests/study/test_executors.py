@@ -16,6 +16,7 @@ from typing import Any, TypeVar
 import pytest
 
 from harness.errors import BadInput, MissingExtra
+from harness.score.manifest import source_hash
 from harness.study import executors
 from harness.study.executors import dask, processes
 from tests.interrupts import heeding_interrupts
@@ -51,10 +52,10 @@ def test_a_single_job_is_done_here() -> None:
     assert isinstance(failed.exception(), ZeroDivisionError)
 
 
-def test_a_pool_refuses_to_mix_versions(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "source_hash", lambda: "edited")
-    ((_, future),) = processes(2)(divmod, [(7, 2)])
-    assert "another version" in str(future.exception())
+def test_a_worker_that_was_started_after_an_edit_refuses() -> None:
+    assert executors._on_worker(source_hash(), os.getcwd(), divmod, 7, 2) == (3, 1)
+    with pytest.raises(BadInput, match="another version"):
+        executors._on_worker("before the edit", os.getcwd(), divmod, 7, 2)
 
 
 def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,10 +20,13 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
+from harness.cells import Job
 from harness.config import Scenario
+from harness.core.protocol import Part
+from harness.errors import BadInput
 from harness.score.files import TEMPORARY
 from harness.study.executors import Each, dask, here, processes
-from harness.study.sweep import Cells, run_cells
+from harness.study.sweep import Cells, run_cells, run_task
 from tests.study.tiny import WALKS
 
 R = TypeVar("R")
@@ -96,6 +99,13 @@ def test_cells_cut_for_one_worker_or_sixteen_have_the_same_bytes(tmp_path: Path)
     assert told(one) == told(many)
     assert kept(tmp_path / "one") == kept(tmp_path / "many")
     assert len(one.rows) == one.planned == 4
+
+
+def test_a_worker_that_does_not_see_the_folder_makes_none_of_its_own(tmp_path: Path) -> None:
+    job = Job(NOISY, Part("walking_p1_01"), "walking", None, "")
+    with pytest.raises(BadInput, match="does not see"):
+        run_task("session", job, tmp_path / "elsewhere", tmp_path / "stop")
+    assert not list(tmp_path.iterdir())
 
 
 def backwards(
