@@ -170,27 +170,12 @@ def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings
     assert len(findings.agreements) == 1
 
 
-def test_what_was_chosen_is_judged_on_clips_that_chose_nothing(tmp_path: Path) -> None:
-    study = STUDY.replace("metric =", 'held_out = ["walking_p1_01@0.10-0.15", "walking_p1_01@0.90-0.95"]\nmetric =')
-    findings, outcome = placement(written(tmp_path, "[exhaustive]\nmost = 1", study=study), tmp_path / "out")
-    assert outcome is Outcome.PASS
-    (best,) = findings.best
-    assert (best.held_out_clips, best.of) == (2, 3)
-    assert best.held_out == pytest.approx(0.0, abs=1e-3)
-    assert all(set(tried.errors) == set(load_scenario(tmp_path / "walk.toml").motion.test) for tried in findings.tried)
-    assert len(list((tmp_path / "out" / "cells").iterdir())) == 2 * 3 + 2
-
-
 def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
-    changes = '[exhaustive]\nmost = 2\n[changes.components]\nslip = [{ station = "pelvis" }]'  # nobody else has it
+    changes = '[exhaustive]\nmost = 1\n[changes.components]\nslip = [{ station = "pelvis" }]'  # nobody else has it
     findings, outcome = placement(written(tmp_path, changes), tmp_path / "out")
     assert outcome is Outcome.INCOMPLETE
-    assert len(findings.failures) == 2 * 3  # sets without a pelvis
-    assert {row.stations for ranking in findings.rankings for row in ranking.rows} == {
-        ("pelvis",),
-        ("right_hand", "pelvis"),
-        ("left_hand", "pelvis"),
-    }
+    assert len(findings.failures) == 2 * 2  # sets without a pelvis
+    assert [[row.stations for row in ranking.rows] for ranking in findings.rankings] == [[("pelvis",)]]
     assert any(note.startswith("not ranked: right_hand was measured on 0 of 2") for note in findings.notes)
 
 
@@ -255,18 +240,36 @@ def test_more_stations_run_at_the_rate_that_the_line_carries() -> None:
         rate_hz(replace(base, tracker=TrackerConfig(baud=1200)), 12, link=True)
 
 
-def test_the_rate_of_a_set_is_that_of_its_size(tmp_path: Path) -> None:
-    study = STUDY.replace("metric =", "link = true\nmetric =")
-    changes = "[exhaustive]\nmost = 3\n[changes.tracker]\nbaud = 19200"
-    findings, _ = placement(written(tmp_path, changes, study=study), tmp_path / "out")
+@pytest.fixture(scope="module")
+def judged_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, PlacementFindings]:
+    """A study on a slow line whose choices are judged on another clip."""
+    folder = tmp_path_factory.mktemp("slow")
+    study = STUDY.replace("metric =", 'link = true\nheld_out = ["walking_p1_01@0.90-0.95"]\nmetric =')
+    path = written(folder, "[exhaustive]\nmost = 2\n[changes.tracker]\nbaud = 9600", study=study)
+    findings, outcome = placement(path, folder / "out")
+    assert outcome is Outcome.PASS
+    return folder, findings
+
+
+def test_the_rate_of_a_set_is_that_of_its_size(judged_elsewhere: tuple[Path, PlacementFindings]) -> None:
+    folder, findings = judged_elsewhere
     rates = {len(tried.stations): tried.rate_hz for tried in findings.tried}
-    assert rates == pytest.approx({1: 20.0, 2: 20.0, 3: 19200 / 380 / 3})
-    assert "3 at 16.84 Hz" in findings.link
-    frames = {}
-    for folder in (tmp_path / "out" / "cells").iterdir():
-        cell = json.loads((folder / "cell.json").read_text())
-        frames[len(cell["stations"])] = cell["rate_hz"]
-    assert frames == pytest.approx(rates)
+    assert rates == pytest.approx({1: 20.0, 2: 9600 / 380 / 2})
+    assert "2 at 12.63 Hz" in findings.link
+    cells = [json.loads((cell / "cell.json").read_text()) for cell in (folder / "out" / "cells").iterdir()]
+    assert {len(cell["stations"]): cell["rate_hz"] for cell in cells} == pytest.approx(rates)
+
+
+def test_what_was_chosen_is_judged_on_clips_that_chose_nothing(
+    judged_elsewhere: tuple[Path, PlacementFindings],
+) -> None:
+    folder, findings = judged_elsewhere
+    one, two = findings.best
+    assert (one.held_out_clips, one.of, two.of) == (1, 3, 3)
+    assert one.held_out == pytest.approx(0.0, abs=1e-3)
+    chosen_on = set(load_scenario(folder / "walk.toml").motion.test)
+    assert all(set(tried.errors) == chosen_on for tried in findings.tried)
+    assert len(list((folder / "out" / "cells").iterdir())) == 2 * 6 + 2
 
 
 @pytest.mark.parametrize("path", shipped_placements(), ids=lambda path: path.stem)
@@ -306,8 +309,5 @@ def test_the_verb_prints_what_came_out_and_names_the_page(tmp_path: Path, capsys
     for line in ("findings: ", "report: "):
         (file,) = [text.removeprefix(line) for text in printed.splitlines() if text.startswith(line)]
         assert Path(file).is_file()
-    assert main([*words, "--json"]) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert (content["outcome"], content["best"][0]["stations"]) == ("pass", ["pelvis"])
     path.write_text(path.read_text().replace("[exhaustive]", "[exhausting]"))
     assert main(words) == 2
