@@ -10,7 +10,7 @@ from harness.score.differences import Difference, groups, lines
 from harness.score.files import plain
 from harness.score.judged import Judged
 from harness.score.manifest import Manifest, flat
-from harness.score.margins import GATED, INFORMED, margin_of
+from harness.score.margins import GATED, INFORMED, TIMES, margin_of
 from harness.score.matching import LOOSENED, Matched, inputs_that_differ, match, named, short
 from harness.score.significance import Verdict
 
@@ -62,6 +62,7 @@ def compare(
     names of `LOOSENED` that cells need not agree in, "coverage", "cells" (without a partner), or `EVERYTHING`.
     The outcome: NOT_COMPARABLE when nothing matched or inputs differ; REGRESSED when a gated line is worse; INCOMPLETE
     when planned cells failed; NOT_COMPARABLE when sides cover different things or a gated line cannot be told; PASS.
+    Times are gated where both sides were measured on the same processor, else they are for information.
     UnknownName for metrics, methods and allowances that do not exist; BadInput for cells that are there twice.
     """
     metrics = tuple(dict.fromkeys(metrics))
@@ -74,8 +75,9 @@ def compare(
     refused = together({name: text for name, text in differing.items() if not allows(allowance, name)})
     allowed = together({name: text for name, text in differing.items() if allows(allowance, name)})
     found = [] if refused else groups(matched.pairs)
-    informed = [metric for metric in INFORMED if metric not in metrics]
-    differences = lines(found, metrics, informed)
+    gated = _gated(metrics, a.manifest, b.manifest)
+    informed = [metric for metric in (*metrics, *INFORMED) if metric not in gated]
+    differences = lines(found, gated, dict.fromkeys(informed))
     faults = {"coverage": coverage(found, metrics), "cells": alone(matched)}
     kept = [text for name, texts in faults.items() for text in texts if not allows(allowance, name)]
     missing = failed("A", a, methods and methods[0]) + failed("B", b, methods and methods[1])
@@ -97,6 +99,12 @@ def compare(
     )
 
 
+def _gated(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:
+    """All of them on one processor; on two those that are no times, for what a step costs beside other work differs."""
+    same = a.circumstances.get("processor") == b.circumstances.get("processor")
+    return tuple(metric for metric in metrics if same or metric not in TIMES)
+
+
 def _outcome(
     matched: Matched,
     refused: Sequence[str],
@@ -116,7 +124,7 @@ def _outcome(
     if failed:
         return Outcome.INCOMPLETE, f"planned cells are missing: {some(failed)}"
     if not gated:
-        return Outcome.NOT_COMPARABLE, "nothing was measured on both sides"
+        return Outcome.NOT_COMPARABLE, "nothing was measured on both sides that could be gated"
     if faults:
         return Outcome.NOT_COMPARABLE, some(faults)
     if by["cannot tell"]:

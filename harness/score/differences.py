@@ -73,7 +73,7 @@ def groups(pairs: Iterable[Pair]) -> list[Group]:
     return [Group(*name, tuple(of_it)) for name, of_it in found.items()]
 
 
-def lines(found: Sequence[Group], gated: Sequence[str], informed: Sequence[str] = ()) -> tuple[Difference, ...]:
+def lines(found: Sequence[Group], gated: Sequence[str], informed: Iterable[str] = ()) -> tuple[Difference, ...]:
     """Every metric of every group that was measured on some clip on both sides: gated lines first, judged together."""
     first = [sides for group in found for metric in gated if (sides := _sides(group, metric)).clips]
     others = [sides for group in found for metric in informed if (sides := _sides(group, metric)).clips]

@@ -84,6 +84,7 @@ def here() -> dict[str, Any]:
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in PACKAGES},
         "platform": platform.platform(),
+        "processor": _processor(),
         "cpu_count": os.cpu_count(),
     }
 
@@ -111,6 +112,17 @@ def _commit(root: Path) -> dict[str, Any]:
 
     status = ask("status", "--porcelain", "--", "harness", "models", "scenarios")
     return {"commit": ask("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+
+
+def _processor() -> str:
+    """Its name and numbers, for virtual machines call many kinds the same."""
+    try:
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
+    except OSError:
+        return platform.processor() or platform.machine()
+    said = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in first.splitlines())}
+    numbers = [said[name] for name in ("cpu family", "model", "stepping") if name in said]
+    return " ".join([said.get("model name") or platform.machine(), *(["/".join(numbers)] if numbers else [])])
 
 
 def _version(package: str) -> str:

@@ -35,7 +35,7 @@ def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: 
 
 
 def step_times_ms(step_ms: Floats) -> dict[str, float]:
-    """Wall time of a step (batch of one): mean, p50, p95, p99 and frames per second; NaN of none, or where not timed."""
+    """Wall time of a step (batch of one): mean, p50, p95, p99 and frames per second; NaN where none was timed."""
     known = step_ms[np.isfinite(step_ms)]
     if not len(known):
         return dict.fromkeys(("step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps"), float("nan"))
@@ -53,8 +53,8 @@ def step_times_ms(step_ms: Floats) -> dict[str, float]:
 def step_relative(step_cpu_ms: Floats, reference_cpu_ms: Floats) -> float:
     """How often the work of `score.reference` fits into a step, by medians of CPU time; NaN where either was not timed.
 
-    CPU time, since wall time is no measure of the method on a busy computer: whoever is sent to wait in every step takes
-    several times as long, while work as short as the reference seldom is.
+    CPU time, since on a busy computer wall time is no measure of the method: whoever is sent to wait in every step
+    takes several times as long, while work as short as the reference seldom is.
     """
     steps, work = (times[np.isfinite(times)] for times in (step_cpu_ms, reference_cpu_ms))
     if not len(steps) or not len(work) or np.median(work) <= 0.0:  # a clock may be too coarse for it

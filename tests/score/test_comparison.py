@@ -55,6 +55,20 @@ def test_worse_is_worse_whatever_else_is_missing_but_not_where_inputs_differ() -
     assert found(other).differences == ()
 
 
+def test_times_are_gated_between_equal_processors_alone() -> None:
+    metrics = {"step_relative": 2.0}
+    slower = side(metrics={"step_relative": 3.0})
+    for processor, outcome in (("Xeon", Outcome.REGRESSED), ("Opteron", Outcome.PASS)):
+        a = replace(side(metrics=metrics), manifest=manifest(processor="Xeon"))
+        b = replace(slower, manifest=manifest(processor=processor))
+        comparison = found(b, a, metrics=[ANGLE, "step_relative"])
+        assert comparison.outcome == outcome
+        (line,) = (line for line in comparison.differences if line.metric == "step_relative")
+        assert (line.gated, line.verdict) == (processor == "Xeon", "worse")
+        alone = found(b, a, metrics=["step_relative"])
+        assert alone.outcome == (Outcome.REGRESSED if processor == "Xeon" else Outcome.NOT_COMPARABLE)
+
+
 def test_a_result_beside_itself_differs_by_exactly_nothing() -> None:
     a = side(methods={"ik": 1.0, "mean_pose": 3.0})
     comparison = compare(a, a)
