@@ -1,0 +1,97 @@
+"""The gate held to its figures: false alarms, changes found, coverage; a share of the studies here, all when slow."""
+
+import numpy as np
+import pytest
+
+from harness.bench import gate
+from harness.bench.gate_errors import KINDS, METRICS, Population, population
+from harness.core.seeds import generator
+from harness.score.margins import GATED
+
+
+@pytest.fixture(scope="module")
+def settings() -> Population:
+    return population("settings")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_stored_errors_are_real_differences_of_many_clips(kind: str) -> None:
+    people = population(kind)
+    assert people.errors.shape == (5, len(METRICS), len(people.clips), 2)
+    assert len(set(people.clips)) == len(people.clips) >= 24
+    assert np.isfinite(people.errors).all()
+    assert (people.errors > 0.0).all()
+    assert (people.errors[..., 0] != people.errors[..., 1]).mean() > 0.95
+    assert set(METRICS) <= set(GATED)
+
+
+@pytest.mark.parametrize("draw", [gate.exchanged, gate.heavy, gate.centred])
+def test_drawn_studies_hold_nothing(draw: gate.Draw, settings: Population) -> None:
+    """Over many draws no side is better in any line."""
+    rng = generator(1, "many")
+    means = []
+    for _ in range(400):
+        errors = draw(settings, 24, rng)
+        means.append((errors[..., 1] - errors[..., 0]).mean(axis=2))
+    mean, sd = np.mean(means, axis=0), np.std(means, axis=0)
+    assert (np.abs(mean) < 5.0 * sd / np.sqrt(400)).all()
+
+
+def test_an_exchange_keeps_what_metrics_of_a_clip_share(settings: Population) -> None:
+    stored = {tuple(sorted(map(float, pair))) for pair in settings.errors[0, 0]}
+    errors = gate.exchanged(settings, 200, generator(1, "one"))
+    assert {tuple(sorted(map(float, pair))) for pair in errors[0, 0]} <= stored
+    both = settings.errors[0]
+    for n in range(200):
+        (at,) = [
+            c for c in range(both.shape[1]) if (np.sort(both[:, c], axis=1) == np.sort(errors[0, :, n], axis=1)).all()
+        ]
+        kept, turned = both[:, at], both[:, at, ::-1]
+        assert (errors[0, :, n] == kept).all() or (errors[0, :, n] == turned).all()
+
+
+def test_worse_is_what_a_comparison_calls_worse(settings: Population) -> None:
+    """Studies skip intervals that cannot matter; verdicts stay those of the gate."""
+    seen = 0
+    for n in range(4):
+        errors = gate.exchanged(settings, 12, generator(1, "both ways", n))[:2]
+        errors[n % 2, :, :, 1] *= 1.0 + 0.03 * n
+        study = gate.study_of(errors)
+        assert [verdict == "worse" for verdict in study.verdicts] == study.worse.tolist()
+        seen += int(study.worse.sum())
+    assert seen >= 4
+
+
+@pytest.mark.parametrize(("count", "of", "most"), [(0, 1000, 0.00299), (25, 1000, 0.0349), (50, 50, 1.0)])
+def test_rates_are_bounded_as_printed_tables_have_it(count: int, of: int, most: float) -> None:
+    assert gate.at_most(count, of) == pytest.approx(most, rel=0.01)
+    assert gate.at_least(of - count, of) == pytest.approx(1.0 - most, abs=1e-3)
+
+
+def false_alarms(people: Population, studies: int, clips: int = 24, draw: gate.Draw = gate.exchanged) -> int:
+    return gate.alarms(people, clips, studies, 1, draw)
+
+
+def test_few_of_the_studies_alarm_falsely(settings: Population) -> None:
+    assert false_alarms(settings, 40) <= 2
+
+
+def test_most_changes_of_3_percent_are_found(settings: Population) -> None:
+    assert gate.found(settings, 24, 20, 1).mean() >= 0.9
+    assert not gate.found(settings, 24, 6, 1, change=0.0).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("clips", "draw"),
+    [(24, gate.exchanged), (12, gate.exchanged), (8, gate.exchanged), (24, gate.heavy), (24, gate.centred)],
+)
+def test_false_alarms_stay_below_5_percent(clips: int, draw: gate.Draw, settings: Population) -> None:
+    count = false_alarms(settings, gate.STUDIES, clips, draw)
+    print(f"{draw.__name__}, {clips} clips: {count} of {gate.STUDIES}")
+    assert gate.at_most(count, gate.STUDIES) <= 0.05
+
+
+@pytest.mark.slow
+def test_a_change_of_3_percent_is_found_in_9_of_10_studies(settings: Population) -> None:
+    assert gate.found(settings, 24, gate.CHANGED, 1).mean() >= 0.9
