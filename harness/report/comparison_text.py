@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from harness.report.comparison_words import (
     MARKS,
+    beside,
     groups_vary,
     in_order,
     interval,
@@ -63,7 +64,7 @@ def _different(comparison: Comparison) -> list[str]:
     for title, found in lists(comparison).items():
         lines.append(f"{title.lower()}: {len(found):,} ({listed([_short(text) for text in found])})")
     for name, a, b in comparison.circumstances[:_MOST_LISTED]:
-        lines.append(f"differs: {name}: {_short(a)} -> {_short(b)}")
+        lines.append(f"differs: {name}: {' -> '.join(beside(a, b, _LETTERS))}")
     if (more := len(comparison.circumstances) - _MOST_LISTED) > 0:
         lines.append(f"differs: {more:,} more circumstances")
     return ["", *lines]

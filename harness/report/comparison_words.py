@@ -85,6 +85,19 @@ def lists(comparison: Comparison) -> dict[str, tuple[str, ...]]:
     return {title: texts for title, texts in found.items() if texts}
 
 
+def beside(a: str, b: str, letters: int) -> tuple[str, str]:
+    """Two long texts on a line each, cut to where they begin to differ."""
+    a, b = (" ".join(text.split()) for text in (a, b))
+    alike = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
+    start = max(0, alike - letters // 3) if max(len(a), len(b)) > letters else 0
+    return _cut(a, start, letters), _cut(b, start, letters)
+
+
+def _cut(text: str, start: int, letters: int) -> str:
+    shown = text[start : start + letters]
+    return ("…" if start else "") + shown + ("…" if start + letters < len(text) else "")
+
+
 def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     """The first few, and how many more."""
     more = f" and {len(names) - most:,} more" if len(names) > most else ""

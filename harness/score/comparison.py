@@ -11,7 +11,7 @@ from harness.score.files import plain
 from harness.score.judged import Judged
 from harness.score.manifest import Manifest, flat
 from harness.score.margins import GATED, INFORMED, TIMES, margin_of
-from harness.score.matching import LOOSENED, Matched, inputs_that_differ, match, named, short
+from harness.score.matching import LOOSENED, Matched, inputs_that_differ, match, named, told
 from harness.score.significance import Verdict
 
 __all__ = ["EVERYTHING", "Comparison", "Difference", "Verdict", "compare"]
@@ -137,4 +137,4 @@ def _outcome(
 def _circumstances(a: Manifest, b: Manifest) -> tuple[tuple[str, str, str], ...]:
     mine, theirs = (flat(plain(side.circumstances)) for side in (a, b))
     names = {**mine, **theirs}
-    return tuple((n, short(mine.get(n)), short(theirs.get(n))) for n in names if mine.get(n) != theirs.get(n))
+    return tuple((n, told(mine.get(n)), told(theirs.get(n))) for n in names if mine.get(n) != theirs.get(n))

@@ -133,7 +133,12 @@ def _text(name: str, differing: Sequence[tuple[Any, Any, str]], pairs: int) -> s
 
 def short(value: Any) -> str:
     """In a few signs."""
+    text = told(value)
+    return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 1] + "…"
+
+
+def told(value: Any) -> str:
+    """Whole."""
     if isinstance(value, list):
         value = ", ".join(map(str, value)) or None
-    text = "none" if value is None else str(value)
-    return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 1] + "…"
+    return "none" if value is None else str(value)

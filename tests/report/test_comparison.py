@@ -188,6 +188,16 @@ def test_what_differs_is_named_and_long_lists_are_counted(tmp_path: Path) -> Non
     assert max(map(len, printed.splitlines())) < 200
 
 
+def test_long_values_are_cut_to_where_they_differ() -> None:
+    a, b = (f"LocalPca(name='local_pca', {'index=None, ' * 20}neighbours={n}, {'loss=None, ' * 20})" for n in (300, 30))
+    printed = text(told([], circumstances=(("constants.local_pca", a, b), ("dirty", "no", "yes"))))
+    (row,) = (row for row in printed.splitlines() if "constants" in row)
+    assert "neighbours=300," in row
+    assert "neighbours=30," in row
+    assert len(row) < 180
+    assert "differs: dirty: no -> yes" in printed
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_equal_sides_are_the_same_and_nothing_differs(tmp_path: Path) -> None:
     shown = told([line("ik", metric, 6, 0.0) for metric in METRICS], circumstances=())
