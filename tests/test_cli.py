@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
+from tests.short_demo import short_demo
 
 
 def run(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -59,7 +60,10 @@ def test_errors_are_json_when_json_is_asked_for(tmp_path: Path) -> None:
     assert "boxing" in said["error"]
 
 
-def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(tmp_path: Path) -> None:
+def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Also when it is a worker that prints."""
     (tmp_path / "noisy.py").write_text(
         "from dataclasses import dataclass\n"
         "from harness.reconstruct.mean_pose import MeanPose\n"
@@ -73,13 +77,17 @@ def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(tmp_path: Path) -
         "    def fit(self, body, examples, rng):\n"
         "        raise KeyboardInterrupt\n"
     )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    short = str(short_demo(tmp_path / "short.toml"))
     for jobs in ("1", "2"):
         words = ("--methods", "noisy:Chatty", "--no-report", "--json", "--jobs", jobs, "--out", f"chatty{jobs}")
-        ended = run("run", "demo", *words, cwd=tmp_path)
-        assert json.loads(ended.stdout)["outcome"] == "pass"
-        assert "hello" in ended.stderr
-    ended = run("run", "demo", "--methods", "noisy:Stopped", "--json", "--out", "stopped", cwd=tmp_path)
-    assert (ended.returncode, json.loads(ended.stdout)) == (130, {"outcome": "interrupted"})
+        assert main(["run", short, *words]) == 0
+        said, talk = capfd.readouterr()
+        assert json.loads(said)["outcome"] == "pass"
+        assert "hello" in talk
+    assert main(["run", short, "--methods", "noisy:Stopped", "--json", "--out", "stopped"]) == 130
+    assert json.loads(capfd.readouterr().out) == {"outcome": "interrupted"}
 
 
 def test_output_into_a_closed_pipe_ends_quietly(tmp_path: Path) -> None:
