@@ -10,8 +10,13 @@ from harness.config import load_scenario
 from harness.mocap import performer
 from harness.score.results import read_summary
 
+SLOW = ("boxing", "jumping", "golf")
+"""Left to `make test-slow`: `mocap/test_performer_difficulty.py` asks the same of every behaviour, without the loop."""
 
-@pytest.mark.parametrize("behaviour", performer.BEHAVIOURS)
+
+@pytest.mark.parametrize(
+    "behaviour", [pytest.param(b, marks=[pytest.mark.slow] if b in SLOW else []) for b in performer.BEHAVIOURS]
+)
 def test_the_mean_pose_errs_three_times_as_much_as_what_was_learnt(tmp_path: Path, behaviour: str) -> None:
     """Perfect trackers, the demo's clips and examples, through the whole loop."""
     demo = load_scenario("demo")

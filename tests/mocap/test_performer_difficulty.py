@@ -44,7 +44,7 @@ def mean_error_deg(estimate: Floats, truth: Floats) -> float:
 def test_learning_from_other_takes_beats_the_mean_pose_threefold(behaviour: str) -> None:
     """Kernel ridge regression from tracker readings to angles, trained on every take but the one it is judged on."""
     takes = {
-        (who, take): features(performer.generate(behaviour, who, take, seed=7), 40)
+        (who, take): features(performer.generate(behaviour, who, take, seed=7, rate_hz=30.0), 10)
         for who in performer.performers()
         for take in range(1, 5)
     }
