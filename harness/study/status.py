@@ -79,7 +79,8 @@ def _of_run(out: Path) -> Status:
     summary = out / "summary.json"
     if not running and summary.is_file() and (not written_s or summary.stat().st_mtime >= written_s[-1]):
         content = read_summary(out)
-        return Status("run", out.name, planned, content["cells_finished"], content["failures"], running)
+        planned, finished = content["cells_planned"], content["cells_finished"]
+        return Status("run", out.name, planned, finished, content["failures"], running)
     since_s = (out / "manifest.json").stat().st_mtime
     made = [at for at in written_s if at >= since_s]
     found = Status("run", out.name, planned, min(len(written_s), planned), {}, running)

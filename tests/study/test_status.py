@@ -1,0 +1,110 @@
+"""How far work is: while it goes on, after it was stopped, and when it is done."""
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.cli import main
+from harness.errors import BadFile
+from harness.score.index import CellIndex
+from harness.score.results import read_cells, summary_rows
+from harness.score.running import at_work
+from harness.study.status import status
+from tests.report.fabricate import Plan, fabricate
+
+PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four cells."""
+    return fabricate(tmp_path_factory.mktemp("status") / "run", PLAN)
+
+
+@pytest.fixture
+def run(made: Path, tmp_path: Path) -> Path:
+    """As `harness run` writes it."""
+    out = tmp_path / "run"
+    shutil.copytree(made, out)
+    manifest = json.loads((out / "manifest.json").read_text())
+    manifest["inputs"] |= {
+        "motion": {"test": ["walking_1", "walking_2"]},
+        "inputs": ["pos+ori"],
+        "vary": {"noise": {"x": [1, 2]}},
+    }
+    manifest["circumstances"]["methods"] = ["ik", "mean_pose"]
+    (out / "manifest.json").write_text(json.dumps(manifest))
+    return out
+
+
+def index(out: Path, rows: list[dict[str, Any]], planned: int, **facts: Any) -> None:
+    out.mkdir(exist_ok=True)
+    (out / "study.json").write_text(json.dumps({"kind": "sweep"}))
+    with CellIndex(out) as found:
+        found.expect([f"cell {n}" for n in range(planned)])
+        found.add(rows)
+        found.ended((f"cell {n}", row["key"], "") for n, row in enumerate(rows))
+        found.ended([(f"cell {planned - 1}", "", "Traceback\nValueError: on purpose")])
+        found.note(name="tiny", **facts)
+
+
+def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path: Path) -> None:
+    out, rows = tmp_path / "sweep", summary_rows(read_cells(made))
+    index(out, rows[:3], 10, started_s=1000.0, seen_s=1030.0, made=3)
+    (out / "cells" / "finished_but_not_in_the_index").mkdir(parents=True)
+    (out / "cells" / ".unfinished-1-abc").mkdir()
+    found = status(out)
+    assert (found.kind, found.name, found.planned, found.finished) == ("sweep", "tiny", 10, 4)
+    assert found.failures == {"cell 9": "Traceback\nValueError: on purpose"}
+    assert not found.running
+    assert found.left_s == pytest.approx(30.0 / 4 * 5)
+    with at_work(out):
+        assert status(out).running
+
+
+def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "sweep"
+    index(out, summary_rows(read_cells(made))[:3], 4, started_s=1000.0, seen_s=1030.0, made=3)
+    (out / "failures.json").write_text("{}")
+    assert main(["status", str(out)]) == 4
+    assert capsys.readouterr().out.splitlines() == [
+        "sweep tiny: finished, 3 of 4 cells finished, 1 failed",
+        "FAILED cell 3: ValueError: on purpose",
+        f"with the commands that make them again: {out / 'failures.json'}",
+        "incomplete",
+    ]
+    assert main(["status", str(out), "--json"]) == 4
+    said = json.loads(capsys.readouterr().out)
+    assert (said["cells_planned"], said["cells_finished"], said["cells_failed"]) == (4, 3, 1)
+    assert (said["running"], said["left_s"], said["outcome"]) == (False, None, "incomplete")
+
+
+def test_a_run_is_counted_by_its_cells_until_it_ends(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = status(run)
+    assert (found.kind, found.planned, found.finished, found.running) == ("run", 4, 4, False)
+    assert main(["status", str(run)]) == 0
+    (run / "summary.json").unlink()
+    found = status(run)
+    assert (found.planned, found.finished, found.failures) == (8, 4, {})
+    with at_work(run, alone=False):
+        assert status(run).running
+    assert main(["status", str(run)]) == 4
+    assert "run run: not running, 4 of 8 cells finished, 0 failed" in capsys.readouterr().out
+
+
+def test_a_paper_is_all_its_runs(run: Path) -> None:
+    shutil.copytree(run, run.parent / "another")
+    (run / "summary.json").unlink()
+    found = status(run.parent)
+    assert (found.kind, found.planned, found.finished) == ("paper", 12, 8)
+
+
+def test_what_is_no_work_of_ours_is_told(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="no such folder"):
+        status(tmp_path / "nowhere")
+    (tmp_path / "mine").mkdir()
+    with pytest.raises(BadFile, match=r"neither index\.sqlite nor manifest\.json"):
+        status(tmp_path / "mine")
