@@ -125,7 +125,8 @@ def inputs_that_differ(
 
 def _text(name: str, differing: Sequence[tuple[Any, Any, str]], pairs: int) -> str:
     mine, theirs, clip = differing[0]
-    text = f"{name}: {short(mine)} against {short(theirs)}"
+    texts = short(mine), short(theirs)
+    text = f"{name}: {' against '.join(texts if texts[0] != texts[1] else map(told, (mine, theirs)))}"
     if any(other[:2] != (mine, theirs) for other in differing):
         text += f" on {clip}"
     return text if len(differing) == pairs else f"{text} ({len(differing)} of {pairs} pairs)"
@@ -133,7 +134,7 @@ def _text(name: str, differing: Sequence[tuple[Any, Any, str]], pairs: int) -> s
 
 def short(value: Any) -> str:
     """In a few signs."""
-    text = told(value)
+    text = f"{value:g}" if isinstance(value, float) else told(value)
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 1] + "…"
 
 

@@ -97,7 +97,8 @@ def differing(changes: dict[str, Any], metrics: tuple[str, ...] = ("mpjpe_mm",),
     ("changes", "texts"),
     [
         ({}, []),
-        ({"tracker": {"rate_hz": 60.0, "items": [40, 2]}}, ["tracker.rate_hz: 40.0 against 60.0"]),
+        ({"tracker": {"rate_hz": 60.0, "items": [40, 2]}}, ["tracker.rate_hz: 40 against 60"]),
+        ({"tracker": {"rate_hz": 40.0 + 1e-9, "items": [40, 2]}}, ["tracker.rate_hz: 40.0 against 40.000000001"]),
         ({"tracker": {"rate_hz": 40.0, "items": []}}, ["tracker.items: 40, 2 against none"]),
         ({"profile": "worn out"}, ["profile: none against worn out"]),
         ({"profile": None}, []),  # what an older version did not know yet is as none
