@@ -1,10 +1,11 @@
 """Baselines: what a run or sweep measured, small enough to be kept under version control, to compare with later.
 
 `results/baselines/NAME` has manifest.json, summary.json (counts and what each method came to) and cells.json: identity
-and metrics of every cell, sorted; of what defines cells, what all share stands once, and the rest once for all the
-cells that it is the same for. No poses and no frames. The same run gives the same bytes.
+and comparable metrics of every cell, sorted, in a line each; of what defines cells, what all share stands once, and the
+rest once for all the cells that it is the same for. No poses and no frames. The same run gives the same bytes.
 """
 
+import json
 import os
 import re
 import shutil
@@ -14,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 from harness.errors import BadInput
-from harness.score.files import TEMPORARY, content_key, plain, read_json, write_json
-from harness.score.judged import BASELINES, CELLS, SCHEMA, Judged, read_judged
+from harness.score.files import TEMPORARY, as_json, content_key, plain, read_json, write_json, write_text
+from harness.score.judged import BASELINES, CELLS, COUNTED, SCHEMA, Judged, read_judged
+from harness.score.margins import MARGINS
 from harness.score.matching import PAIRED_ON
+from harness.score.metrics import DEFINITIONS
 
 _SUMMARISED = ("outcome", "cells_finished", "cells_planned", "methods", "groups")
 """What is kept of a summary: a run's says what each method came to, a sweep's what each group of cells did."""
@@ -49,7 +52,7 @@ def save(run: Path, name: str, folder: Path = BASELINES, force: bool = False) ->
     summary = read_json(run / "summary.json", "the summary of a run or sweep")
     write_json(beside / "manifest.json", judged.manifest.as_dict())
     write_json(beside / "summary.json", {kind: summary[kind] for kind in _SUMMARISED if kind in summary})
-    write_json(beside / CELLS, _packed(judged))
+    write_text(beside / CELLS, _packed(judged))
     before = beside.with_name(f"{beside.name}-before")
     if target.exists():
         os.rename(target, before)
@@ -58,19 +61,23 @@ def save(run: Path, name: str, folder: Path = BASELINES, force: bool = False) ->
     return target
 
 
-def _packed(judged: Judged) -> dict[str, Any]:
+def _packed(judged: Judged) -> str:
     """What `judged.read_judged` reads back."""
     cells = sorted(judged.cells, key=lambda cell: [str(plain(getattr(cell, name))) for name in PAIRED_ON])
     definitions = [plain(cell.defined_by) for cell in cells]
     first, *others = definitions
     shared = {name: first[name] for name in first if all(_same(other, first, name) for other in others)}
-    parts, packed = {}, []
+    metrics = [name for name in DEFINITIONS if name in (*COUNTED, *MARGINS) and any(name in c.metrics for c in cells)]
+    parts, lines = {}, []
     for cell, definition in zip(cells, definitions, strict=True):
         rest = {name: definition[name] for name in sorted(definition) if name not in shared}
         part = content_key(rest)[:12]
         parts[part] = rest
-        packed.append({**{f.name: getattr(cell, f.name) for f in fields(cell) if f.name != "defined_by"}, "part": part})
-    return {"schema": SCHEMA, "planned": judged.planned, "shared": shared, "parts": parts, "cells": packed}
+        line = {f.name: getattr(cell, f.name) for f in fields(cell) if f.name not in ("defined_by", "metrics")}
+        lines.append({**line, "part": part, "metrics": [cell.metrics.get(name) for name in metrics]})
+    head = {"schema": SCHEMA, "planned": judged.planned, "shared": shared, "parts": parts, "metrics": metrics}
+    rows = ",\n  ".join(json.dumps(plain(line), allow_nan=False, ensure_ascii=False) for line in lines)
+    return f'{as_json(head).rstrip().removesuffix("}").rstrip()},\n "cells": [\n  {rows}\n ]\n}}\n'
 
 
 def _same(one: Mapping[str, Any], other: Mapping[str, Any], name: str) -> bool:

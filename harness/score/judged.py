@@ -20,7 +20,7 @@ CELLS = "cells.json"
 SCHEMA = 1
 _TEXTS = ("scenario", "clip", "method", "inputs", "protocol", "noise", "behaviour", "performer")
 _KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
-_COUNTED = ("frames_matched", "frames_expected")
+COUNTED = ("frames_matched", "frames_expected")
 _AGAIN = "Run, or save, it again."
 
 
@@ -109,7 +109,10 @@ def _of_baseline(folder: Path) -> Judged:
         raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
     try:
         shared, parts, planned = content["shared"], content["parts"], int(content["planned"])
-        whole = [{**cell, "defined_by": {**shared, **parts[cell["part"]]}} for cell in content["cells"]]
+        names, whole = content["metrics"], []
+        for cell in content["cells"]:
+            metrics = dict(zip(names, cell["metrics"], strict=True))
+            whole.append({**cell, "metrics": metrics, "defined_by": {**shared, **parts[cell["part"]]}})
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise BadFile(path, f"damaged ({error!r})", expected, _AGAIN) from error
     cells = tuple(_cell(path, cell) for cell in whole)
@@ -123,8 +126,8 @@ def _cell(path: Path, content: Mapping[str, Any]) -> JudgedCell:
     for name, kind in _KINDS.items():
         if not isinstance(content.get(name), kind):
             raise BadFile(path, f"{name} is {content.get(name)!r}", f"a cell with a {kind.__name__} there", _AGAIN)
-    for name in (*_COUNTED, *content["metrics"]):
+    for name in (*COUNTED, *content["metrics"]):
         value = content["metrics"].get(name)
-        if not (isinstance(value, int | float) and math.isfinite(value)) and (value is not None or name in _COUNTED):
+        if not (isinstance(value, int | float) and math.isfinite(value)) and (value is not None or name in COUNTED):
             raise BadFile(path, f"{name} is {value!r}", "a cell with a number there", _AGAIN)
     return JudgedCell(**{name: content[name] for name in _KINDS})
