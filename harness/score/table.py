@@ -35,14 +35,14 @@ def _lines(index: CellIndex) -> Iterator[str]:
     varied = {text: json.loads(text) for text in texts}
     keys = list(dict.fromkeys(key for values in varied.values() for key in values))
     values = {text: [_short(found[key]) if key in found else "" for key in keys] for text, found in varied.items()}
-    lines = _Lines()
+    lines, places = _Lines(), len(FIRST)
     table = csv.writer(lines, lineterminator="\n")
     table.writerow([*FIRST, *(f"vary.{key}" for key in keys), *METRICS, "key", "seconds"])
     yield lines.last
-    for columns in index.columns(*FIRST, "varied", *METRICS, "key", "seconds"):
-        first, text, rest = columns[: len(FIRST)], columns[len(FIRST)], columns[len(FIRST) + 1 :]
-        table.writerow([*first, *values[text], *map(_figure, rest)])
-        yield lines.last
+    for columns in index.columns(*FIRST, "varied", "key", "seconds", *METRICS):
+        first, (text, key, seconds), figures = columns[:places], columns[places : places + 3], columns[places + 3 :]
+        table.writerow([*first, *values[text]])
+        yield f"{lines.last[:-1]},{_figures(figures)},{key},{_figures((seconds,))}\n"
 
 
 class _Lines:
@@ -61,8 +61,12 @@ def _short(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
 
 
-def _figure(value: Any) -> Any:
-    return f"{value:.9g}" if isinstance(value, float) else value
+def _figures(values: Sequence[float | None]) -> str:
+    """Nine digits of each, empty where there is none; all at once, for there are millions."""
+    try:
+        return ",".join(["%.9g"] * len(values)) % tuple(values)
+    except TypeError:
+        return ",".join("" if value is None else f"{value:.9g}" for value in values)
 
 
 def groups(index: CellIndex) -> list[dict[str, Any]]:
