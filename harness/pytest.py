@@ -59,7 +59,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
                 pytest.skip(f"kept as baseline {kept}: nothing was compared")
             checked = gate.check(method, baseline, against=baseline_method, metrics=metrics)
         except HarnessError as error:
-            pytest.fail(f"harness: {error}", pytrace=False)
+            raise pytest.fail.Exception(f"harness: {error}", pytrace=False) from None
         request.node.user_properties += checked.properties()  # as `record_property`, which warns where it need not
         if not checked.passed:
             pytest.fail(str(checked), pytrace=False)

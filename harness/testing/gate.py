@@ -3,7 +3,9 @@
 `harness.pytest` does this in a project's own tests.
 """
 
+import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -23,6 +25,7 @@ from harness.score.results import read_summary
 
 SCENARIO = "gate"
 """What a method is measured on when its first baseline is made, unless told otherwise."""
+_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
@@ -118,8 +121,24 @@ class Gate:
 
     def _run(self, scenario: Scenario) -> Path:
         out = self.out / f"{scenario.name}-{content_key(repr(scenario))[:12]}"
-        experiment.run(scenario, out, command=self.command)
+        with _one_thread():
+            experiment.run(scenario, out, jobs=2, command=self.command)
         return out
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes that are started meanwhile compute as the command line does, whatever this one has loaded: threads that
+    wait for each other cost CPU time, and steps would seem many times as expensive."""
+    before = {name: os.environ.get(name) for name in _THREADS}
+    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            del os.environ[name]
+            if value is not None:
+                os.environ[name] = value
 
 
 def scenario_of(manifest: Manifest) -> Scenario:

@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -50,8 +51,10 @@ def measured(scenario: Scenario, out: Path, *, command: str = "", **changes: Any
     return write_run(out, replace(sides, manifest=of_it))
 
 
-def run(scenario: Scenario, out: Path, *, command: str = "") -> Outcome:
-    """Instead of `experiment.run`."""
+def run(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
+    """Instead of `experiment.run`, in processes that have one thread each."""
+    assert jobs > 1
+    assert os.environ["OMP_NUM_THREADS"] == os.environ["OPENBLAS_NUM_THREADS"] == "1"
     measured(scenario, out, command=command)
     return Outcome.PASS
 
@@ -62,6 +65,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
     monkeypatch.setattr(experiment, "run", run)
     monkeypatch.setitem(CHANGE, "now", 1.0)
     monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
     first = measured(replace(TINY, methods=("mine:Mine", "ik")), pytester.path / "first")
     baseline.save(first, "main", pytester.path / "results/baselines")
     return pytester
@@ -74,6 +78,7 @@ def gated(project: pytest.Pytester, source: str = ONE.format(""), *options: str)
 
 def test_a_method_that_is_as_it_was_passes(project: pytest.Pytester) -> None:
     gated(project).assert_outcomes(passed=1)
+    assert os.environ["OMP_NUM_THREADS"] == "3"
 
 
 def test_a_worse_method_fails_with_the_table(project: pytest.Pytester) -> None:
@@ -99,7 +104,7 @@ def test_other_metrics_may_be_chosen(project: pytest.Pytester) -> None:
 
 
 def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
-    def otherwise(scenario: Scenario, out: Path, *, command: str = "") -> Outcome:
+    def otherwise(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
         measured(scenario, out, defined_by={"tracker": {"rate_hz": 60.0, "items": [40, 2]}})
         return Outcome.PASS
 
@@ -115,7 +120,7 @@ def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, mon
 def test_cells_that_failed_are_told_with_their_traceback(
     project: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def failing(scenario: Scenario, out: Path, *, command: str = "") -> Outcome:
+    def failing(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
         measured(scenario, out, failed=("mine:Mine on walk_09",))
         return Outcome.INCOMPLETE
 
@@ -138,6 +143,7 @@ def test_what_cannot_be_gated_fails_in_one_line(project: pytest.Pytester, call: 
     result = gated(project, f"def test_mine(harness_gate):\n    harness_gate({call})\n")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines([f"harness: {told}"])
+    result.stdout.no_fnmatch_line("*exception*")
 
 
 def test_a_first_baseline_is_kept_and_then_held_to(project: pytest.Pytester) -> None:
