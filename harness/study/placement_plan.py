@@ -14,9 +14,10 @@ from harness.errors import BadInput
 from harness.score.margins import margin_of
 from harness.score.placement import Place
 from harness.study import search, suffices
-from harness.study.candidates import Unit, Worn, worn
+from harness.study.candidates import Unit, Worn, chosen, worn
 from harness.study.placement_study import PlacementStudy, base_scenario, find_study, load_study
 from harness.study.ranking import Costs
+from harness.study.refine import refuse_few
 from harness.study.search import stations
 from harness.study.trying import Asked, rate_hz
 
@@ -107,6 +108,9 @@ def plan(path: Path | str, folder: Path | None) -> Plan:
         check_names(alone, source_of(one.motion, folder, one.seed), parts)
     if study.exhaustive:
         search.refuse_absurd(study.exhaustive, made.units, len(scenario.motion.test) * len(scenario.methods))
+    if study.refine and study.refine.set:
+        start = worn(chosen(study.refine.set, made.units, "refine.set"), made.units)
+        refuse_few(start, len(scenario.motion.test))
     for size in {len(one) for one in made.known_sets()}:
         made.rate_hz(size)
     return made

@@ -24,11 +24,9 @@ Mover = tuple[int, ...]
 
 
 def refine(table: Refine, start: Worn, measure: Measure, clips: int) -> tuple[Search, Worn]:
-    """What it came to, and every step; BadInput when so few clips could never show that a move helps."""
+    """What it came to, and every step; BadInput on too few clips."""
+    refuse_few(start, clips)
     movers = movers_of(start)
-    if clips < (least := fewest_clips(4 * len(movers))):
-        found = f"refine: on {clips} clips none of {4 * len(movers)} moves could ever be surely better."
-        raise BadInput(found, f"Judge on {least} clips or more, or refine a smaller set.")
     origin = {station_name(one): one for one in start}
     now, steps, looked = start, [Step(stations(start), "")], 0
     for along, around_deg in zip(table.along, table.around_deg, strict=True):
@@ -45,6 +43,14 @@ def refine(table: Refine, start: Worn, measure: Measure, clips: int) -> tuple[Se
         ended = f"{table.most_moves} moves, the most that were asked for"
     title = f"{names(stations(start))}: moved along and around"
     return Search("refine", title, tuple(steps), f"{ended}; {looked} places were looked at"), now
+
+
+def refuse_few(start: Worn, clips: int) -> None:
+    """BadInput when so few clips could never show that a move helps."""
+    moves = 4 * len(movers_of(start))
+    if clips < (least := fewest_clips(moves)):
+        found = f"refine: on {clips} clips none of {moves} moves could ever be surely better."
+        raise BadInput(found, f"Judge on {least} clips or more, or refine a smaller set.")
 
 
 def movers_of(start: Worn) -> tuple[Mover, ...]:

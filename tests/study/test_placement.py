@@ -1,12 +1,14 @@
 """Placement studies from their file to their findings, with a method of which the answer is known."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+import harness
 from harness.cli import main
 from harness.config import load_scenario, shipped_placements
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
@@ -187,6 +189,7 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
         (["[exhaustive]\nmost = 2\nmost_cells = 11"], "6 sets of up to 2 of 3 trackers are 12 cells"),
         (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base names 'knee'"),
         (["[refine]\nset = ['pelvis']\nalong = []"], "as many of both"),
+        (["[refine]\nset = ['pelvis']"], "on 2 clips none of 4 moves .* 8 clips or more"),
         (["[refine]\nset = ['pelvis']\nalong = [0.1, 0.0]"], "steps above 0"),
         (["[ablate]\n[changes]\nmethods = ['ik']"], "The study has its own"),
         (["[ablate]\n[changes]\nnoise = 'loud'"], "loud"),
@@ -280,6 +283,16 @@ def test_every_shipped_study_is_ready_to_be_done(path: Path) -> None:
     assert len(ready.held_out.motion.test) >= 6
     with pytest.raises(BadFile, match="a placement study; expected a scenario"):
         load_scenario(path.stem)
+
+
+def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
+    page = Path(harness.__file__).parent.parent / "docs" / "studies.md"
+    (text,) = re.findall(r"```toml\n(schema = 1\nkind = \"placement\".*?)```", page.read_text(), re.DOTALL)
+    (tmp_path / "mine.toml").write_text(text)
+    ready = plan(tmp_path / "mine.toml", None)
+    assert ready.scenario.components == {"wobble": {}, "loose": {"share": 0.2}}
+    assert len(ready.units) == 2 + 1 + 12
+    assert ready.rate_hz(5) == 40.0
 
 
 def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
