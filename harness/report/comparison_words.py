@@ -157,9 +157,10 @@ def direction(line: Difference) -> tuple[int, int, int]:
 
 
 def _decimals(line: Difference) -> int:
-    """So many that the interval's width, or else the difference, has two digits."""
-    width = (line.high - line.low) if line.low is not None and line.high is not None else 0.0
-    finest = min((size for size in (width, abs(line.difference), line.margin) if size > 0.0), default=1.0)
+    """So many that the interval's width has two digits, or without one the lesser of difference and margin."""
+    width = line.high - line.low if line.low is not None and line.high is not None else 0.0
+    sizes = (width,) if width > 1e-3 * line.margin else (abs(line.difference), line.margin)
+    finest = min((size for size in sizes if size > 0.0), default=1.0)
     return min(_MOST_DECIMALS, max(0, 1 - math.floor(math.log10(finest))))
 
 

@@ -188,6 +188,23 @@ def test_what_differs_is_named_and_long_lists_are_counted(tmp_path: Path) -> Non
     assert max(map(len, printed.splitlines())) < 200
 
 
+@pytest.mark.parametrize(
+    ("difference", "low", "high", "margin", "shown"),
+    [
+        (0.0123, 0.0101, 0.0149, 0.04, "+0.0123 +0.0101 to +0.0149"),
+        (0.0032, -0.1426, 0.1355, 0.3, "0.00 −0.14 to +0.14"),
+        (0.0, 0.0, 0.0, 0.07, "0.000 0.000 to 0.000"),
+        (1234.5, 1100.2, 1390.4, 13.0, "+1,234 +1,100 to +1,390"),
+        (-0.5, None, None, 0.07, "−0.500 –"),
+    ],
+)
+def test_figures_have_the_decimals_of_their_interval(
+    difference: float, low: float | None, high: float | None, margin: float, shown: str
+) -> None:
+    found = replace(ONE, difference=difference, low=low, high=high, margin=margin)
+    assert f"{signed(found, found.difference)} {interval(found)}" == shown
+
+
 def test_long_values_are_cut_to_where_they_differ() -> None:
     a, b = (f"LocalPca(name='local_pca', {'index=None, ' * 20}neighbours={n}, {'loss=None, ' * 20})" for n in (300, 30))
     printed = text(told([], circumstances=(("constants.local_pca", a, b), ("dirty", "no", "yes"))))
