@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow lint compiled clean
+.PHONY: demo test test-slow gate lint compiled clean
 
 demo: compiled
 	$(BIN)/harness demo
@@ -13,6 +13,12 @@ test: compiled
 
 test-slow: compiled
 	$(BIN)/python -m pytest -m slow --hypothesis-profile=default
+
+# Whether the project's own methods are as good as they were: see CONTRIBUTING.md.
+gate: compiled
+	rm -rf build/gate
+	$(BIN)/harness run gate --jobs 2 --no-report --out build/gate
+	$(BIN)/harness compare gate build/gate --html build/gate/comparison.html
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
