@@ -58,11 +58,13 @@ def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
     turns = clip.world_from_root
     meant = _Meant.on(target, own, kept_rad, clip)
     angles_rad = refit.pointing_alike(own, humanoid24.pack(clip.root_m, turns, kept_rad), target)
-    moved = skeleton.forward(target, meant.root_m, turns, angles_rad)
+    turned = skeleton.turned(target, turns, angles_rad)
+    moved = skeleton.placed(target, meant.root_m, turned)
     root_m = meant.root_m + _best_offset_m(meant.joints_m - moved.end_m, turns)
-    moved = skeleton.forward(target, root_m, turns, angles_rad)
+    moved = skeleton.placed(target, root_m, turned)
     root_m[:, 2] += ground.settled(meant.soles_m - ground.sole_heights_m(target, moved), meant.standing, clip.rate_hz)
-    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(root_m, angles_rad)
+    moved = skeleton.placed(target, root_m, turned)
+    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
 
 
 def with_angles_kept(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
@@ -77,7 +79,8 @@ def with_angles_kept(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport
     moved = skeleton.forward(target, meant.root_m, turns, angles_rad)
     soles_m = (ground.sole_heights_m(target, moved) - meant.soles_m)[meant.standing]
     root_m = meant.root_m - np.array([0.0, 0.0, np.median(soles_m) if soles_m.size else 0.0])
-    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(root_m, angles_rad)
+    moved = skeleton.placed(target, root_m, moved.world_from_bone)
+    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,10 +115,9 @@ class _Meant:
         low_m = scale * (soles_m - floor_m)
         return cls(clip, own, kept_rad, target, seen, standing, floor_m, scale, root_m, joints_m, low_m)
 
-    def report(self, root_m: Floats, angles_rad: Floats) -> RetargetReport:
-        """How far a motion of the common body (T, 3), (T, 48) is from it."""
+    def report(self, moved: Pose) -> RetargetReport:
+        """How far a motion of the common body is from it."""
         clip, target, scale = self.clip, self.target, self.scale
-        moved = skeleton.forward(target, root_m, clip.world_from_root, angles_rad)
         plain = skeleton.forward(target, scale * clip.root_m, clip.world_from_root, self.kept_rad)
         deviation_mm = 1e3 * np.linalg.norm(moved.end_m - self.joints_m, axis=2)
         feet_mm, plain_feet_mm = (

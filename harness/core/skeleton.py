@@ -95,17 +95,27 @@ class Pose:
 
 def forward(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, angles_rad: Floats) -> Pose:
     """Forward kinematics of T frames: root position (T, 3), root quaternion (T, 4), hinge angles (T, D)."""
-    frames = len(angles_rad)
+    return placed(skeleton, root_m, turned(skeleton, world_from_root, angles_rad))
+
+
+def turned(skeleton: Skeleton, world_from_root: Floats, angles_rad: Floats) -> Floats:
+    """(T, B, 3, 3) `world_from_bone`: the greater part of the work, and the same wherever the root is."""
     root = rotations.to_matrix(world_from_root)
-    start = np.empty((frames, skeleton.bone_count, 3))
-    end = np.empty_like(start)
-    turned = np.empty((frames, skeleton.bone_count, 3, 3))
+    out = np.empty((len(angles_rad), skeleton.bone_count, 3, 3))
     for b, parent in enumerate(skeleton.parents):
-        above, at = (root, root_m) if parent < 0 else (turned[:, parent], end[:, parent])
-        turned[:, b] = above @ bone_rotation(skeleton, b, angles_rad)
-        start[:, b] = at
-        end[:, b] = at + turned[:, b] @ skeleton.bone_m[b]
-    return Pose(start, end, turned)
+        above = root if parent < 0 else out[:, parent]
+        out[:, b] = above @ bone_rotation(skeleton, b, angles_rad)
+    return out
+
+
+def placed(skeleton: Skeleton, root_m: Floats, world_from_bone: Floats) -> Pose:
+    """Bones turned so (T, B, 3, 3), hung on the root's path (T, 3)."""
+    start = np.empty(world_from_bone.shape[:3])
+    end = np.empty_like(start)
+    for b, parent in enumerate(skeleton.parents):
+        start[:, b] = root_m if parent < 0 else end[:, parent]
+        end[:, b] = start[:, b] + world_from_bone[:, b] @ skeleton.bone_m[b]
+    return Pose(start, end, world_from_bone)
 
 
 def bone_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
