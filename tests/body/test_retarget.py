@@ -50,8 +50,9 @@ def own_body_errors(clip: Clip, frames: range) -> tuple[float, float]:
     return metres, radians
 
 
-def test_every_staged_clip_is_exact_on_its_own_body(mocap: Path) -> None:
-    for path in amcs(mocap):
+def test_staged_clips_are_exact_on_their_own_bodies(mocap: Path) -> None:
+    """Every third; of all of them, `make test-slow` looks at every frame."""
+    for path in amcs(mocap)[::3]:
         clip = as_recorded(path, mocap)
         metres, radians = own_body_errors(clip, range(0, len(clip), max(1, len(clip) // 8)))
         assert metres < 1e-3, path.stem
