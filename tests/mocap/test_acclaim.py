@@ -200,10 +200,13 @@ def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     huge = tmp_path / "x.amc"
     with huge.open("wb") as file:
         file.truncate(files.LIMIT_BYTES + 1)  # a hole: it takes no room on the disk
-    start = time.perf_counter()
+    skeleton = standard_skeleton()
+    tracemalloc.start()
     with pytest.raises(BadFile, match="at most 256 MB"):
-        read_amc(huge, standard_skeleton(), rate_hz=120.0)
-    assert time.perf_counter() - start < 0.2
+        read_amc(huge, skeleton, rate_hz=120.0)
+    _, most = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert most < 1_000_000
     assert "no such file" in _refused_path(tmp_path / "absent.amc")
     assert "a folder" in _refused_path(tmp_path)
 
@@ -224,9 +227,9 @@ def test_memory_stays_near_what_the_motion_needs(tmp_path: Path) -> None:
 def test_five_thousand_frames_load_within_a_second(tmp_path: Path) -> None:
     file = tmp_path / "91_01.amc"
     file.write_text(amc_text(clip(5000)))
-    start = time.perf_counter()
+    start_s = time.process_time()  # that of a busy machine goes on more slowly than its clock
     read_amc(file, standard_skeleton(), rate_hz=120.0)
-    assert time.perf_counter() - start < 1.0
+    assert time.process_time() - start_s < 1.0
 
 
 def test_every_staged_motion_parses(mocap: Path) -> None:

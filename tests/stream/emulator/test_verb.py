@@ -39,7 +39,7 @@ def test_it_plays_until_it_is_told_to_end(end: signal.Signals, tmp_path: Path) -
             answer += more
         client.close()
         program.send_signal(end)
-        out, talk = program.communicate(timeout=30)
+        out, talk = program.communicate(timeout=120)
     assert "stations 1 left_hand, 2 right_hand, 3 left_ankle, 4 right_ankle\n" in said[0]
     assert said[1] == f"an IS-900 at {link}; Ctrl-C ends it\n"
     assert answer[55:] == b"21l1111" + b"0" * 28 + b"\r\n"
