@@ -1,11 +1,15 @@
 """Everything that can be named on the command line or in a scenario, with a line about each."""
 
+from pathlib import Path
+
 from harness.config import Scenario, load_scenario, shipped_placements, shipped_scenarios, variants
 from harness.mocap import performer
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
 from harness.stream.inputs import COMBINATIONS
+from harness.study.expand import expand, load_sweep, shipped_sweeps
 from harness.study.placement_study import load_study
+from harness.study.sweep import planned_cells
 
 
 def catalogue() -> dict[str, dict[str, str]]:
@@ -14,6 +18,7 @@ def catalogue() -> dict[str, dict[str, str]]:
         "methods": {name: _method(name) for name in registry.methods()},
         "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
         "placement studies": {path.stem: load_study(path).title for path in shipped_placements()},
+        "sweeps": {path.stem: _sweep(path) for path in shipped_sweeps()},
         f"motion of the {performer.SOURCE}": {b: _range(performer.take_names(b)) for b in performer.BEHAVIOURS},
         "inputs": dict(COMBINATIONS),
         "noise": {
@@ -40,6 +45,12 @@ def _line(name: str) -> str:
         f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
         f"{len(scenario.wearing)} stations, {_errors(scenario)}; {len(scenario.methods)} methods"
     )
+
+
+def _sweep(path: Path) -> str:
+    scenarios = expand(*load_sweep(path))
+    cells = sum(len(planned_cells(scenario)) for scenario in scenarios)
+    return f"{', '.join(dict.fromkeys(s.name for s in scenarios))}, {_errors(scenarios[0])}; {cells} cells"
 
 
 def _errors(scenario: Scenario) -> str:
