@@ -192,7 +192,7 @@ def test_ctrl_c_leaves_nothing_behind(model: Rehearsal, tmp_path: Path) -> None:
             while "pose 1 of 8" not in program.stderr.readline():
                 assert program.poll() is None
             program.send_signal(signal.SIGINT)
-            said, talk = program.communicate(timeout=60.0)
+            said, talk = program.communicate(timeout=120.0)
         assert not device.emulator.device.streaming
     assert program.returncode == 130
     assert said.splitlines()[-1] == "interrupted"

@@ -167,6 +167,6 @@ def test_a_local_cluster_ends_with_the_program(end: signal.Signals, tmp_path: Pa
             os.killpg(running.pid, end)  # as a terminal does
         else:
             running.kill()
-        _, complained = running.communicate(timeout=20)  # returns when no process holds our pipes any more
+        _, complained = running.communicate(timeout=120)  # returns when no process holds our pipes any more
     assert running.returncode == -end
     assert complained.count("Traceback") == (1 if end is signal.SIGINT else 0)  # the program's own
