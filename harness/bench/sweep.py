@@ -167,18 +167,18 @@ def _make_up(real: Path, out: Path, count: int) -> None:
     with CellIndex(real, read_only=True) as index:
         rows, facts = list(index.rows()), index.facts()
     rows = [row for row in rows if row["method"] != "ik"]
-    files = list((real / "cells" / rows[0]["key"]).iterdir())
+    files = [list((real / "cells" / row["key"]).iterdir()) for row in rows]
     made = [(f"{n:032x}", _changed(rows[n % len(rows)], *divmod(n // len(rows), 20))) for n in range(count)]
     with CellIndex(out) as index:
         index.note(**facts)
         index.expect([key for key, _ in made])
         index.add({**row, "key": key} for key, row in made)
         index.ended((key, key, "") for key, _ in made)
-    for key, _ in made:
+    for n, (key, _) in enumerate(made):
         folder = out / "cells" / key
         folder.mkdir()
-        for file in files:
-            os.link(file, folder / file.name)
+        for file in files[n % len(rows)]:
+            os.link(file, folder / file.name)  # of many, for a file has no more than some 65,000 names
 
 
 def _changed(row: Mapping[str, Any], seed: int, latency_ms: int) -> dict[str, Any]:

@@ -47,6 +47,7 @@ def kept(out: Path) -> dict[str, str]:
     for folder in (out / "cells").iterdir():
         assert not folder.name.startswith(TEMPORARY)
         content = json.loads((folder / "cell.json").read_text())
+        del content["reproduce"]  # names the folder
         content["metrics"] = {k: v for k, v in content["metrics"].items() if not k.startswith(TIMED)}
         state = blake2b(json.dumps(content).encode())
         with np.load(folder / "frames.npz") as frames:
