@@ -24,7 +24,7 @@ _LOOKS: Mapping[Verdict, dict[str, Any]] = {
     "cannot tell": {"color": FAINT, "marker": "o", "markerfacecolor": PAPER},
 }
 """What is worse or better has a triangle that points to where it went: by shape as well as by colour."""
-_WIDE = 12.0
+_WIDE = 40.0
 """So many times the median reach of a row, the longest row makes the axis symmetrically logarithmic."""
 
 
