@@ -17,11 +17,11 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.recording import RecordingWriter, record_capture
 from harness.stream.replay import RecordingStream
 
-FRAMES = 150
-AT_ONCE, SHOWN = 30, 80
+FRAMES = 80
+AT_ONCE, SHOWN = 15, 60
 """The motion begins with `MZ`; by so many samples later a client that means to stream has sent its `C`."""
-RATE_HZ, ATTEMPTS, LATEST_MS = 20.0, 5, 50.0
-"""A period is 50 ms, and a frame waits for one and a half."""
+RATE_HZ, ATTEMPTS, LATEST_MS = 10.0, 5, 100.0
+"""A period is 100 ms, and a frame waits for one and a half."""
 SOURCES = ("recorded simulation", "pty", "recorded pty", "tcp", "recorded tcp")
 
 Sources = dict[str, list[TrackerFrame]]
