@@ -140,12 +140,17 @@ def _chart(
 
     most = f" Names: the {_MOST_NAMED} of {len(order)} places worth most." if len(order) > _MOST_NAMED else ""
     worn = " Dark balls: worn already." if len(values) < len(places) else ""
+    named = {places[n].name: value for n, value in values.items()}
+    alike = any(
+        named.get(name.replace("left_", "right_", 1)) == value for name, value in named.items() if "left_" in name
+    )
+    pairs = " Both of a pair that is worn together have the pair's value." if alike else ""
     said = ", ".join(f"{plain_name(places[n].name)} {signed(values[n])}" for n in order)
     return drawn(
         f"body_map_{number}",
         f"{shown.what[0].upper()}{shown.what[1:]}",
         f"Balls: places that were tried, with what they are worth [{unit}]. Skin has the colour of the places on its "
-        f"own bone, nearer ones more; grey bones had none.{worn}{most} From ahead the performer's left is right.",
+        f"own bone, nearer ones more; grey bones had none.{worn}{pairs}{most} Seen from ahead, left is right.",
         f"The body coloured by {shown.what}: {said} {unit}.",
         draw,
         _HEIGHT_IN,

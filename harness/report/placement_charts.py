@@ -10,7 +10,7 @@ import numpy as np
 
 from harness.core.seeds import generator
 from harness.report.figures import drawn
-from harness.report.placement_words import error, figure, named, plain_name, ranks, saved, signed, way
+from harness.report.placement_words import TIES, error, figure, named, plain_name, ranks, saved, signed, way
 from harness.report.run import file_name
 from harness.report.style import COLOURS, FAINT, INK, PAPER, Chart, bare
 from harness.score.placement import Agreement, PlacementFindings, Ranking, Search, Tried, Worth
@@ -76,7 +76,7 @@ def pareto(findings: PlacementFindings) -> Chart:
         "pareto",
         "Error against the number of trackers",
         "Grey: every set tried. Blue: the best of its size with the 95 % interval of its mean; filled where no smaller "
-        f"set errs less. Ringed: sets that nothing shows to be worse than it.{rate}",
+        f"set errs less. Ringed: ties with it.{rate}",
         f"Error against the number of trackers; the best set of each size is {said}.",
         draw,
         4.2,
@@ -127,9 +127,9 @@ def ranking(findings: PlacementFindings, found: Ranking, number: int) -> Chart:
     first, ties = found.rows[0], sum(row.tied for row in found.rows) - 1
     return drawn(
         f"ranking_{number}_{file_name(found.mode)}",
-        f"{found.mode}: {found.title}",
-        "Mean paired difference to the first and its 95 % interval. Blue: nothing shows that it is worse than the "
-        f"first. On the right the ranks that the intervals leave it.{more}",
+        f"{found.mode}: {plain_name(found.title)}",
+        f"Mean paired difference to the first and its 95 % interval. Blue: a tie. {TIES} On the right the ranks that "
+        f"are left to each.{more}",
         f"{found.title}: {named(first.stations)} first, {ties} tied with it.",
         draw,
         _FRAME_IN + _ROW_IN * len(rows),
@@ -187,7 +187,7 @@ def path(findings: PlacementFindings, found: Search) -> Chart:
     ended += f" {held}." if (held := saved(found, findings.unit)) else ""
     return drawn(
         f"path_{file_name(found.mode)}_{file_name(found.title)}",
-        f"{found.mode}: {found.title}",
+        f"{found.mode}: {plain_name(found.title)}",
         "From above, a step a row: what was changed, and in brackets what nothing shows to be worse. Filled: the step "
         f"helps, by its paired 95 % interval. Grey: the interval of the mean.{ended}",
         f"{found.mode}, {found.title}: {said} {findings.unit}.",
@@ -265,8 +265,8 @@ def charts(findings: PlacementFindings) -> dict[str, list[Chart]]:
     shown = [rows for rows in modes.values() if any(row.difference is not None for row in rows)]
     return {
         "pareto": [pareto(findings)] if measured else [],
-        "rankings": [ranking(findings, r, n) for n, r in enumerate(findings.rankings, start=1) if r.rows],
+        "rankings": [ranking(findings, r, n) for n, r in enumerate(findings.rankings, start=1) if len(r.rows) > 1],
         "worth": [worth(findings, rows, n) for n, rows in enumerate(shown, start=1)],
-        "paths": [path(findings, search) for search in findings.searches if search.steps],
+        "paths": [path(findings, search) for search in findings.searches if len(search.steps) > 1],
         "stability": [stability(findings)] if len(findings.conditions) > 1 else [],
     }

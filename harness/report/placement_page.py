@@ -10,6 +10,7 @@ from harness.report.markup import Markup, folded, joined, table, tag
 from harness.report.paper_claims import claims_list
 from harness.report.paper_table import prose
 from harness.report.placement_words import (
+    TIES,
     difference,
     figure,
     given,
@@ -103,7 +104,7 @@ def _best(findings: PlacementFindings) -> Markup | None:
         "The best set of each size and its mean error with the 95 % interval over clips"
         + ("; held out: on clips on which nothing was chosen" if judged else "")
         + "; of how many sets it is the best, and in how many resamples of the clips it stays so; sets of as many that "
-        "nothing shows to be worse."
+        f"are as good: ties. {TIES}"
     )
     head = ["trackers", _words("best set"), "error", *(["held out"] if judged else []), "rate", "best of"]
     return table(caption, [*head, _words("as good")], rows, label="best sets")
@@ -130,7 +131,7 @@ def _rankings(content: PlacementContent) -> Markup:
     """Each as a chart, with its numbers folded; or the numbers alone."""
     findings = content.findings
     charts = list(content.charts.get("rankings", ()))
-    shown = [ranking for ranking in findings.rankings if ranking.rows]
+    shown = [ranking for ranking in findings.rankings if len(ranking.rows) > 1]
     parts = []
     for n, ranking in enumerate(shown):
         numbers = _ranking(findings, ranking)
@@ -149,8 +150,7 @@ def _ranking(findings: PlacementFindings, ranking: Ranking) -> Markup:
         step = "" if row.rank == 1 or row.step is None else difference(row.step, row.step_low, row.step_high)
         rank = ranks(row.rank_low, row.rank_high)
         rows.append([row.rank, name, rank, tie, _error(findings, tried), behind, step])
-    base = f" ({named(ranking.base)})" if ranking.base else ""
-    caption = joined(tag("b", f"{ranking.mode}: {ranking.title}"), f". {MODES[ranking.mode]}{base}.")
+    caption = joined(tag("b", f"{ranking.mode}: {plain_name(ranking.title)}"), f" ({MODES[ranking.mode]}).")
     head = [
         "rank",
         _words("trackers"),
@@ -190,9 +190,10 @@ def _steps(findings: PlacementFindings) -> Any:
         head = ["step", _words("trackers"), "error", f"gain [{findings.unit}]", _words("as good a step")]
         ended = f" Ended: {search.ended}." if search.ended else ""
         ended += f" {held}." if (held := saved(search, findings.unit)) else ""
-        caption = joined(tag("b", f"{search.mode}: {search.title}"), f". {MODES[search.mode]}.{ended}")
+        title = f"{search.mode}: {plain_name(search.title)}"
+        caption = joined(tag("b", title), f" ({MODES[search.mode]}).{ended}")
         return folded(
-            f"Numbers of {search.mode}, {search.title}",
+            f"Numbers of {title}",
             table(caption, head, rows, label=f"{search.mode} {search.title}"),
         )
 

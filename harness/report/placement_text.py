@@ -4,6 +4,7 @@ import textwrap
 
 from harness.report.paper_text import WIDTH, claims_text
 from harness.report.placement_words import (
+    TIES,
     difference,
     error,
     figure,
@@ -29,7 +30,7 @@ def text(findings: PlacementFindings) -> str:
     parts = [[textwrap.fill(sentence(findings), WIDTH), *_about(findings)], _best(findings)]
     if findings.claims:
         parts.append(["what papers say", *claims_text(findings.claims)])
-    parts += [_ranking(findings, ranking) for ranking in findings.rankings]
+    parts += [_ranking(findings, ranking) for ranking in findings.rankings if len(ranking.rows) > 1]
     parts += [_search(findings, search) for search in findings.searches]
     parts += [_worth(findings), _stability(findings), _rest(findings)]
     return "\n\n".join("\n".join(part) for part in parts if part)
@@ -42,6 +43,7 @@ def _about(findings: PlacementFindings) -> list[str]:
         textwrap.fill(f"{what}, {findings.motion}, noise {findings.noise}, seed {findings.seed}{link}", WIDTH),
         f"{len(given(findings))} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
         f"{len(findings.failures)} failed; mean over clips with its 95 % interval",
+        textwrap.fill(TIES, WIDTH),
     ]
 
 
@@ -63,8 +65,7 @@ def _best(findings: PlacementFindings) -> list[str]:
 
 
 def _ranking(findings: PlacementFindings, ranking: Ranking) -> list[str]:
-    base = f" {named(ranking.base)}" if ranking.base else ""
-    title = f"{ranking.mode}: {ranking.title} ({MODES[ranking.mode]}{base and ':' + base})"
+    title = f"{ranking.mode}: {plain_name(ranking.title)} ({MODES[ranking.mode]})"
     head = ["rank", "stations", "", findings.unit, "behind the first"]
     rows = []
     for row in ranking.rows[:_MOST_ROWS]:
@@ -88,7 +89,11 @@ def _search(findings: PlacementFindings, search: Search) -> list[str]:
         rows.append([plain_name(step.changed) or "start", named(step.stations), also, mean, gain])
     ended = [f"ended: {search.ended}"] if search.ended else []
     ended += [held] if (held := saved(search, findings.unit)) else []
-    return [f"{search.mode}: {search.title}", *aligned([head, *rows], text_columns=3), *ended]
+    return [
+        f"{search.mode}: {plain_name(search.title)} ({MODES[search.mode]})",
+        *aligned([head, *rows], text_columns=3),
+        *ended,
+    ]
 
 
 def _worth(findings: PlacementFindings) -> list[str]:

@@ -10,6 +10,11 @@ from harness.score.placement import Best, Place, PlacementFindings, Search, Stat
 _PAIRED = ("left_", "right_")
 _IRREGULAR = {"foot": "feet", "calf": "calves", "humerus": "humeri", "femur": "femora", "tibia": "tibiae"}
 _MOST_DECIMALS = 4
+TIES = (
+    "A tie is not surely worse than the first by sign flips over clips, counting all comparisons (Holm 1979); an "
+    "interval is of one pair alone, so that it may leave zero out and still be a tie."
+)
+"""What tables and pictures mean by a tie."""
 _WORTH = {"ablate": "left out of", "add": "added to", "exhaustive": "with it against without it, over all sets"}
 
 
