@@ -93,6 +93,13 @@ def found(people: Population, clips: int, studies: int, seed: int, change: float
     return np.array(seen)
 
 
+def told_same(people: Population, clips: int, studies: int, seed: int) -> float:
+    """Share of the lines of studies without a change that are called the same; of the others nothing can be told."""
+    rngs = (generator(seed, "gate", "exchanged", clips, n) for n in range(studies))
+    verdicts = [study_of(exchanged(people, clips, rng)).verdicts for rng in rngs]
+    return float(np.mean(np.array(verdicts) == "same"))
+
+
 def covered(people: Population, clips: int, studies: int, seed: int) -> float:
     """Share of the 95 % intervals that hold the mean of all stored differences, from which clips are drawn."""
     difference = people.errors[..., 1] - people.errors[..., 0]
@@ -129,6 +136,9 @@ def bench_gate(seed: int = 1) -> list[Row]:
         _found("3 % worse found, 12 clips", settings, 12, seed),
         _found("3 % worse found, 24 clips, other noise in B", draws, 24, seed),
     ]
+    for clips in (24, 12):
+        share, beside = 100.0 * told_same(settings, clips, COVERED, seed), f"{COVERED} studies"
+        rows.append(Row(f"lines of equally good sides told the same, {clips} clips", share, "%", beside, ""))
     for clips in (24, 12, 8):
         share = 100.0 * covered(settings, clips, COVERED, seed)
         beside = f"nominally 95; {COVERED} studies of {len(METRICS) * len(settings.methods)} lines"

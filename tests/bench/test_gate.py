@@ -62,6 +62,10 @@ def test_worse_is_what_a_comparison_calls_worse(settings: Population) -> None:
     assert seen >= 4
 
 
+def test_most_lines_of_equally_good_sides_are_told_the_same(settings: Population) -> None:
+    assert 0.8 <= gate.told_same(settings, 24, 3, 1) <= 1.0
+
+
 @pytest.mark.parametrize(("count", "of", "most"), [(0, 1000, 0.00299), (25, 1000, 0.0349), (50, 50, 1.0)])
 def test_rates_are_bounded_as_printed_tables_have_it(count: int, of: int, most: float) -> None:
     assert gate.at_most(count, of) == pytest.approx(most, rel=0.01)
