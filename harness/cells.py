@@ -203,10 +203,10 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
 def reconstruct(
     reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
 ) -> tuple[Floats, Ints, Floats, tuple[Floats, Floats]]:
-    """Estimates (F, 55), status (F,), wall time of each step [ms] (F,), CPU time of each and of the reference [ms] (F,).
+    """Estimates (F, 55), status (F,), wall time of each step (F,), CPU time of each and of the reference (F,) [ms].
 
-    Reference work follows every so many steps. The step after it finds the method's data gone from the caches and is not
-    timed, NaN: times are of steps that follow a step. The truth stays on this side.
+    Reference work follows every so many steps. The step after it finds the method's data gone from the caches and is
+    not timed, NaN: times are of steps that follow a step. The truth stays on this side.
     """
     session, work = reconstructor.begin(calibration), Reference()
     qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
