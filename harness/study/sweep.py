@@ -29,7 +29,7 @@ T = TypeVar("T")
 MOST = 200
 """Cells in one task: what is lost of the index when the coordinator is killed, and how often a bar moves."""
 _TASKS = 4
-"""At least, for each worker, if there are cells enough: the last one to end does not keep the others waiting long."""
+"""For each worker in the end, if there are cells enough: the last one to end does not keep the others waiting long."""
 
 
 @dataclass(frozen=True)
@@ -99,14 +99,15 @@ def planned_cells(scenario: Scenario) -> list[str]:
 
 
 def tasks_of(scenarios: Iterable[Scenario], folder: Path | None, command: str, workers: int) -> list[Task]:
-    """Whole clips, whose cells share motion and learning; parts of them where too few are left for every worker."""
+    """Whole clips, whose cells share motion and learning; parts of the last ones, so that all workers end together."""
     whole = [(called(s), job, len(variants(s))) for s in scenarios for job in _jobs(s, folder, command)]
-    wanted = -(-_TASKS * workers // max(len(whole), 1))
-    tasks = [
-        Task(name, replace(job, chosen=tuple(some)) if len(some) < count else job)
-        for name, job, count in whole
-        for some in _shared(range(count), max(wanted, -(-count * _width(job.scenario) // MOST)))
-    ]
+    shared = max(min(len(whole), workers), 1)
+    tasks = []
+    for place, (name, job, count) in enumerate(whole):
+        pieces = -(-_TASKS * workers // shared) if place >= len(whole) - shared else 1
+        pieces = max(pieces, -(-count * _width(job.scenario) // MOST))
+        parts = (tuple(some) if len(some) < count else () for some in _shared(range(count), pieces))
+        tasks += [Task(name, replace(job, chosen=chosen)) for chosen in parts]
     pieces = -(-workers // max(len(tasks), 1))
     return [
         replace(task, job=replace(task.job, scenario=replace(task.job.scenario, methods=tuple(some))))

@@ -77,14 +77,15 @@ def test_every_cell_is_in_the_table_in_planned_order(made_up: Path) -> None:
     assert read(made_up / "out" / "study.json")["kind"] == "sweep"
 
 
-@pytest.mark.parametrize("workers", [2, 16])
-def test_any_number_of_workers_in_any_order_gives_the_same_bytes(made_up: Path, workers: int) -> None:
+def test_any_number_of_workers_in_any_order_gives_the_same_bytes(made_up: Path) -> None:
     file = sweep_file(made_up)
-    sweep(file, made_up / "one")
-    sweep(file, made_up / "many", each=backwards, workers=workers)
-    assert untimed(made_up / "one" / "table.csv") == untimed(made_up / "many" / "table.csv")
-    for name in ("summary.json", "failures.json"):
-        assert (made_up / "one" / name).read_bytes() == (made_up / "many" / name).read_bytes()
+    sweep(file, made_up / "1")
+    for workers in (2, 16):
+        out = made_up / str(workers)
+        sweep(file, out, each=backwards, workers=workers)
+        assert untimed(made_up / "1" / "table.csv") == untimed(out / "table.csv")
+        for name in ("summary.json", "failures.json"):
+            assert (made_up / "1" / name).read_bytes() == (out / name).read_bytes()
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, 16, 1000])
