@@ -25,7 +25,8 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--help"])
     assert ended.value.code == 0
     text = capsys.readouterr().out
-    for verb in ("demo", "run", "list", "inspect", "mocap", "export", "report", "check", "bench", "doctor", "paper"):
+    verbs = "demo run list inspect mocap export report check bench doctor paper compare baseline sweep status placement"
+    for verb in verbs.split():
         assert f"    {verb} " in text
 
 

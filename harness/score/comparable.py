@@ -70,7 +70,7 @@ def coverage(found: Iterable[Group], metrics: Sequence[str]) -> list[str]:
 def alone(matched: Matched) -> list[str]:
     """Cells without a partner, a line for each side."""
     sides = (("A", matched.only_a), ("B", matched.only_b))
-    return [f"{len(cells)} cells are only in {side}: {some([*map(named, cells)])}" for side, cells in sides if cells]
+    return [f"{_cells(len(cells))} only in {side}: {some([*map(named, cells)])}" for side, cells in sides if cells]
 
 
 def failed(side: str, judged: Judged, method: str | None) -> tuple[str, ...]:
@@ -79,8 +79,12 @@ def failed(side: str, judged: Judged, method: str | None) -> tuple[str, ...]:
     unfinished = judged.planned - len(judged.cells) - len(judged.failed)
     return (
         *(f"{side}: {name}" for name in names),
-        *([f"{side}: {unfinished} cells that are not finished"] if unfinished > 0 else []),
+        *([f"{side}: {_cells(unfinished)} not finished"] if unfinished > 0 else []),
     )
+
+
+def _cells(count: int) -> str:
+    return "1 cell is" if count == 1 else f"{count} cells are"
 
 
 def some(texts: Sequence[str]) -> str:

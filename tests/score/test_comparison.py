@@ -36,7 +36,7 @@ def found(b: Judged, a: Judged | None = None, **options: Any) -> Comparison:
         (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, "nothing was measured on both sides"),
         (side(defined_by={"calibration": "poses"}), Outcome.NOT_COMPARABLE, "inputs differ: calibration: none against"),
         (side(failed=["ik on walk_99"]), Outcome.INCOMPLETE, "planned cells are missing: B: ik on walk_99"),
-        (replace(side(), planned=11), Outcome.INCOMPLETE, "B: 3 cells that are not finished"),
+        (replace(side(), planned=11), Outcome.INCOMPLETE, "B: 3 cells are not finished"),
         (Judged("B", manifest(), (), 1, ("ik on walk_00",)), Outcome.INCOMPLETE, "ik on walk_00"),
     ],
 )
@@ -182,7 +182,7 @@ def test_cells_without_a_partner_are_named_and_may_be_allowed() -> None:
     assert (comparison.only_a, comparison.only_b) == ((), ("ik on walk_08 (demo, seed 1)",))
     assert comparison.outcome == Outcome.NOT_COMPARABLE
     assert found(more, allow=["cells"]).outcome == found(more, allow=[EVERYTHING]).outcome == Outcome.PASS
-    assert found(side(), more, allow=["cells"]).allowed == ("1 cells are only in A: ik on walk_08 (demo, seed 1)",)
+    assert found(side(), more, allow=["cells"]).allowed == ("1 cell is only in A: ik on walk_08 (demo, seed 1)",)
 
 
 def test_circumstances_that_differ_are_listed() -> None:
