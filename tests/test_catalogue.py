@@ -31,4 +31,5 @@ def test_a_method_of_a_package_is_listed_with_its_own_source(monkeypatch: pytest
 
 def test_a_scenario_says_what_it_varies() -> None:
     assert "varies noise" in catalogue()["scenarios"]["boxing"]
+    assert "walk" in catalogue()["placement studies"]["placement_walking"]
     assert "noise default" in catalogue()["scenarios"]["demo"]

@@ -28,22 +28,34 @@ class OneStation:
         return Fitted(tpose(body.skeleton))
 
 
+@dataclass(frozen=True)
+class NoStation(OneStation):
+    """The T-pose, whatever is worn."""
+
+    name: str = "no_station"
+    summary: str = "reads nothing"
+
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Fitted":
+        return Fitted(tpose(body.skeleton), "")
+
+
 @dataclass(frozen=True, eq=False)
 class Fitted:
     qpos: Floats
+    needed: str = NEEDED
 
     def begin(self, calibration: Calibration) -> "Session":
-        return Session(self.qpos, calibration)
+        return Session(self.qpos, calibration, self.needed)
 
 
 class Session:
-    def __init__(self, qpos: Floats, calibration: Calibration) -> None:
-        self.qpos, self.calibration = np.array(qpos), calibration
+    def __init__(self, qpos: Floats, calibration: Calibration, needed: str) -> None:
+        self.qpos, self.calibration, self.needed = np.array(qpos), calibration, needed
 
     def step(self, frame: TrackerFrame) -> Estimate:
         known = self.calibration
-        if NEEDED in known.stations:
-            row = known.stations.index(NEEDED)
+        if self.needed in known.stations:
+            row = known.stations.index(self.needed)
             turn = rotations.multiply(known.world_from_tracker, frame.tracker_from_station[row])
             self.qpos[3:7] = rotations.multiply(turn, rotations.inverse(known.bone_from_station[row]))
         return Estimate(self.qpos, Status.SOLVED)

@@ -245,9 +245,10 @@ def test_more_stations_run_at_the_rate_that_the_line_carries() -> None:
 
 @pytest.fixture(scope="module")
 def judged_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, PlacementFindings]:
-    """A study on a slow line whose choices are judged on another clip."""
+    """A study of two methods on a slow line, whose choices are judged on another clip."""
     folder = tmp_path_factory.mktemp("slow")
-    study = STUDY.replace("metric =", 'link = true\nheld_out = ["walking_p1_01@0.90-0.95"]\nmetric =')
+    more = 'link = true\ncondition_size = 1\nheld_out = ["walking_p1_01@0.90-0.95"]\nmetric ='
+    study = STUDY.replace("metric =", more).replace('OneStation"]', 'OneStation", "tests.study.one_station:NoStation"]')
     path = written(folder, "[exhaustive]\nmost = 2\n[changes.tracker]\nbaud = 9600", study=study)
     findings, outcome = placement(path, folder / "out")
     assert outcome is Outcome.PASS
@@ -269,10 +270,24 @@ def test_what_was_chosen_is_judged_on_clips_that_chose_nothing(
     folder, findings = judged_elsewhere
     one, two = findings.best
     assert (one.held_out_clips, one.of, two.of) == (1, 3, 3)
-    assert one.held_out == pytest.approx(0.0, abs=1e-3)
+    assert one.held_out is not None
     chosen_on = set(load_scenario(folder / "walk.toml").motion.test)
     assert all(set(tried.errors) == chosen_on for tried in findings.tried)
-    assert len(list((folder / "out" / "cells").iterdir())) == 2 * 6 + 2
+    assert len(list((folder / "out" / "cells").iterdir())) == 2 * (2 * 6 + 2)
+
+
+def test_methods_count_alike_and_rank_for_themselves(judged_elsewhere: tuple[Path, PlacementFindings]) -> None:
+    _, findings = judged_elsewhere
+    own, reads_it, reads_nothing = findings.conditions
+    assert [each.kind for each in findings.conditions] == ["own", "method", "method"]
+    assert own.best == reads_it.best == {"1": ("pelvis",)}
+    for mean, one, other in zip(own.means, reads_it.means, reads_nothing.means, strict=True):
+        assert mean is not None
+        assert one is not None
+        assert other is not None
+        assert mean == pytest.approx((one + other) / 2.0)
+    assert reads_it.means[2] == pytest.approx(0.0, abs=1e-3)
+    assert reads_nothing.means[0] == pytest.approx(reads_nothing.means[2])
 
 
 @pytest.mark.parametrize("path", shipped_placements(), ids=lambda path: path.stem)
