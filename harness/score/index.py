@@ -103,9 +103,15 @@ class CellIndex:
                 "UPDATE plan SET key = NULL, failure = NULL WHERE cell = ?", ((cell,) for cell in cells)
             )
 
-    def forget_plan(self) -> None:
+    def plan(self, cells: Sequence[str]) -> None:
+        """These cells in this order are the plan, and no others; what is known of them is kept."""
+        known = {cell: rest for cell, *rest in self._db.execute("SELECT cell, key, failure FROM plan")}
         with self._db:
             self._db.execute("DELETE FROM plan")
+            self._db.executemany(
+                "INSERT INTO plan (cell, key, failure) VALUES (?, ?, ?)",
+                ((cell, *known.get(cell, (None, None))) for cell in cells),
+            )
 
     def ended(self, what: Iterable[tuple[str, str, str]]) -> None:
         """(cell, key, failure) of cells of the plan; one of the two is empty."""

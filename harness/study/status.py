@@ -60,9 +60,9 @@ def _of_index(out: Path) -> Status:
     kind = str(read_json(out / "study.json", "what a study is").get("kind", "placement"))
     finished = min(counts.finished + unwritten, counts.planned - counts.failed)
     found = Status(kind, str(facts.get("name", out.name)), counts.planned, finished, failures, running)
-    made = facts.get("made", 0) + unwritten
+    made = facts.get("made", 0) + (unwritten if running else 0)
     took_s = (now if running else facts.get("seen_s", now)) - facts.get("started_s", now)
-    return replace(found, left_s=took_s / made * found.left if made and found.left else None)
+    return replace(found, left_s=took_s / made * found.left if made and found.left and took_s > 0.0 else None)
 
 
 def _of_run(out: Path) -> Status:

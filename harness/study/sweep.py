@@ -19,8 +19,10 @@ from harness.cells import Ended, Job, Planned, Progress, forget_motion, run_job
 from harness.config import Scenario, variants
 from harness.core.protocol import Part
 from harness.errors import BadInput, HarnessError
-from harness.score.files import TEMPORARY
+from harness.reconstruct import registry
+from harness.score.files import TEMPORARY, content_key
 from harness.score.index import CellIndex
+from harness.score.manifest import source_hash
 from harness.study.executors import Each
 from harness.study.stopping import stoppable
 
@@ -125,8 +127,9 @@ def work(
         raise BadInput(f"Two cells are called {twice!r}.", "Scenarios of other content need other names.")
     (out / "cells").mkdir(exist_ok=True)
     index.expect(names)
-    index.reset(names)
-    index.note(started_s=time.time(), made=0)
+    sources, facts, failed = _sources(tasks), index.facts(), index.failures()
+    index.reset(names if facts.get("sources") != sources else [name for name in names if name in failed])
+    index.note(sources=sources, started_s=time.time(), made=0)
     stop, ended = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, Ended]()
     with stoppable(stop):
         broken = []
@@ -141,6 +144,12 @@ def work(
                 cells = [Ended(str(cell), failure="a worker process died") for cell in task.job.cells()]
             _keep(index, task, cells, ended, progress, len(names))
     return ended
+
+
+def _sources(tasks: Sequence[Task]) -> str:
+    """Of all code at work: while it is as it was, what was finished counts as finished before it is looked at again."""
+    names = sorted({name for task in tasks for name in task.job.scenario.methods})
+    return content_key([source_hash(), [registry.source_hash(registry.resolve(name)) for name in names]])
 
 
 def _keep(

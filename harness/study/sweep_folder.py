@@ -57,9 +57,7 @@ def run_sweep(
     with at_work(out), CellIndex(out) as index:
         write_json(out / "study.json", {"kind": "sweep", **asdict(sweep), "command": command})
         index.gather()
-        if not only:
-            index.forget_plan()
-        index.expect(names)
+        index.plan(names)
         index.note(name=sweep.name, command=command)
         try:
             ended = work(index, [only] if only else names, tasks, out, each, progress)

@@ -64,8 +64,9 @@ def test_what_failed_is_counted_and_kept_until_it_is_made_again(tmp_path: Path) 
         index.expect(["c", "d"])
         index.reset(["c"])
         assert index.counts() == Counts(4, 1, 1)
-        index.forget_plan()
-        assert index.counts() == Counts(0, 0, 0)
+        index.plan(["e", "b", "a"])
+        assert index.counts() == Counts(3, 1, 1)
+        assert list(index.failures()) == ["b"]
 
 
 def test_cells_that_the_index_lacks_are_gathered_from_their_folders(run: Path) -> None:

@@ -60,7 +60,7 @@ def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path
     assert (found.kind, found.name, found.planned, found.finished) == ("sweep", "tiny", 10, 4)
     assert found.failures == {"cell 9": "Traceback\nValueError: on purpose"}
     assert not found.running
-    assert found.left_s == pytest.approx(30.0 / 4 * 5)
+    assert found.left_s == pytest.approx(30.0 / 3 * 5)
     with at_work(out):
         assert status(out).running
 
