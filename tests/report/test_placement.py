@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from harness.report.placement_text import text
 from harness.report.placement_words import difference, enough, figure, named, sentence
 from harness.score.placement import Best, PlacementFindings, Stations, Tried
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
+from tests.report.reading import text_of
 
 NO_PICTURE = "the renderer was ended by SIGABRT"
 ANSWER = (
@@ -37,32 +37,6 @@ def findings() -> PlacementFindings:
 def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a machine that cannot render: quick, and the page has to say so."""
     monkeypatch.setattr(placement, "body_map", lambda *args, **options: (None, NO_PICTURE))
-
-
-class _Reader(HTMLParser):
-    """Complains of elements that are not closed in order; gathers the text."""
-
-    def __init__(self, page: Path) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.text: list[str] = []
-        self.feed(page.read_text(encoding="utf-8"))
-        assert self.open == []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in ("meta", "br", "img"):
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        if self.open[-1:] != ["style"]:
-            self.text.append(data)
-
-
-def text_of(page: Path) -> str:
-    return re.sub(r"\s+", " ", " ".join(_Reader(page).text))
 
 
 def study_of(errors: dict[Stations, list[float | None]], better: str = "lower") -> PlacementFindings:
