@@ -8,7 +8,7 @@ from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
 from harness.stream.inputs import COMBINATIONS
 from harness.study.expand import expand, load_sweep, shipped_sweeps
-from harness.study.placement_study import load_study
+from harness.study.placement.study_file import load_study
 from harness.study.sweep import planned_cells
 
 

@@ -25,7 +25,7 @@ def place_trackers(args: argparse.Namespace) -> Outcome:
     from harness.report.placement_text import text
     from harness.score.files import plain
     from harness.study.executors import processes
-    from harness.study.placement import FINDINGS, placement
+    from harness.study.placement.placement import FINDINGS, placement
 
     out = args.out or Path("results") / Path(args.study).stem
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk

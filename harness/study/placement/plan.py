@@ -13,13 +13,13 @@ from harness.core.protocol import Part
 from harness.errors import BadInput
 from harness.score.margins import margin_of
 from harness.score.placement import Place
-from harness.study import search, suffices
-from harness.study.candidates import Unit, Worn, chosen, worn
-from harness.study.placement_study import PlacementStudy, base_scenario, find_study, load_study
-from harness.study.ranking import Costs
-from harness.study.refine import refuse_few
-from harness.study.search import stations
-from harness.study.trying import Asked, rate_hz
+from harness.study.placement import search, suffices
+from harness.study.placement.candidates import Unit, Worn, chosen, worn
+from harness.study.placement.ranking import Costs
+from harness.study.placement.refine import refuse_few
+from harness.study.placement.search import stations
+from harness.study.placement.study_file import PlacementStudy, base_scenario, find_study, load_study
+from harness.study.placement.trying import Asked, rate_hz
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ import pytest
 
 from harness.score.findings import Claim
 from harness.score.placement import Stations
-from harness.study.candidates import Candidate, units_of
-from harness.study.placement_study import Published
-from harness.study.ranking import Costs
-from harness.study.search import stations
-from harness.study.suffices import judged, rival, sets_of
+from harness.study.placement.candidates import Candidate, units_of
+from harness.study.placement.ranking import Costs
+from harness.study.placement.search import stations
+from harness.study.placement.study_file import Published
+from harness.study.placement.suffices import judged, rival, sets_of
 
 UNITS = units_of(
     [

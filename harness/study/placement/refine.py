@@ -14,10 +14,10 @@ from harness.errors import BadInput
 from harness.score.paired import paired
 from harness.score.placement import Place, Search, Step
 from harness.score.significance import SIGNIFICANCE, holm, sign_flip_p
-from harness.study.candidates import Worn, mirrored, refused, station_name
-from harness.study.placement_study import Refine
-from harness.study.ranking import complete, fewest_clips, in_order, names
-from harness.study.search import Measure, stations
+from harness.study.placement.candidates import Worn, mirrored, refused, station_name
+from harness.study.placement.ranking import complete, fewest_clips, in_order, names
+from harness.study.placement.search import Measure, stations
+from harness.study.placement.study_file import Refine
 
 Mover = tuple[int, ...]
 """Which places of a set move together."""

@@ -10,10 +10,10 @@ from collections.abc import Mapping, Sequence
 
 from harness.score.findings import Claim
 from harness.score.placement import Stations
-from harness.study.candidates import Unit, Worn, chosen, worn
 from harness.study.claims import errs_less
-from harness.study.placement_study import Published
-from harness.study.ranking import Costs, complete, in_order, names
+from harness.study.placement.candidates import Unit, Worn, chosen, worn
+from harness.study.placement.ranking import Costs, complete, in_order, names
+from harness.study.placement.study_file import Published
 
 
 def sets_of(claim: Published, units: Sequence[Unit]) -> tuple[Worn, list[Worn], Worn]:

@@ -13,7 +13,7 @@ from harness.core.share import share_folder
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.score.margins import MARGINS
 from harness.score.metrics import DEFINITIONS
-from harness.study.candidates import Candidate, Grid, Unit, chosen, units_of
+from harness.study.placement.candidates import Candidate, Grid, Unit, chosen, units_of
 
 MOST_STATIONS = 12
 """Of an IS-900 (docs/is900.md)."""

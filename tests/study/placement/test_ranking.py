@@ -7,7 +7,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.score.placement import Stations
-from harness.study.ranking import (
+from harness.study.placement.ranking import (
     best_of_sizes,
     complete,
     crossed,

@@ -10,7 +10,7 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.score.paired import FEWEST_CLIPS, LEVEL
 from harness.score.placement import Agreement, Condition, Stations
-from harness.study.ranking import Costs, complete, in_order, mean, stays
+from harness.study.placement.ranking import Costs, complete, in_order, mean, stays
 
 _RESAMPLES = 2000
 

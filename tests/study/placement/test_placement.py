@@ -14,11 +14,11 @@ from harness.config import load_scenario, shipped_placements
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.score.placement import PlacementFindings, read_placement
 from harness.simulate.link import TrackerConfig
-from harness.study.placement import FINDINGS, placement
-from harness.study.placement_plan import plan
-from harness.study.placement_study import load_study
+from harness.study.placement.placement import FINDINGS, placement
+from harness.study.placement.plan import plan
+from harness.study.placement.study_file import load_study
+from harness.study.placement.trying import rate_hz
 from harness.study.study import open_study
-from harness.study.trying import rate_hz
 
 SCENARIO = """
 schema = 1
@@ -40,7 +40,7 @@ schema = 1
 kind = "placement"
 title = "Which one does it read?"
 scenario = "walk"
-methods = ["tests.study.one_station:OneStation"]
+methods = ["tests.study.placement.one_station:OneStation"]
 metric = "root_angle_deg"
 [[candidate]]
 name = "hand"
@@ -248,7 +248,9 @@ def judged_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Pl
     """A study of two methods on a slow line, whose choices are judged on another clip."""
     folder = tmp_path_factory.mktemp("slow")
     more = 'link = true\ncondition_size = 1\nheld_out = ["walking_p1_01@0.90-0.95"]\nmetric ='
-    study = STUDY.replace("metric =", more).replace('OneStation"]', 'OneStation", "tests.study.one_station:NoStation"]')
+    study = STUDY.replace("metric =", more).replace(
+        'OneStation"]', 'OneStation", "tests.study.placement.one_station:NoStation"]'
+    )
     path = written(folder, "[exhaustive]\nmost = 2\n[changes.tracker]\nbaud = 9600", study=study)
     findings, outcome = placement(path, folder / "out")
     assert outcome is Outcome.PASS

@@ -17,8 +17,8 @@ from harness.cells import Progress
 from harness.config import Scenario, variants
 from harness.errors import BadInput
 from harness.score.files import content_key, plain
-from harness.study.candidates import Worn, station_name
 from harness.study.executors import Each
+from harness.study.placement.candidates import Worn, station_name
 from harness.study.sweep import Cells, planned_cells, run_cells
 
 FASTEST_HZ = 180.0

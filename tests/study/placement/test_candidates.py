@@ -12,7 +12,7 @@ from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
 from harness.score.placement import Place
-from harness.study.candidates import (
+from harness.study.placement.candidates import (
     Candidate,
     Grid,
     Pair,

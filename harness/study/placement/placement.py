@@ -19,17 +19,17 @@ from harness.score.findings import Claim
 from harness.score.metrics import DEFINITIONS
 from harness.score.paired import FEWEST_CLIPS, interval, paired
 from harness.score.placement import Best, PlacementFindings, Search, Stations, write_placement
-from harness.study import search, suffices
-from harness.study.candidates import Worn, chosen, worn
 from harness.study.executors import Each, here
-from harness.study.placement_plan import Plan, moved, plan
-from harness.study.placement_study import Published
-from harness.study.ranking import Costs, best_of_sizes, complete, fewest_clips, tried
-from harness.study.refine import refine
-from harness.study.search import Found, stations
-from harness.study.stability import Elsewhere, agreements, conditions
+from harness.study.placement import search, suffices
+from harness.study.placement.candidates import Worn, chosen, worn
+from harness.study.placement.plan import Plan, moved, plan
+from harness.study.placement.ranking import Costs, best_of_sizes, complete, fewest_clips, tried
+from harness.study.placement.refine import refine
+from harness.study.placement.search import Found, stations
+from harness.study.placement.stability import Elsewhere, agreements, conditions
+from harness.study.placement.study_file import Published
+from harness.study.placement.trying import Trying
 from harness.study.study import open_study
-from harness.study.trying import Trying
 
 FINDINGS = "findings.json"
 

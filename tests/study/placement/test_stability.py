@@ -6,7 +6,7 @@ from scipy import stats
 
 from harness.core.arrays import Floats
 from harness.score.placement import Stations
-from harness.study.stability import Elsewhere, agreements, conditions, tau_b
+from harness.study.placement.stability import Elsewhere, agreements, conditions, tau_b
 
 CLIPS = tuple(f"clip_{n}" for n in range(8))
 SETS: tuple[Stations, ...] = tuple((name,) for name in "abcdef")

@@ -7,11 +7,20 @@ import pytest
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.score.placement import Place
-from harness.study.candidates import Candidate, Unit, Worn, mirrored, units_of, worn
-from harness.study.placement_study import Ablate, Add, Exhaustive, Greedy, Refine
-from harness.study.ranking import Costs
-from harness.study.refine import movers_of, refine
-from harness.study.search import ablate, add, best_tried, every_set, exhaustive, greedy, refuse_absurd, stations
+from harness.study.placement.candidates import Candidate, Unit, Worn, mirrored, units_of, worn
+from harness.study.placement.ranking import Costs
+from harness.study.placement.refine import movers_of, refine
+from harness.study.placement.search import (
+    ablate,
+    add,
+    best_tried,
+    every_set,
+    exhaustive,
+    greedy,
+    refuse_absurd,
+    stations,
+)
+from harness.study.placement.study_file import Ablate, Add, Exhaustive, Greedy, Refine
 
 CLIPS = tuple(f"clip_{n:02}" for n in range(12))
 UNITS = units_of(
