@@ -32,7 +32,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.json:
             print(json.dumps({"outcome": outcome.word, "error": str(error)}))
     except BrokenPipeError:  # the reader of our output went away, as `| head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _print_no_more()
         return Outcome.PASS.exit_code
     except (KeyboardInterrupt, Exception) as error:
         if not was_interrupted(error):
@@ -43,8 +43,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.json:
             print(json.dumps({"outcome": outcome.word}))
     if not args.json:
-        print(outcome.word, flush=True)
+        try:
+            print(outcome.word, flush=True)
+        except BrokenPipeError:
+            _print_no_more()
     return outcome.exit_code
+
+
+def _print_no_more() -> None:
+    """Python flushes stdout once more when it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def build_parser() -> argparse.ArgumentParser:
