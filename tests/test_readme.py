@@ -29,10 +29,10 @@ DEMO = load_scenario("demo")
 def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the very command; `demo` is a shorter one here, a file of that name."""
     short_demo(tmp_path / "demo")
-    code = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    assert len(code) == 1
-    assert len(code[0].splitlines()) < 40
-    (tmp_path / "upright.py").write_text(code[0])
+    code, gate = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len(code.splitlines()) < 40
+    assert 'harness_gate("upright:Upright"' in gate  # tests/testing/test_gate.py runs one
+    (tmp_path / "upright.py").write_text(code)
     command = next(c for c in re.findall(r"`harness (run demo --methods [^`]*)`", README))
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
