@@ -57,7 +57,7 @@ def test_worse_is_worse_whatever_else_is_missing_but_not_where_inputs_differ() -
 
 def test_times_are_gated_between_equal_processors_alone() -> None:
     metrics = {"step_relative": 2.0}
-    slower = side(metrics={"step_relative": 3.0})
+    slower = side(metrics={"step_relative": 3.5})
     for processor, outcome in (("Xeon", Outcome.REGRESSED), ("Opteron", Outcome.PASS)):
         a = replace(side(metrics=metrics), manifest=manifest(processor="Xeon"))
         b = replace(slower, manifest=manifest(processor=processor))

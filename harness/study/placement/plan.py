@@ -80,8 +80,11 @@ class Plan:
         if not self.study.link:
             return ""
         tracker = self.scenario.tracker
-        rates = ", ".join(f"{size} at {self.rate_hz(size):.4g} Hz" for size in sizes)
-        return f"a line of {tracker.baud} baud carries {rates} (at most {tracker.rate_hz:g} Hz)"
+        slowed = [size for size in sizes if self.rate_hz(size) < tracker.rate_hz]
+        if not slowed:
+            return f"a line of {tracker.baud} baud carries all that were tried at {tracker.rate_hz:g} Hz"
+        rates = ", ".join(f"{size} at {self.rate_hz(size):.4g} Hz" for size in slowed)
+        return f"a line of {tracker.baud} baud carries {rates}, fewer at {tracker.rate_hz:g} Hz"
 
     def costs(self, errors: Costs) -> dict[str, float | None]:
         """The other way round as well."""
