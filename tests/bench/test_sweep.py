@@ -32,4 +32,4 @@ def test_two_jobs_are_given_the_same_shipped_clips(tmp_path: Path) -> None:
     (tmp_path / "shared.toml").write_text(sweep.SHARED)
     (scenario,) = expand(*load_sweep(tmp_path / "shared.toml"))
     assert scenario.motion.test == sweep.CLIPS
-    assert len(variants(scenario)) == 4
+    assert len(variants(scenario)) == 16
