@@ -68,7 +68,7 @@ class CellIndex:
         holes = ", ".join("?" * len(_COLUMNS))
         columns = (_as_columns(row, took_s) for row, took_s in zip(rows, took, strict=True))
         with self._db:
-            self._db.executemany(f"INSERT OR IGNORE INTO cells VALUES ({holes})", columns)  # noqa: S608
+            self._db.executemany(f"INSERT OR IGNORE INTO cells VALUES ({holes})", columns)  # noqa: S608  # holes alone
 
     def gather(self) -> int:
         """Add the finished cells that lie in the folder and are not here; how many. Those of older versions, which
@@ -141,14 +141,14 @@ class CellIndex:
         if strange := [name for name in where if name not in (*TEXTS, "seed")]:
             raise ValueError(f"no column {strange[0]!r}")
         chosen = "".join(f" AND {name} = ?" for name in where)
-        question = f"SELECT cells.* FROM plan JOIN cells USING (key) WHERE 1{chosen} ORDER BY place"  # noqa: S608
+        question = f"SELECT cells.* FROM plan JOIN cells USING (key) WHERE 1{chosen} ORDER BY place"  # noqa: S608  # known names
         return map(_as_row, self._db.execute(question, tuple(where.values())))
 
     def rows_of(self, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
         """These cells, in this order; KeyError for one that is not here."""
         for start in range(0, len(keys), _AT_ONCE):
             some = keys[start : start + _AT_ONCE]
-            question = f"SELECT * FROM cells WHERE key IN ({', '.join('?' * len(some))})"  # noqa: S608
+            question = f"SELECT * FROM cells WHERE key IN ({', '.join('?' * len(some))})"  # noqa: S608  # holes alone
             found = {columns[0]: columns for columns in self._db.execute(question, some)}
             yield from (_as_row(found[key]) for key in some)
 
@@ -157,7 +157,7 @@ class CellIndex:
         if strange := [name for name in names if name not in _COLUMNS]:
             raise ValueError(f"no column {strange[0]!r}")
         chosen = ", ".join(f"cells.{name}" for name in names)
-        question = f"SELECT {chosen} FROM plan JOIN cells USING (key) ORDER BY place"  # noqa: S608
+        question = f"SELECT {chosen} FROM plan JOIN cells USING (key) ORDER BY place"  # noqa: S608  # known names
         return iter(self._db.execute(question))
 
     def note(self, **facts: Any) -> None:

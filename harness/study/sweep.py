@@ -178,7 +178,7 @@ def _done(
                 yield tasks[which], error
         except HarnessError:
             raise
-        except Exception:
+        except Exception:  # a task that could not even be sent or answered: its cells fail, the others go on
             failure = traceback.format_exc()
             yield tasks[which], [Ended(str(cell), failure=failure) for cell in tasks[which].job.cells()]
 
