@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 
 from harness import __version__
-from harness.commands import calibrate, compare, emulate, live, motion, paper, placement, record, runs, sweep, trust
+from harness.commands import calibrate, check, compare, emulate, live, mocap, paper, placement, record, run, sweep
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 
@@ -64,16 +64,16 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"harness {__version__}")
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for add in (
-        runs.add_demo,
-        runs.add_run,
-        trust.add_list,
-        motion.add_inspect,
-        motion.add_mocap,
-        runs.add_export,
-        runs.add_report,
-        trust.add_check,
-        trust.add_bench,
-        trust.add_doctor,
+        run.add_demo,
+        run.add_run,
+        check.add_list,
+        mocap.add_inspect,
+        mocap.add_mocap,
+        run.add_export,
+        run.add_report,
+        check.add_check,
+        check.add_bench,
+        check.add_doctor,
         calibrate.add_calibrate,
         emulate.add_emulate,
         live.add_live,

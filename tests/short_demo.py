@@ -3,13 +3,13 @@
 import re
 from pathlib import Path
 
-from harness.config import find_scenario
-from harness.mocap import performer
+from harness.experiment.scenario import find_scenario
+from harness.mocap import synthetic
 
 
 def short_demo(path: Path) -> Path:
     """Written as a scenario of its own."""
-    examples = ", ".join(f'"{behaviour}_p2_01"' for behaviour in performer.BEHAVIOURS)
+    examples = ", ".join(f'"{behaviour}_p2_01"' for behaviour in synthetic.BEHAVIOURS)
     text, found = re.subn(
         r"(?s)examples = \[.*?\]", f"examples = [{examples}]", find_scenario("demo").read_text("utf-8")
     )

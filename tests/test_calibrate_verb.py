@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body, build
-from harness.calibrate.file import CalibrationFile, read_calibration, write_calibration
+from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
 from harness.calibrate.poses import POSES
 from harness.cli import main
 from harness.core import rotations
@@ -23,14 +23,14 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.humanoid24 import BONES
 from harness.core.motion import Take
-from harness.posing import Posing
+from harness.experiment.calibration_session import Posing
+from harness.experiment.playback import Rehearsal, rehearse
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.reconstruct.ik import PREVIOUS
-from harness.rehearsal import Rehearsal, rehearse
-from harness.stream.emulator.serve import serving
+from harness.reconstruct.methods.ik import PREVIOUS
+from harness.stream.emulator.server import serving
 from harness.stream.frame import TrackerFrame
-from harness.stream.replay import RecordingStream
+from harness.stream.recording.replay import RecordingStream
 from tests.interrupts import heeding_interrupts
 
 CLIP = "boxing_p1_01"

@@ -7,26 +7,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import experiment
 from harness.body import kinematics
 from harness.body.humanoid import Body
-from harness.calibrate.bone_space import BoneSpace, bone_space
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrated import Calibrated, TrackerSession, by_poses, by_tpose, errors_of
-from harness.cells import reconstruct
-from harness.config import Calibrating, Motion, Scenario, load_scenario
+from harness.calibrate.skeleton_prior import BoneSpace, bone_space
 from harness.core import rotations
 from harness.core.motion import Take
-from harness.core.protocol import Part
+from harness.core.split import Part
 from harness.errors import BadInput, Outcome
-from harness.mocap import performer
+from harness.experiment import engine
+from harness.experiment.cells import reconstruct
+from harness.experiment.clip_evaluation import Setting, mounts_of, noise_of, tracker_of
+from harness.experiment.scenario import Calibrating, Motion, Scenario, load_scenario
+from harness.experiment.simulated_calibration import Calibrated, TrackerSession, by_poses, by_tpose, errors_of
+from harness.mocap import synthetic
 from harness.mocap.sources import open_source
-from harness.reconstruct.ik import PREVIOUS
-from harness.reconstruct.mean_pose import FittedMeanPose, MeanPose
-from harness.report.text import table
-from harness.score.results import read_cells, read_summary
-from harness.setting import Setting, mounts_of, noise_of, tracker_of
-from harness.simulate.simulate import Simulation, exact_calibration, simulate
+from harness.reconstruct.methods.ik import PREVIOUS
+from harness.reconstruct.methods.mean_pose import FittedMeanPose, MeanPose
+from harness.report.run.text import table
+from harness.results.storage import read_cells, read_summary
+from harness.simulate.simulation import Simulation, exact_calibration, simulate
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import combination
 
@@ -165,7 +165,7 @@ def test_a_model_that_nobody_takes_for_one_fails_its_cells(tmp_path: Path) -> No
     """Of two performers who are far off their pose, each cell fails with the reason; nothing stops the run."""
     scenario = replace(SMALL, calibration="tpose", calibrating=Calibrating(miss_deg=30.0))
     with pytest.raises(BadInput, match="Nothing could be run"):
-        experiment.run(scenario, tmp_path / "run")
+        engine.run(scenario, tmp_path / "run")
     failures = read_summary(tmp_path / "run")["failures"]
     assert len(failures) == 4
     assert all("T-pose" in text or "exchanged" in text for text in failures.values())
@@ -181,7 +181,7 @@ def side_by_side(*clips: str, kinds: Sequence[str]) -> Scenario:
 def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
     """And a run goes on where it was."""
     scenario = side_by_side("walking_p1_01", kinds=KINDS)
-    assert experiment.run(scenario, tmp_path) is Outcome.PASS
+    assert engine.run(scenario, tmp_path) is Outcome.PASS
     cells = list(read_cells(tmp_path))
     assert [cell.calibration for cell in cells] == list(KINDS)
     for cell in cells:
@@ -194,7 +194,7 @@ def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
     assert f"calibration {', '.join(KINDS)}" in printed
     assert all(f"calibration={kind}" in printed for kind in KINDS)
     made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()}
-    experiment.run(scenario, tmp_path)
+    engine.run(scenario, tmp_path)
     assert {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()} == made
 
 
@@ -204,7 +204,7 @@ def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
 def test_one_worker_or_two_are_told_the_same(tmp_path: Path, kinds: tuple[str, ...]) -> None:
     scenario = side_by_side("walking_p1_01", "boxing_p2_01", kinds=kinds)
     for jobs in (1, 2):
-        assert experiment.run(scenario, tmp_path / str(jobs), jobs=jobs) is Outcome.PASS
+        assert engine.run(scenario, tmp_path / str(jobs), jobs=jobs) is Outcome.PASS
     one, two = (list(read_cells(tmp_path / jobs)) for jobs in ("1", "2"))
     assert len(one) == len(two) == 2 * len(kinds)
     for cell, other in zip(one, two, strict=True):
@@ -285,7 +285,7 @@ def test_methods_and_their_examples_stand_on_the_body_that_was_found(
 
 def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
     source = open_source("builtin", None, seed=1, rate_hz=None)
-    performers = [performer.skeleton(name).length_m for name in performer.performers()]
+    performers = [synthetic.skeleton(name).length_m for name in synthetic.performers()]
     for skeleton in source.people("p1").values():
         assert min(np.abs(skeleton.length_m - own).max() for own in performers) > 0.002
 

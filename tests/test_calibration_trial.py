@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.calibration_trial import Trials, trials
 from harness.errors import BadInput, UnknownName
+from harness.experiment.calibration_accuracy import Trials, trials
 
 
 @cache

@@ -4,9 +4,9 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from harness.catalogue import catalogue
+from harness.commands.catalogue import catalogue
 from harness.reconstruct import registry
-from harness.reconstruct.mean_pose import MeanPose
+from harness.reconstruct.methods.mean_pose import MeanPose
 
 
 class Theirs(MeanPose):

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.cells import Job, forget_motion, run_job
-from harness.config import Motion, Scenario, load_scenario, variants
-from harness.core.protocol import Part
+from harness.core.split import Part
 from harness.errors import BadFile
-from harness.score.cell import as_row, cell_folder, read_cell, read_row, write_cell
-from harness.score.results import Cell
+from harness.experiment.cells import Job, forget_motion, run_job
+from harness.experiment.scenario import Motion, Scenario, load_scenario, variants
+from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
+from harness.results.storage import Cell
 
 SMALL = Scenario(
     name="small",

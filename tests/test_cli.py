@@ -68,7 +68,7 @@ def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(
     """Also when it is a worker that prints."""
     (tmp_path / "noisy.py").write_text(
         "from dataclasses import dataclass\n"
-        "from harness.reconstruct.mean_pose import MeanPose\n"
+        "from harness.reconstruct.methods.mean_pose import MeanPose\n"
         "@dataclass(frozen=True)\n"
         "class Chatty(MeanPose):\n"
         "    def fit(self, body, examples, rng):\n"
@@ -113,7 +113,7 @@ def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
         raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
-    for where in ("harness.rehearsal.rehearse", "harness.experiment.run"):
+    for where in ("harness.experiment.playback.rehearse", "harness.experiment.engine.run"):
         monkeypatch.setattr(where, interrupted)
     assert main(verb.split()) == expected
     said = capsys.readouterr()

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.score.judged import Judged
+from harness.results.reader import Judged
 from tests.score.sides import manifest, side, write_run
 from tests.score.test_comparison import ANGLE, STEADY, TORN
 
@@ -96,7 +96,7 @@ def test_an_interrupt_says_so(here: Path, capsys: pytest.CaptureFixture[str], mo
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("harness.score.comparison.compare", interrupted)
+    monkeypatch.setattr("harness.compare.comparison.compare", interrupted)
     assert main(["compare", "main", "again"]) == 130
     assert capsys.readouterr().out.splitlines() == ["interrupted"]
 

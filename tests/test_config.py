@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from harness.config import Station, load_scenario, shipped_scenarios, variants
 from harness.core.fields import changed
-from harness.core.protocol import Part
+from harness.core.split import Part
 from harness.errors import BadFile, HarnessError, UnknownName
-from harness.score.cell import varied_text
+from harness.experiment.scenario import Station, load_scenario, shipped_scenarios, variants
+from harness.results.cell import varied_text
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.noise import level

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.experiment.playback import Rehearsal, rehearse
 from harness.reconstruct import registry
-from harness.rehearsal import Rehearsal, rehearse
 from harness.stream.driver import Is900, Wanted
 from harness.stream.emulator import serving
 from harness.stream.frame import TrackerFrame
-from harness.stream.recording import RecordingWriter, record_capture
-from harness.stream.replay import RecordingStream
+from harness.stream.recording.recording import RecordingWriter, record_capture
+from harness.stream.recording.replay import RecordingStream
 
 FRAMES = 80
 AT_ONCE, SHOWN = 15, 60

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from harness import trials
-from harness.contest import TURN, Follower, contest, following
 from harness.core.arrays import Floats
+from harness.experiment import benchmark_clips
+from harness.experiment.benchmark_clips import WARM_UP, Trial
+from harness.experiment.round_robin_timing import TURN, Follower, contest, following
 from harness.reconstruct.database import MotionDatabase
 from harness.stream.frame import TrackerFrame
-from harness.trials import WARM_UP, Trial
 
 
 @pytest.fixture(scope="module")
 def shown() -> list[Trial]:
-    return trials.trials_of(trials.held_out(2, 1, 4.1), 1, trials.scenario())
+    return benchmark_clips.trials_of(benchmark_clips.held_out(2, 1, 4.1), 1, benchmark_clips.scenario())
 
 
 def test_contenders_take_turns_and_meet_every_frame_once(shown: list[Trial]) -> None:
@@ -40,8 +40,8 @@ def test_the_first_second_counts_for_nothing_and_the_first_frame_for_itself(show
 
 
 def test_what_follows_learns_nothing_of_the_truth(shown: list[Trial]) -> None:
-    learnt = MotionDatabase.build(trials.body(), trials.makers(801, 1))
-    follow = following(trials.learner("ik", learnt, 1))
+    learnt = MotionDatabase.build(benchmark_clips.body(), benchmark_clips.makers(801, 1))
+    follow = following(benchmark_clips.learner("ik", learnt, 1))
     frames = shown[0].simulation.frames[:5]
     paths = []
     for before in (shown[0].truth[0], np.zeros(55)):

@@ -5,24 +5,24 @@ from pathlib import Path
 
 import pytest
 
-from harness import experiment
-from harness.config import load_scenario
-from harness.mocap import performer
-from harness.score.results import read_summary
+from harness.experiment import engine
+from harness.experiment.scenario import load_scenario
+from harness.mocap import synthetic
+from harness.results.storage import read_summary
 
 SLOW = ("boxing", "jumping", "golf")
 """Left to `make test-slow`: `mocap/test_performer_difficulty.py` asks the same of every behaviour, without the loop."""
 
 
 @pytest.mark.parametrize(
-    "behaviour", [pytest.param(b, marks=[pytest.mark.slow] if b in SLOW else []) for b in performer.BEHAVIOURS]
+    "behaviour", [pytest.param(b, marks=[pytest.mark.slow] if b in SLOW else []) for b in synthetic.BEHAVIOURS]
 )
 def test_the_mean_pose_errs_three_times_as_much_as_what_was_learnt(tmp_path: Path, behaviour: str) -> None:
     """Perfect trackers, the demo's clips and examples, through the whole loop."""
     demo = load_scenario("demo")
     motion = replace(demo.motion, test=(f"{behaviour}_p1_01",), behaviours=(behaviour,))
     methods = ("mean_pose", "kernel_ridge", "kernel_ridge+ik")
-    experiment.run(replace(demo, motion=motion, noise="clean", methods=methods), tmp_path / "run")
+    engine.run(replace(demo, motion=motion, noise="clean", methods=methods), tmp_path / "run")
     rows = read_summary(tmp_path / "run")["cells"]
     mean, *learnt = (row["joint_angle_mean_deg"] for row in rows)
     for error in learnt:

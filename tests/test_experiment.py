@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness import experiment
 from harness.body.humanoid import Body
-from harness.config import Motion, Scenario, Station, load_scenario
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
+from harness.core.files import TEMPORARY
 from harness.core.motion import Take
 from harness.errors import BadInput, Outcome, UnknownName
+from harness.experiment import engine
+from harness.experiment.scenario import Motion, Scenario, Station, load_scenario
 from harness.reconstruct.contract import Reconstructor, Session
-from harness.report.text import table
-from harness.score.files import TEMPORARY
-from harness.score.orders import Order
-from harness.score.results import read_cells, read_summary
+from harness.report.run.text import table
+from harness.results.expected_orders import Order
+from harness.results.storage import read_cells, read_summary
 from harness.stream.frame import TrackerFrame
 from tests.interrupts import heeding_interrupts
 from tests.short_demo import short_demo
@@ -48,7 +48,7 @@ def rows(out: Path) -> list[dict[str, Any]]:
 def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
     out = tmp_path / "run"
-    outcome = experiment.run(SMALL, out, progress=lambda cell, done, planned: seen.append((done, planned)))
+    outcome = engine.run(SMALL, out, progress=lambda cell, done, planned: seen.append((done, planned)))
     assert outcome is Outcome.PASS
     assert seen == [(k, 4) for k in (1, 2, 3, 4)]
     found = {(row["method"], row["clip"]): row for row in rows(out)}
@@ -68,13 +68,13 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
 
 def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    experiment.run(SMALL, out)
+    engine.run(SMALL, out)
     made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     gone = sorted(made)[0]
     for file in (out / "cells" / gone).iterdir():
         file.unlink()
     (out / "cells" / gone).rmdir()
-    experiment.run(SMALL, out)
+    engine.run(SMALL, out)
     again = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     assert set(again) == set(made)
     assert {name for name in made if again[name] != made[name]} == {gone}
@@ -83,7 +83,7 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_expected_orders_are_judged_and_are_no_part_of_what_a_run_is(tmp_path: Path) -> None:
     out = tmp_path / "run"
     expected = Order("nobody", methods=SMALL.methods)
-    experiment.run(replace(SMALL, order=(expected,)), out)
+    engine.run(replace(SMALL, order=(expected,)), out)
     walking, boxing = read_summary(out)["orders"]
     assert (walking["behaviour"], boxing["behaviour"], boxing["clips"]) == ("walking", "boxing", 1)
     errors = [row["joint_angle_mean_deg"] for row in rows(out) if row["behaviour"] == "boxing"]
@@ -91,25 +91,25 @@ def test_expected_orders_are_judged_and_are_no_part_of_what_a_run_is(tmp_path: P
     assert boxing["holds"] == (round(errors[0], 2) < round(errors[1], 2))
     assert "expected orders: " in table(read_summary(out))
     made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
-    experiment.run(SMALL, out)
+    engine.run(SMALL, out)
     assert {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()} == made
     assert read_summary(out)["orders"] == []
 
 
 def test_another_run_is_never_written_over(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    experiment.run(replace(SMALL, methods=("mean_pose",)), out)
+    engine.run(replace(SMALL, methods=("mean_pose",)), out)
     with pytest.raises(BadInput, match="another run"):
-        experiment.run(replace(SMALL, seed=2), out)
+        engine.run(replace(SMALL, seed=2), out)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
-        experiment.run(SMALL, tmp_path / "mine")
+        engine.run(SMALL, tmp_path / "mine")
 
 
 def test_one_worker_or_two_give_the_same_results(tmp_path: Path) -> None:
-    experiment.run(SMALL, tmp_path / "one", jobs=1)
-    experiment.run(SMALL, tmp_path / "two", jobs=2)
+    engine.run(SMALL, tmp_path / "one", jobs=1)
+    engine.run(SMALL, tmp_path / "two", jobs=2)
     one, two = ({cell.key: cell for cell in read_cells(tmp_path / name)} for name in ("one", "two"))
     assert set(one) == set(two)
     for key, cell in one.items():
@@ -146,7 +146,7 @@ class Exits(Broken):
 @pytest.mark.parametrize("method", ["tests.test_experiment:Broken", "tests.test_experiment:Exits"])
 def test_a_failing_method_fails_alone(tmp_path: Path, method: str) -> None:
     scenario = replace(SMALL, methods=(method, "mean_pose"))
-    assert experiment.run(scenario, tmp_path / "run") is Outcome.INCOMPLETE
+    assert engine.run(scenario, tmp_path / "run") is Outcome.INCOMPLETE
     summary = read_summary(tmp_path / "run")
     assert (summary["cells_finished"], summary["cells_planned"]) == (2, 4)
     assert len(summary["failures"]) == 2
@@ -165,7 +165,7 @@ class Struck(Broken):
 
 def test_ctrl_c_behind_another_error_is_still_ctrl_c(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt):
-        experiment.run(replace(SMALL, methods=("tests.test_experiment:Struck",)), tmp_path / "run")
+        engine.run(replace(SMALL, methods=("tests.test_experiment:Struck",)), tmp_path / "run")
 
 
 VARIED = replace(
@@ -178,8 +178,8 @@ VARIED = replace(
 
 def test_every_clip_runs_with_every_combination_of_varied_values(tmp_path: Path) -> None:
     """In every table: noise in its column, the values in theirs, and no row pools over them."""
-    experiment.run(VARIED, tmp_path / "one")
-    experiment.run(VARIED, tmp_path / "two", jobs=2)
+    engine.run(VARIED, tmp_path / "one")
+    engine.run(VARIED, tmp_path / "two", jobs=2)
     found = rows(tmp_path / "one")
     assert [row["key"] for row in found] == [row["key"] for row in rows(tmp_path / "two")]
     assert [(row["varied"]["noise"], row["varied"]["motion.longest_s"], row["clip"]) for row in found] == [
@@ -203,8 +203,8 @@ def test_every_clip_runs_with_every_combination_of_varied_values(tmp_path: Path)
 
 def test_what_is_varied_shares_motion_and_learning_with_the_same_result_as_alone(tmp_path: Path) -> None:
     varied = replace(VARIED, vary={"components.echo.share": [0.0, 0.2]})
-    experiment.run(varied, tmp_path / "varied")
-    experiment.run(replace(VARIED, vary={}, components={"echo": {"share": 0.2}}), tmp_path / "alone")
+    engine.run(varied, tmp_path / "varied")
+    engine.run(replace(VARIED, vary={}, components={"echo": {"share": 0.2}}), tmp_path / "alone")
     alone = {cell.clip: cell for cell in read_cells(tmp_path / "alone")}
     both = list(read_cells(tmp_path / "varied"))
     for cell in both[2:]:
@@ -212,7 +212,7 @@ def test_what_is_varied_shares_motion_and_learning_with_the_same_result_as_alone
         assert cell.defined_by == alone[cell.clip].defined_by
         assert not np.array_equal(cell.estimate_qpos, both[0].estimate_qpos)
     made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "varied" / "cells").iterdir()}
-    experiment.run(varied, tmp_path / "varied")
+    engine.run(varied, tmp_path / "varied")
     assert made == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "varied" / "cells").iterdir()}
 
 
@@ -220,9 +220,9 @@ def test_a_stream_has_the_stations_that_are_worn_and_no_others(tmp_path: Path) -
     """What is not worn is not lost: one tracker is solved, at one worker or two, as if it were the scenario's only."""
     worn = replace(SMALL, noise="clean", vary={"worn": [["pelvis"], ["left_hand", "pelvis"]]}, methods=("kernel_cca",))
     hung = {"pelvis": Station("lhipjoint", along=0.0, around_deg=165.0), **SMALL.stations}
-    experiment.run(replace(worn, stations=hung), tmp_path / "one")
-    experiment.run(replace(worn, stations=hung), tmp_path / "two", jobs=2)
-    experiment.run(replace(worn, stations={"pelvis": hung["pelvis"]}, vary={}), tmp_path / "alone")
+    engine.run(replace(worn, stations=hung), tmp_path / "one")
+    engine.run(replace(worn, stations=hung), tmp_path / "two", jobs=2)
+    engine.run(replace(worn, stations={"pelvis": hung["pelvis"]}, vary={}), tmp_path / "alone")
     one, two, alone = (list(read_cells(tmp_path / name)) for name in ("one", "two", "alone"))
     assert [cell.stations for cell in one] == 2 * [("pelvis",)] + 2 * [("pelvis", "left_hand")]
     assert [cell.key for cell in one] == [cell.key for cell in two]
@@ -237,7 +237,7 @@ def test_a_stream_has_the_stations_that_are_worn_and_no_others(tmp_path: Path) -
 def test_a_value_that_changes_nothing_for_a_method_has_a_row_of_its_own(tmp_path: Path) -> None:
     vary = {"motion.examples": [["walking_p1_02"], ["walking_p2_02"]]}
     one = replace(VARIED.motion, test=("walking_p1_01",))
-    experiment.run(replace(VARIED, motion=one, methods=("ik:previous", "mean_pose"), vary=vary), tmp_path / "run")
+    engine.run(replace(VARIED, motion=one, methods=("ik:previous", "mean_pose"), vary=vary), tmp_path / "run")
     found = [(row["method"], row["performer"], row["varied"]["motion.examples"]) for row in rows(tmp_path / "run")]
     assert found == [
         (method, performer, [example])
@@ -248,7 +248,7 @@ def test_a_value_that_changes_nothing_for_a_method_has_a_row_of_its_own(tmp_path
 
 def test_what_is_all_warm_up_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="warm-up"):
-        experiment.run(replace(SMALL, motion=replace(SMALL.motion, longest_s=1.0)), tmp_path / "run")
+        engine.run(replace(SMALL, motion=replace(SMALL.motion, longest_s=1.0)), tmp_path / "run")
 
 
 @pytest.mark.parametrize("protocol", ["sequence", "subject", "block"])
@@ -256,7 +256,7 @@ def test_a_whole_clip_is_never_its_own_example(tmp_path: Path, protocol: Any) ->
     own = replace(SMALL.motion, test=("walking_p1_01",), behaviours=("walking",), examples=("walking_p1_01",))
     scenario = replace(SMALL, motion=replace(own, protocol=protocol), methods=("mean_pose",))
     with pytest.raises(BadInput, match="examples"):
-        experiment.run(scenario, tmp_path / "run")
+        engine.run(scenario, tmp_path / "run")
 
 
 @pytest.mark.parametrize(
@@ -277,7 +277,7 @@ def test_names_that_do_not_exist_are_refused_before_anything_is_written(
     tmp_path: Path, change: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(UnknownName) as caught:
-        experiment.run(replace(SMALL, **change), tmp_path / "run")
+        engine.run(replace(SMALL, **change), tmp_path / "run")
     assert message in str(caught.value)
     assert not (tmp_path / "run").exists()
 
@@ -285,13 +285,13 @@ def test_names_that_do_not_exist_are_refused_before_anything_is_written(
 @pytest.mark.parametrize("wrong", [{"echo": {"share": "much"}}, {"echo": {"share": float("nan")}}, {"lost": 3}])
 def test_values_of_components_are_checked(tmp_path: Path, wrong: dict[str, object]) -> None:
     with pytest.raises(BadInput, match=r"components.*expected"):
-        experiment.run(replace(SMALL, components=wrong), tmp_path / "run")
+        engine.run(replace(SMALL, components=wrong), tmp_path / "run")
     assert not (tmp_path / "run").exists()
 
 
 def test_noise_components_change_what_is_seen(tmp_path: Path) -> None:
     echoes = replace(SMALL, methods=("mean_pose",), components={"echo": {"share": 0.3}})
-    experiment.run(echoes, tmp_path / "run")
+    engine.run(echoes, tmp_path / "run")
     cell = next(iter(read_cells(tmp_path / "run")))
     assert 0.15 < cell.health["echo_share"] < 0.45
     assert cell.noise == "default*"
@@ -321,7 +321,7 @@ def test_a_killed_run_leaves_whole_cells_and_resumes(tmp_path: Path) -> None:
     finished = {path.name for path in (out / "cells").iterdir() if not path.name.startswith(TEMPORARY)}
     assert len(finished) >= 2
     scenario = replace(load_scenario(tmp_path / "short.toml"), methods=methods)
-    assert experiment.run(scenario, out) is Outcome.PASS
+    assert engine.run(scenario, out) is Outcome.PASS
     assert finished <= {str(row["key"]) for row in rows(out)}
     assert len(rows(out)) == len(scenario.methods) * len(scenario.motion.test)
 
@@ -364,7 +364,7 @@ def test_workers_end_with_the_run(tmp_path: Path, end: signal.Signals, code: int
 
 def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
     scenario = load_scenario("golf")
-    assert experiment.run(scenario, tmp_path / "run", folder=mocap) is Outcome.PASS
+    assert engine.run(scenario, tmp_path / "run", folder=mocap) is Outcome.PASS
     found = {str(row["method"]): row for row in rows(tmp_path / "run")}
     assert found["ik"]["motion_source"] == "cmu"
     assert found["best_match"]["protocol"] == "block"
@@ -375,7 +375,7 @@ def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
 def test_a_line_that_is_too_slow_is_told_and_measures_nothing(tmp_path: Path) -> None:
     """Six stations at 1000 Hz are nineteen times what 115200 baud carry."""
     fast = replace(SMALL, methods=("mean_pose",), tracker=replace(SMALL.tracker, rate_hz=1000.0))
-    assert experiment.run(fast, tmp_path / "run") is Outcome.NOT_COMPARABLE
+    assert engine.run(fast, tmp_path / "run") is Outcome.NOT_COMPARABLE
     said = table(read_summary(tmp_path / "run"))
     assert "THE LINE IS TOO SLOW: 9" in said
     assert "not measured" in said
@@ -384,5 +384,5 @@ def test_a_line_that_is_too_slow_is_told_and_measures_nothing(tmp_path: Path) ->
 def test_more_stations_than_the_device_has_are_refused_at_once(tmp_path: Path) -> None:
     many = replace(SMALL, stations={f"s{k}": Station("head") for k in range(13)})
     with pytest.raises(BadInput, match="12"):
-        experiment.run(many, tmp_path / "run")
+        engine.run(many, tmp_path / "run")
     assert not (tmp_path / "run").exists()

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from harness.config import Scenario, load_scenario
+from harness.compare.margins import GATED
+from harness.compare.significance import SIGNIFICANCE
+from harness.experiment.scenario import Scenario, load_scenario
 from harness.reconstruct import registry
-from harness.score.judged import read_judged
-from harness.score.margins import GATED
-from harness.score.significance import SIGNIFICANCE
-from harness.testing.gate import scenario_of
+from harness.results.reader import read_judged
+from harness.testing.regression_gate import scenario_of
 
 BASELINE = Path(__file__).parents[1] / "results" / "baselines" / "gate"
 

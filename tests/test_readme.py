@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 import harness
-from harness import experiment
-from harness.catalogue import catalogue
 from harness.cli import build_parser, main
-from harness.config import load_scenario
+from harness.commands.catalogue import catalogue
 from harness.core.options import alternatives
 from harness.errors import Outcome
+from harness.experiment import engine
+from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
-from harness.report.text import table
-from harness.score.results import read_summary
+from harness.report.run.text import table
+from harness.results.storage import read_summary
 from tests.short_demo import short_demo
 
 ROOT = Path(harness.__file__).parent.parent
@@ -84,7 +84,7 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, clip: str, behavi
     """Every figure but times, to 5 %: another machine's arithmetic may differ in the last bits."""
     shown = README.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
     alone = replace(DEMO, motion=replace(DEMO.motion, test=(clip,), behaviours=(behaviour,)))
-    assert experiment.run(alone, tmp_path / "demo") is Outcome.PASS
+    assert engine.run(alone, tmp_path / "demo") is Outcome.PASS
     made = table(read_summary(tmp_path / "demo"))
     rows, again = ([line.split() for line in text.splitlines() if "/" in line] for text in (shown, made))
     assert len(rows) == 1 + len(DEMO.methods) * len(DEMO.motion.test)  # the title first

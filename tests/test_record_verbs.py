@@ -15,13 +15,13 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.rehearsal import Rehearsal, rehearse
-from harness.stream.blocks import CONFIGURED, HEADER, RECEIVED
+from harness.experiment.playback import Rehearsal, rehearse
+from harness.stream.codec.blocks import CONFIGURED, HEADER, RECEIVED
 from harness.stream.driver import Is900, Wanted
 from harness.stream.emulator import EmulatorConfig, serving
-from harness.stream.frame_table import COLUMNS
-from harness.stream.recording import RecordingWriter, read_recording
-from harness.stream.replay import RecordingStream
+from harness.stream.recording.frame_table import COLUMNS
+from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.replay import RecordingStream
 from tests.interrupts import heeding_interrupts
 from tests.stream.test_recording import newer
 from tests.stream.wire import same

@@ -7,20 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.cells import reconstruct
-from harness.config import find_scenario
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
+from harness.experiment.cells import reconstruct
+from harness.experiment.playback import Rehearsal, rehearse
+from harness.experiment.scenario import find_scenario
+from harness.experiment.score_recording import Judged, judge, rehearsal_of, table
 from harness.reconstruct import registry
-from harness.recorded import Judged, judge, rehearsal_of, table
-from harness.rehearsal import Rehearsal, rehearse
 from harness.score.score import score
-from harness.stream import commands
+from harness.stream.codec import commands
+from harness.stream.codec.reader import WireFormat
 from harness.stream.emulator.device import Device
 from harness.stream.inputs import combination
-from harness.stream.reader import WireFormat
-from harness.stream.recording import RecordingWriter, record_capture
-from harness.stream.replay import RecordingStream
+from harness.stream.recording.recording import RecordingWriter, record_capture
+from harness.stream.recording.replay import RecordingStream
 from tests.stream.wire import same
 
 CLIP, METHODS = "boxing_p1_01", ("ik:previous", "best_match")

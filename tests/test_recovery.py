@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import experiment
-from harness.config import load_scenario
 from harness.errors import Outcome, UnknownName
-from harness.report.text import table
-from harness.score.results import read_cells, read_summary
+from harness.experiment import engine
+from harness.experiment.scenario import load_scenario
+from harness.report.run.text import table
+from harness.results.storage import read_cells, read_summary
 
 SCENARIO = """
 schema = 1
@@ -38,7 +38,7 @@ head = { bone = "head", along = 1.0, around_deg = 0.0 }
 def test_recovery_is_measured_by_a_run(tmp_path: Path) -> None:
     (tmp_path / "lost.toml").write_text(SCENARIO)
     out = tmp_path / "out"
-    assert experiment.run(load_scenario(tmp_path / "lost.toml"), out) is Outcome.PASS
+    assert engine.run(load_scenario(tmp_path / "lost.toml"), out) is Outcome.PASS
     cells = {cell.varied["disturbance.kind"]: cell for cell in read_cells(out)}
     plain, lost = cells["none"], cells["all_lost"]
     before = plain.time_s < 1.5 - 1e-9
@@ -61,5 +61,5 @@ def test_recovery_is_measured_by_a_run(tmp_path: Path) -> None:
 def test_a_station_that_nobody_wears_is_refused_before_anything_is_written(tmp_path: Path) -> None:
     (tmp_path / "lost.toml").write_text(SCENARIO.replace('"head"\nfrom', '"haed"\nfrom'))
     with pytest.raises(UnknownName, match="Did you mean 'head'"):
-        experiment.run(load_scenario(tmp_path / "lost.toml"), tmp_path / "out")
+        engine.run(load_scenario(tmp_path / "lost.toml"), tmp_path / "out")
     assert not (tmp_path / "out").exists()

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from harness.config import find_scenario
 from harness.errors import BadInput, HarnessError, UnknownName
-from harness.rehearsal import rehearse
+from harness.experiment.playback import rehearse
+from harness.experiment.scenario import find_scenario
 
 
 def test_what_is_not_asked_for_is_as_the_scenario_has_it() -> None:

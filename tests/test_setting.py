@@ -7,21 +7,21 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from harness.cells import reconstruct
-from harness.config import Motion, Scenario, Station
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, standard_skeleton, unpack
 from harness.core.motion import Clip
-from harness.core.protocol import Part
+from harness.core.split import Part
 from harness.errors import BadInput
+from harness.experiment.cells import reconstruct
+from harness.experiment.clip_evaluation import Setting
+from harness.experiment.scenario import Motion, Scenario, Station
 from harness.mocap.sources import open_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
-from harness.reconstruct.ik import PREVIOUS
-from harness.reconstruct.mean_pose import MeanPose
-from harness.setting import Setting
+from harness.reconstruct.methods.ik import PREVIOUS
+from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.simulate import noise
-from harness.simulate.components.white import White
+from harness.simulate.components.white_noise import White
 from harness.stream.inputs import combination
 
 SCENARIO = Scenario(

@@ -13,12 +13,12 @@ from threading import Timer
 import numpy as np
 import pytest
 
-from harness.rehearsal import rehearse
+from harness.experiment.playback import rehearse
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_type
+from harness.stream.codec.records import Settings
 from harness.stream.driver import Is900, LineEvent, Wanted
 from harness.stream.emulator import EmulatorConfig, Sent, serving
 from harness.stream.frame import TrackerFrame
-from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS, record_type
-from harness.stream.records import Settings
 
 AWAY = {"unplugged", "stalled", "silent", "reset", "wrong list", "refused"}
 """After these the driver sets the device up anew, and what comes meanwhile is no data to it."""

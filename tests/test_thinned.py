@@ -7,7 +7,7 @@ import pytest
 
 from harness.core.motion import Take
 from harness.errors import BadInput
-from harness.setting import thinned
+from harness.experiment.clip_evaluation import thinned
 
 
 def takes(*lengths: int) -> list[Take]:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.cells import reconstruct
-from harness.score.reference import EVERY
+from harness.experiment.cells import reconstruct
+from harness.experiment.reference_workload import EVERY
 
 
 class Diary:

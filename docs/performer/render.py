@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from harness.mocap import performer
-from harness.report.contact_sheet import contact_sheet
+from harness.mocap import synthetic
+from harness.report.kit.contact_sheet import contact_sheet
 
 # behaviour, performer, take, first figure [s], between figures [s], bone whose heading is the view's
 SHEETS = (
@@ -17,7 +17,7 @@ SHEETS = (
 
 def main() -> None:
     for behaviour, who, take, start_s, every_s, faces in SHEETS:
-        clip = performer.generate(behaviour, who, take, seed=7)
+        clip = synthetic.generate(behaviour, who, take, seed=7)
         title = f"{behaviour.replace('_', ' ')}: built-in performer {who}, take {take}, seed 7"
         path = Path(__file__).parent / f"{behaviour}.png"
         contact_sheet(clip, path, start_s=start_s, every_s=every_s, rows=2, title=title, faces=faces)

@@ -18,7 +18,7 @@ import numpy as np
 from harness.bench.rows import Row
 from harness.body import humanoid, mounts
 from harness.body.kinematics import Kinematics
-from harness.body.retarget import to_own_body
+from harness.body.retargeting import to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
@@ -26,11 +26,11 @@ from harness.core.estimate import Estimate
 from harness.core.humanoid24 import pack
 from harness.core.motion import Take
 from harness.core.seeds import generator
-from harness.mocap import performer
-from harness.reconstruct.hinges import HingeLimits
-from harness.reconstruct.ik import Ik
-from harness.reconstruct.residuals import Loss, Residuals
-from harness.reconstruct.solver import Prior, Solver, Stopping
+from harness.mocap import synthetic
+from harness.reconstruct.methods.ik import Ik
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
+from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -86,8 +86,8 @@ def bench_ik(seed: int = 1, frames: int = 400) -> list[Row]:
 
 def make_setting(seed: int, frames: int) -> Setting:
     """A walk, and readings of it in the frame of the world."""
-    who = performer.performers()[0]
-    clip = performer.generate("walking", who, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
+    who = synthetic.performers()[0]
+    clip = synthetic.generate("walking", who, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
     worn = tuple(mounts.DEFAULTS[station] for station in STATIONS)
     body = humanoid.build(clip.skeleton, worn)
     on_bones = [mounts.place(body.skeleton, mount) for mount in worn]
@@ -104,7 +104,7 @@ def make_setting(seed: int, frames: int) -> Setting:
     qpos[:, 7:] = HingeLimits(body).principal(qpos[:, 7:])
     rng, kinematics = generator(seed, "bench", "ik"), Kinematics(body)
     readings = [_reading(kinematics, calibration, q, t / RATE_HZ, rng) for t, q in enumerate(qpos)]
-    other = performer.generate("walking", who, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
+    other = synthetic.generate("walking", who, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
     example = to_own_body(other)[1]
     return Setting(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), (example,))
 

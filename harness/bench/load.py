@@ -10,7 +10,7 @@ from harness.bench.rows import Row
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.mocap import amc
+from harness.mocap.read import amc
 
 FRAMES = 5000
 

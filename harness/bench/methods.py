@@ -1,7 +1,7 @@
 """How fast the methods are, how far off with these very options, and how much memory they take.
 
 All learn from one database of built-in takes and follow held-out ones, in the setting of the accuracy tables
-(`trials`). They take turns, a second of motion each, beside `ik` and mink, so that whatever else the machine does meets
+(`benchmark_clips`). They take turns, a second of motion each, beside `ik` and mink, so that whatever else the machine does meets
 all alike. What memory and a larger database cost is measured in processes of their own (`alone`).
 """
 
@@ -13,29 +13,29 @@ from pathlib import Path
 
 import numpy as np
 
-from harness import trials
-from harness.bench import index
-from harness.bench.alone import NOTHING, run_alone
+from harness.bench import neighbour_search
+from harness.bench.peak_memory import NOTHING, run_alone
 from harness.bench.rows import Row
 from harness.body import humanoid
-from harness.config import load_scenario
-from harness.contest import Follower, Progress, Tally, contest, following
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.mocap import performer
-from harness.progress import ProgressBar
+from harness.core.progress import ProgressBar
+from harness.experiment import benchmark_clips
+from harness.experiment.benchmark_clips import Trial
+from harness.experiment.clip_evaluation import mounts_of
+from harness.experiment.round_robin_timing import Follower, Progress, Tally, contest, following
+from harness.experiment.scenario import load_scenario
+from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.database.ground import POSTURE
-from harness.reconstruct.dynamic_map import DynamicMap
 from harness.reconstruct.index import Flat, choose
-from harness.reconstruct.index.choose import AUTO
-from harness.reconstruct.local_pca import LocalPca
-from harness.setting import mounts_of
+from harness.reconstruct.index.selection import AUTO
+from harness.reconstruct.methods.dynamic_map import DynamicMap
+from harness.reconstruct.methods.local_pca import LocalPca
+from harness.reconstruct.solver.ground_frame import POSTURE
 from harness.stream.frame import TrackerFrame
-from harness.trials import Trial
 
 HELD_TO = {"dynamic_map": 1000, "local_pca": 1000, "kernel_cca": 2000, "weighted_blend": 2000}
 """Frames a second on one core, final inverse kinematics included where the method ends with it."""
@@ -57,7 +57,7 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
         with ProgressBar("takes") as bar:
             learnt = database(small, FRAMES, seed, bar)
         with ProgressBar("turns") as bar:
-            tallies = beside_mink({name: trials.learner(name, learnt, seed) for name in others}, seed, bar)
+            tallies = beside_mink({name: benchmark_clips.learner(name, learnt, seed) for name in others}, seed, bar)
         nothing = run_alone(NOTHING, small, seed)
         with ProgressBar("methods") as bar:
             for done, name in enumerate(HELD_TO):
@@ -77,8 +77,8 @@ def bench_methods(seed: int = 1, *, large: bool = False) -> list[Row]:
 
 def database(folder: Path, frames: int, seed: int, progress: Progress) -> MotionDatabase:
     """So many frames of built-in takes, on disk and memory-mapped."""
-    takes = trials.makers(frames, seed)
-    return MotionDatabase.build(trials.body(), takes, workers=WORKERS, progress=progress, folder=folder)
+    takes = benchmark_clips.makers(frames, seed)
+    return MotionDatabase.build(benchmark_clips.body(), takes, workers=WORKERS, progress=progress, folder=folder)
 
 
 def rows_of(name: str, tallies: dict[str, Tally], others: Sequence[Row]) -> list[Row]:
@@ -117,8 +117,10 @@ def memory_row(name: str, nothing_bytes: int, peak_bytes: int, frames: int) -> R
 
 def slower_row(name: str, few: MotionDatabase, many: MotionDatabase, seed: int, progress: Progress) -> Row:
     """What a larger database costs: both take turns."""
-    both = {which: following(trials.learner(name, known, seed)) for which, known in (("few", few), ("many", many))}
-    tallies = contest(both, trials.trials(seed, SECONDS), progress)
+    both = {
+        which: following(benchmark_clips.learner(name, known, seed)) for which, known in (("few", few), ("many", many))
+    }
+    tallies = contest(both, benchmark_clips.trials(seed, SECONDS), progress)
     few_ms, many_ms = (float(np.median(tallies[which].step_ms)) for which in ("few", "many"))
     text = f"{many_ms:.3f} against {few_ms:.3f} ms a step, {len(many):,} against {len(few):,} frames"
     ratio = _ratio(tallies["many"], tallies["few"])
@@ -127,10 +129,10 @@ def slower_row(name: str, few: MotionDatabase, many: MotionDatabase, seed: int, 
 
 def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
     """The share of the true neighbours that each method's index finds, for every so manyth query."""
-    held_out = trials.held_out(len(performer.BEHAVIOURS), seed, trials.TAKE_S)
+    held_out = benchmark_clips.held_out(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
     rows = []
-    for kind in (index.readings, index.both, index.evidence):
-        search = kind(trials.body(), learnt, held_out)
+    for kind in (neighbour_search.readings, neighbour_search.both, neighbour_search.evidence):
+        search = kind(benchmark_clips.body(), learnt, held_out)
         judge, used, shares = Flat(search.vectors), choose(AUTO, search.vectors, search.count), []
         for query in np.concatenate(search.queries)[::every]:
             true, found = (set(one.nearest(query, search.count)[0].tolist()) for one in (judge, used))
@@ -142,7 +144,7 @@ def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Row]:
 
 def query_numbers(method: Method) -> int:
     """Numbers in the vector by which a method finds examples: poses, what the stations read, or both."""
-    stations = len(load_scenario(trials.SETTING).stations)
+    stations = len(load_scenario(benchmark_clips.SETTING).stations)
     if isinstance(method, LocalPca):
         return (POSTURE + 3) * 2 - 3 + 9 * stations
     if isinstance(method, DynamicMap) and method.like == "evidence":
@@ -165,7 +167,7 @@ def _ratio(other: Tally, own: Tally) -> float:
 def beside_mink(fitted: Mapping[str, Reconstructor], seed: int, progress: Progress) -> dict[str, Tally]:
     """The contest of these and mink on the first seconds of a held-out take of each behaviour."""
     contenders = {name: following(learnt) for name, learnt in fitted.items()}
-    return contest({**contenders, MINK: _mink}, trials.trials(seed, SECONDS), progress)
+    return contest({**contenders, MINK: _mink}, benchmark_clips.trials(seed, SECONDS), progress)
 
 
 def _mink(trial: Trial) -> Follower:
@@ -173,7 +175,7 @@ def _mink(trial: Trial) -> Follower:
     from harness.bench.ik import Setting, with_mink
 
     worn = trial.simulation.calibration
-    body = humanoid.build(trackers=mounts_of(load_scenario(trials.SETTING)))
+    body = humanoid.build(trackers=mounts_of(load_scenario(benchmark_clips.SETTING)))
     at_home = replace(worn, world_from_tracker=rotations.IDENTITY, tracker_origin_m=np.zeros(3))
     solve = with_mink(Setting(body, at_home, [], np.zeros((0, 55)), ()))
 

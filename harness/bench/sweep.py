@@ -22,14 +22,14 @@ from typing import Any
 import numpy as np
 
 from harness.bench.rows import Row
-from harness.cells import Job, judge, source_of
-from harness.config import Scenario, load_scenario
 from harness.core.arrays import Floats
-from harness.core.protocol import Part
+from harness.core.split import Part
+from harness.experiment.cells import Job, judge, source_of
+from harness.experiment.clip_evaluation import Setting
+from harness.experiment.scenario import Scenario, load_scenario
 from harness.reconstruct import registry
-from harness.score.index import CellIndex
-from harness.score.table import TIMES, groups, write_table
-from harness.setting import Setting
+from harness.results.index import CellIndex
+from harness.results.table import TIMES, groups, write_table
 
 MANY = 100_000
 SMALL, FEW = 200, 20

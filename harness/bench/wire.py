@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from harness.bench.rows import Row
-from harness.bench.wire_case import CASES, CLIP, SCENARIO, Case
+from harness.bench.wire_cases import CASES, CLIP, SCENARIO, Case
 from harness.core.arrays import Bools, Floats
-from harness.rehearsal import rehearse
-from harness.stream import ascii
-from harness.stream.decoder import Decoder
-from harness.stream.items import STATION_CHARACTERS, record_type
-from harness.stream.reader import FrameReader
-from harness.stream.records import Settings
+from harness.experiment.playback import rehearse
+from harness.stream.codec import ascii_records
+from harness.stream.codec.decoder import Decoder
+from harness.stream.codec.items import STATION_CHARACTERS, record_type
+from harness.stream.codec.reader import FrameReader
+from harness.stream.codec.records import Settings
 
 METHOD = "dynamic_map"
 SECONDS, LONG_S = 15.0, 600.0
@@ -48,7 +48,7 @@ def _decoding(seed: int, repeats: int) -> list[Row]:
     wire, items = played.wire_format, played.wire_format.items
     binary = played.wire.data * 10
     table = np.frombuffer(binary, record_type(items))
-    text = ascii.write(items, table)
+    text = ascii_records.write(items, table)
     one = [played.wire.data[at : at + table.itemsize] for at in range(0, len(played.wire.data), table.itemsize)]
     lists = dict.fromkeys(wire.characters, items)
 

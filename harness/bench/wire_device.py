@@ -12,8 +12,8 @@ from threading import Thread
 
 import numpy as np
 
-from harness.bench.wire_case import CLIP, SCENARIO
-from harness.rehearsal import rehearse
+from harness.bench.wire_cases import CLIP, SCENARIO
+from harness.experiment.playback import rehearse
 from harness.stream.emulator import EmulatorConfig, Sent, serving
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from harness.body import anatomy, mounts
 from harness.core import humanoid24, skeleton
 from harness.core.arrays import Floats, Ints
-from harness.core.share import share_folder
+from harness.core.package_data import share_folder
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 

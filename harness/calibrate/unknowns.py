@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.body.mounts import Mount, place
-from harness.calibrate.bone_space import BoneSpace
+from harness.calibrate.skeleton_prior import BoneSpace
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton

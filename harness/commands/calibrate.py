@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.verb import (
+from harness.commands.common import (
     Verbs,
     add_line,
     add_verb,
@@ -23,8 +23,8 @@ from harness.commands.verb import (
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.live.calibrate import Show
-    from harness.posing import Found
+    from harness.calibrate.guided_calibration import Show
+    from harness.experiment.calibration_session import Found
 
 _SOURCES = ("recording", "live", "simulate", "sheet")
 _WORN = ("scenario", "stations", "kind", "clip", "out")
@@ -90,7 +90,7 @@ def calibrate(args: argparse.Namespace) -> Outcome:
 def _sheet(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.poses import POSES
     from harness.core.humanoid24 import standard_skeleton
-    from harness.live.sheet import draw_poses
+    from harness.live.pose_sheet import draw_poses
 
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
@@ -99,7 +99,7 @@ def _sheet(args: argparse.Namespace) -> Outcome:
 
 
 def _trial(args: argparse.Namespace) -> Outcome:
-    from harness.calibration_trial import trials
+    from harness.experiment.calibration_accuracy import trials
     from harness.simulate.noise import level
 
     given = {"noise": args.noise, "seed": args.seed}
@@ -116,7 +116,7 @@ def _trial(args: argparse.Namespace) -> Outcome:
 
 
 def _found(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.file import require_place, write_calibration
+    from harness.calibrate.calibration_file import require_place, write_calibration
 
     if args.out is None:
         raise BadInput("--out is missing.", "Name the file to write: --out me.toml.")
@@ -130,10 +130,10 @@ def _found(args: argparse.Namespace) -> Outcome:
 
 
 def _of_device(args: argparse.Namespace) -> "Found":
-    from harness.config import load_scenario
-    from harness.live.view import View
-    from harness.posing import Posing
-    from harness.rehearsal import chosen
+    from harness.experiment.calibration_session import Posing
+    from harness.experiment.playback import chosen
+    from harness.experiment.scenario import load_scenario
+    from harness.live.viewer import View
     from harness.stream.driver import Is900, Wanted
 
     for name in ("port", "scenario"):
@@ -158,9 +158,9 @@ def _of_device(args: argparse.Namespace) -> "Found":
 
 
 def _of_recording(args: argparse.Namespace) -> "Found":
-    from harness.posing import Posing
-    from harness.recorded import stations_in
-    from harness.stream.replay import RecordingStream
+    from harness.experiment.calibration_session import Posing
+    from harness.experiment.score_recording import stations_in
+    from harness.stream.recording.replay import RecordingStream
 
     stream = RecordingStream(args.recording)
     for lost in stream.recording.lost:

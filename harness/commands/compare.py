@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.verb import Verbs, add_verb, say
+from harness.commands.common import Verbs, add_verb, say
 from harness.errors import BadInput, Outcome
 
 _SIDE = "folder of a run or sweep, or of a baseline, or a baseline's name"
@@ -20,7 +20,7 @@ def add_baseline(verbs: Verbs) -> None:
 
 
 def save_baseline(args: argparse.Namespace) -> Outcome:
-    from harness.score.baseline import save
+    from harness.compare.baseline import save
 
     folder = save(args.run, args.name, force=args.force)
     return say(args, {"baseline": str(folder)}, f"baseline: {folder}")
@@ -41,12 +41,12 @@ def add_compare(verbs: Verbs) -> None:
 def compare_sides(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
+    from harness.compare.comparison import compare
+    from harness.compare.margins import GATED
+    from harness.core.files import plain
     from harness.core.options import split
-    from harness.report.comparison import text, write_page
-    from harness.score.comparison import compare
-    from harness.score.files import plain
-    from harness.score.judged import read_judged
-    from harness.score.margins import GATED
+    from harness.report.comparison.writer import text, write_page
+    from harness.results.reader import read_judged
 
     if args.b is None and not args.methods:
         raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")

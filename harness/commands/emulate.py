@@ -5,7 +5,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.verb import (
+from harness.commands.common import (
     FEWEST,
     Verbs,
     add_verb,
@@ -20,7 +20,7 @@ from harness.commands.verb import (
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.config import Scenario
+    from harness.experiment.scenario import Scenario
     from harness.stream.emulator.config import EmulatorConfig
 
 
@@ -55,9 +55,9 @@ def add_emulate(verbs: Verbs) -> None:
 
 
 def emulate(args: argparse.Namespace) -> Outcome:
-    from harness.rehearsal import rehearse
+    from harness.experiment.playback import rehearse
     from harness.stream.emulator.capacity import check_capacity
-    from harness.stream.emulator.serve import open_port, play
+    from harness.stream.emulator.server import open_port, play
 
     if args.pty and args.anywhere:
         raise BadInput("--anywhere with --pty.", "It is for --tcp: leave it out.")

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from harness.commands.verb import (
+from harness.commands.common import (
     Verbs,
     add_line,
     add_verb,
@@ -24,11 +24,11 @@ from harness.commands.verb import (
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.calibrate.file import CalibrationFile
+    from harness.calibrate.calibration_file import CalibrationFile
+    from harness.calibrate.guided_calibration import Calibrator
     from harness.core.calibration import Calibration
-    from harness.live.calibrate import Calibrator
+    from harness.experiment.playback import Rehearsal
     from harness.live.pose import Output
-    from harness.rehearsal import Rehearsal
     from harness.stream.driver import Is900, LineEvent
 
 _KINDS = ("exact", "tpose", "poses")
@@ -82,12 +82,12 @@ def live(args: argparse.Namespace) -> Outcome:
 
 
 def _live(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.file import read_calibration
+    from harness.calibrate.calibration_file import read_calibration
+    from harness.experiment.playback import rehearse
     from harness.live import summary
-    from harness.live.floor import Floor
-    from harness.live.perform import Plan, perform, warm_up
+    from harness.live.scheduling_jitter import Floor
+    from harness.live.session import Plan, perform, warm_up
     from harness.reconstruct import registry
-    from harness.rehearsal import rehearse
 
     told = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
     rehearsal = rehearse(args.scenario, stations=stations_of(args), **told)
@@ -157,8 +157,8 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
     """What is asked for; closed again when something after it is refused."""
     from harness.live.bvh import Bvh
     from harness.live.lsl import Lsl
-    from harness.live.table import Table
-    from harness.live.view import View
+    from harness.live.pose_table import Table
+    from harness.live.viewer import View
     from harness.live.vmc import Vmc
 
     if args.out is not None and args.view != "frames":
@@ -185,7 +185,7 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
 
 def _posed(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[LineEvent]") -> "CalibrationFile":
     """What eight poses tell, held before anything is learnt: methods learn on the bones that are found."""
-    from harness.posing import Posing
+    from harness.experiment.calibration_session import Posing
 
     posing = Posing(args.scenario, tuple(rehearsal.scenario.stations), folder=args.mocap)
     with _device(args, rehearsal, events) as device:
@@ -197,7 +197,7 @@ def _posed(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[LineE
 
 
 def _worn(args: argparse.Namespace, rehearsal: "Rehearsal") -> "Calibration | Calibrator":
-    from harness.live.calibrate import StandInTPose
+    from harness.calibrate.guided_calibration import StandInTPose
 
     if args.calibration == "tpose":
         return StandInTPose(rehearsal.body, rehearsal.mounts)

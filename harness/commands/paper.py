@@ -5,10 +5,10 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.runs import this_command
-from harness.commands.verb import Verbs, add_verb, positive, say
+from harness.commands.common import Verbs, add_verb, positive, say
+from harness.commands.run import this_command
+from harness.core.progress import ProgressBar
 from harness.errors import Outcome
-from harness.progress import ProgressBar
 
 
 def add_paper(verbs: Verbs) -> None:
@@ -24,10 +24,10 @@ def add_paper(verbs: Verbs) -> None:
 def rerun_paper(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.report.paper import write_paper
-    from harness.report.paper_text import text_tables
-    from harness.score.files import plain
-    from harness.study.paper import paper, rerun
+    from harness.core.files import plain
+    from harness.report.paper.text import text_tables
+    from harness.report.paper.writer import write_paper
+    from harness.study.papers.paper import paper, rerun
 
     out = args.out or Path("results") / (args.paper + ("_cmu" if args.mocap else ""))
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk

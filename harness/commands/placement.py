@@ -5,10 +5,10 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.runs import this_command
-from harness.commands.verb import Verbs, add_verb, positive, say
+from harness.commands.common import Verbs, add_verb, positive, say
+from harness.commands.run import this_command
+from harness.core.progress import ProgressBar
 from harness.errors import Outcome
-from harness.progress import ProgressBar
 
 
 def add_placement(verbs: Verbs) -> None:
@@ -21,11 +21,11 @@ def add_placement(verbs: Verbs) -> None:
 def place_trackers(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.report.placement import write_placement_page
-    from harness.report.placement_text import text
-    from harness.score.files import plain
-    from harness.study.executors import processes
-    from harness.study.placement.placement import FINDINGS, placement
+    from harness.core.files import plain
+    from harness.experiment.executors import processes
+    from harness.report.placement.text import text
+    from harness.report.placement.writer import write_placement_page
+    from harness.study.placement.placement_study import FINDINGS, placement
 
     out = args.out or Path("results") / Path(args.study).stem
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness import __version__
-from harness.commands.verb import (
+from harness.commands.common import (
     Verbs,
     add_line,
     add_verb,
@@ -26,7 +26,7 @@ from harness.commands.verb import (
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
-    from harness.stream.replay import RecordingStream
+    from harness.stream.recording.replay import RecordingStream
 
 
 SIMULATED = "sim:"
@@ -69,8 +69,8 @@ def record(args: argparse.Namespace) -> Outcome:
 
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
-    from harness.rehearsal import rehearse
-    from harness.stream.recording import RecordingWriter, record_capture
+    from harness.experiment.playback import rehearse
+    from harness.stream.recording.recording import RecordingWriter, record_capture
 
     RecordingWriter(args.file).close()  # refuses what is no place to record into before a long simulation
     stations = args.stations
@@ -105,8 +105,8 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
 
 def _record_port(args: argparse.Namespace) -> Outcome:
     from harness.stream.driver import Wanted
-    from harness.stream.recorder import record_port
-    from harness.stream.recording import RecordingWriter
+    from harness.stream.recording.recorder import record_port
+    from harness.stream.recording.recording import RecordingWriter
 
     stations = None if args.stations is None else tuple(names_of(args.stations))
     wanted = Wanted(stations=stations, rate_hz=args.rate, **line_wanted(args))
@@ -143,7 +143,7 @@ def add_replay(verbs: Verbs) -> None:
 
 
 def replay(args: argparse.Namespace) -> Outcome:
-    from harness.stream.replay import RecordingStream, speed_of
+    from harness.stream.recording.replay import RecordingStream, speed_of
 
     stream = RecordingStream(args.file, speed_of(args.speed))
     for lost in stream.recording.lost:
@@ -155,8 +155,8 @@ def replay(args: argparse.Namespace) -> Outcome:
 
 
 def _play(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
-    from harness.stream.frame_table import COLUMNS, as_csv, rows
-    from harness.stream.summary import Summary
+    from harness.stream.recording.frame_table import COLUMNS, as_csv, rows
+    from harness.stream.recording.summary import Summary
 
     summary = Summary(stream.stations)
     if args.frames and not args.json:
@@ -185,22 +185,22 @@ def _counts(stream: "RecordingStream") -> str:
 
 
 def _judge(args: argparse.Namespace, stream: "RecordingStream") -> Outcome:
-    from harness import recorded
-    from harness.calibrate.file import read_calibration
+    from harness.calibrate.calibration_file import read_calibration
     from harness.core.options import alternatives, split
+    from harness.experiment import score_recording
 
     told = {"scenario": args.scenario, "clip": args.clip, "rate_hz": args.rate, "noise": args.noise, "seed": args.seed}
-    rehearsal = recorded.rehearsal_of(stream, **told, folder=args.mocap)
+    rehearsal = score_recording.rehearsal_of(stream, **told, folder=args.mocap)
     if args.calibration is not None:
         rehearsal = rehearsal.going_by(read_calibration(args.calibration))
     methods = rehearsal.scenario.methods
     if args.methods is not None:
         methods = tuple(name for text in split(args.methods, ",") for name in alternatives(text))
     with redirect_stdout(sys.stderr):  # what a method prints is talk
-        judged = recorded.judge(stream, rehearsal, methods)
+        judged = score_recording.judge(stream, rehearsal, methods)
     played = f"{rehearsal.scenario.name}, {rehearsal.setting.part}"
     content = {"scenario": rehearsal.scenario.name, "clip": str(rehearsal.setting.part), **stream.counts}
     content |= {"lost": stream.recording.lost, "methods": [one.as_dict() for one in judged]}
     measured = any(one.metrics["joint_angle_mean_deg"] is not None for one in judged)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
-    return say(args, content, f"played from {played}", "", recorded.table(judged), outcome=outcome)
+    return say(args, content, f"played from {played}", "", score_recording.table(judged), outcome=outcome)

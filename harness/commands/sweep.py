@@ -8,12 +8,12 @@ from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from harness.commands.verb import Verbs, add_verb, ended_by_sigterm, positive, say
+from harness.commands.common import Verbs, add_verb, ended_by_sigterm, positive, say
+from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
-from harness.progress import ProgressBar
 
 if TYPE_CHECKING:
-    from harness.study.status import Status
+    from harness.experiment.status import Status
 
 _MOST_FAILURES = 10
 _OF_A_CLUSTER = 64
@@ -33,13 +33,13 @@ def add_sweep(verbs: Verbs) -> None:
 
 
 def run_sweep(args: argparse.Namespace) -> Outcome:
-    from harness.report.sweep import read_sweep
-    from harness.report.sweep_page import write_sweep
-    from harness.report.sweep_text import text
-    from harness.score.files import read_json
-    from harness.study.executors import dask, processes
-    from harness.study.expand import expand, load_sweep
-    from harness.study.sweep_folder import run_sweep as run
+    from harness.core.files import read_json
+    from harness.experiment.executors import dask, processes
+    from harness.experiment.sweep import run_sweep as run
+    from harness.experiment.sweep_config import expand, load_sweep
+    from harness.report.sweep.page import write_sweep
+    from harness.report.sweep.reader import read_sweep
+    from harness.report.sweep.text import text
 
     if args.dask and args.jobs and args.dask != "local":
         raise BadInput("--jobs with --dask.", "A scheduler's workers are started by whoever starts it: leave it out.")
@@ -86,7 +86,7 @@ def add_status(verbs: Verbs) -> None:
 
 
 def show_status(args: argparse.Namespace) -> Outcome:
-    from harness.study.status import status
+    from harness.experiment.status import status
 
     found = status(args.folder)
     content = {

@@ -7,9 +7,9 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.live.files import Written
+from harness.live.incremental_file import Written
 from harness.live.pose import LivePose
-from harness.mocap.export_bvh import channels, hierarchy, row
+from harness.mocap.write.bvh import channels, hierarchy, row
 
 _COUNT = "Frames: {:>10}"
 """As wide for any number, since it stands before the frames and grows with them."""

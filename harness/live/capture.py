@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Thread
 
-from harness.live.queue import DroppingQueue
+from harness.live.dropping_queue import DroppingQueue
 from harness.stream.frame import TrackerFrame, TrackerStream
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from harness.live.latency import Durations
-from harness.live.perform import Performed
+from harness.live.session import Performed
 
 
 def as_dict(done: Performed, floor: Mapping[str, Any]) -> dict[str, Any]:

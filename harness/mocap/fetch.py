@@ -18,8 +18,8 @@ from urllib.parse import urlsplit
 
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
-from harness.mocap.acclaim import AsfFile, read_amc, read_asf_file
 from harness.mocap.library import INDEX, read_index
+from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
 
 CMU_URL = "http://mocap.cs.cmu.edu"
 LISTED_RATE_HZ = 120.0

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from harness.mocap.checks import Spike
+from harness.mocap.motion_checks import Spike
 
 SHOWN = 8
 """So many spikes are spelled out; the rest are counted."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from harness.core.motion import Clip
 from harness.core.skeleton import unwrapped
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.files import check_size
+from harness.mocap.read.file_checks import check_size
 
 INDEX = "manifest.csv"
 FORMATS = ("amc", "bvh", "npz", "c3d")
@@ -98,14 +98,14 @@ class MotionLibrary:
         if entry.format == "c3d":
             raise BadInput(f"{entry.name} is a C3D file, which holds markers.", "Give its AMC, BVH or npz.")
         if entry.format == "bvh":
-            from harness.mocap.bvh import read_clip as read_bvh_clip
+            from harness.mocap.read.bvh import read_clip as read_bvh_clip
 
             return read_bvh_clip(entry.path)
         if entry.format == "npz":
-            from harness.mocap.amass import read_clip as read_npz_clip
+            from harness.mocap.read.amass import read_clip as read_npz_clip
 
             return read_npz_clip(entry.path)
-        from harness.mocap.acclaim import read_clip
+        from harness.mocap.read.acclaim import read_clip
 
         rate_hz = entry.rate_hz or self._rate_hz
         if rate_hz is None:

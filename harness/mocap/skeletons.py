@@ -7,7 +7,7 @@ import numpy as np
 from harness.core.humanoid24 import BONES
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.asf import read_asf
+from harness.mocap.read.asf import read_asf
 
 
 def skeletons(folder: Path | str) -> dict[str, Skeleton]:

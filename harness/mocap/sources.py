@@ -8,7 +8,7 @@ from typing import Protocol
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.mocap.library import MotionLibrary
 from harness.mocap.skeletons import skeletons
 
@@ -56,14 +56,14 @@ def open_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | N
 class BuiltIn:
     """The built-in performer's takes; the seed is the scenario's."""
 
-    title = performer.SOURCE
+    title = synthetic.SOURCE
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
         self._made: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
-        return tuple(name for behaviour in performer.BEHAVIOURS for name in performer.take_names(behaviour))
+        return tuple(name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
 
     def check(self, name: str) -> None:
         if name not in self.names():
@@ -78,7 +78,7 @@ class BuiltIn:
     def load(self, name: str) -> Clip:
         if name not in self._made:
             behaviour, who, take = _parts(name)
-            self._made[name] = performer.generate(behaviour, who, take, seed=self._seed)
+            self._made[name] = synthetic.generate(behaviour, who, take, seed=self._seed)
         return self._made[name]
 
     def people(self, without: str) -> dict[str, Skeleton]:
@@ -88,7 +88,7 @@ class BuiltIn:
 
 @cache
 def _others() -> dict[str, Skeleton]:
-    return {f"other {number}": skeleton for number, skeleton in enumerate(performer.population(PEOPLE, seed=0), 1)}
+    return {f"other {number}": skeleton for number, skeleton in enumerate(synthetic.population(PEOPLE, seed=0), 1)}
 
 
 def _parts(name: str) -> tuple[str, str, int]:

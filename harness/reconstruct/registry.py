@@ -20,15 +20,15 @@ from typing import Any, cast
 from harness.core.fields import changed
 from harness.core.options import named, split
 from harness.errors import BadInput, HarnessError, UnknownName
-from harness.reconstruct import dynamic_map, ik
-from harness.reconstruct.best_match import BestMatch
-from harness.reconstruct.clean_up import SUFFIX, CleanUp
 from harness.reconstruct.contract import Method
-from harness.reconstruct.kernel_cca import KernelCca
-from harness.reconstruct.kernel_ridge import KernelRidge
-from harness.reconstruct.local_pca import LocalPca
-from harness.reconstruct.mean_pose import MeanPose
-from harness.reconstruct.weighted_blend import WeightedBlend
+from harness.reconstruct.methods import dynamic_map, ik
+from harness.reconstruct.methods.best_match import BestMatch
+from harness.reconstruct.methods.clean_up import SUFFIX, CleanUp
+from harness.reconstruct.methods.kernel_cca import KernelCca
+from harness.reconstruct.methods.kernel_ridge import KernelRidge
+from harness.reconstruct.methods.local_pca import LocalPca
+from harness.reconstruct.methods.mean_pose import MeanPose
+from harness.reconstruct.methods.weighted_blend import WeightedBlend
 
 GROUP = "harness.methods"
 _SAYS = ("name", "summary", "needs_examples", "fit")

@@ -51,7 +51,7 @@ def step_times_ms(step_ms: Floats) -> dict[str, float]:
 
 
 def step_relative(step_cpu_ms: Floats, reference_cpu_ms: Floats) -> float:
-    """How often the work of `score.reference` fits into a step, by medians of CPU time; NaN where either was not timed.
+    """How often the work of `experiment.reference_workload` fits into a step, by medians of CPU time; NaN where either was not timed.
 
     CPU time, since on a busy computer wall time is no measure of the method: whoever is sent to wait in every step
     takes several times as long, while work as short as the reference seldom is.

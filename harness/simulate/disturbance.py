@@ -1,7 +1,7 @@
 """Faults that a reconstructor must get over, by name: what happens, for how long, and back to normal.
 
 Two runs that differ in nothing but their disturbance share every other draw (`core.seeds`), so that the one shows what
-the other's error would have been; `score.recovery` compares them.
+the other's error would have been; `results.recovery` compares them.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -10,11 +10,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from harness.errors import UnknownName
-from harness.simulate.components.displaced import Displaced
 from harness.simulate.components.lost_station import LostStation
-from harness.simulate.components.turned import Turned
-from harness.simulate.limits import require
+from harness.simulate.components.orientation_offset import Turned
+from harness.simulate.components.position_offset import Displaced
 from harness.simulate.noise import Noise
+from harness.simulate.parameter_ranges import require
 
 Kind = Literal["none", "one_lost", "all_lost", "one_off", "all_turned", "start_off"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

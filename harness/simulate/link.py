@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadInput
-from harness.stream.items import BITS_PER_BYTE, STANDARD_LIST, size
+from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, size
 
 
 @dataclass(frozen=True)

@@ -4,20 +4,20 @@ from dataclasses import dataclass
 
 from harness.errors import UnknownName
 from harness.simulate.components.clock import Clock
-from harness.simulate.components.displaced import Displaced
+from harness.simulate.components.drift_noise import Slow
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
-from harness.simulate.components.loose import Loose
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.session import Session
-from harness.simulate.components.slow import Slow
-from harness.simulate.components.speed import Speed
-from harness.simulate.components.turned import Turned
-from harness.simulate.components.white import White
-from harness.simulate.components.wobble import Wobble
-from harness.simulate.sensed import Sensed
+from harness.simulate.components.orientation_offset import Turned
+from harness.simulate.components.position_offset import Displaced
+from harness.simulate.components.session_bias import Session
+from harness.simulate.components.soft_tissue import Wobble
+from harness.simulate.components.speed_error import Speed
+from harness.simulate.components.strap_slip import Loose
+from harness.simulate.components.white_noise import White
+from harness.simulate.readings import Sensed
 
 LEVELS = ("clean", "noise", "default")
 

@@ -9,7 +9,7 @@ import numpy as np
 from harness.errors import HarnessError
 from harness.reconstruct import registry
 from harness.stream.frame import TrackerFrame
-from harness.testing.trial import make_trial, only_positions, told
+from harness.testing.contract_case import make_trial, only_positions, told
 
 _FRAMES = 8
 

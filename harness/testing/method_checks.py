@@ -6,9 +6,9 @@ from typing import Any
 
 from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Method
+from harness.testing.contract_case import make_trial
 from harness.testing.rules import RULES
-from harness.testing.rules.seen import Broken
-from harness.testing.trial import make_trial
+from harness.testing.rules.assertions import Broken
 
 
 class MethodBroken(HarnessError):

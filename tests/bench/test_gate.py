@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from harness.bench import gate
-from harness.bench.gate_errors import KINDS, METRICS, Population, population
+from harness.bench import regression_gate
+from harness.bench.null_errors import KINDS, METRICS, Population, population
+from harness.compare.margins import GATED
 from harness.core.seeds import generator
-from harness.score.margins import GATED
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +25,8 @@ def test_stored_errors_are_real_differences_of_many_clips(kind: str) -> None:
     assert set(METRICS) <= set(GATED)
 
 
-@pytest.mark.parametrize("draw", [gate.exchanged, gate.heavy, gate.centred])
-def test_drawn_studies_hold_nothing(draw: gate.Draw, settings: Population) -> None:
+@pytest.mark.parametrize("draw", [regression_gate.exchanged, regression_gate.heavy, regression_gate.centred])
+def test_drawn_studies_hold_nothing(draw: regression_gate.Draw, settings: Population) -> None:
     """Over many draws no side is better in any line."""
     rng = generator(1, "many")
     means = []
@@ -39,7 +39,7 @@ def test_drawn_studies_hold_nothing(draw: gate.Draw, settings: Population) -> No
 
 def test_an_exchange_keeps_what_metrics_of_a_clip_share(settings: Population) -> None:
     stored = {tuple(sorted(map(float, pair))) for pair in settings.errors[0, 0]}
-    errors = gate.exchanged(settings, 200, generator(1, "one"))
+    errors = regression_gate.exchanged(settings, 200, generator(1, "one"))
     assert {tuple(sorted(map(float, pair))) for pair in errors[0, 0]} <= stored
     both = settings.errors[0]
     for n in range(200):
@@ -54,26 +54,28 @@ def test_worse_is_what_a_comparison_calls_worse(settings: Population) -> None:
     """Studies skip intervals that cannot matter; verdicts stay those of the gate."""
     seen = 0
     for n in range(4):
-        errors = gate.exchanged(settings, 12, generator(1, "both ways", n))[:2]
+        errors = regression_gate.exchanged(settings, 12, generator(1, "both ways", n))[:2]
         errors[n % 2, :, :, 1] *= 1.0 + 0.03 * n
-        study = gate.study_of(errors)
+        study = regression_gate.study_of(errors)
         assert [verdict == "worse" for verdict in study.verdicts] == study.worse.tolist()
         seen += int(study.worse.sum())
     assert seen >= 4
 
 
 def test_most_lines_of_equally_good_sides_are_told_the_same(settings: Population) -> None:
-    assert 0.8 <= gate.told_same(settings, 24, 3, 1) <= 1.0
+    assert 0.8 <= regression_gate.told_same(settings, 24, 3, 1) <= 1.0
 
 
 @pytest.mark.parametrize(("count", "of", "most"), [(0, 1000, 0.00299), (25, 1000, 0.0349), (50, 50, 1.0)])
 def test_rates_are_bounded_as_printed_tables_have_it(count: int, of: int, most: float) -> None:
-    assert gate.at_most(count, of) == pytest.approx(most, rel=0.01)
-    assert gate.at_least(of - count, of) == pytest.approx(1.0 - most, abs=1e-3)
+    assert regression_gate.at_most(count, of) == pytest.approx(most, rel=0.01)
+    assert regression_gate.at_least(of - count, of) == pytest.approx(1.0 - most, abs=1e-3)
 
 
-def false_alarms(people: Population, studies: int, clips: int = 24, draw: gate.Draw = gate.exchanged) -> int:
-    return gate.alarms(people, clips, studies, 1, draw)
+def false_alarms(
+    people: Population, studies: int, clips: int = 24, draw: regression_gate.Draw = regression_gate.exchanged
+) -> int:
+    return regression_gate.alarms(people, clips, studies, 1, draw)
 
 
 def test_few_of_the_studies_alarm_falsely(settings: Population) -> None:
@@ -81,21 +83,27 @@ def test_few_of_the_studies_alarm_falsely(settings: Population) -> None:
 
 
 def test_most_changes_of_3_percent_are_found(settings: Population) -> None:
-    assert gate.found(settings, 24, 20, 1).mean() >= 0.9
-    assert not gate.found(settings, 24, 6, 1, change=0.0).any()
+    assert regression_gate.found(settings, 24, 20, 1).mean() >= 0.9
+    assert not regression_gate.found(settings, 24, 6, 1, change=0.0).any()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("clips", "draw"),
-    [(24, gate.exchanged), (12, gate.exchanged), (8, gate.exchanged), (24, gate.heavy), (24, gate.centred)],
+    [
+        (24, regression_gate.exchanged),
+        (12, regression_gate.exchanged),
+        (8, regression_gate.exchanged),
+        (24, regression_gate.heavy),
+        (24, regression_gate.centred),
+    ],
 )
-def test_false_alarms_stay_below_5_percent(clips: int, draw: gate.Draw, settings: Population) -> None:
-    count = false_alarms(settings, gate.STUDIES, clips, draw)
-    print(f"{draw.__name__}, {clips} clips: {count} of {gate.STUDIES}")
-    assert gate.at_most(count, gate.STUDIES) <= 0.05
+def test_false_alarms_stay_below_5_percent(clips: int, draw: regression_gate.Draw, settings: Population) -> None:
+    count = false_alarms(settings, regression_gate.STUDIES, clips, draw)
+    print(f"{draw.__name__}, {clips} clips: {count} of {regression_gate.STUDIES}")
+    assert regression_gate.at_most(count, regression_gate.STUDIES) <= 0.05
 
 
 @pytest.mark.slow
 def test_a_change_of_3_percent_is_found_in_9_of_10_studies(settings: Population) -> None:
-    assert gate.found(settings, 24, gate.CHANGED, 1).mean() >= 0.9
+    assert regression_gate.found(settings, 24, regression_gate.CHANGED, 1).mean() >= 0.9

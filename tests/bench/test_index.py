@@ -1,6 +1,6 @@
 """The bench of indexes: exact search is exact, the chosen index finds enough, and every figure is named once."""
 
-from harness.bench.index import bench_index
+from harness.bench.neighbour_search import bench_index
 
 
 def test_recall_of_every_index_on_a_small_set() -> None:

@@ -8,9 +8,9 @@ import pytest
 
 pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 
-from harness import trials
-from harness.bench import alone, methods
-from harness.bench.alone import NOTHING
+from harness.bench import methods, peak_memory
+from harness.bench.peak_memory import NOTHING
+from harness.experiment import benchmark_clips
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
 
@@ -19,14 +19,14 @@ from harness.reconstruct.database import MotionDatabase
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten takes, two of each behaviour, one of them of the performer who is followed."""
     where = tmp_path_factory.mktemp("bench") / "database"
-    MotionDatabase.build(trials.body(), trials.makers(8_000, 1), folder=where)
+    MotionDatabase.build(benchmark_clips.body(), benchmark_clips.makers(8_000, 1), folder=where)
     return where
 
 
 def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(methods, "SECONDS", 2.0)
     learnt = MotionDatabase.open(folder)
-    fitted = {name: trials.learner(name, learnt, 1) for name in ("weighted_blend", "ik")}
+    fitted = {name: benchmark_clips.learner(name, learnt, 1) for name in ("weighted_blend", "ik")}
     tallies = methods.beside_mink(fitted, 1, lambda *_: None)
     assert set(tallies) == {"weighted_blend", "ik", "mink"}
     assert {len(tally.turn_s) for tally in tallies.values()} == {5}
@@ -57,11 +57,11 @@ def test_options_change_the_hash() -> None:
 
 def test_memory_is_that_of_the_process_alone(folder: Path) -> None:
     held = np.ones(30_000_000)  # 240 MB that a child must not count
-    nothing = alone.run_alone(NOTHING, folder, 1)
+    nothing = peak_memory.run_alone(NOTHING, folder, 1)
     assert held[-1] == 1.0
     assert nothing > 50e6
     if sys.platform == "linux":
-        assert nothing < alone.peak_bytes()
+        assert nothing < peak_memory.peak_bytes()
 
 
 def test_recall_is_judged_by_exact_search(folder: Path) -> None:

@@ -4,8 +4,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from harness.bench import sweep
-from harness.config import variants
-from harness.study.expand import expand, load_sweep
+from harness.experiment.scenario import variants
+from harness.experiment.sweep_config import expand, load_sweep
 
 
 def test_what_is_judged_beside_are_the_cells_of_the_sweep(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body.box import BoxQP
+from harness.body.box_qp import BoxQP
 
 
 @pytest.mark.parametrize("half_width", [np.inf, 1.0, 0.05])

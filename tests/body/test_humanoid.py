@@ -10,7 +10,7 @@ import pytest
 
 from harness.body import anatomy, humanoid, mjcf, mounts
 from harness.core import humanoid24, skeleton
-from harness.core.share import share_folder
+from harness.core.package_data import share_folder
 from harness.core.skeleton import Skeleton
 from harness.core.workers import call_each
 from harness.errors import BadInput

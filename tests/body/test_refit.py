@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.body import anatomy, ground, humanoid, refit
+from harness.body import anatomy, bone_directions, ground, humanoid
 from harness.core import humanoid24, skeleton
 from harness.core.arrays import Floats
 from harness.core.skeleton import Pose, Skeleton
@@ -24,9 +24,9 @@ def directions(own: Skeleton, qpos: Floats, angles_rad: Floats) -> Floats:
 def test_equal_bodies_keep_their_angles(lanky: Skeleton, rng: np.random.Generator) -> None:
     qpos = random_qpos(rng, 30)
     _, _, angles_rad = humanoid24.unpack(qpos)
-    np.testing.assert_allclose(refit.pointing_alike(lanky, qpos, lanky), angles_rad, atol=1e-6)
+    np.testing.assert_allclose(bone_directions.pointing_alike(lanky, qpos, lanky), angles_rad, atol=1e-6)
     longer = lanky.with_bones(1.2 * lanky.bone_m)
-    np.testing.assert_allclose(refit.pointing_alike(lanky, qpos, longer), angles_rad, atol=1e-6)
+    np.testing.assert_allclose(bone_directions.pointing_alike(lanky, qpos, longer), angles_rad, atol=1e-6)
 
 
 def test_three_hinges_point_exactly_and_fewer_come_nearer(lanky: Skeleton, rng: np.random.Generator) -> None:
@@ -35,7 +35,7 @@ def test_three_hinges_point_exactly_and_fewer_come_nearer(lanky: Skeleton, rng: 
     meant = directions(lanky, qpos, kept_rad)
     before, after = (
         np.linalg.norm(directions(STANDARD, qpos, angles) - meant, axis=2).mean(axis=0)
-        for angles in (kept_rad, refit.pointing_alike(lanky, qpos, STANDARD))
+        for angles in (kept_rad, bone_directions.pointing_alike(lanky, qpos, STANDARD))
     )
     assert np.max(after[FREE]) < 1e-7
     np.testing.assert_allclose(after[RIGID], before[RIGID])
@@ -46,7 +46,7 @@ def test_a_correction_never_leaves_the_limits(rng: np.random.Generator) -> None:
     bone_m = np.array(STANDARD.bone_m)
     bone_m[STANDARD.index("lclavicle")] = [0.15, 0.12, 0.0]  # 55 deg off: more than the clavicle's hinges allow
     qpos = random_qpos(rng, 50)
-    fitted = refit.pointing_alike(STANDARD.with_bones(bone_m), qpos, STANDARD)
+    fitted = bone_directions.pointing_alike(STANDARD.with_bones(bone_m), qpos, STANDARD)
     where = STANDARD.dof_of_bone[STANDARD.index("lclavicle")]
     low, high = humanoid24.limits_rad()[where].T
     assert np.all((fitted[:, where] >= low) & (fitted[:, where] <= high))
@@ -57,8 +57,11 @@ def test_angles_stay_near_the_own_ones_across_turns_and_twins(lanky: Skeleton, r
     smooth = np.cumsum(rng.normal(scale=0.05, size=(400, 48)), axis=0) + 5.0
     qpos = humanoid24.pack(np.zeros((400, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (400, 1)), smooth)
     small = STANDARD.with_bones(0.98 * STANDARD.bone_m + 0.02 * lanky.bone_m)
-    assert np.max(np.abs(refit.pointing_alike(small, qpos, STANDARD)[:, _one_hinge()] - smooth[:, _one_hinge()])) < 0.1
-    fitted = refit.pointing_alike(small, qpos, STANDARD)
+    assert (
+        np.max(np.abs(bone_directions.pointing_alike(small, qpos, STANDARD)[:, _one_hinge()] - smooth[:, _one_hinge()]))
+        < 0.1
+    )
+    fitted = bone_directions.pointing_alike(small, qpos, STANDARD)
     assert np.max(np.abs(fitted - smooth)) < np.pi + 0.1
 
 

@@ -9,16 +9,16 @@ import numpy as np
 from harness.body.humanoid import build
 from harness.body.kinematics import Kinematics
 from harness.body.mounts import DEFAULTS, Mount, place
-from harness.calibrate.bone_space import BoneSpace, bone_space
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrate.tpose import LEVEL
+from harness.calibrate.skeleton_prior import BoneSpace, bone_space
+from harness.calibrate.tpose_calibration import LEVEL
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.mocap.performer import population
+from harness.mocap.synthetic import population
 from harness.stream.frame import TrackerFrame
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")

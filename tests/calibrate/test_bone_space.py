@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from harness.calibrate.bone_space import LEAST_REST_M, bone_space
+from harness.calibrate.skeleton_prior import LEAST_REST_M, bone_space
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadInput
-from harness.mocap.performer import population
+from harness.mocap.synthetic import population
 from tests.calibrate.standing_model import straightened
 
 PEOPLE = population(60, seed=5)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.body.mounts import DEFAULTS
-from harness.calibrate.bundle import Bundle, Expected, Normal, level_turn_rad, mean_turns
+from harness.calibrate.bundle_adjustment import Bundle, Expected, Normal, level_turn_rad, mean_turns
 from harness.calibrate.poses import POSES, angles_rad
 from harness.calibrate.unknowns import Shared, Solution
 from harness.core import rotations

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from harness.calibrate.chain import Chain, Reached
+from harness.calibrate.station_kinematics import Chain, Reached
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import standard_skeleton

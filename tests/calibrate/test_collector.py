@@ -9,19 +9,19 @@ import pytest
 
 from harness.body import humanoid
 from harness.body.mounts import DEFAULTS
-from harness.body.retarget import to_own_body
-from harness.calibrate.collector import PoseCollector
-from harness.calibrate.likeness import Likeness
+from harness.body.retargeting import to_own_body
+from harness.calibrate.guided_calibration import HoldPoses
+from harness.calibrate.hold import stood_still
+from harness.calibrate.pose_classifier import Likeness
+from harness.calibrate.pose_collector import PoseCollector
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrate.still import stood_still
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
-from harness.live.calibrate import HoldPoses
-from harness.mocap import performer
-from harness.simulate.holding import hold_times_s, holding
+from harness.mocap import synthetic
+from harness.simulate.held_poses import hold_times_s, holding
 from harness.simulate.noise import level
-from harness.simulate.simulate import TrackerConfig, simulate
+from harness.simulate.simulation import TrackerConfig, simulate
 from harness.stream.frame import TrackerFrame
 from tests.calibrate.test_tpose import changed
 
@@ -102,7 +102,7 @@ def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
 @pytest.mark.parametrize(("stations", "miss_deg"), [(SIX, 5.0), (FOUR, 2.5), (FOUR, 5.0)])
 def test_poor_poses_of_other_people_are_taken(stations: tuple[str, ...], miss_deg: float) -> None:
     """Nothing is known of the performer."""
-    clip = performer.generate("walking", "p3", 1, seed=1, duration_s=3.0)
+    clip = synthetic.generate("walking", "p3", 1, seed=1, duration_s=3.0)
     who = to_own_body(clip)[0]
     poses = [configuration(one, who.skeleton) for one in POSES]
     _, said = collected(stream(poses, stations, miss_deg=miss_deg, seed=3, who=who), stations)
@@ -156,7 +156,7 @@ def test_whoever_stops_early_is_told_what_there_was() -> None:
 
 
 def test_whoever_walks_holds_nothing() -> None:
-    who, take = to_own_body(performer.generate("walking", "p1", 1, seed=1, duration_s=8.0, rate_hz=60.0))
+    who, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=8.0, rate_hz=60.0))
     mounts = [DEFAULTS[name] for name in SIX]
     frames = simulate(who, take, mounts, TrackerConfig(rate_hz=RATE_HZ), level("default"), seed=1).frames
     collector, said = collected(frames, blind=True)

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.calibrate import doubts
-from harness.calibrate.bundle import Bundle
-from harness.calibrate.eight import EightPoses, calibrate_poses
-from harness.calibrate.fit import fit
+from harness.calibrate import pose_checks
+from harness.calibrate.bundle_adjustment import Bundle
+from harness.calibrate.bundle_fit import fit
+from harness.calibrate.hold import NotStanding
+from harness.calibrate.pose_calibration import EightPoses, calibrate_poses
 from harness.calibrate.poses import POSES, angles_rad
-from harness.calibrate.still import NotStanding
-from harness.calibrate.tpose import LEVEL
+from harness.calibrate.tpose_calibration import LEVEL
 from harness.calibrate.unknowns import Shared
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -229,9 +229,9 @@ def test_stations_that_do_not_tell_the_heading_are_refused() -> None:
     shared = Shared(standard_skeleton(), space(), model.mounts)
     bundle = Bundle(shared, asked_rad, place_m, rotations.to_matrix(turn))
     found = fit(bundle, 0.001, 0.005)
-    doubts.require_poses(bundle, found)
+    pose_checks.require_poses(bundle, found)
     with pytest.raises(NotStanding, match="torso, head do not tell which way the performer faces"):
-        doubts.require_poses(bundle, replace(found, heading_sd_rad=0.4))
+        pose_checks.require_poses(bundle, replace(found, heading_sd_rad=0.4))
 
 
 def test_other_numbers_of_poses_or_stations_are_refused() -> None:

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.calibrate.file import CalibrationFile, read_calibration, write_calibration
+from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput

@@ -13,19 +13,19 @@ from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics, joint_centres_m
 from harness.body.mounts import DEFAULTS, Mount, place
-from harness.body.retarget import to_own_body
-from harness.calibrate.still import NotStanding, median_rotation
-from harness.calibrate.tpose import LEVEL, TPoseCollector, calibrate_tpose
+from harness.body.retargeting import to_own_body
+from harness.calibrate.hold import NotStanding, median_rotation
+from harness.calibrate.tpose_calibration import LEVEL, TPoseCollector, calibrate_tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.motion import Take
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.mocap import performer
-from harness.reconstruct.ik import PREVIOUS
+from harness.mocap import synthetic
+from harness.reconstruct.methods.ik import PREVIOUS
 from harness.simulate.noise import level
-from harness.simulate.simulate import TrackerConfig, simulate
+from harness.simulate.simulation import TrackerConfig, simulate
 from harness.stream.frame import TrackerFrame
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -96,7 +96,7 @@ class Session:
 @cache
 def bodies() -> tuple[Body, ...]:
     """The standard body, and three of other proportions."""
-    clips = [performer.generate("walking", who, 1, seed=1, duration_s=3.0) for who in performer.performers()[:3]]
+    clips = [synthetic.generate("walking", who, 1, seed=1, duration_s=3.0) for who in synthetic.performers()[:3]]
     return (humanoid.build(), *(to_own_body(clip)[0] for clip in clips))
 
 
@@ -222,7 +222,7 @@ def refusal(session: Session, frames: Sequence[TrackerFrame]) -> str:
 
 @pytest.mark.parametrize("noise", ["clean", "default"])
 def test_someone_who_walks_is_told_to_stand(noise: str) -> None:
-    body, take = to_own_body(performer.generate("walking", "p1", 1, seed=1, duration_s=3.5, rate_hz=40.0))
+    body, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.5, rate_hz=40.0))
     session = Session(body, noise=noise)
     assert "moved" in refusal(session, session.seen(take.qpos)[0])
 
@@ -348,7 +348,7 @@ def test_the_median_of_rotations_leaves_outliers_alone(rng: np.random.Generator)
 @pytest.mark.parametrize("noise", ["clean", "noise"])
 def test_a_method_reaches_nearly_as_far_as_with_the_truth(noise: str) -> None:
     """Half as far off again, in joint centres, as with the true calibration, and 5 mm where that is perfect."""
-    body, take = to_own_body(performer.generate("walking", "p1", 1, seed=1, duration_s=3.0, rate_hz=40.0))
+    body, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.0, rate_hz=40.0))
     session = Session(body, noise=noise)
     found = calibrate_tpose(session.held()[0], body, session.mounts).calibration
     frames, truth = session.seen(take.qpos)

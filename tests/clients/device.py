@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
+from harness.stream.codec.records import from_yaw_pitch_roll_deg
+from harness.stream.codec.samples import Samples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.serve import serving
-from harness.stream.records import from_yaw_pitch_roll_deg
-from harness.stream.samples import Samples
+from harness.stream.emulator.server import serving
 
 RADIUS_M, LAP_S, QUALITY = 0.3, 5.0, 214
 ROOT = Path(__file__).parents[2]

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.core.protocol import Part, allowed_frames, examples_of, refuse_leak
+from harness.core.split import Part, allowed_frames, examples_of, refuse_leak
 from harness.errors import BadInput
 
 SUBJECTS = {"13_17": "13", "13_30": "13", "14_02": "14"}

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import harness
-from harness.core.share import share_folder
+from harness.core.package_data import share_folder
 from harness.errors import UnknownName
 
 

@@ -15,9 +15,9 @@ from harness.core.humanoid24 import unpack
 from harness.errors import BadFile
 from harness.live.bvh import Bvh
 from harness.live.pose import LivePose
-from harness.live.table import Table
-from harness.mocap.export_bvh import bvh_files
-from harness.mocap.export_motion import Motion
+from harness.live.pose_table import Table
+from harness.mocap.write.bvh import bvh_files
+from harness.mocap.write.posed_motion import Motion
 from tests.live.posing import configuration, frame, live_pose
 
 RATE_HZ = 40.0

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from harness.body import humanoid
-from harness.calibrate.still import NotStanding
+from harness.calibrate.guided_calibration import Say, StandInTPose
+from harness.calibrate.hold import NotStanding
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import Take
+from harness.experiment.clip_evaluation import mounts_of, noise_of
+from harness.experiment.playback import Rehearsal, rehearse
 from harness.live import summary
-from harness.live.calibrate import Say, StandInTPose
-from harness.live.floor import Floor
-from harness.live.perform import Performed, Plan, perform, warm_up
 from harness.live.pose import LivePose
-from harness.rehearsal import Rehearsal, rehearse
-from harness.setting import mounts_of, noise_of
-from harness.simulate.simulate import simulate
+from harness.live.scheduling_jitter import Floor
+from harness.live.session import Performed, Plan, perform, warm_up
+from harness.simulate.simulation import simulate
 from harness.stream.frame import TrackerFrame, TrackerStream
 from tests.live.posing import frame
 from tests.live.streams import Broken, Paced

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from harness.cli import main
+from harness.experiment.playback import Rehearsal, rehearse
 from harness.reconstruct import registry
-from harness.rehearsal import Rehearsal, rehearse
-from harness.stream.emulator.serve import serving
+from harness.stream.emulator.server import serving
 from tests.interrupts import heeding_interrupts
 
 WHAT = ["--scenario", "demo", "--clip", "boxing_p1_01", "--method", "ik"]

@@ -10,7 +10,7 @@ import pytest
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.errors import BadFile, BadInput
-from harness.live.view import View, _made
+from harness.live.viewer import View, _made
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")

@@ -12,9 +12,9 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
-from harness.mocap.amass import JOINTS, SMPL_MAP
-from harness.mocap.asf import INCH_M, WORLD_FROM_ASF
-from harness.mocap.bvh import CMU_MAP
+from harness.mocap.read.amass import JOINTS, SMPL_MAP
+from harness.mocap.read.asf import INCH_M, WORLD_FROM_ASF
+from harness.mocap.read.bvh import CMU_MAP
 
 UNIT_M = INCH_M / 0.45
 LEFT_OUT = ("thorax", "lwrist", "rwrist")

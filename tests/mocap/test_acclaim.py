@@ -12,9 +12,9 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip
 from harness.core.skeleton import forward
 from harness.errors import BadFile, BadInput
-from harness.mocap import files
-from harness.mocap.acclaim import read_amc, read_asf, read_asf_file, read_clip
 from harness.mocap.library import MotionLibrary
+from harness.mocap.read import file_checks
+from harness.mocap.read.acclaim import read_amc, read_asf, read_asf_file, read_clip
 from tests.mocap.synthetic import UNIT_M, amc_text, asf_text, clip
 
 ASF, AMC = asf_text(standard_skeleton()), amc_text(clip(4))
@@ -199,7 +199,7 @@ def test_a_rate_that_is_none_is_refused(tmp_path: Path, rate_hz: float) -> None:
 def test_a_huge_file_is_refused_before_it_is_read(tmp_path: Path) -> None:
     huge = tmp_path / "x.amc"
     with huge.open("wb") as file:
-        file.truncate(files.LIMIT_BYTES + 1)  # a hole: it takes no room on the disk
+        file.truncate(file_checks.LIMIT_BYTES + 1)  # a hole: it takes no room on the disk
     skeleton = standard_skeleton()
     tracemalloc.start()
     with pytest.raises(BadFile, match="at most 256 MB"):

@@ -10,9 +10,9 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.errors import BadFile, MissingExtra
-from harness.mocap import c3d, c3d_child
-from harness.mocap.c3d import marker_spreads, read_c3d
 from harness.mocap.library import MotionLibrary
+from harness.mocap.read import c3d, ezc3d_process
+from harness.mocap.read.c3d import marker_spreads, read_c3d
 
 ezc3d = pytest.importorskip("ezc3d", reason="C3D files need the extra c3d")
 
@@ -104,12 +104,12 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int) -> None:
 
 def test_a_crash_of_ezc3d_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _write(tmp_path / "x.c3d", np.ones((3, 3, 3)))
-    for how, found in ((-11, "it crashes"), (c3d_child.REFUSED, "ValueError: no")):
+    for how, found in ((-11, "it crashes"), (ezc3d_process.REFUSED, "ValueError: no")):
         done = subprocess.CompletedProcess([], how, "", "ValueError: no\n")
         monkeypatch.setattr(subprocess, "run", lambda *args, done=done, **options: done)
         with pytest.raises(BadFile, match=found):
             read_c3d(tmp_path / "x.c3d")
-    missing = subprocess.CompletedProcess([], c3d_child.NO_EZC3D, "", "")
+    missing = subprocess.CompletedProcess([], ezc3d_process.NO_EZC3D, "", "")
     monkeypatch.setattr(subprocess, "run", lambda *args, **options: missing)
     with pytest.raises(MissingExtra, match=r"tracker-harness\[c3d\]"):
         read_c3d(tmp_path / "x.c3d")
@@ -124,7 +124,7 @@ def test_a_file_that_keeps_ezc3d_busy_is_given_up(tmp_path: Path, monkeypatch: p
 
 def test_the_child_says_when_ezc3d_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ezc3d", None)
-    assert c3d_child.main("any", "any") == c3d_child.NO_EZC3D
+    assert ezc3d_process.main("any", "any") == ezc3d_process.NO_EZC3D
 
 
 SPREAD_M = {"02_01": (0.012, 0.030), "02_05": (0.020, 0.045), "05_13": (0.040, 0.110)}

@@ -13,13 +13,13 @@ from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.core.skeleton import Skeleton, forward
 from harness.errors import BadInput, UnknownName
-from harness.mocap.bvh import read_bvh
-from harness.mocap.export import FORMATS, export
-from harness.mocap.export_bvh import euler_zyx_deg
-from harness.mocap.export_tum import POINTS
-from harness.score.doctor import evo_ape_mean_m, evo_program
+from harness.mocap.read.bvh import read_bvh
+from harness.mocap.write.bvh import euler_zyx_deg
+from harness.mocap.write.export import FORMATS, export
+from harness.mocap.write.tum import POINTS
 from harness.score.pair import Pair, posed
 from harness.score.positions import root_position_mm
+from harness.testing.score_checks import evo_ape_mean_m, evo_program
 
 FRAMES, RATE_HZ = 50, 40.0
 SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile
-from harness.mocap import amass, bvh
-from harness.mocap.acclaim import read_amc, read_asf
-from harness.mocap.c3d_header import check_header
-from harness.mocap.joints import JointClip
+from harness.mocap.read import amass, bvh
+from harness.mocap.read.acclaim import read_amc, read_asf
+from harness.mocap.read.c3d_header import check_header
+from harness.mocap.read.joint_clip import JointClip
 from tests.mocap.synthetic import amass_arrays, amc_text, asf_text, bvh_text, clip
 
 SKELETON = standard_skeleton()

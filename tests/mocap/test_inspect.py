@@ -10,7 +10,7 @@ import pytest
 from harness.core.arrays import Floats
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
-from harness.mocap.inspect import inspect_clip, inspect_file
+from harness.mocap.file_inspection import inspect_clip, inspect_file
 from harness.mocap.library import MotionLibrary
 from tests.mocap.synthetic import amass_arrays, asf_text, bvh_text, clip, write_clip
 

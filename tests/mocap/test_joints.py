@@ -10,9 +10,9 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.skeleton import forward
 from harness.errors import BadFile, BadInput
-from harness.mocap import amass, bvh
-from harness.mocap.joints import fit_hinges
 from harness.mocap.library import MotionLibrary
+from harness.mocap.read import amass, bvh
+from harness.mocap.read.joint_clip import fit_hinges
 from tests.mocap.synthetic import LEFT_OUT, UNIT_M, amass_arrays, bvh_text, clip
 
 SHARED = ["02_01", "02_05", "05_13", "07_05", "14_08", "16_16", "29_01", "49_06"]

@@ -12,21 +12,21 @@ from harness.core.arrays import Bools, Floats
 from harness.core.motion import Clip
 from harness.core.skeleton import Pose, forward
 from harness.errors import BadInput, UnknownName
-from harness.mocap import performer
-from harness.mocap.inspect import inspect_clip
-from harness.mocap.performer.curves import GRAVITY_M_S2
-from harness.mocap.performer.feet import ANKLE_M, BALL_M, HEEL_BEHIND_M, flat_pitch_rad
+from harness.mocap import synthetic
+from harness.mocap.file_inspection import inspect_clip
+from harness.mocap.synthetic.curves import GRAVITY_M_S2
+from harness.mocap.synthetic.foot_trajectory import ANKLE_M, BALL_M, HEEL_BEHIND_M, flat_pitch_rad
 
 TAKES = [("p1", 1), ("p2", 2), ("p3", 3), ("p4", 4), ("p5", 5), ("p6", 6), ("p7", 3), ("p8", 2)]
 """Every performer, every take number."""
-EVERY = [(behaviour, who, take) for behaviour in performer.BEHAVIOURS for who, take in TAKES]
+EVERY = [(behaviour, who, take) for behaviour in synthetic.BEHAVIOURS for who, take in TAKES]
 on_every_take = pytest.mark.parametrize(("behaviour", "who", "take"), EVERY)
-on_every_behaviour = pytest.mark.parametrize("behaviour", performer.BEHAVIOURS)
+on_every_behaviour = pytest.mark.parametrize("behaviour", synthetic.BEHAVIOURS)
 
 
 @cache
 def made(behaviour: str, who: str, take: int, seed: int = 7) -> tuple[Clip, Pose]:
-    clip = performer.generate(behaviour, who, take, seed=seed)
+    clip = synthetic.generate(behaviour, who, take, seed=seed)
     return clip, forward(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
 
 
@@ -65,40 +65,40 @@ def runs(mask: Bools) -> list[tuple[int, int]]:
 
 @on_every_behaviour
 def test_take_names_carry_performer_and_number(behaviour: str) -> None:
-    names = performer.take_names(behaviour)
+    names = synthetic.take_names(behaviour)
     assert len(set(names)) == len(names) >= 12
     for name in names[:: len(names) // 3]:
         who, take = name.split("_")[-2:]
-        clip = performer.generate(behaviour, who, int(take), seed=1, duration_s=1.0)
+        clip = synthetic.generate(behaviour, who, int(take), seed=1, duration_s=1.0)
         assert (clip.name, clip.subject, clip.behaviour) == (name, who, behaviour)
         assert clip.source == "built-in performer"
 
 
 @on_every_behaviour
 def test_the_same_seed_gives_the_same_bytes(behaviour: str) -> None:
-    first, again, other = (performer.generate(behaviour, "p2", 3, seed=seed) for seed in (5, 5, 6))
+    first, again, other = (synthetic.generate(behaviour, "p2", 3, seed=seed) for seed in (5, 5, 6))
     for field in ("root_m", "world_from_root", "angles_rad"):
         assert getattr(first, field).tobytes() == getattr(again, field).tobytes()
     assert np.mean(np.abs(first.angles_rad - other.angles_rad)) > np.deg2rad(1.0)
 
 
 def test_duration_and_rate_are_as_asked() -> None:
-    clip = performer.generate("golf", "p1", 1, seed=0, duration_s=5.0, rate_hz=60.0)
+    clip = synthetic.generate("golf", "p1", 1, seed=0, duration_s=5.0, rate_hz=60.0)
     assert clip.duration_s == pytest.approx(5.0)
     assert clip.rate_hz == 60.0
 
 
 def test_unknown_names_are_refused_with_the_choices() -> None:
     with pytest.raises(UnknownName, match="boxing"):
-        performer.take_names("boxin")
+        synthetic.take_names("boxin")
     with pytest.raises(UnknownName, match="p1"):
-        performer.generate("boxing", "nobody", 1, seed=0)
+        synthetic.generate("boxing", "nobody", 1, seed=0)
     with pytest.raises(BadInput, match="from 1"):
-        performer.generate("boxing", "p1", 0, seed=0)
+        synthetic.generate("boxing", "p1", 0, seed=0)
 
 
 def test_performers_differ_in_proportions_as_people_do() -> None:
-    skeletons = [performer.skeleton(who) for who in performer.performers()]
+    skeletons = [synthetic.skeleton(who) for who in synthetic.performers()]
     standard = humanoid24.standard_skeleton()
     assert len(skeletons) >= 6
     lengths = np.array([s.length_m for s in skeletons])
@@ -112,9 +112,9 @@ def test_performers_differ_in_proportions_as_people_do() -> None:
 
 
 def test_a_population_is_other_people_of_the_same_spread() -> None:
-    many = performer.population(400, seed=3)
+    many = synthetic.population(400, seed=3)
     lengths = np.array([person.length_m for person in many])
-    own = np.array([performer.skeleton(who).length_m for who in performer.performers()])
+    own = np.array([synthetic.skeleton(who).length_m for who in synthetic.performers()])
     nearest = np.abs(lengths[:, None] - own).max(axis=-1).min()
     assert nearest > 1e-3, "a performer among them"
     standard = humanoid24.standard_skeleton()
@@ -125,7 +125,7 @@ def test_a_population_is_other_people_of_the_same_spread() -> None:
 
 
 def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
-    few, many, other = (performer.population(count, seed) for count, seed in ((3, 5), (9, 5), (3, 6)))
+    few, many, other = (synthetic.population(count, seed) for count, seed in ((3, 5), (9, 5), (3, 6)))
     for one, same in zip(few, many, strict=False):
         np.testing.assert_array_equal(one.bone_m, same.bone_m)
     lengths = np.array([person.length_m for person in (*many, *other)])
@@ -134,7 +134,7 @@ def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
 
 def test_the_performers_are_the_ones_that_results_were_measured_on() -> None:
     """Rounded: the last bit of a sine is the machine's."""
-    bones_m = np.round([performer.skeleton(who).bone_m for who in performer.performers()], 9) + 0.0
+    bones_m = np.round([synthetic.skeleton(who).bone_m for who in synthetic.performers()], 9) + 0.0
     assert blake2b(bones_m.tobytes(), digest_size=8).hexdigest() == "b81940f776d8d094"
 
 
@@ -281,6 +281,6 @@ def test_a_take_is_made_quickly(behaviour: str) -> None:
     spent_s = []
     for take in (1, 2, 3):
         start_s = time.process_time()
-        performer.generate(behaviour, "p1", take, seed=99)
+        synthetic.generate(behaviour, "p1", take, seed=99)
         spent_s.append(time.process_time() - start_s)
     assert min(spent_s) < 1.0  # of 20 s

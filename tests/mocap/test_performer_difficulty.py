@@ -7,7 +7,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import Clip
 from harness.core.skeleton import forward
-from harness.mocap import performer
+from harness.mocap import synthetic
 
 STATIONS = {"head": 0.5, "thorax": 0.5, "lhand": 0.5, "rhand": 0.5, "ltibia": 0.9, "rtibia": 0.9}
 """Bones that carry a tracker, and where along them."""
@@ -40,12 +40,12 @@ def mean_error_deg(estimate: Floats, truth: Floats) -> float:
     return float(np.rad2deg(np.abs((estimate - truth + np.pi) % (2.0 * np.pi) - np.pi)).mean())
 
 
-@pytest.mark.parametrize("behaviour", performer.BEHAVIOURS)
+@pytest.mark.parametrize("behaviour", synthetic.BEHAVIOURS)
 def test_learning_from_other_takes_beats_the_mean_pose_threefold(behaviour: str) -> None:
     """Kernel ridge regression from tracker readings to angles, trained on every take but the one it is judged on."""
     takes = {
-        (who, take): features(performer.generate(behaviour, who, take, seed=7, rate_hz=30.0), 10)
-        for who in performer.performers()
+        (who, take): features(synthetic.generate(behaviour, who, take, seed=7, rate_hz=30.0), 10)
+        for who in synthetic.performers()
         for take in range(1, 5)
     }
     for judged in JUDGED:

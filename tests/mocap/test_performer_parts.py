@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.mocap import performer
-from harness.mocap.performer import curves, limbs
-from harness.mocap.performer.feet import BALL_M, Plant, flat_pitch_rad, foot
-from harness.mocap.performer.gestures import Gesture, play, timed
+from harness.mocap import synthetic
+from harness.mocap.synthetic import curves, limb_ik
+from harness.mocap.synthetic.foot_trajectory import BALL_M, Plant, flat_pitch_rad, foot
+from harness.mocap.synthetic.gestures import Gesture, play, timed
 
 STEP = 1e-3
 
@@ -90,32 +90,32 @@ def test_gestures_add_up_and_rest_outside() -> None:
 
 def test_euler_angles_are_undone(rng: np.random.Generator) -> None:
     angles = rng.uniform(-1.4, 1.4, (200, 3))
-    m = limbs.about(2, angles[:, 2]) @ limbs.about(1, angles[:, 1]) @ limbs.about(0, angles[:, 0])
-    np.testing.assert_allclose(limbs.euler_xyz(m), angles, atol=1e-9)
+    m = limb_ik.about(2, angles[:, 2]) @ limb_ik.about(1, angles[:, 1]) @ limb_ik.about(0, angles[:, 0])
+    np.testing.assert_allclose(limb_ik.euler_xyz(m), angles, atol=1e-9)
 
 
 def test_the_middle_joint_is_one_bone_from_either_end(rng: np.random.Generator) -> None:
     top, towards = rng.normal(size=(2, 100, 3))
-    end = top + limbs.unit(rng.normal(size=(100, 3))) * rng.uniform(0.2, 0.75, (100, 1))
-    knee = limbs.middle_joint(top, end, towards, 0.41, 0.38)
+    end = top + limb_ik.unit(rng.normal(size=(100, 3))) * rng.uniform(0.2, 0.75, (100, 1))
+    knee = limb_ik.middle_joint(top, end, towards, 0.41, 0.38)
     np.testing.assert_allclose(np.linalg.norm(knee - top, axis=1), 0.41, atol=1e-9)
     np.testing.assert_allclose(np.linalg.norm(end - knee, axis=1), 0.38, atol=1e-9)
-    foot_of_knee = top + limbs.unit(end - top) * np.sum((knee - top) * limbs.unit(end - top), axis=1, keepdims=True)
+    foot_of_knee = top + limb_ik.unit(end - top) * np.sum((knee - top) * limb_ik.unit(end - top), axis=1, keepdims=True)
     assert np.all(np.sum((knee - foot_of_knee) * towards, axis=1) > 0.0)
 
 
 def test_pointing_reaches_its_direction(rng: np.random.Generator) -> None:
     vector = np.array([0.001, -0.03, 0.118])
     a, c = rng.uniform(-0.6, 0.6, (2, 50))
-    wanted = limbs.turned(limbs.about(1, c) @ limbs.about(0, a), limbs.unit(vector))
-    found_a, found_c = limbs.pointing(vector, wanted)
+    wanted = limb_ik.turned(limb_ik.about(1, c) @ limb_ik.about(0, a), limb_ik.unit(vector))
+    found_a, found_c = limb_ik.pointing(vector, wanted)
     np.testing.assert_allclose(found_a, a, atol=1e-9)
     np.testing.assert_allclose(found_c, c, atol=1e-9)
 
 
 def test_a_planted_ball_stays_and_the_foot_arrives() -> None:
     t = np.arange(0.0, 3.0, 0.005)
-    skeleton = performer.skeleton("p1")
+    skeleton = synthetic.skeleton("p1")
     plants = [Plant(0.0, 1.0, (0.0, 0.0), 0.0, 0.3, 0.9, 0.05, 0.33), Plant(1.5, 3.0, (0.8, 0.1), 0.4, 0.3, 0.9)]
     moving = foot(t, skeleton, "l", plants)
     still = (t > 0.3) & (t <= 1.0)

@@ -7,13 +7,13 @@ import pytest
 
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.mocap.skeletons import skeletons
 from tests.mocap.synthetic import asf_text
 
 
 def test_copies_count_once_and_lengths_come_back_in_metres(tmp_path: Path) -> None:
-    people = performer.population(3, seed=1)
+    people = synthetic.population(3, seed=1)
     for subject, person in zip(("9", "10", "11"), people, strict=True):
         for where in ("asf", f"cmu/{subject}"):
             (tmp_path / where).mkdir(parents=True, exist_ok=True)
@@ -27,7 +27,7 @@ def test_copies_count_once_and_lengths_come_back_in_metres(tmp_path: Path) -> No
 
 
 def test_two_skeletons_of_one_subject_are_refused(tmp_path: Path) -> None:
-    first, second = performer.population(2, seed=1)
+    first, second = synthetic.population(2, seed=1)
     for where, person in (("a", first), ("b", second)):
         (tmp_path / where).mkdir()
         (tmp_path / where / "91.asf").write_text(asf_text(person))

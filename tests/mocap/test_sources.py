@@ -4,13 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.mocap.sources import PEOPLE, open_source
 from tests.mocap.synthetic import asf_text
 
 
 def test_a_library_s_people_are_its_skeletons_but_one(tmp_path: Path) -> None:
-    for subject, person in zip(("07", "08", "09"), performer.population(3, seed=1), strict=True):
+    for subject, person in zip(("07", "08", "09"), synthetic.population(3, seed=1), strict=True):
         (tmp_path / f"{subject}.asf").write_text(asf_text(person))
     source = open_source("cmu", tmp_path, seed=1, rate_hz=None)
     assert list(source.people(without="08")) == ["07", "09"]

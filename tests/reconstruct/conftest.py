@@ -7,15 +7,15 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import joint_centres_m
-from harness.body.retarget import to_own_body
+from harness.body.retargeting import to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import Take
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.reconstruct.contract import Method
-from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import combination
 from harness.testing.frames import exact_frames, worn
@@ -58,7 +58,7 @@ class Scene:
 
 
 def scene(behaviour: str, take: int = 1, seconds: float = 3.0) -> Scene:
-    clip = performer.generate(behaviour, performer.performers()[0], take, seed=1, duration_s=seconds, rate_hz=40.0)
+    clip = synthetic.generate(behaviour, synthetic.performers()[0], take, seed=1, duration_s=seconds, rate_hz=40.0)
     body, on_body = to_own_body(clip)
     calibration = worn(body)
     return Scene(body, calibration, on_body, exact_frames(body, calibration, on_body.qpos))

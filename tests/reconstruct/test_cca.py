@@ -6,7 +6,7 @@ import scipy.linalg
 import scipy.spatial
 
 from harness.core.arrays import Floats
-from harness.reconstruct import cca
+from harness.reconstruct.methods import cca
 
 PAIRS, KAPPA = 14, 1e-2
 

@@ -10,8 +10,8 @@ from harness.core.estimate import Estimate, Status
 from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
-from harness.reconstruct.dynamic_map import LITERAL, DynamicMap
-from harness.reconstruct.local_pca import LocalPca
+from harness.reconstruct.methods.dynamic_map import LITERAL, DynamicMap
+from harness.reconstruct.methods.local_pca import LocalPca
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import exact_frames, without
 

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 
 from harness.body.kinematics import joint_centres_m
-from harness.body.retarget import to_common_body
+from harness.body.retargeting import to_common_body
 from harness.core.estimate import Status
 from harness.core.motion import Take
 from harness.core.workers import call_each
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.score.angles import wrapped
 from harness.testing import method_checks
+from harness.testing.contract_case import make_trial
 from harness.testing.frames import exact_frames
 from harness.testing.method_checks import check_method
 from harness.testing.rules import RULES
-from harness.testing.rules.sameness import answers, bears_another_process
-from harness.testing.rules.seen import same
-from harness.testing.trial import make_trial
+from harness.testing.rules.assertions import same
+from harness.testing.rules.reproducibility import answers, bears_another_process
 
 from .conftest import Scene, moved, scene
 
@@ -66,7 +66,7 @@ def walk() -> Scene:
 def others() -> tuple[Take, ...]:
     """Two takes of other people, on the body of the one who walks."""
     clips = [
-        performer.generate(b, performer.performers()[p], 1, seed=1, duration_s=4.0, rate_hz=40.0) for b, p in _OTHERS
+        synthetic.generate(b, synthetic.performers()[p], 1, seed=1, duration_s=4.0, rate_hz=40.0) for b, p in _OTHERS
     ]
     return tuple(to_common_body(clip, walk().body.skeleton)[0] for clip in clips)
 

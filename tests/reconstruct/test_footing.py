@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from harness.body.kinematics import Kinematics
-from harness.reconstruct.controls import Controls
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.database.ground import ground_of, moved, posture_of, standing
 from harness.reconstruct.descent import stood
-from harness.reconstruct.footing import stepped
+from harness.reconstruct.features.ground_step import stepped
+from harness.reconstruct.features.station_features import Controls
+from harness.reconstruct.solver.ground_frame import ground_of, moved, posture_of, standing
 
 from .conftest import Scene
 from .conftest import moved as elsewhere

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.gate import Gate
+from harness.reconstruct.solver.outlier_gate import Gate
 
 PERIOD_S = 0.025
 SPEED_M_S = np.array([4.0, 0.0, 0.0])

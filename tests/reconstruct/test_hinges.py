@@ -7,7 +7,7 @@ from harness.body.humanoid import build
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.skeleton import forward
-from harness.reconstruct.hinges import HingeLimits
+from harness.reconstruct.solver.hinge_limits import HingeLimits
 
 LIMITS = HingeLimits(build())
 SKELETON = build().skeleton

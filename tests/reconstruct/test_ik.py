@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.retarget import to_own_body
+from harness.body.retargeting import to_own_body
 from harness.core.estimate import Status
 from harness.errors import BadInput
 from harness.mocap.library import MotionLibrary
-from harness.reconstruct.clean_up import CleanUp
-from harness.reconstruct.hinges import HingeLimits
-from harness.reconstruct.ik import GAUSSIAN, MEAN, PREVIOUS, Ik
-from harness.reconstruct.mean_pose import MeanPose
+from harness.reconstruct.methods.clean_up import CleanUp
+from harness.reconstruct.methods.ik import GAUSSIAN, MEAN, PREVIOUS, Ik
+from harness.reconstruct.methods.mean_pose import MeanPose
+from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import exact_frames, without, worn
 

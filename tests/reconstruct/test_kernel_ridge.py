@@ -5,7 +5,7 @@ import pytest
 
 from harness.core.humanoid24 import unpack
 from harness.errors import BadInput
-from harness.reconstruct.kernel_ridge import KernelRidge
+from harness.reconstruct.methods.kernel_ridge import KernelRidge
 from harness.testing.frames import exact_frames, without
 
 from .conftest import Scene, moved

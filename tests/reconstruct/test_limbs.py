@@ -5,9 +5,9 @@ import pytest
 
 from harness.body import humanoid
 from harness.core.arrays import Floats
-from harness.reconstruct.hinges import HingeLimits
-from harness.reconstruct.limbs import Limbs
-from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.limb_solver import Limbs
+from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import exact_frames, without, worn
 
 BODY = humanoid.build()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats, Singles
-from harness.reconstruct.local_model import closeness, forecast
+from harness.reconstruct.methods.local_dynamic_model import closeness, forecast
 
 
 def examples(rng: np.random.Generator, count: int, rank: int, size: int = 20) -> tuple[Floats, Floats]:

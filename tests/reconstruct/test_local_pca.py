@@ -5,13 +5,13 @@ import pytest
 
 from harness.core.arrays import Floats, Singles
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.database.ground import ground_of, posture_of
 from harness.reconstruct.descent import Space, cost_within, damped, nearest, refer, stood
-from harness.reconstruct.hinges import HingeLimits
-from harness.reconstruct.local_pca import LocalPca
-from harness.reconstruct.residuals import Loss, Residuals
-from harness.reconstruct.solver import Stopping
-from harness.reconstruct.subspace import Confined, inverted, spanned
+from harness.reconstruct.methods.local_pca import LocalPca
+from harness.reconstruct.solver.ground_frame import ground_of, posture_of
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.ik_solver import Stopping
+from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.subspace import Confined, inverted, spanned
 
 from .conftest import Scene
 

@@ -8,14 +8,15 @@ import pytest
 from harness.core.estimate import Status
 from harness.core.humanoid24 import BONES, unpack
 from harness.errors import BadInput
-from harness.reconstruct.database import MotionDatabase, ground
-from harness.reconstruct.kernel_cca import KernelCca
-from harness.reconstruct.local_examples import LocalExamples, Weights
-from harness.reconstruct.local_regression import LocalRegression
-from harness.reconstruct.outlook import Outlook
-from harness.reconstruct.residuals import Loss, Residuals
-from harness.reconstruct.viewpoint import anchor_of
-from harness.reconstruct.weighted_blend import WeightedBlend
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.features.anchor_frame import anchor_of
+from harness.reconstruct.features.example_features import LocalExamples, Weights
+from harness.reconstruct.features.query_features import Outlook
+from harness.reconstruct.methods.kernel_cca import KernelCca
+from harness.reconstruct.methods.local_regression import LocalRegression
+from harness.reconstruct.methods.weighted_blend import WeightedBlend
+from harness.reconstruct.solver import ground_frame
+from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import exact_frames, without
 
 from .conftest import Scene, moved
@@ -108,7 +109,7 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     assert examples.nearest(query, trust, 1).tolist() == [row]
     inputs, asked, poses = examples.pairs(np.array([row]), np.array([row]), query, trust)
     np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
-    stood = ground.standing(poses[0, :52], ground.moved(np.array(view), poses[0, 52:]))
+    stood = ground_frame.standing(poses[0, :52], ground_frame.moved(np.array(view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 

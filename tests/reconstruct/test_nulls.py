@@ -9,8 +9,8 @@ from harness.core import rotations
 from harness.core.humanoid24 import unpack
 from harness.core.motion import Take
 from harness.errors import BadInput
-from harness.reconstruct.best_match import BestMatch
-from harness.reconstruct.mean_pose import MeanPose, mean_posture
+from harness.reconstruct.methods.best_match import BestMatch
+from harness.reconstruct.methods.mean_pose import MeanPose, mean_posture
 from harness.testing.frames import exact_frames, without
 
 from .conftest import Scene, moved

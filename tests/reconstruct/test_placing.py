@@ -8,8 +8,8 @@ from harness.body.humanoid import tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
-from harness.reconstruct.placing import placed, postures
-from harness.reconstruct.residuals import Loss, Residuals
+from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.root_placement import placed, postures
 from harness.stream.inputs import combination
 from harness.testing.frames import exact_frames, worn
 

@@ -10,9 +10,9 @@ import pytest
 
 from harness.errors import BadInput, UnknownName
 from harness.reconstruct import registry
-from harness.reconstruct.clean_up import CleanUp
-from harness.reconstruct.ik import GAUSSIAN, Ik
-from harness.reconstruct.mean_pose import MeanPose
+from harness.reconstruct.methods.clean_up import CleanUp
+from harness.reconstruct.methods.ik import GAUSSIAN, Ik
+from harness.reconstruct.methods.mean_pose import MeanPose
 
 
 @pytest.mark.parametrize("name", sorted(registry.methods()))
@@ -37,7 +37,7 @@ def test_presets_differ_in_their_repr() -> None:
 
 
 def test_anyones_own_class_by_module() -> None:
-    assert registry.resolve("harness.reconstruct.mean_pose:MeanPose") == MeanPose()
+    assert registry.resolve("harness.reconstruct.methods.mean_pose:MeanPose") == MeanPose()
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_a_near_miss_gets_a_suggestion() -> None:
 
 def test_a_module_without_that_class_and_a_class_that_is_no_method() -> None:
     with pytest.raises(UnknownName, match="Did you mean 'MeanPose'"):
-        registry.resolve("harness.reconstruct.mean_pose:MeanPoze")
+        registry.resolve("harness.reconstruct.methods.mean_pose:MeanPoze")
     with pytest.raises(BadInput, match="no summary"):
         registry.resolve("fractions:Fraction")
 
@@ -89,7 +89,7 @@ def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPa
     def installed(group: str) -> Iterator[EntryPoint]:
         assert group == "harness.methods"
         for name in ("theirs", "ik"):
-            yield EntryPoint(name, "harness.reconstruct.mean_pose:MeanPose", group)
+            yield EntryPoint(name, "harness.reconstruct.methods.mean_pose:MeanPose", group)
 
     monkeypatch.setattr(registry, "entry_points", installed)
     assert registry.resolve("theirs") == MeanPose()
@@ -100,7 +100,7 @@ def test_the_source_hash_follows_a_method_into_its_own_files(tmp_path: Path, mon
     """A lone file, and what it imports from beside itself, however deep; nothing else that lies there."""
     monkeypatch.syspath_prepend(tmp_path)
     for name, text in {
-        "split_method": "import split_options\nfrom harness.reconstruct.ik import Ik\n\n\nclass Mine(Ik): ...\n",
+        "split_method": "import split_options\nfrom harness.reconstruct.methods.ik import Ik\n\n\nclass Mine(Ik): ...\n",
         "split_options": "from split_numbers import *\n",
         "split_numbers": "SIGMA = 1.0\n",
         "split_stranger": "",
@@ -140,7 +140,7 @@ def test_options_of_a_method_and_of_its_clean_up() -> None:
 
 
 def test_options_of_anyone_s_own_class() -> None:
-    name = "harness.reconstruct.ik:Ik[stopping.most_steps=2]"
+    name = "harness.reconstruct.methods.ik:Ik[stopping.most_steps=2]"
     method = registry.resolve(name)
     assert isinstance(method, Ik)
     assert (method.stopping.most_steps, method.name) == (2, name)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core import rotations
-from harness.reconstruct.smoothing import shares, slerp, smoothed_rotation
+from harness.reconstruct.features.smoothing import shares, slerp, smoothed_rotation
 
 ALPHA, BETA = 0.3, 0.4
 

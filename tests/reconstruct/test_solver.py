@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from harness.reconstruct.hinges import HingeLimits
-from harness.reconstruct.residuals import Loss, Residuals
-from harness.reconstruct.solver import Prior, Solver, Stopping
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
+from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import without
 
 from .conftest import Scene

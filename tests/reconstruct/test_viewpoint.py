@@ -5,7 +5,7 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.viewpoint import Bearing
+from harness.reconstruct.features.anchor_frame import Bearing
 
 EVERY: Bools = np.ones(4, bool)
 

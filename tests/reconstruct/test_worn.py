@@ -3,7 +3,7 @@
 import threading
 from dataclasses import replace
 
-from harness.reconstruct.worn import WhileWorn
+from harness.reconstruct.features.calibration_cache import WhileWorn
 
 from .conftest import Scene
 

@@ -12,8 +12,8 @@ from scipy.ndimage import gaussian_filter1d
 from harness.core.arrays import Bools, Floats
 from harness.core.humanoid24 import BONES, pack, unpack
 from harness.core.seeds import generator
-from harness.mocap.performer import SOURCE, generate
-from harness.score import manifest, results
+from harness.mocap.synthetic import SOURCE, generate
+from harness.results import manifest, storage
 from harness.score.score import score
 
 RATE_HZ = 40.0
@@ -51,7 +51,7 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
     methods = METHODS if plan.methods is None else plan.methods
     scenario = {"name": "fabricated", "methods": list(methods), **asdict(replace(plan, methods=None))}
     command = "harness run fabricated.toml --out results/fabricated"
-    results.open_run(out, manifest.of_run(scenario, motion_source=SOURCE, command=command))
+    storage.open_run(out, manifest.of_run(scenario, motion_source=SOURCE, command=command))
     keys, failures, planned = [], {}, 0
     takes = range(1, plan.takes + 1)
     for times, behaviour, take, inputs in itertools.product(
@@ -64,15 +64,15 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
                 failures[f"{method} on {behaviour}_{take}"] = text
                 continue
             cell = make_cell(behaviour, take, method, (times + 1) * error_deg, inputs, plan, plan.varied[times])
-            results.write_cell(out, cell)
+            storage.write_cell(out, cell)
             keys.append(cell.key)
-    results.write_summary(out, keys=keys, planned=planned, failures=failures)
+    storage.write_summary(out, keys=keys, planned=planned, failures=failures)
     return out
 
 
 def make_cell(
     behaviour: str, take: int, method: str, error_deg: float, inputs: str, plan: Plan, varied: Mapping[str, Any]
-) -> results.Cell:
+) -> storage.Cell:
     """One method on one take of the performer."""
     made = generate(behaviour, "p1", take, seed=1, duration_s=plan.duration_s, rate_hz=RATE_HZ)
     skeleton, dofs = made.skeleton.subset(BONES)
@@ -84,8 +84,8 @@ def make_cell(
     estimate = _wrong(truth, error_deg, valid, rng)[seen]
     status, step_ms = np.where(valid.all(axis=1), 0, 1)[seen], rng.gamma(4.0, 0.15, len(seen))
     defined_by = {"clip": clip, "take": take, "inputs": inputs, "rate_hz": RATE_HZ, "varied": varied}
-    return results.Cell(
-        key=results.cell_key(defined_by, {"name": method}, "made up"),
+    return storage.Cell(
+        key=storage.cell_key(defined_by, {"name": method}, "made up"),
         method=method,
         behaviour=behaviour,
         clip=clip,

@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from harness.compare.comparison import Comparison, Difference, Verdict
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import Outcome
-from harness.score.comparison import Comparison, Difference, Verdict
 
 METRICS = {"joint_angle_mean_deg": ("deg", 2.0, 0.03), "mpjpe_mm": ("mm", 12.0, 0.03), "step_relative": ("x", 6.0, 0.1)}
 """Metric -> unit, size, margin as a share of A's mean."""

@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from harness.core.seeds import generator
-from harness.score.findings import Bars, Claim, Experiment, Findings, Lines, Table, write_findings
+from harness.results.findings import Bars, Claim, Experiment, Findings, Lines, Table, write_findings
 
 METHODS: Mapping[str, float] = {"dynamic_map": 1.0, "local_pca": 1.6, "ik": 2.4}
 """Method -> size of its errors [deg], in the order that the paper expects."""

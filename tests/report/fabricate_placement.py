@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.compare.paired_statistics import FEWEST_CLIPS, Paired
 from harness.core.seeds import generator
-from harness.score.findings import Claim
-from harness.score.paired import FEWEST_CLIPS, Paired
-from harness.score.placement import (
+from harness.results.findings import Claim
+from harness.results.placement_findings import (
     Agreement,
     Best,
     Condition,

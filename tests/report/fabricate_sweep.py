@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.seeds import generator
-from harness.score.index import CellIndex
+from harness.results.index import CellIndex
 
 COMMAND = "harness sweep made_up.toml --out results/made_up"
 FAILURE = "Traceback (most recent call last):\n  somewhere\nValueError: <b>no</b> pose & no plan"

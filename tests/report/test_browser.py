@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.report import write_report
+from harness.report.run.writer import write_report
 from tests.report.fabricate import Plan, fabricate
 
 HOSTILE = "<script>alert(1)</script>"

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from harness.report import calibration_cost
-from harness.report.calibrating import section, text
+from harness.report.run import calibration_cost
+from harness.report.run.calibration_errors import section, text
 
 FOUND = {"mount_mm": 20.0, "mount_deg": 5.0, "length_mm": 0.0, "room_heading_deg": 3.0, "room_origin_mm": 30.0}
 

@@ -8,18 +8,28 @@ from pathlib import Path
 import pytest
 from matplotlib.figure import Figure
 
+from harness.compare.comparison import Comparison, Difference
 from harness.errors import Outcome
-from harness.report import comparison as report
-from harness.report.comparison import text, write_page
-from harness.report.comparison_intervals import _draw as draw_intervals
-from harness.report.comparison_intervals import intervals
-from harness.report.comparison_page import Pictures, comparison_page
-from harness.report.comparison_slopes import BETTER, WORSE, slopes
-from harness.report.comparison_slopes import _draw as draw_slopes
-from harness.report.comparison_words import BIG, MARKS, MEANINGS, direction, interval, percent, sentence, signed, tally
-from harness.report.figures import drawn
-from harness.report.style import Chart
-from harness.score.comparison import Comparison, Difference
+from harness.report.comparison import writer as report
+from harness.report.comparison.interval_chart import _draw as draw_intervals
+from harness.report.comparison.interval_chart import intervals
+from harness.report.comparison.page import Pictures, comparison_page
+from harness.report.comparison.slope_chart import BETTER, WORSE, slopes
+from harness.report.comparison.slope_chart import _draw as draw_slopes
+from harness.report.comparison.wording import (
+    BIG,
+    MARKS,
+    MEANINGS,
+    direction,
+    interval,
+    percent,
+    sentence,
+    signed,
+    tally,
+)
+from harness.report.comparison.writer import text, write_page
+from harness.report.kit.style import Chart
+from harness.report.run.charts import drawn
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_comparison import CIRCUMSTANCES, GROUP, METRICS, comparison, line, whole
 from tests.report.reading import read, text_of

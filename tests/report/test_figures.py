@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import pytest
 from matplotlib.figure import Figure
 
-from harness.config import load_scenario
-from harness.report.figures import drawn, legend
+from harness.experiment.scenario import load_scenario
+from harness.report.run.charts import drawn, legend
 
 LONG = load_scenario("boxing_outliers").methods
 ALL = load_scenario("boxing").methods

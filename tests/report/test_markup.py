@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.report.markup import Markup, joined, table, tag
+from harness.report.kit.markup import Markup, joined, table, tag
 
 
 def test_children_and_attributes_are_escaped() -> None:

@@ -1,6 +1,6 @@
 """What a reader is told of expected orders."""
 
-from harness.report.orders import section, text
+from harness.report.run.expected_orders import section, text
 
 ROW = {
     "source": "a paper",

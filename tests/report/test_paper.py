@@ -10,11 +10,11 @@ import pytest
 
 from harness.cli import main
 from harness.errors import BadFile
-from harness.report import paper
-from harness.report.paper import write_paper
-from harness.report.paper_page import inside
-from harness.report.paper_verdicts import MARKS, sentence, tally
-from harness.score.findings import Bars, Claim, Experiment, Findings, Lines, Table
+from harness.report.paper import writer
+from harness.report.paper.page import inside
+from harness.report.paper.verdicts import MARKS, sentence, tally
+from harness.report.paper.writer import write_paper
+from harness.results.findings import Bars, Claim, Experiment, Findings, Lines, Table
 from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
 from tests.report.reading import read, text_of
 
@@ -202,7 +202,7 @@ def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
 
 
 def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(paper, "find_spec", lambda name: None)
+    monkeypatch.setattr(writer, "find_spec", lambda name: None)
     said = text_of(write_paper(write_study(tmp_path, kim())))
     assert "Missing here Figures: matplotlib is not installed; their numbers are tables" in said
     assert "RH+LH+RA+LA+PEL" in said
@@ -213,7 +213,7 @@ def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest
 def test_a_study_without_figures_misses_nothing_without_matplotlib(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(paper, "find_spec", lambda name: None)
+    monkeypatch.setattr(writer, "find_spec", lambda name: None)
     assert "Missing here" not in text_of(alone(tmp_path, EMPTY))
 
 

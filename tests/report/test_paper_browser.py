@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.paper import write_paper
+from harness.report.paper.writer import write_paper
 from tests.report.fabricate_paper import liu, write_study
 
 

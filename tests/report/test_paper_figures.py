@@ -12,13 +12,13 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
-from harness.report.figures import drawn
-from harness.report.paper_bars import draw_bars, height_in, lies
-from harness.report.paper_figures import charts
-from harness.report.paper_lines import apart, draw_lines
-from harness.report.paper_numbers import numbers
-from harness.report.style import COLOURS
-from harness.score.findings import Bars, Experiment, Lines
+from harness.report.kit.style import COLOURS
+from harness.report.paper.bar_chart import draw_bars, height_in, lies
+from harness.report.paper.charts import charts
+from harness.report.paper.figure_table import numbers
+from harness.report.paper.line_chart import apart, draw_lines
+from harness.report.run.charts import drawn
+from harness.results.findings import Bars, Experiment, Lines
 from tests.report.fabricate_paper import METHODS, curves, liu, sets
 
 EMPTY = Experiment("empty", "", "", ())
@@ -114,8 +114,8 @@ def test_a_name_has_one_colour_wherever_it_is_drawn(monkeypatch: pytest.MonkeyPa
     def note(canvas: Figure, shown: Bars | Lines, places: Mapping[str, int]) -> None:
         found.append((set(shown.series), places))
 
-    monkeypatch.setattr("harness.report.paper_figures.draw_bars", note)
-    monkeypatch.setattr("harness.report.paper_figures.draw_lines", note)
+    monkeypatch.setattr("harness.report.paper.charts.draw_bars", note)
+    monkeypatch.setattr("harness.report.paper.charts.draw_lines", note)
     several = [Bars("", "", ("a",), dict.fromkeys(names, (1.0,))) for names in (("x", "ik"), ("y", "z"), ("z", "ik"))]
     charts(replace(liu(), experiments=(*liu().experiments, replace(EMPTY, figures=tuple(several)))))
     assert len(found) == 6

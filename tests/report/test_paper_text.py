@@ -9,10 +9,10 @@ import pytest
 import harness
 from harness.cli import main
 from harness.errors import BadFile
-from harness.report.paper_readme import show_in_readme
-from harness.report.paper_text import WIDTH, text_tables
-from harness.report.paper_verdicts import difference, interval
-from harness.score.findings import Claim, Experiment
+from harness.report.paper.readme import show_in_readme
+from harness.report.paper.text import WIDTH, text_tables
+from harness.report.paper.verdicts import difference, interval
+from harness.results.findings import Claim, Experiment
 from tests.report.fabricate_paper import kim, liu, write_study
 
 RESULTS = (Path(harness.__file__).parent.parent / "results" / "README.md").read_text(encoding="utf-8")

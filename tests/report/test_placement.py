@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.report import body_map as body
-from harness.report import placement
-from harness.report.apart import started
-from harness.report.body_map import Shown, blended, body_map, maps
-from harness.report.placement import write_placement_page
-from harness.report.placement_charts import charts
-from harness.report.placement_text import text
-from harness.report.placement_words import difference, enough, figure, named, sentence
-from harness.score.placement import Best, PlacementFindings, Stations, Tried
+from harness.report.kit.render_process import started
+from harness.report.placement import body_map as body
+from harness.report.placement import writer
+from harness.report.placement.body_map import Shown, blended, body_map, maps
+from harness.report.placement.charts import charts
+from harness.report.placement.text import text
+from harness.report.placement.wording import difference, enough, figure, named, sentence
+from harness.report.placement.writer import write_placement_page
+from harness.results.placement_findings import Best, PlacementFindings, Stations, Tried
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
 from tests.report.reading import text_of
 
@@ -36,7 +36,7 @@ def findings() -> PlacementFindings:
 @pytest.fixture
 def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a machine that cannot render: quick, and the page has to say so."""
-    monkeypatch.setattr(placement, "body_map", lambda *args, **options: (None, NO_PICTURE))
+    monkeypatch.setattr(writer, "body_map", lambda *args, **options: (None, NO_PICTURE))
 
 
 def study_of(errors: dict[Stations, list[float | None]], better: str = "lower") -> PlacementFindings:
@@ -171,7 +171,7 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, f
 def test_without_matplotlib_there_are_tables(
     tmp_path: Path, findings: PlacementFindings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(placement, "find_spec", lambda name: None)
+    monkeypatch.setattr(writer, "find_spec", lambda name: None)
     page = write_placement_page(write_made_up(tmp_path, findings))
     said = text_of(page)
     assert "matplotlib is not installed" in said

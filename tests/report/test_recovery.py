@@ -1,6 +1,6 @@
 """What a reader is told of recovery."""
 
-from harness.report.recovery import section, text
+from harness.report.run.recovery import section, text
 
 ROW = {
     "method": "ik",

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile
-from harness.report import apart, scrubber
-from harness.report.report import movie_fps, write_report
-from harness.report.run import WORST_METRICS, read_run
-from harness.report.style import COLOURS
-from harness.report.verdict import verdict
+from harness.report.kit import render_process, skeleton_player
+from harness.report.kit.style import COLOURS
+from harness.report.run.data import WORST_METRICS, read_run
+from harness.report.run.headline import verdict
+from harness.report.run.writer import movie_fps, write_report
 from tests.report.fabricate import METHODS, Plan, fabricate
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$"
@@ -174,8 +174,8 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
 
 
 def test_charts_show_no_more_lines_than_look_different(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.report.run.STYLES", 3)
-    monkeypatch.setattr("harness.report.figures.COLOURS", COLOURS[:3])
+    monkeypatch.setattr("harness.report.run.data.STYLES", 3)
+    monkeypatch.setattr("harness.report.run.charts.COLOURS", COLOURS[:3])
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"poor": 20.0, **METHODS}, duration_s=3.0))
     page = write_report(out, rendered=False).read_text()
     for name in ("error_walking", "error_cdf"):
@@ -213,7 +213,7 @@ def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(("package", "module"), [("pyvista", apart), ("plotly", scrubber)])
+@pytest.mark.parametrize(("package", "module"), [("pyvista", render_process), ("plotly", skeleton_player)])
 def test_a_missing_extra_costs_its_part_alone(
     package: str, module: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -285,7 +285,7 @@ def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tupl
 def test_importing_the_report_draws_in_no_heavy_library_and_no_global_plot_state(tmp_path: Path) -> None:
     fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=2.0))
     code = (
-        "import sys; from pathlib import Path; from harness.report.report import write_report;"
+        "import sys; from pathlib import Path; from harness.report.run.writer import write_report;"
         "assert not {'pyvista', 'vtk', 'matplotlib', 'plotly'} & set(sys.modules);"
         "import matplotlib; before = matplotlib.rcParams.copy(); write_report(Path(sys.argv[1]), rendered=False);"
         "assert matplotlib.rcParams.copy() == before; assert 'matplotlib.pyplot' not in sys.modules;"

@@ -11,17 +11,17 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.cli import main
+from harness.compare.paired_statistics import interval
 from harness.errors import BadFile
-from harness.report import sweep_page
-from harness.report.figures import drawn
-from harness.report.sweep import gathered, read_sweep
-from harness.report.sweep_charts import MOST_SERIES, Curve, _dots_in, _draw, curves, shown_of, varying
-from harness.report.sweep_page import write_sweep
-from harness.report.sweep_statistics import HEADLINE, METRICS, Key, Statistic
-from harness.report.sweep_text import text
-from harness.report.sweep_words import effect, faults, sentence
-from harness.score.index import CellIndex
-from harness.score.paired import interval
+from harness.report.run.charts import drawn
+from harness.report.sweep import page as sweep_page
+from harness.report.sweep.charts import MOST_SERIES, Curve, _dots_in, _draw, curves, shown_of, varying
+from harness.report.sweep.data import HEADLINE, METRICS, Key, Statistic
+from harness.report.sweep.page import write_sweep
+from harness.report.sweep.reader import gathered, read_sweep
+from harness.report.sweep.text import text
+from harness.report.sweep.wording import effect, faults, sentence
+from harness.results.index import CellIndex
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
 from tests.report.reading import read, text_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.report.worst import Window, together, worst_of, worst_window
+from harness.report.run.worst_window import Window, together, worst_of, worst_window
 
 RATE_HZ = 50.0
 

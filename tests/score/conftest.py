@@ -10,8 +10,8 @@ import pytest
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Status
 from harness.core.humanoid24 import pack, standard_skeleton
-from harness.score import results
-from harness.score.cell import IDENTITY
+from harness.results import storage
+from harness.results.cell import IDENTITY
 from harness.score.score import Scores, score
 
 RATE_HZ = 40.0
@@ -47,10 +47,10 @@ def judge(truth_qpos: Floats) -> Judge:
 
 
 @pytest.fixture
-def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., results.Cell]:
+def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., storage.Cell]:
     """A cell whose estimate is off by some metres along x; other fields can be named."""
 
-    def cell(off_m: float = 0.01, frames: int = FRAMES, **fields: object) -> results.Cell:
+    def cell(off_m: float = 0.01, frames: int = FRAMES, **fields: object) -> storage.Cell:
         estimate = truth_qpos[:frames].copy()
         estimate[:, 0] += off_m
         content: dict[str, Any] = {
@@ -85,8 +85,8 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., results.Cell]:
             "suspect": np.zeros((frames, 2)),
         } | fields
         described = {name: content[name] for name in IDENTITY}
-        key = results.cell_key(described, {"off_m": off_m, "frames": frames}, "source")
-        return results.Cell(key=key, **content)
+        key = storage.cell_key(described, {"off_m": off_m, "frames": frames}, "source")
+        return storage.Cell(key=key, **content)
 
     return cell
 

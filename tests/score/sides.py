@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from harness.core.files import content_key, plain
 from harness.core.seeds import generator
-from harness.score.files import content_key, plain
-from harness.score.judged import Judged, JudgedCell
-from harness.score.manifest import Manifest
+from harness.results.manifest import Manifest
+from harness.results.reader import Judged, JudgedCell
 from harness.score.metrics import DEFINITIONS, VERSIONS
 
 SIZES = {"joint_angle_mean_deg": 2.0, "mpjpe_mm": 12.0, "jitter_m_s3": 700.0}

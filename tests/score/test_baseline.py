@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
+from harness.compare.baseline import save
+from harness.compare.comparison import compare
+from harness.compare.margins import MARGINS
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
-from harness.score import results
-from harness.score.baseline import save
-from harness.score.cell import CARRIED, IDENTITY
-from harness.score.comparison import compare
-from harness.score.index import CellIndex
-from harness.score.judged import COUNTED, Judged, JudgedCell, read_judged
-from harness.score.margins import MARGINS
+from harness.results import storage
+from harness.results.cell import CARRIED, IDENTITY
+from harness.results.index import CellIndex
+from harness.results.reader import COUNTED, Judged, JudgedCell, read_judged
 from tests.score.sides import manifest, side, write_run
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
@@ -62,13 +62,13 @@ def test_a_baseline_is_small_sorted_and_always_the_same(run: Path, baselines: Pa
     assert all(set(part) == {"clip"} for part in content["parts"].values()), "what all share stands once"
 
 
-def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: Callable[..., results.Cell]) -> None:
+def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: Callable[..., storage.Cell]) -> None:
     content = manifest()
-    results.open_run(run_folder, content)
+    storage.open_run(run_folder, content)
     cells = [make_cell(off_m=0.01 * n, clip=f"walk_{n}", scenario="demo", varied={"noise": "clean"}) for n in (2, 1)]
     for cell in cells:
-        results.write_cell(run_folder, cell)
-    results.write_summary(run_folder, keys=[cell.key for cell in cells], planned=3, failures={"ik on walk_3": "no"})
+        storage.write_cell(run_folder, cell)
+    storage.write_summary(run_folder, keys=[cell.key for cell in cells], planned=3, failures={"ik on walk_3": "no"})
     found = read_judged(run_folder)
     assert [cell.clip for cell in found.cells] == ["walk_2", "walk_1"]
     assert found.cells[0].metrics == cells[0].metrics

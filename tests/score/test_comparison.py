@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.compare.comparison import EVERYTHING, Comparison, compare
+from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
-from harness.score.comparison import EVERYTHING, Comparison, compare
-from harness.score.judged import Judged
-from harness.score.margins import MARGINS
+from harness.results.reader import Judged
 from harness.score.metrics import DEFINITIONS
 from tests.score.sides import SIZES, cell, manifest, side
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile
-from harness.score.findings import Bars, Claim, Experiment, Findings, Lines, Table, read_findings, write_findings
+from harness.results.findings import Bars, Claim, Experiment, Findings, Lines, Table, read_findings, write_findings
 
 FINDINGS = Findings(
     paper="liu2011",

@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile, BadInput
-from harness.score.index import INDEX, CellIndex, Counts
-from harness.score.results import read_cells, summary_rows
-from harness.score.running import at_work, is_running
-from harness.score.table import SUMMED, TIMES, groups, write_table
+from harness.results.index import INDEX, CellIndex, Counts
+from harness.results.lock import at_work, is_running
+from harness.results.storage import read_cells, summary_rows
+from harness.results.table import SUMMED, TIMES, groups, write_table
 from tests.report.fabricate import Plan, fabricate
 
 

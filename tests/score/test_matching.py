@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
+from harness.compare.matching import LOOSENED, PAIRED_ON, inputs_that_differ, match
 from harness.errors import BadInput, UnknownName
-from harness.score.judged import Judged
-from harness.score.matching import LOOSENED, PAIRED_ON, inputs_that_differ, match
+from harness.results.reader import Judged
 from tests.score.sides import cell, manifest, side
 
 OTHER: dict[str, Any] = {

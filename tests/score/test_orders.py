@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from harness.score.orders import Order, judged
+from harness.results.expected_orders import Order, judged
 
 METHODS = Order("a paper", methods=("new", "old", "ik"), why_not={"old > ik": "because"})
 INPUTS = Order("a paper", inputs=("pos+ori", "pos"), method="new")

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from harness.compare.paired_statistics import FEWEST_CLIPS, Paired, expanded, interval, paired
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.score.paired import FEWEST_CLIPS, Paired, expanded, interval, paired
 
 
 def ends(found: Paired) -> list[float]:

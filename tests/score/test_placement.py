@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile
-from harness.score.placement import is_placement, read_placement, write_placement
+from harness.results.placement_findings import is_placement, read_placement, write_placement
 from tests.report.fabricate_placement import made_up
 
 Damage = Callable[[dict[str, Any]], Any]

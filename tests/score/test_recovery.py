@@ -8,9 +8,9 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
-from harness.score.files import plain
-from harness.score.recovery import Recoveries, table
-from harness.score.results import Cell
+from harness.core.files import plain
+from harness.results.recovery import Recoveries, table
+from harness.results.storage import Cell
 
 MakeCell = Callable[..., Cell]
 END_S = 5.0

@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from harness.score.reference import Reference
+from harness.experiment.reference_workload import Reference
 
 
 def test_the_work_is_the_same_every_time_and_solves_what_it_says() -> None:

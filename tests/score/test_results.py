@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.core.files import TEMPORARY, plain
 from harness.errors import BadFile, BadInput, ShapeError
-from harness.score import manifest as manifests
-from harness.score import results
-from harness.score.files import TEMPORARY, plain
+from harness.results import manifest as manifests
+from harness.results import storage
 
-MakeCell = Callable[..., results.Cell]
+MakeCell = Callable[..., storage.Cell]
 ISSUE_COLUMNS = (
     "method,behaviour,clip,motion_source,stations,mount,rate_hz,inputs,protocol,calibration,noise,seed,"
     "frames_matched,frames_expected,joint_angle_mean_deg,joint_angle_rms_deg,mpjre_deg,mpjpe_mm,mpjpe_root_mm,"
@@ -36,11 +36,11 @@ def manifest(**changes: object) -> manifests.Manifest:
 
 def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCell) -> None:
     cell = make_cell()
-    results.open_run(run_folder, manifest())
-    assert not results.has_cell(run_folder, cell.key)
-    back = results.read_cell(results.write_cell(run_folder, cell))
-    assert results.has_cell(run_folder, cell.key)
-    for name in results.Cell.__dataclass_fields__:
+    storage.open_run(run_folder, manifest())
+    assert not storage.has_cell(run_folder, cell.key)
+    back = storage.read_cell(storage.write_cell(run_folder, cell))
+    assert storage.has_cell(run_folder, cell.key)
+    for name in storage.Cell.__dataclass_fields__:
         if name != "scores":
             np.testing.assert_array_equal(getattr(back, name), getattr(cell, name), err_msg=name)
     assert back.metrics == plain(cell.metrics)
@@ -52,15 +52,15 @@ def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCe
 
 def test_what_calibration_found_is_kept(run_folder: Path, make_cell: MakeCell) -> None:
     """The estimate stands on the true bones unless others are named."""
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     known, found = make_cell(), make_cell(0.02, calibration_errors={"length_mm": 4.0})
     np.testing.assert_array_equal(known.estimate_bone_m, known.bone_m)
     longer = make_cell(0.03, calibration_errors={"length_mm": 4.0}, estimate_bone_m=1.05 * known.bone_m)
     for cell in (known, found, longer):
-        back = results.read_cell(results.write_cell(run_folder, cell))
+        back = storage.read_cell(storage.write_cell(run_folder, cell))
         np.testing.assert_array_equal(back.bone_m, known.bone_m)
         np.testing.assert_array_equal(back.estimate_bone_m, cell.estimate_bone_m)
-        assert results.summary_rows([back])[0]["calibration_errors"] == cell.calibration_errors
+        assert storage.summary_rows([back])[0]["calibration_errors"] == cell.calibration_errors
     with pytest.raises(ShapeError, match="estimate_bone_m"):
         make_cell(estimate_bone_m=known.bone_m[:5])
 
@@ -71,11 +71,11 @@ def test_a_cell_refuses_arrays_that_disagree(make_cell: MakeCell) -> None:
 
 
 def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: MakeCell) -> None:
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     cells = [make_cell(0.01), make_cell(0.03, clip="walk_02", stations=("head", "torso"))]
     for cell in cells:
-        results.write_cell(run_folder, cell)
-    results.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
+        storage.write_cell(run_folder, cell)
+    storage.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
     text = (run_folder / "summary.csv").read_text()
     assert text.startswith(ISSUE_COLUMNS + ",")
     rows = list(csv.reader(text.splitlines()))
@@ -83,14 +83,14 @@ def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: Mak
     assert first["stations"] == "head torso"
     assert float(first["mpjpe_mm"]) == pytest.approx(10.0, abs=1e-6)
     assert [row[2] for row in rows[1:]] == ["walk_01", "walk_02"]
-    assert [c.key for c in results.read_cells(run_folder)] == [c.key for c in cells]
+    assert [c.key for c in storage.read_cells(run_folder)] == [c.key for c in cells]
 
 
 def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: Path, make_cell: MakeCell) -> None:
     cells = [make_cell(0.01, frames=300), make_cell(0.05, frames=100, clip="walk_02")]
     for cell in cells:
-        results.write_cell(run_folder, cell)
-    content = results.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
+        storage.write_cell(run_folder, cell)
+    content = storage.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
     (method,) = content["methods"]
     mpjpe = method["metrics"]["mpjpe_mm"]
     assert mpjpe["mean"] == pytest.approx(30.0)
@@ -105,8 +105,8 @@ def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, ma
     cell = make_cell()
     uneven = {**cell.scores.per_frame, "joint_angle_rms_deg": np.where(np.arange(400) < 100, 2.0, 0.0)}
     scores = type(cell.scores)(cell.metrics, uneven, cell.scores.per_joint, cell.scores.scored)
-    results.write_cell(run_folder, make_cell(scores=scores))
-    content = results.write_summary(run_folder, keys=[cell.key], planned=1)
+    storage.write_cell(run_folder, make_cell(scores=scores))
+    content = storage.write_summary(run_folder, keys=[cell.key], planned=1)
     assert content["methods"][0]["metrics"]["joint_angle_rms_deg"]["frame_weighted"] == pytest.approx(1.0)
 
 
@@ -114,8 +114,8 @@ def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: Make
     cells = [make_cell(0.01 * n, clip=f"c{n}", inputs=i, protocol=p) for n, (i, p) in
              enumerate([("pos", "block"), ("pos", "subject"), ("pos+ori", "block")])]  # fmt: skip
     for cell in cells:
-        results.write_cell(run_folder, cell)
-    content = results.write_summary(run_folder, keys=[c.key for c in cells], planned=4, failures={"ik on d": "boom"})
+        storage.write_cell(run_folder, cell)
+    content = storage.write_summary(run_folder, keys=[c.key for c in cells], planned=4, failures={"ik on d": "boom"})
     assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
     assert content["outcome"] == "incomplete"
     assert (content["cells_finished"], content["cells_planned"]) == (3, 4)
@@ -123,44 +123,44 @@ def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: Make
 
 
 def test_a_run_goes_on_where_it_was_and_clears_what_a_kill_left(run_folder: Path, make_cell: MakeCell) -> None:
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     cell = make_cell()
-    results.write_cell(run_folder, cell)
+    storage.write_cell(run_folder, cell)
     half = run_folder / "cells" / f"{TEMPORARY}{NOBODY}-abc"
     half.mkdir()
     (half / "cell.json").write_text("{")
     (run_folder / f"{TEMPORARY}{NOBODY}-summary.json").write_text("{")
-    results.open_run(run_folder, manifest(methods=["ik", "local_pca"]))
+    storage.open_run(run_folder, manifest(methods=["ik", "local_pca"]))
     assert sorted(os.listdir(run_folder)) == ["cells", "manifest.json"]
     assert os.listdir(run_folder / "cells") == [cell.key]
-    assert results.has_cell(run_folder, cell.key)
+    assert storage.has_cell(run_folder, cell.key)
 
 
 def test_writing_a_finished_cell_again_keeps_the_first(run_folder: Path, make_cell: MakeCell) -> None:
-    folder = results.write_cell(run_folder, make_cell())
+    folder = storage.write_cell(run_folder, make_cell())
     before = (folder / "cell.json").stat().st_mtime_ns
-    results.write_cell(run_folder, make_cell())
+    storage.write_cell(run_folder, make_cell())
     assert (folder / "cell.json").stat().st_mtime_ns == before
     assert os.listdir(run_folder / "cells") == [folder.name]
 
 
 def test_another_run_is_refused_and_says_in_what_it_differs(run_folder: Path) -> None:
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     before = (run_folder / "manifest.json").read_bytes()
     with pytest.raises(BadInput, match=r"motion\.test.*--out"):
-        results.open_run(run_folder, manifest(motion={"test": ["a"]}))
+        storage.open_run(run_folder, manifest(motion={"test": ["a"]}))
     with pytest.raises(BadInput, match="seed"):
-        results.open_run(run_folder, manifest(seed=2))
+        storage.open_run(run_folder, manifest(seed=2))
     assert (run_folder / "manifest.json").read_bytes() == before
 
 
 def test_a_folder_of_other_files_is_refused_untouched(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
-        results.open_run(tmp_path, manifest())
+        storage.open_run(tmp_path, manifest())
     assert os.listdir(tmp_path) == ["thesis.tex"]
     with pytest.raises(BadInput, match="is a file"):
-        results.open_run(tmp_path / "thesis.tex", manifest())
+        storage.open_run(tmp_path / "thesis.tex", manifest())
 
 
 @pytest.mark.parametrize(
@@ -178,20 +178,20 @@ def test_a_folder_of_other_files_is_refused_untouched(tmp_path: Path) -> None:
 def test_a_broken_cell_is_a_clear_refusal(
     run_folder: Path, make_cell: MakeCell, file: str, content: bytes | None
 ) -> None:
-    folder = results.write_cell(run_folder, make_cell())
+    folder = storage.write_cell(run_folder, make_cell())
     if content is None:
         (folder / file).unlink()
     else:
         (folder / file).write_bytes(content)
     with pytest.raises(BadFile, match=r"cell\.json|frames\.npz|" + folder.name):
-        results.read_cell(folder)
+        storage.read_cell(folder)
 
 
 @pytest.mark.parametrize(("field", "value"), [("bone_m", "long"), ("bone_m", [[1, 2]]), ("notes", 3), ("key", None)])
 def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
     run_folder: Path, make_cell: MakeCell, field: str, value: object
 ) -> None:
-    folder = results.write_cell(run_folder, make_cell())
+    folder = storage.write_cell(run_folder, make_cell())
     content = json.loads((folder / "cell.json").read_text())
     if value is None:
         del content[field]
@@ -199,7 +199,7 @@ def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
         content[field] = value
     (folder / "cell.json").write_text(json.dumps(content))
     with pytest.raises(BadFile, match=folder.name):
-        results.read_cell(folder)
+        storage.read_cell(folder)
 
 
 WRITE_FOR_EVER = """
@@ -213,28 +213,28 @@ for n in itertools.count():
 
 
 def test_a_kill_at_any_moment_leaves_whole_cells_only(run_folder: Path, make_cell: MakeCell) -> None:
-    results.open_run(run_folder, manifest())
-    key = results.write_cell(run_folder, make_cell()).name
+    storage.open_run(run_folder, manifest())
+    key = storage.write_cell(run_folder, make_cell()).name
     for turn, delay_s in enumerate((0.0, 0.013, 0.029)):
         child = subprocess.Popen([sys.executable, "-c", WRITE_FOR_EVER, str(run_folder), key, str(turn)])
         try:
-            while not results.has_cell(run_folder, f"{turn}-0"):
+            while not storage.has_cell(run_folder, f"{turn}-0"):
                 assert child.poll() is None, "the child writes nothing"
                 time.sleep(0.002)
             time.sleep(delay_s)
         finally:
             child.kill()
             child.wait()
-    results.open_run(run_folder, manifest())
-    cells = list(results.read_cells(run_folder))
+    storage.open_run(run_folder, manifest())
+    cells = list(storage.read_cells(run_folder))
     assert len(cells) == len(os.listdir(run_folder / "cells")) >= 4
 
 
 def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:
-    folder = results.write_cell(run_folder, make_cell())
+    folder = storage.write_cell(run_folder, make_cell())
     np.savez(folder / "frames.npz", time_s=np.array([{"a": 1}], dtype=object))
     with pytest.raises(BadFile, match="pickle"):
-        results.read_cell(folder)
+        storage.read_cell(folder)
 
 
 @pytest.mark.parametrize(
@@ -244,44 +244,44 @@ def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
     run_folder: Path, make_cell: MakeCell, change: dict[str, object], message: str
 ) -> None:
     key = make_cell().key
-    results.write_cell(run_folder, make_cell())
-    content = results.write_summary(run_folder, keys=[key], planned=1) | change
+    storage.write_cell(run_folder, make_cell())
+    content = storage.write_summary(run_folder, keys=[key], planned=1) | change
     text = json.dumps({name: value for name, value in content.items() if value is not None})
     (run_folder / "summary.json").write_text(text)
     with pytest.raises(BadFile, match=message):
-        results.read_cells(run_folder)
+        storage.read_cells(run_folder)
 
 
 def test_what_another_run_is_writing_is_left_alone(run_folder: Path) -> None:
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     theirs, left_behind = f"{TEMPORARY}{os.getppid()}-cell", f"{TEMPORARY}{NOBODY}-cell"
     for name in (theirs, left_behind):
         (run_folder / "cells" / name).mkdir()
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     assert os.listdir(run_folder / "cells") == [theirs]
 
 
 def test_no_run_in_a_folder_is_said_at_once(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="harness run"):
-        results.read_cells(tmp_path)
+        storage.read_cells(tmp_path)
     with pytest.raises(BadFile, match="harness run"):
-        results.read_summary(tmp_path)
+        storage.read_summary(tmp_path)
 
 
 def test_a_key_depends_on_inputs_method_and_source_and_on_nothing_else() -> None:
-    key = results.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "ik"}, "s")
-    assert key == results.cell_key({"b": {"c": 2.0}, "a": 1}, {"name": "ik"}, "s")
+    key = storage.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "ik"}, "s")
+    assert key == storage.cell_key({"b": {"c": 2.0}, "a": 1}, {"name": "ik"}, "s")
     others = [
-        results.cell_key({"a": 2, "b": {"c": 2.0}}, {"name": "ik"}, "s"),
-        results.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "pca"}, "s"),
-        results.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "ik"}, "t"),
+        storage.cell_key({"a": 2, "b": {"c": 2.0}}, {"name": "ik"}, "s"),
+        storage.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "pca"}, "s"),
+        storage.cell_key({"a": 1, "b": {"c": 2.0}}, {"name": "ik"}, "t"),
     ]
     assert len({key, *others}) == 4
-    assert results.digest(np.zeros((2, 3))) != results.digest(np.zeros((3, 2)))
+    assert storage.digest(np.zeros((2, 3))) != storage.digest(np.zeros((3, 2)))
 
 
 def test_a_manifest_survives_its_file_and_names_the_machine(run_folder: Path) -> None:
-    results.open_run(run_folder, manifest())
+    storage.open_run(run_folder, manifest())
     back = manifests.Manifest.read(run_folder / "manifest.json")
     assert back.differences(manifest()) == []
     assert back.metric_versions["mpjpe_mm"] >= 1
@@ -300,8 +300,8 @@ def test_known_and_new_performers_and_varied_values_are_never_pooled(run_folder:
         for n, (who, share) in enumerate(zip(("known", "known", "new"), shares, strict=True))
     ]
     for cell in cells:
-        results.write_cell(run_folder, cell)
-    content = results.write_summary(run_folder, keys=[c.key for c in cells], planned=3)
+        storage.write_cell(run_folder, cell)
+    content = storage.write_summary(run_folder, keys=[c.key for c in cells], planned=3)
     assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
     assert [row["varied"]["components.echo.share"] for row in content["behaviours"]] == shares
     assert [row["performer"] for row in content["cells"]] == ["known", "known", "new"]

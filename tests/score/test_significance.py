@@ -5,10 +5,10 @@ import itertools
 import numpy as np
 import pytest
 
+from harness.compare import significance
+from harness.compare.significance import Judgement, holm, judge, least_p, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.score import significance
-from harness.score.significance import Judgement, holm, judge, least_p, sign_flip_p
 
 
 def by_hand(difference: Floats) -> float:

@@ -5,13 +5,13 @@ from typing import Protocol
 import numpy as np
 import pytest
 
-from harness.body import mounts, retarget
+from harness.body import mounts, retargeting
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
 from harness.core.motion import Take
 from harness.core.seeds import generator
-from harness.mocap import performer
-from harness.simulate.sensed import Sensed
+from harness.mocap import synthetic
+from harness.simulate.readings import Sensed
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
@@ -55,10 +55,10 @@ def worn(*stations: str) -> list[Mount]:
 @pytest.fixture(scope="session")
 def boxer() -> tuple[Body, Take]:
     """Twelve seconds of the built-in performer, on the performer's own body."""
-    return retarget.to_own_body(performer.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
+    return retargeting.to_own_body(synthetic.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
 
 
 @pytest.fixture(scope="session")
 def walker() -> tuple[Body, Take]:
     """Five seconds of the built-in performer's walk, on the performer's own body."""
-    return retarget.to_own_body(performer.generate("walking", "p1", 1, seed=1, duration_s=5.0))
+    return retargeting.to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=5.0))

@@ -16,19 +16,19 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadInput, UnknownName
 from harness.simulate.components.clock import Clock
-from harness.simulate.components.displaced import Displaced
+from harness.simulate.components.drift_noise import Slow
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.session import Session
-from harness.simulate.components.slow import Slow
-from harness.simulate.components.speed import Speed
-from harness.simulate.components.turned import Turned
-from harness.simulate.components.white import White
+from harness.simulate.components.orientation_offset import Turned
+from harness.simulate.components.position_offset import Displaced
+from harness.simulate.components.session_bias import Session
+from harness.simulate.components.speed_error import Speed
+from harness.simulate.components.white_noise import White
 from harness.simulate.noise import Noise, level
-from harness.simulate.sensed import Sensed
+from harness.simulate.readings import Sensed
 from tests.simulate.conftest import Still
 
 ODDS = 1e-6

@@ -8,7 +8,7 @@ from harness.core import rotations
 from harness.core.motion import Take
 from harness.simulate.disturbance import KINDS, Disturbance, Kind
 from harness.simulate.noise import level
-from harness.simulate.simulate import Simulation, TrackerConfig, simulate
+from harness.simulate.simulation import Simulation, TrackerConfig, simulate
 from tests.simulate.conftest import SIX, worn
 
 BEGIN_S, END_S = 3.0, 5.0

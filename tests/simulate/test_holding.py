@@ -10,12 +10,12 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.mocap import performer
-from harness.simulate.holding import hold_times_s, holding
+from harness.mocap import synthetic
+from harness.simulate.held_poses import hold_times_s, holding
 from harness.simulate.link import TrackerConfig
+from harness.simulate.mounting import strapped
 from harness.simulate.noise import Noise, level
-from harness.simulate.simulate import simulate
-from harness.simulate.strapped import strapped
+from harness.simulate.simulation import simulate
 from harness.stream.frame import TrackerFrame
 
 COUNT = 8
@@ -24,7 +24,7 @@ SIX = [DEFAULTS[name] for name in ("left_hand", "right_hand", "left_ankle", "rig
 
 @pytest.fixture(scope="module")
 def body() -> Body:
-    return build(performer.skeleton("p2"))
+    return build(synthetic.skeleton("p2"))
 
 
 def poses(body: Body) -> list[Floats]:

@@ -6,9 +6,9 @@ import pytest
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.motion import Take
-from harness.simulate.lap import lap
+from harness.simulate.loop import lap
 from harness.simulate.noise import level
-from harness.simulate.simulate import TrackerConfig, simulate
+from harness.simulate.simulation import TrackerConfig, simulate
 from tests.simulate.conftest import worn
 
 TRACKER = TrackerConfig(slot_s=0.0033)

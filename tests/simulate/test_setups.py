@@ -13,18 +13,18 @@ from harness.core import rotations
 from harness.core.motion import Take
 from harness.errors import BadInput, UnknownName
 from harness.simulate.components.clock import Clock
+from harness.simulate.components.drift_noise import Slow
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.session import Session
-from harness.simulate.components.slow import Slow
-from harness.simulate.components.speed import Speed
-from harness.simulate.components.white import White
+from harness.simulate.components.session_bias import Session
+from harness.simulate.components.speed_error import Speed
+from harness.simulate.components.white_noise import White
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import Noise, level
-from harness.simulate.simulate import Simulation, simulate
+from harness.simulate.simulation import Simulation, simulate
 from tests.simulate.conftest import SIX, worn
 
 Boxer = tuple[Body, Take]

@@ -20,11 +20,11 @@ from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountSlip
 from harness.simulate.link import TrackerConfig
 from harness.simulate.noise import LEVELS, Noise, level
-from harness.simulate.simulate import Simulation, sampling_times_s, simulate
+from harness.simulate.simulation import Simulation, sampling_times_s, simulate
 from harness.simulate.trajectory import Trajectory
-from harness.stream.capture import Capture
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.reader import CaptureStream, FrameReader
 from harness.stream.frame import TrackerFrame
-from harness.stream.reader import CaptureStream, FrameReader
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn
 

@@ -10,7 +10,7 @@ from harness.core.arrays import Floats
 from harness.core.motion import Take
 from harness.errors import BadInput
 from harness.simulate.noise import level
-from harness.simulate.simulate import TrackerConfig, simulate
+from harness.simulate.simulation import TrackerConfig, simulate
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
 

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from harness.body import flesh
+from harness.body import soft_tissue
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
-from harness.config import load_scenario
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, pack
 from harness.core.motion import Take
 from harness.errors import BadInput, UnknownName
-from harness.setting import noise_of
-from harness.simulate.components.loose import Loose
+from harness.experiment.clip_evaluation import noise_of
+from harness.experiment.scenario import load_scenario
 from harness.simulate.components.mount import MountSlip
-from harness.simulate.components.wobble import Wobble, bounded, follow
+from harness.simulate.components.soft_tissue import Wobble, bounded, follow
+from harness.simulate.components.strap_slip import Loose
 from harness.simulate.noise import LEVELS, Noise, level
-from harness.simulate.sensed import Sensed
-from harness.simulate.simulate import TrackerConfig, sampling_times_s, sense
+from harness.simulate.readings import Sensed
+from harness.simulate.simulation import TrackerConfig, sampling_times_s, sense
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import Still
 from tests.simulate.test_components import ODDS, assert_sd, errors
@@ -149,7 +149,7 @@ def test_lying_down_it_sags_towards_the_floor(boxer: tuple[Body, Take]) -> None:
     lying = Take("lying", take.subject, take.source, take.behaviour, 40.0, np.tile(pose, (40, 1)))
     still, wobbly = (worn_through(body, lying, THIGH, wobble=w) for w in (None, Wobble()))
     down_m = (wobbly.position_m - still.position_m)[-1, 0, 2]  # the tracker's z points down
-    assert 0.003 < down_m < flesh.thickness_m("rfemur", 0.5)
+    assert 0.003 < down_m < soft_tissue.thickness_m("rfemur", 0.5)
 
 
 def test_in_a_walk_thighs_wobble_by_centimetres_and_shins_by_millimetres(walker: tuple[Body, Take]) -> None:
@@ -183,15 +183,15 @@ def test_numbers_that_cannot_be_are_refused() -> None:
 
 @pytest.mark.parametrize("bone", BONES)
 def test_every_bone_has_flesh_on_both_sides_alike(bone: str) -> None:
-    assert 0.002 <= flesh.thickness_m(bone, 0.0) <= 0.06
-    if bone[0] in "lr" and bone[1:] in flesh.THICKNESS_M:
+    assert 0.002 <= soft_tissue.thickness_m(bone, 0.0) <= 0.06
+    if bone[0] in "lr" and bone[1:] in soft_tissue.THICKNESS_M:
         other = {"l": "r", "r": "l"}[bone[0]] + bone[1:]
-        assert flesh.thickness_m(bone, 0.3) == flesh.thickness_m(other, 0.3)
+        assert soft_tissue.thickness_m(bone, 0.3) == soft_tissue.thickness_m(other, 0.3)
 
 
 def test_flesh_of_no_bone() -> None:
     with pytest.raises(UnknownName, match="'femur'"):
-        flesh.thickness_m("femur", 0.5)
+        soft_tissue.thickness_m("femur", 0.5)
 
 
 def test_loose_straps_slip_as_often_and_as_far_as_said(still: Still) -> None:

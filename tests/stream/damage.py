@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.capture import Capture
-from harness.stream.decoder import Decoder, Event, Records
-from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS, size
-from harness.stream.reader import FrameReader, WireFormat
-from harness.stream.records import Said, Settings, encode, to_bytes
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.decoder import Decoder, Event, Records
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, size
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.records import Said, Settings, encode, to_bytes
 
 Kind = Literal["flipped", "changed", "lost", "added"]
 KINDS: tuple[Kind, ...] = ("flipped", "changed", "lost", "added")

@@ -8,11 +8,11 @@ from hypothesis import strategies as st
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream import ascii as text
-from harness.stream import items
-from harness.stream.decoder import Decoder, Records, joined
-from harness.stream.readings import Readings, readings
-from harness.stream.records import Said, Settings, Table, encode, from_yaw_pitch_roll_deg, to_bytes
+from harness.stream.codec import ascii_records as text
+from harness.stream.codec import items
+from harness.stream.codec.decoder import Decoder, Records, joined
+from harness.stream.codec.readings import Readings, readings
+from harness.stream.codec.records import Said, Settings, Table, encode, from_yaw_pitch_roll_deg, to_bytes
 
 INCHES, CENTIMETRES = 0.0254, 0.01
 POSE = np.array([[1.0, -0.5, 1.5]]), from_yaw_pitch_roll_deg(np.array([[90.0, -10.0, 5.5]]))

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.stream.assemble import Assembler
+from harness.stream.codec.assembler import Assembler
+from harness.stream.codec.readings import Readings
 from harness.stream.frame import TrackerFrame
-from harness.stream.readings import Readings
 from tests.stream.wire import columns
 
 PERIOD_S, SLOT_S, LATE_S = 0.025, 0.003, 500.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.stream.clock import Unwrapper
+from harness.stream.codec.clock import Unwrapper
 from tests.stream.wire import stamps_s
 
 HOST_S: Floats = stamps_s(50) + 1000.0

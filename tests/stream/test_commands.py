@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.stream import commands
-from harness.stream.commands import LONGEST_LINE, Command, CommandReader
+from harness.stream.codec import commands
+from harness.stream.codec.commands import LONGEST_LINE, Command, CommandReader
 
 
 def read(data: bytes) -> list[bytes]:

@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from harness.stream.decoder import LONGEST_REPLY, Event, Garbage, Records, joined
+from harness.stream.codec.decoder import LONGEST_REPLY, Event, Garbage, Records, joined
 from tests.stream.damage import FATES, KINDS, LISTS, Fate, Kind, cost, fate, fate_of_wrong_station, found, sound
 
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.stream.datagram import Datagram, parse
+from harness.stream.codec.datagram import Datagram, parse
 
 EXAMPLE = bytes.fromhex(
     "ff010703 0401ff05 7fff000000000000 0000b442 000020c1 0000b040 0000803f 000000bf 0000c03f 2b874541"

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.stream.decoder import LONGEST_REPLY, Decoder, Event, Garbage, Records, Reply, joined
-from harness.stream.items import STANDARD_LIST
+from harness.stream.codec.decoder import LONGEST_REPLY, Decoder, Event, Garbage, Records, Reply, joined
+from harness.stream.codec.items import STANDARD_LIST
 from tests.stream.wire import RECORD, sent, stamps_s
 
 STATUS = b"21S3FB         4.2301 IS900VET" + b" " * 23 + b"\r\n"

@@ -6,19 +6,19 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from harness.body import mounts, retarget
+from harness.body import mounts, retargeting
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.simulate import noise
 from harness.simulate.disturbance import KINDS, Disturbance, Kind
-from harness.simulate.simulate import TrackerConfig, simulate
-from harness.stream.capture import Capture
-from harness.stream.items import STATION_CHARACTERS
-from harness.stream.plausible import Motion
-from harness.stream.reader import FrameReader, WireFormat
-from harness.stream.readings import Readings, join
-from harness.stream.records import Said, encode
+from harness.simulate.simulation import TrackerConfig, simulate
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.items import STATION_CHARACTERS
+from harness.stream.codec.plausibility import Motion
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.readings import Readings, join
+from harness.stream.codec.records import Said, encode
 
 RATE_HZ = 40.0
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -128,7 +128,7 @@ def test_readings_join_as_they_were() -> None:
 @pytest.mark.parametrize(("behaviour", "rate_hz"), [("boxing", 120.0), ("jumping", 40.0)])
 def test_no_sound_reading_of_a_simulation_is_marked(behaviour: str, rate_hz: float) -> None:
     """At any level and under any disturbance, and for the 16-bit list too."""
-    body, take = retarget.to_own_body(performer.generate(behaviour, performer.performers()[0], 1, seed=1))
+    body, take = retargeting.to_own_body(synthetic.generate(behaviour, synthetic.performers()[0], 1, seed=1))
     worn = [mounts.DEFAULTS[station] for station in STATIONS]
     setups: list[tuple[str, Kind]] = [("clean", "none"), ("noise", "none"), *(("default", kind) for kind in KINDS)]
     for level, kind in setups:

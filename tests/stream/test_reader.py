@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.capture import Capture
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
+from harness.stream.codec.reader import CaptureStream, FrameReader, WireFormat
+from harness.stream.codec.records import Said, Settings, encode, to_bytes
+from harness.stream.codec.replies import TrackingStatus
 from harness.stream.frame import TrackerFrame
-from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS
-from harness.stream.reader import CaptureStream, FrameReader, WireFormat
-from harness.stream.records import Said, Settings, encode, to_bytes
-from harness.stream.replies import TrackingStatus
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, columns, frames_of, received, same, sent, stamps_s
 
 ROUNDS = 12

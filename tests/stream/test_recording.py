@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile
-from harness.stream.blocks import HEADER, LONGEST, MARKER, RECEIVED, SENT, VERSION, Block, Lost, blocks, encode
-from harness.stream.driver.events import LineEvent
-from harness.stream.reader import WireFormat
-from harness.stream.recording import Recording, RecordingWriter, read_recording
-from harness.stream.records import Settings
+from harness.stream.codec.blocks import HEADER, LONGEST, MARKER, RECEIVED, SENT, VERSION, Block, Lost, blocks, encode
+from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.records import Settings
+from harness.stream.line_events import LineEvent
+from harness.stream.recording.recording import Recording, RecordingWriter, read_recording
 from tests.stream.wire import FOUR
 
 ENTRIES = [
@@ -265,8 +265,8 @@ def test_a_full_disk_is_said() -> None:
 
 ENDLESS = """
 import sys
-from harness.stream.reader import WireFormat
-from harness.stream.recording import RecordingWriter
+from harness.stream.codec.reader import WireFormat
+from harness.stream.recording.recording import RecordingWriter
 writer = RecordingWriter(sys.argv[1], {"source": "a test"})
 writer.configured(WireFormat(("head",), 40.0), 0.0, 0.0)
 for count in range(10**9):

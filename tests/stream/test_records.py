@@ -5,9 +5,9 @@ import pytest
 
 from harness.core import rotations
 from harness.errors import BadInput, UnknownName
-from harness.stream import items
-from harness.stream.readings import Readings, readings
-from harness.stream.records import Said, Settings, encode, pack_14_bit, unpack_14_bit
+from harness.stream.codec import items
+from harness.stream.codec.readings import Readings, readings
+from harness.stream.codec.records import Said, Settings, encode, pack_14_bit, unpack_14_bit
 
 POSITION_M = np.array([[1.0, -0.5, 1.5]])
 INCHES, CENTIMETRES = Settings(metres_per_unit=0.0254), Settings(metres_per_unit=0.01)

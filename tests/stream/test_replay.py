@@ -13,12 +13,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, BadInput
-from harness.stream.blocks import HEADER, RECEIVED
-from harness.stream.capture import Capture
+from harness.stream.codec.blocks import HEADER, RECEIVED
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.reader import WireFormat
 from harness.stream.frame import TrackerFrame
-from harness.stream.reader import WireFormat
-from harness.stream.recording import Recording, RecordingWriter, read_recording, record_capture
-from harness.stream.replay import RecordingStream, Speed, next_line, speed_of
+from harness.stream.recording.recording import Recording, RecordingWriter, read_recording, record_capture
+from harness.stream.recording.replay import RecordingStream, Speed, next_line, speed_of
 from harness.testing.stream_checks import check_stream
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
 

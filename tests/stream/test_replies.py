@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.stream.replies import (
+from harness.stream.codec.replies import (
     DeviceError,
     Digits,
     Emitter,

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from harness.stream.codec.continuous_reader import Sessions
 from harness.stream.frame import TrackerFrame
-from harness.stream.sessions import Sessions
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
 
 ROUNDS = 5

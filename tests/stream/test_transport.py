@@ -13,7 +13,7 @@ import pytest
 import serial
 
 from harness.errors import BadInput
-from harness.stream.transport import LineLost, PolledPort, Transport, open_transport
+from harness.stream.driver.transport import LineLost, PolledPort, Transport, open_transport
 
 PATIENT_S = 120.0
 

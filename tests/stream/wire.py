@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core.arrays import Floats
-from harness.stream.capture import Capture
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, size
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.records import Said, Settings, encode
 from harness.stream.frame import TrackerFrame
-from harness.stream.items import STANDARD_LIST, STATION_CHARACTERS, size
-from harness.stream.reader import FrameReader, WireFormat
-from harness.stream.records import Said, Settings, encode
 
 RATE_HZ, SLOT_S = 40.0, 0.0033
 RECORD = size(STANDARD_LIST)

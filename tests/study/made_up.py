@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from harness import cells
-from harness.cells import Planned
 from harness.core.seeds import generator
+from harness.experiment import cells
+from harness.experiment.cells import Planned
+from harness.experiment.clip_evaluation import Setting
 from harness.reconstruct.contract import Method
-from harness.score.cell import Cell
+from harness.results.cell import Cell
 from harness.score.score import Scores
-from harness.setting import Setting
 from tests.report.fabricate import Plan, make_cell
 
 FAILING = "ik:previous+ik"
@@ -50,7 +50,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
 def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where tests work; what is judged there is made up, and its page without charts, which others look at."""
     monkeypatch.setattr(cells, "judge", judge)
-    monkeypatch.setattr("harness.report.sweep_page.find_spec", lambda name: None)
+    monkeypatch.setattr("harness.report.sweep.page.find_spec", lambda name: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path
 

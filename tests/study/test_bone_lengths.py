@@ -5,12 +5,12 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES
-from harness.mocap import performer
-from harness.study.bone_lengths import MODES, by_tibia, eigenmodes, kept_by_count, left_out_m, mirrored
+from harness.mocap import synthetic
+from harness.study.papers.bone_lengths import MODES, by_tibia, eigenmodes, kept_by_count, left_out_m, mirrored
 
 
 def _lengths_m(people: int, seed: int = 1) -> Floats:
-    return np.array([person.length_m for person in performer.population(people, seed)])
+    return np.array([person.length_m for person in synthetic.population(people, seed)])
 
 
 def test_modes_of_a_plane_are_two_and_find_its_axes(rng: np.random.Generator) -> None:

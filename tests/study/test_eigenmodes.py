@@ -7,15 +7,15 @@ import pytest
 
 from harness.core.humanoid24 import BONES
 from harness.errors import BadInput
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.mocap.skeletons import skeletons
-from harness.score.findings import Bars, Lines
-from harness.study.bone_lengths import MODES, by_tibia, eigenmodes, left_out_m
-from harness.study.eigenmodes import bone_modes
+from harness.results.findings import Bars, Lines
+from harness.study.papers.bone_lengths import MODES, by_tibia, eigenmodes, left_out_m
+from harness.study.papers.eigenmodes import bone_modes
 
 
 def test_the_experiment_on_drawn_people_is_not_comparable() -> None:
-    drawn = {str(which): person for which, person in enumerate(performer.population(20, 1))}
+    drawn = {str(which): person for which, person in enumerate(synthetic.population(20, 1))}
     told = bone_modes(drawn, "drawn", measured=False, seed=1)
     assert told == bone_modes(drawn, "drawn", measured=False, seed=1)
     (claim,) = told.claims
@@ -35,7 +35,7 @@ def test_the_experiment_on_drawn_people_is_not_comparable() -> None:
 
 
 def test_six_people_are_too_few() -> None:
-    six = {str(which): person for which, person in enumerate(performer.population(6, 1))}
+    six = {str(which): person for which, person in enumerate(synthetic.population(6, 1))}
     with pytest.raises(BadInput, match="without a remainder"):
         bone_modes(six, "drawn", measured=True, seed=1)
 

@@ -16,9 +16,9 @@ from typing import Any, TypeVar
 import pytest
 
 from harness.errors import BadInput, MissingExtra
-from harness.score.manifest import source_hash
-from harness.study import executors
-from harness.study.executors import dask, processes
+from harness.experiment import executors
+from harness.experiment.executors import dask, processes
+from harness.results.manifest import source_hash
 from tests.interrupts import heeding_interrupts
 
 R = TypeVar("R")
@@ -147,7 +147,7 @@ def test_a_local_cluster_ends_with_the_program(end: signal.Signals, tmp_path: Pa
     program = tmp_path / "program.py"
     program.write_text(
         "import time\n"
-        "from harness.study.executors import dask\n"
+        "from harness.experiment.executors import dask\n"
         "if __name__ == '__main__':\n"
         "    with dask('local', workers=2) as each:\n"
         "        for which, _ in each(time.sleep, [(0.0,), (600.0,), (600.0,)]):\n"

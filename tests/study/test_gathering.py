@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness import trials
 from harness.core.motion import Take
-from harness.mocap import performer
+from harness.experiment import benchmark_clips
+from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
-from harness.score import manifest
-from harness.study import gathering
-from harness.study.gathering import first_frames, gathered, judged, lacking
-from harness.study.study import Study
+from harness.results import manifest
+from harness.study.papers import speed_dataset
+from harness.study.papers.paper_study import Study
+from harness.study.papers.speed_dataset import first_frames, gathered, judged, lacking
 from tests.mocap.synthetic import clip, write_clip
 
-WORN = trials.scenario()
+WORN = benchmark_clips.scenario()
 
 
 @pytest.fixture
@@ -46,33 +46,35 @@ def test_built_in_frames_are_counted_by_behaviour(tmp_path: Path) -> None:
     study, frames = Study(tmp_path, "builtin", 1, {}), {"golf": 850, "boxing": 40}
     assert lacking(study, frames) == ""
     found = gathered(study, frames, WORN, tmp_path / "databases")
-    counted = {b: sum(len(run) for run in found.learnt.runs if run.behaviour == b) for b in performer.BEHAVIOURS}
+    counted = {b: sum(len(run) for run in found.learnt.runs if run.behaviour == b) for b in synthetic.BEHAVIOURS}
     assert {behaviour: count for behaviour, count in counted.items() if count} == frames
     assert len(found.shown) == 2
     assert not {trial.take for trial in found.shown} & {run.take for run in found.learnt.runs}
-    assert len(found.shown[0].simulation.frames) == pytest.approx(gathering.SECONDS * trials.RATE_HZ, abs=2)
+    assert len(found.shown[0].simulation.frames) == pytest.approx(
+        speed_dataset.SECONDS * benchmark_clips.RATE_HZ, abs=2
+    )
 
 
 def test_a_database_is_built_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = gathering.built(tmp_path, {"seed": 1}, lambda: trials.makers(50, 1))
+    first = speed_dataset.built(tmp_path, {"seed": 1}, lambda: benchmark_clips.makers(50, 1))
     asked: list[str] = []
 
     def takes() -> list[Take]:
         asked.append("again")
-        return [trials.built_in(0, 1, frames=60)]
+        return [benchmark_clips.built_in(0, 1, frames=60)]
 
-    again = gathering.built(tmp_path, {"seed": 1}, takes)
+    again = speed_dataset.built(tmp_path, {"seed": 1}, takes)
     np.testing.assert_array_equal(first.posture, again.posture)
     assert not asked
-    assert len(gathering.built(tmp_path, {"seed": 2}, takes)) == 60
+    assert len(speed_dataset.built(tmp_path, {"seed": 2}, takes)) == 60
     monkeypatch.setattr(manifest, "source_hash", lambda: "edited")
-    assert len(gathering.built(tmp_path, {"seed": 1}, takes)) == 60
+    assert len(speed_dataset.built(tmp_path, {"seed": 1}, takes)) == 60
     assert asked == ["again", "again"]
 
 
 @pytest.mark.parametrize(("count", "lengths"), [(0, []), (5, [5]), (10, [10]), (15, [10, 5]), (99, [10, 20])])
 def test_as_many_frames_as_there_are(count: int, lengths: list[int]) -> None:
-    takes = [trials.built_in(which, 1, frames=frames) for which, frames in enumerate((10, 20))]
+    takes = [benchmark_clips.built_in(which, 1, frames=frames) for which, frames in enumerate((10, 20))]
     assert [len(take) for take in first_frames(takes, count)] == lengths
 
 

@@ -5,17 +5,17 @@ from pathlib import Path
 
 import pytest
 
-from harness.cells import check_names, source_of
-from harness.config import load_scenario, variants
-from harness.core.protocol import Part, allowed_frames
-from harness.core.share import share_folder
-from harness.score.findings import Findings, read_findings, write_findings
-from harness.setting import Setting
-from harness.study.kim2012 import PAPER
-from harness.study.sparse_database import ARM_AND_SPINE
-from harness.study.study import Study, open_study, run_experiments
-from harness.study.tables import GROUPS
-from harness.study.tracker_sets import named
+from harness.core.package_data import share_folder
+from harness.core.split import Part, allowed_frames
+from harness.experiment.cells import check_names, source_of
+from harness.experiment.clip_evaluation import Setting
+from harness.experiment.scenario import load_scenario, variants
+from harness.results.findings import Findings, read_findings, write_findings
+from harness.study.papers.kim2012 import PAPER
+from harness.study.papers.paper_study import Study, open_study, run_experiments
+from harness.study.papers.sparse_database import ARM_AND_SPINE
+from harness.study.papers.station_sets import named
+from harness.study.papers.tables import GROUPS
 
 FILES = sorted((share_folder("scenarios") / "papers" / "kim2012").glob("*.toml"))
 BUILT_IN = [path for path in FILES if path.stem.startswith("builtin_")]

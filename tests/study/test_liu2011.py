@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.cells import source_of
-from harness.config import load_scenario, shipped_scenarios
-from harness.core.protocol import Part
 from harness.core.seeds import generator
-from harness.score.cell import Cell
-from harness.score.findings import Claim, Experiment
-from harness.study.frame_by_frame import frame_by_frame
-from harness.study.leave_one_out import BEHAVIOURS, leave_one_out, own_model
-from harness.study.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs
-from harness.study.paper import PAPERS, Motion, paper
-from harness.study.study import Study, check_runs
+from harness.core.split import Part
+from harness.experiment.cells import source_of
+from harness.experiment.scenario import load_scenario, shipped_scenarios
+from harness.results.cell import Cell
+from harness.results.findings import Claim, Experiment
+from harness.study.papers.frame_by_frame import frame_by_frame
+from harness.study.papers.leave_one_out import BEHAVIOURS, leave_one_out, own_model
+from harness.study.papers.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs
+from harness.study.papers.paper import PAPERS, Motion, paper
+from harness.study.papers.paper_study import Study, check_runs
 
 LOW, MIDDLE, HIGH = 1.0, 2.0, 3.0
 THEIRS = {"dynamic_map": LOW, "dynamic_map:window": LOW, "local_pca": MIDDLE, "ik": HIGH}

@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 
 import harness
-from harness.report.paper_verdicts import MARKS
-from harness.score.findings import Experiment
-from harness.study.paper import PAPERS, paper
-from harness.study.study import Study
+from harness.report.paper.verdicts import MARKS
+from harness.results.findings import Experiment
+from harness.study.papers.paper import PAPERS, paper
+from harness.study.papers.paper_study import Study
 
 ROOT = Path(harness.__file__).parent.parent
 PAGE = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
@@ -38,8 +38,8 @@ def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     """Where nothing ran it says so."""
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     imports = (
-        "from harness.score.findings import Experiment\nfrom harness.study.claims import errs_less\n"
-        "from harness.study.study import Study\nfrom harness.study.tables import by_clip, mean_bars\n\n\n"
+        "from harness.results.findings import Experiment\nfrom harness.study.papers.claims import errs_less\n"
+        "from harness.study.papers.paper_study import Study\nfrom harness.study.papers.tables import by_clip, mean_bars\n\n\n"
     )
     file = tmp_path / "swords.py"
     file.write_text(imports + code)

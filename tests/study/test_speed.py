@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from harness.score.findings import Bars
-from harness.study import speed as module
-from harness.study.pace import Pace
-from harness.study.speed import KIM2012, LIU2011, Published, judge, speed
-from harness.study.study import Study
+from harness.results.findings import Bars
+from harness.study.papers import published_speed as module
+from harness.study.papers.method_speed import Pace
+from harness.study.papers.paper_study import Study
+from harness.study.papers.published_speed import KIM2012, LIU2011, Published, judge, speed
 
 TINY = Published("It runs.", "walking", {"golf": {"golf": 850}}, ("weighted_blend", "ik"), ("weighted_blend",), fps=0.1)
 
@@ -73,7 +73,7 @@ def test_tables_and_bars_have_every_pace() -> None:
 
 
 def test_a_speed_is_measured_once_and_its_database_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.study.gathering.SECONDS", 3.2)
+    monkeypatch.setattr("harness.study.papers.speed_dataset.SECONDS", 3.2)
     study = Study(tmp_path, "builtin", 1, {})
     first = speed(study, TINY)
     assert [claim.verdict for claim in first.claims] == ["reproduced"]

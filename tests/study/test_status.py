@@ -9,10 +9,10 @@ import pytest
 
 from harness.cli import main
 from harness.errors import BadFile
-from harness.score.index import CellIndex
-from harness.score.results import read_cells, summary_rows
-from harness.score.running import at_work
-from harness.study.status import status
+from harness.experiment.status import status
+from harness.results.index import CellIndex
+from harness.results.lock import at_work
+from harness.results.storage import read_cells, summary_rows
 from tests.report.fabricate import Plan, fabricate
 
 PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)

@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 from harness.cli import main
+from harness.core.files import TEMPORARY
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.score.files import TEMPORARY
-from harness.score.findings import Bars, Experiment, Lines, read_findings
-from harness.study.paper import Paper, rerun
-from harness.study.study import Study, open_study, planned_cells, run_experiments
-from harness.study.tables import by_clip
+from harness.results.findings import Bars, Experiment, Lines, read_findings
+from harness.study.papers.paper import Paper, rerun
+from harness.study.papers.paper_study import Study, open_study, planned_cells, run_experiments
+from harness.study.papers.tables import by_clip
 from tests.interrupts import heeding_interrupts
 from tests.study.tiny import BOUTS, TINY, WALKS
 
@@ -185,7 +185,7 @@ def test_a_paper_without_runs_on_a_motion_says_so(tmp_path: Path) -> None:
 def test_the_verb_prints_claims_and_where_the_report_lies(
     finished: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("harness.study.paper.paper", lambda name: TINY)
+    monkeypatch.setattr("harness.study.papers.paper.paper", lambda name: TINY)
     words = ["paper", "liu2011", "--out", str(finished), "--jobs", "1"]
     assert main(words) == 0
     said = capsys.readouterr().out.splitlines()

@@ -13,19 +13,19 @@ from typing import Any
 
 import pytest
 
-from harness import cells
-from harness.cells import Job
 from harness.cli import main
-from harness.config import load_scenario
+from harness.core.files import TEMPORARY
 from harness.errors import BadInput, Outcome
-from harness.score.files import TEMPORARY
-from harness.score.results import read_cells
-from harness.score.running import at_work
-from harness.score.table import TIMES
-from harness.study.executors import Each, R, here
-from harness.study.expand import expand, load_sweep
-from harness.study.sweep import planned_cells, run_cells, tasks_of
-from harness.study.sweep_folder import run_sweep
+from harness.experiment import cells
+from harness.experiment.cell_scheduler import planned_cells, run_cells, tasks_of
+from harness.experiment.cells import Job
+from harness.experiment.executors import Each, R, here
+from harness.experiment.scenario import load_scenario
+from harness.experiment.sweep import run_sweep
+from harness.experiment.sweep_config import expand, load_sweep
+from harness.results.lock import at_work
+from harness.results.storage import read_cells
+from harness.results.table import TIMES
 from tests.study.made_up import FAILING, judge, made_up, sweep_file
 
 __all__ = ["made_up"]

@@ -20,13 +20,13 @@ from typing import Any, TypeVar
 import numpy as np
 import pytest
 
-from harness.cells import Job
-from harness.config import Scenario
-from harness.core.protocol import Part
+from harness.core.files import TEMPORARY
+from harness.core.split import Part
 from harness.errors import BadInput
-from harness.score.files import TEMPORARY
-from harness.study.executors import Each, dask, here, processes
-from harness.study.sweep import Cells, run_cells, run_task
+from harness.experiment.cell_scheduler import Cells, run_cells, run_task
+from harness.experiment.cells import Job
+from harness.experiment.executors import Each, dask, here, processes
+from harness.experiment.scenario import Scenario
 from tests.study.tiny import WALKS
 
 R = TypeVar("R")

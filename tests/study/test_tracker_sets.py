@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from harness.score.findings import Verdict
-from harness.study.tracker_sets import (
+from harness.results.findings import Verdict
+from harness.study.papers.station_sets import (
     SHORT,
     averaged,
     best_of_its_size,

@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.cli import main
-from harness.config import Motion, Scenario, load_scenario
-from harness.score.findings import Experiment
-from harness.study import paper as papers
-from harness.study.claims import errs_less
-from harness.study.paper import Paper
-from harness.study.study import Study
-from harness.study.tables import by_clip, error_lines, joint_groups, mean_bars, mean_table
+from harness.experiment.scenario import Motion, Scenario, load_scenario
+from harness.results.findings import Experiment
+from harness.study.papers import paper as papers
+from harness.study.papers.claims import errs_less
+from harness.study.papers.paper import Paper
+from harness.study.papers.paper_study import Study
+from harness.study.papers.tables import by_clip, error_lines, joint_groups, mean_bars, mean_table
 
 WALKS = Scenario(
     name="walks",

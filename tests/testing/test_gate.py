@@ -13,14 +13,15 @@ from typing import Any
 
 import pytest
 
-from harness import experiment
-from harness.config import Scenario, load_scenario
+from harness.compare import baseline
 from harness.errors import BadInput, Outcome
-from harness.score import baseline, manifest
-from harness.score.judged import read_judged
-from harness.score.manifest import Manifest
-from harness.testing.annotations import annotations
-from harness.testing.gate import Gate, scenario_of
+from harness.experiment import engine
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.results import manifest
+from harness.results.manifest import Manifest
+from harness.results.reader import read_judged
+from harness.testing.github_annotations import annotations
+from harness.testing.regression_gate import Gate, scenario_of
 from tests.score.sides import side, write_run
 from tests.testing import upright
 
@@ -52,7 +53,7 @@ def measured(scenario: Scenario, out: Path, *, command: str = "", **changes: Any
 
 
 def run(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
-    """Instead of `experiment.run`, in processes that have one thread each."""
+    """Instead of `engine.run`, in processes that have one thread each."""
     assert jobs > 1
     assert os.environ["OMP_NUM_THREADS"] == os.environ["OPENBLAS_NUM_THREADS"] == "1"
     measured(scenario, out, command=command)
@@ -62,7 +63,7 @@ def run(scenario: Scenario, out: Path, *, jobs: int, command: str) -> Outcome:
 @pytest.fixture
 def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
     """Somebody's project with a baseline `main` of two methods; its methods are as good as `CHANGE` says."""
-    monkeypatch.setattr(experiment, "run", run)
+    monkeypatch.setattr(engine, "run", run)
     monkeypatch.setitem(CHANGE, "now", 1.0)
     monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
@@ -73,7 +74,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
 
 def gated(project: pytest.Pytester, source: str = ONE.format(""), *options: str) -> pytest.RunResult:
     project.makepyfile(source)
-    return project.runpytest_inprocess("-p", "harness.pytest", "-p", "no:cacheprovider", *options)
+    return project.runpytest_inprocess("-p", "harness.testing.plugin", "-p", "no:cacheprovider", *options)
 
 
 def test_a_method_that_is_as_it_was_passes(project: pytest.Pytester) -> None:
@@ -108,7 +109,7 @@ def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, mon
         measured(scenario, out, defined_by={"tracker": {"rate_hz": 60.0, "items": [40, 2]}})
         return Outcome.PASS
 
-    monkeypatch.setattr(experiment, "run", otherwise)
+    monkeypatch.setattr(engine, "run", otherwise)
     monkeypatch.setenv("GITHUB_ACTIONS", "true")
     monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
     result = gated(project)
@@ -124,7 +125,7 @@ def test_cells_that_failed_are_told_with_their_traceback(
         measured(scenario, out, failed=("mine:Mine on walk_09",))
         return Outcome.INCOMPLETE
 
-    monkeypatch.setattr(experiment, "run", failing)
+    monkeypatch.setattr(engine, "run", failing)
     result = gated(project)
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["*planned cells are missing*mine:Mine on walk_09*", "Traceback: no pose"])
@@ -236,7 +237,7 @@ def test_a_scenario_is_read_off_a_manifest_and_only_a_runs() -> None:
 
 def test_other_projects_pay_nothing_for_the_plugin() -> None:
     """It is loaded with every pytest, and needs no more than that has."""
-    source = "import sys, pytest; before = set(sys.modules); import harness.pytest\n"
+    source = "import sys, pytest; before = set(sys.modules); import harness.testing.plugin\n"
     source += "print([name for name in set(sys.modules) - before if not name.startswith('harness')], pytest.__file__)"
     said = subprocess.run([sys.executable, "-c", source], capture_output=True, text=True, check=True).stdout
     assert said.startswith("[] ")

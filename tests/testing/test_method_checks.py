@@ -20,7 +20,7 @@ from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import Take
-from harness.reconstruct.coverage import Coverage
+from harness.reconstruct.solver.status_monitor import Coverage
 from harness.stream.frame import TrackerFrame
 from harness.testing import method_checks
 from harness.testing.method_checks import MethodBroken, check_method, examine

@@ -17,8 +17,8 @@ import numpy as np
 
 from harness.core.arrays import Singles
 from harness.errors import BadFile, BadInput
-from harness.reconstruct.database.database import MotionDatabase, Run
-from harness.reconstruct.database.ground import POSTURE
+from harness.reconstruct.database.motion_database import MotionDatabase, Run
+from harness.reconstruct.solver.ground_frame import POSTURE
 
 FORMAT, VERSION = "tracker-harness motion database", 1
 COLUMNS = {"posture": POSTURE, "step": 3}

@@ -18,10 +18,10 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.compiled import compiled
-from harness.reconstruct.database.ground import POSTURE
+from harness.reconstruct.solver.ground_frame import POSTURE
 
 if TYPE_CHECKING:
-    from harness.reconstruct.database.database import MotionDatabase
+    from harness.reconstruct.database.motion_database import MotionDatabase
 
 
 @dataclass(frozen=True, eq=False)

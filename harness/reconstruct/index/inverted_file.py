@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from harness.core.arrays import Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.reconstruct.index.principal import Principal, chunks
+from harness.reconstruct.index.principal_axes import Principal, chunks
 from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
 
 Codes = NDArray[np.int16]

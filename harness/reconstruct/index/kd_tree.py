@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from harness.core.arrays import Floats, Ints, Singles
 from harness.core.seeds import generator
 from harness.reconstruct.index.flat import ranked
-from harness.reconstruct.index.principal import Principal
+from harness.reconstruct.index.principal_axes import Principal
 from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
 
 _SPARE = 4

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from harness.simulate.limits import require
-from harness.simulate.sensed import Sensed
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
 
 
 @dataclass(frozen=True)

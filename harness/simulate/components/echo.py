@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.simulate.components.excursion import direction
-from harness.simulate.limits import require
-from harness.simulate.sensed import Sensed
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
 
 _WARM_UP = 64
 """Readings before the take, so that it may begin inside a burst."""

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.simulate.limits import require
-from harness.simulate.sensed import Sensed
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.errors import UnknownName
-from harness.simulate.limits import require
-from harness.simulate.sensed import Sensed
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
 
 
 @dataclass(frozen=True)

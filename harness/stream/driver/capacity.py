@@ -3,7 +3,7 @@
 import math
 
 from harness.errors import BadInput
-from harness.stream.items import BITS_PER_BYTE, SHORT_LIST, size
+from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, size
 
 TRACKING_BYTES = 48
 """Of an answer to `MP` (docs/is900.md 7)."""

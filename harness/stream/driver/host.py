@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from harness.stream.transport import Transport, open_transport
+from harness.stream.driver.transport import Transport, open_transport
 
 
 @dataclass(frozen=True)

@@ -7,20 +7,20 @@ from collections.abc import Callable, Iterator
 from types import TracebackType
 
 from harness.errors import BadInput
-from harness.stream import commands
-from harness.stream.driver.events import Kind, LineEvent, NoWitness, Witness
-from harness.stream.driver.find import Found, NoAnswer, bauds_of, find, status_of
+from harness.stream.codec import commands
+from harness.stream.codec.continuous_reader import Sessions
+from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.replies import OutputList, Status
+from harness.stream.driver.config import Timing, Wanted
+from harness.stream.driver.configurator import SetUp
+from harness.stream.driver.connection import Closing, Line
+from harness.stream.driver.detection import Found, NoAnswer, bauds_of, find, status_of
 from harness.stream.driver.host import Host
-from harness.stream.driver.line import Closing, Line
-from harness.stream.driver.setup import SetUp
 from harness.stream.driver.stations import Stations, choose, restore
-from harness.stream.driver.wanted import Timing, Wanted
+from harness.stream.driver.transport import LineLost
 from harness.stream.driver.watchdog import Finding, Watchdog, complaint_of
 from harness.stream.frame import TrackerFrame
-from harness.stream.reader import WireFormat
-from harness.stream.replies import OutputList, Status
-from harness.stream.sessions import Sessions
-from harness.stream.transport import LineLost
+from harness.stream.line_events import Kind, LineEvent, NoWitness, Witness
 
 _RATE_OVER = 50
 """Frames that the present rate is counted over."""

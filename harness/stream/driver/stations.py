@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 from harness.errors import BadInput
-from harness.stream.commands import STATION_STATES, TRACKING, switch_station
-from harness.stream.driver.line import Line
-from harness.stream.items import STATION_CHARACTERS
-from harness.stream.replies import StationStates, TrackingStatus
+from harness.stream.codec.commands import STATION_STATES, TRACKING, switch_station
+from harness.stream.codec.items import STATION_CHARACTERS
+from harness.stream.codec.replies import StationStates, TrackingStatus
+from harness.stream.driver.connection import Line
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,11 @@ from typing import Literal
 
 import numpy as np
 
-from harness.stream.driver.events import Kind
-from harness.stream.driver.wanted import Timing
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.replies import OutputList, ReplyEvent, Status, parse
+from harness.stream.driver.config import Timing
 from harness.stream.frame import TrackerFrame
-from harness.stream.reader import FrameReader, WireFormat
-from harness.stream.replies import OutputList, ReplyEvent, Status, parse
+from harness.stream.line_events import Kind
 
 Step = Literal["none", "ask", "set up", "reopen"]
 """Ask how the device is, set it up anew, or open the line anew and then set it up."""

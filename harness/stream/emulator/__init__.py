@@ -8,6 +8,6 @@ from harness.stream.emulator.device import Device
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
 from harness.stream.emulator.message import Message, Sent
-from harness.stream.emulator.serve import Serving, serving
+from harness.stream.emulator.server import Serving, serving
 
 __all__ = ["Device", "Emulator", "EmulatorConfig", "Fault", "Message", "Sent", "Serving", "serving"]

@@ -1,7 +1,7 @@
 """Whether a line can carry what a scenario asks of it, before anybody waits for records that never come."""
 
 from harness.errors import BadInput
-from harness.stream.items import BITS_PER_BYTE, SHORT_LIST, size
+from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, size
 
 
 def check_capacity(stations: int, rate_hz: float, items: tuple[int, ...], baud: int) -> None:

@@ -8,19 +8,19 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import replace
 
-from harness.stream.commands import Command, CommandReader
+from harness.stream.codec.commands import Command, CommandReader
+from harness.stream.codec.items import SINCE_FIRMWARE
+from harness.stream.codec.replies import DeviceError, ReplyEvent
+from harness.stream.codec.samples import Samples
 from harness.stream.emulator.argument import OUT_OF_RANGE, UNKNOWN, Argument, Refused
 from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.device_commands import AT_ONCE, ORDERS
 from harness.stream.emulator.message import Message
-from harness.stream.emulator.orders import AT_ONCE, ORDERS
 from harness.stream.emulator.player import Player
 from harness.stream.emulator.queries import QUERIES
-from harness.stream.emulator.rounds import Rounds
+from harness.stream.emulator.round_encoder import Rounds
 from harness.stream.emulator.setters import BARE, SETTERS, SILENT
 from harness.stream.emulator.settings import STATIONS, DeviceSettings, StationSettings
-from harness.stream.items import SINCE_FIRMWARE
-from harness.stream.replies import DeviceError, ReplyEvent
-from harness.stream.samples import Samples
 
 _BUFFER_FULL = -5
 _KEPT = 100

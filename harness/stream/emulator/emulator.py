@@ -1,13 +1,13 @@
 """Device, faults and line together, still without input or output: bytes in, bytes with their times out."""
 
 from harness.errors import UnknownName
+from harness.stream.codec.samples import Samples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 from harness.stream.emulator.faults import Faults, Spell
-from harness.stream.emulator.line import Line
 from harness.stream.emulator.message import Sent
+from harness.stream.emulator.serial_line import Line
 from harness.stream.emulator.settings import STATIONS
-from harness.stream.samples import Samples
 
 
 class Emulator:

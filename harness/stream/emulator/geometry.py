@@ -10,8 +10,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.stream.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
 from harness.stream.emulator.settings import StationSettings, Turn, Vector
-from harness.stream.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
 
 _ALONG_M = 2.0
 """Points on the axes lie so far from the origin where an alignment is read; any distance says the same."""

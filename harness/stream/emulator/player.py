@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.stream.samples import Samples
+from harness.stream.codec.samples import Samples
 
 _SOON_S = 1e-9
 """Moments closer than this are one [s]."""

@@ -2,10 +2,7 @@
 
 from collections.abc import Callable, Iterable
 
-from harness.stream.emulator import geometry
-from harness.stream.emulator.argument import OUT_OF_RANGE, Argument, Refused
-from harness.stream.emulator.settings import STATIONS, DeviceSettings, StationSettings
-from harness.stream.replies import (
+from harness.stream.codec.replies import (
     Digits,
     Genlock,
     Numbers,
@@ -18,6 +15,9 @@ from harness.stream.replies import (
     SystemRecord,
     Unknown,
 )
+from harness.stream.emulator import geometry
+from harness.stream.emulator.argument import OUT_OF_RANGE, Argument, Refused
+from harness.stream.emulator.settings import STATIONS, DeviceSettings, StationSettings
 
 Query = Callable[[DeviceSettings, Argument], Iterable[ReplyEvent]]
 _FLAGS = 32

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from harness.errors import HarnessError
+from harness.stream.codec.items import record_type
+from harness.stream.codec.records import Said, Settings, encode
+from harness.stream.codec.replies import Emitter
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import MISSING, OUT_OF_RANGE, Argument, Refused
 from harness.stream.emulator.config import RATES
 from harness.stream.emulator.settings import NOWHERE, UNTURNED, DeviceSettings
-from harness.stream.items import record_type
-from harness.stream.records import Said, Settings, encode
-from harness.stream.replies import Emitter
 
 Setter = Callable[[DeviceSettings, Argument], DeviceSettings]
 _CM = 0.01

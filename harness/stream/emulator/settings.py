@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 
-from harness.stream.replies import Emitter
+from harness.stream.codec.replies import Emitter
 
 STATIONS = "123456789ABC"
 DEFAULT_LIST = (2, 4, 1)

@@ -23,11 +23,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.body.mounts import Mount, place
-from harness.config import Station
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
-from harness.score.placement import Place
+from harness.experiment.scenario import Station
+from harness.results.placement_findings import Place
 
 Pair = Literal["", "each", "together"]
 Unit = tuple[Place, ...]

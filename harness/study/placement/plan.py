@@ -7,19 +7,19 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from harness.cells import check_names, source_of
-from harness.config import Scenario
-from harness.core.protocol import Part
+from harness.compare.margins import margin_of
+from harness.core.split import Part
 from harness.errors import BadInput
-from harness.score.margins import margin_of
-from harness.score.placement import Place
-from harness.study.placement import search, suffices
+from harness.experiment.cells import check_names, source_of
+from harness.experiment.scenario import Scenario
+from harness.results.placement_findings import Place
+from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import Unit, Worn, chosen, worn
+from harness.study.placement.cell_cache import Asked, rate_hz
+from harness.study.placement.config import PlacementStudy, base_scenario, find_study, load_study
 from harness.study.placement.ranking import Costs
-from harness.study.placement.refine import refuse_few
+from harness.study.placement.refinement import refuse_few
 from harness.study.placement.search import stations
-from harness.study.placement.study_file import PlacementStudy, base_scenario, find_study, load_study
-from harness.study.placement.trying import Asked, rate_hz
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Plan:
         if study.exhaustive:
             found += search.every_set(study.exhaustive, self.units)
         for claim in study.claim:
-            suited, others, whole = suffices.sets_of(claim, self.units)
+            suited, others, whole = published_claims.sets_of(claim, self.units)
             found += [suited, *others, whole]
         return list(dict.fromkeys(found))
 

@@ -13,11 +13,11 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from harness.compare.paired_statistics import FEWEST_CLIPS, interval, paired
+from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.score.paired import FEWEST_CLIPS, interval, paired
-from harness.score.placement import Best, Mode, Ranked, Ranking, Stations, Tried
-from harness.score.significance import SIGNIFICANCE, holm, sign_flip_p
+from harness.results.placement_findings import Best, Mode, Ranked, Ranking, Stations, Tried
 
 Costs = Mapping[str, float | None]
 """Clip -> cost; None where it was not measured."""

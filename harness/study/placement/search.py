@@ -11,12 +11,12 @@ from typing import Literal
 
 import numpy as np
 
+from harness.compare.paired_statistics import Paired, paired
 from harness.errors import BadInput
-from harness.score.paired import Paired, paired
-from harness.score.placement import Ranking, Search, Stations, Step, Worth
+from harness.results.placement_findings import Ranking, Search, Stations, Step, Worth
 from harness.study.placement.candidates import Unit, Worn, chosen, worn
+from harness.study.placement.config import Ablate, Add, Exhaustive, Greedy, fits
 from harness.study.placement.ranking import Costs, complete, in_order, names, rank
-from harness.study.placement.study_file import Ablate, Add, Exhaustive, Greedy, fits
 
 Measure = Callable[[Sequence[Worn]], Mapping[Worn, Costs]]
 """Tries sets: what each costs on each clip."""

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.compare.paired_statistics import FEWEST_CLIPS, LEVEL
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.score.paired import FEWEST_CLIPS, LEVEL
-from harness.score.placement import Agreement, Condition, Stations
+from harness.results.placement_findings import Agreement, Condition, Stations
 from harness.study.placement.ranking import Costs, complete, in_order, mean, stays
 
 _RESAMPLES = 2000

@@ -13,17 +13,17 @@ from harness.core.hinges import twin
 from harness.core.humanoid24 import QPOS_OF_DOF, pack
 from harness.core.motion import Take
 from harness.errors import BadInput
-from harness.mocap import performer
+from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase, Run
-from harness.reconstruct.database.ground import ground_of, moved, posture_of, seen_from, standing
-from harness.reconstruct.hinges import HingeLimits
+from harness.reconstruct.solver.ground_frame import ground_of, moved, posture_of, seen_from, standing
+from harness.reconstruct.solver.hinge_limits import HingeLimits
 from tests.reconstruct.conftest import moved as elsewhere
 
 BODY = humanoid.build()
 
 
 def make_take(behaviour: str, number: int, seconds: float = 2.0) -> Take:
-    clip = performer.generate(behaviour, "p2", number, seed=1, duration_s=seconds, rate_hz=40.0)
+    clip = synthetic.generate(behaviour, "p2", number, seed=1, duration_s=seconds, rate_hz=40.0)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)
     return Take(clip.name, clip.subject, clip.source, clip.behaviour, 40.0, qpos)
 
@@ -216,4 +216,4 @@ def test_a_database_of_one_frame_has_no_window_of_two(takes: list[Take]) -> None
     single = MotionDatabase.build(BODY, [changed(takes[0], takes[0].qpos[:1])])
     assert (len(single), len(single.windows(1)), len(single.windows(2))) == (1, 1, 0)
     assert single.windows(2).gather(np.zeros(0, np.int64)).shape == (0, 107)
-    assert single.runs == (Run(takes[0].name, "p2", performer.SOURCE, "walking", 0, 1),)
+    assert single.runs == (Run(takes[0].name, "p2", synthetic.SOURCE, "walking", 0, 1),)

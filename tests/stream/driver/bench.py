@@ -7,15 +7,15 @@ from typing import Protocol
 import numpy as np
 
 from harness.errors import BadInput
+from harness.stream.codec.reader import WireFormat
+from harness.stream.codec.samples import Samples
 from harness.stream.driver import Is900, LineEvent, Wanted
+from harness.stream.driver.config import Timing
 from harness.stream.driver.host import Host
-from harness.stream.driver.wanted import Timing
+from harness.stream.driver.transport import LineLost, Transport
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.frame import TrackerFrame
-from harness.stream.reader import WireFormat
-from harness.stream.samples import Samples
-from harness.stream.transport import LineLost, Transport
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
 LAP_S = 10.0

@@ -3,8 +3,8 @@
 import pytest
 
 from harness.errors import BadInput
+from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, size
 from harness.stream.driver.capacity import check_capacity, load
-from harness.stream.items import SHORT_LIST, STANDARD_LIST, size
 
 BAUD = 115200
 

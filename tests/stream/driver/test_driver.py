@@ -17,7 +17,7 @@ from harness.errors import BadInput
 from harness.stream.driver import Is900, LineEvent, Timing, Wanted
 from harness.stream.emulator import EmulatorConfig, serving
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.serve import Serving
+from harness.stream.emulator.server import Serving
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
 from tests.interrupts import heeding_interrupts

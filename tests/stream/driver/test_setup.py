@@ -8,11 +8,11 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
+from harness.stream.codec.items import BAUDS, SHORT_LIST, STANDARD_LIST, size
+from harness.stream.codec.replies import Status
 from harness.stream.driver import Is900, Timing, Wanted
-from harness.stream.driver.measure import rate_of_stamps
+from harness.stream.driver.rate_measurement import rate_of_stamps
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.items import BAUDS, SHORT_LIST, STANDARD_LIST, size
-from harness.stream.replies import Status
 from tests.stream.driver.bench import NAMES, Bench, Device, Notes, Played, Scripted, frames_for, swaying
 
 

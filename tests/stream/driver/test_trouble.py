@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.stream.commands import output_list
+from harness.stream.codec.commands import output_list
+from harness.stream.codec.continuous_reader import Sessions
+from harness.stream.codec.items import SHORT_LIST
 from harness.stream.driver import Is900, LineEvent, Timing, Wanted
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import ByteKind, Fault
 from harness.stream.frame import TrackerFrame
-from harness.stream.items import SHORT_LIST
-from harness.stream.sessions import Sessions
 from tests.stream.driver.bench import Adapter, Bench, Device, Notes, Played, frames_for, swaying
 
 BACK_WITHIN_S = 2.0

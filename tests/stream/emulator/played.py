@@ -4,9 +4,9 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.stream.codec.samples import Samples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
-from harness.stream.samples import Samples
 
 NAMES = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
 

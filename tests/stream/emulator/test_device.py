@@ -5,10 +5,10 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.stream.codec.items import record_type
+from harness.stream.codec.records import from_yaw_pitch_roll_deg
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
-from harness.stream.items import record_type
-from harness.stream.records import from_yaw_pitch_roll_deg
 from tests.stream.emulator.played import Talk, samples
 
 QUIET = b"O1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfu"

@@ -6,8 +6,8 @@ tests/clients.
 
 import pytest
 
+from harness.stream.codec.items import size
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.items import size
 from tests.stream.emulator.played import Talk
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from harness.simulate.link import TrackerConfig, transmit
-from harness.stream.emulator.line import MOST_REPLIES, Line
 from harness.stream.emulator.message import Message
+from harness.stream.emulator.serial_line import MOST_REPLIES, Line
 
 RECORD = bytes(38)
 

@@ -18,7 +18,7 @@ from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
 from harness.stream.emulator.message import Sent
 from harness.stream.emulator.pty_port import PtyPort
-from harness.stream.emulator.serve import Serving, open_port, serving
+from harness.stream.emulator.server import Serving, open_port, serving
 from harness.stream.emulator.tcp_port import TcpPort
 from tests.stream.emulator.played import samples
 
@@ -228,7 +228,7 @@ def test_waiting_costs_no_time_of_the_processor(link: Path) -> None:
     """Alone in a process: 2 s of silence."""
     code = f"""
 import time
-from harness.stream.emulator.serve import serving
+from harness.stream.emulator.server import serving
 from tests.stream.emulator.played import samples
 with serving(samples(), pty={str(link)!r}):
     before = time.process_time()

@@ -2,9 +2,9 @@
 
 import pytest
 
+from harness.stream.codec.replies import TrackingStatus
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.setters import SETTERS, SILENT
-from harness.stream.replies import TrackingStatus
 from tests.stream.emulator.played import Talk
 
 STATES = b"21l" + b"1111" + b"0" * 28 + b"\r\n"

@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.rehearsal import Rehearsal, rehearse
-from harness.stream import commands
+from harness.experiment.playback import Rehearsal, rehearse
+from harness.stream.codec import commands
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.driver.transport import Transport, open_transport
 from harness.stream.emulator import EmulatorConfig, serving
 from harness.stream.frame import TrackerFrame
-from harness.stream.reader import FrameReader, WireFormat
-from harness.stream.transport import Transport, open_transport
 
 PATIENT_S = 120.0
 """A loaded machine gets so long before a test fails."""

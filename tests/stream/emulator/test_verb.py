@@ -12,14 +12,14 @@ from typing import get_args
 import pytest
 
 from harness.cli import main
-from harness.config import Scenario, find_scenario, load_scenario, variants
-from harness.core.protocol import Part
+from harness.core.split import Part
 from harness.errors import BadInput, HarnessError
+from harness.experiment.clip_evaluation import Setting
+from harness.experiment.scenario import Scenario, find_scenario, load_scenario, variants
 from harness.mocap.sources import open_source
-from harness.reconstruct.ik import PREVIOUS
-from harness.setting import Setting
+from harness.reconstruct.methods.ik import PREVIOUS
+from harness.stream.driver.transport import open_transport
 from harness.stream.emulator.faults import Kind
-from harness.stream.transport import open_transport
 from tests.interrupts import heeding_interrupts
 
 

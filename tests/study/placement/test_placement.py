@@ -10,15 +10,15 @@ import pytest
 
 import harness
 from harness.cli import main
-from harness.config import load_scenario, shipped_placements
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.score.placement import PlacementFindings, read_placement
+from harness.experiment.scenario import load_scenario, shipped_placements
+from harness.results.placement_findings import PlacementFindings, read_placement
 from harness.simulate.link import TrackerConfig
-from harness.study.placement.placement import FINDINGS, placement
+from harness.study.papers.paper_study import open_study
+from harness.study.placement.cell_cache import rate_hz
+from harness.study.placement.config import load_study
+from harness.study.placement.placement_study import FINDINGS, placement
 from harness.study.placement.plan import plan
-from harness.study.placement.study_file import load_study
-from harness.study.placement.trying import rate_hz
-from harness.study.study import open_study
 
 SCENARIO = """
 schema = 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.score.placement import Stations
+from harness.results.placement_findings import Stations
 from harness.study.placement.ranking import (
     best_of_sizes,
     complete,

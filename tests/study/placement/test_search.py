@@ -6,10 +6,11 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.score.placement import Place
+from harness.results.placement_findings import Place
 from harness.study.placement.candidates import Candidate, Unit, Worn, mirrored, units_of, worn
+from harness.study.placement.config import Ablate, Add, Exhaustive, Greedy, Refine
 from harness.study.placement.ranking import Costs
-from harness.study.placement.refine import movers_of, refine
+from harness.study.placement.refinement import movers_of, refine
 from harness.study.placement.search import (
     ablate,
     add,
@@ -20,7 +21,6 @@ from harness.study.placement.search import (
     refuse_absurd,
     stations,
 )
-from harness.study.placement.study_file import Ablate, Add, Exhaustive, Greedy, Refine
 
 CLIPS = tuple(f"clip_{n:02}" for n in range(12))
 UNITS = units_of(

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from harness.core.arrays import Floats
-from harness.score.placement import Stations
+from harness.results.placement_findings import Stations
 from harness.study.placement.stability import Elsewhere, agreements, conditions, tau_b
 
 CLIPS = tuple(f"clip_{n}" for n in range(8))

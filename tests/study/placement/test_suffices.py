@@ -2,13 +2,13 @@
 
 import pytest
 
-from harness.score.findings import Claim
-from harness.score.placement import Stations
+from harness.results.findings import Claim
+from harness.results.placement_findings import Stations
 from harness.study.placement.candidates import Candidate, units_of
+from harness.study.placement.config import Published
+from harness.study.placement.published_claims import judged, rival, sets_of
 from harness.study.placement.ranking import Costs
 from harness.study.placement.search import stations
-from harness.study.placement.study_file import Published
-from harness.study.placement.suffices import judged, rival, sets_of
 
 UNITS = units_of(
     [

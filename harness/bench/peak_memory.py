@@ -1,0 +1,77 @@
+"""One method in a process of its own: the memory that it takes.
+
+    python -m harness.bench.peak_memory METHOD FOLDER SEED
+
+prints the peak in bytes. With METHOD "nothing" the process does all that is not learning: it has loaded everything,
+libraries of linear algebra with their work space too, made the frames, and followed them with plain inverse kinematics.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+from scipy.linalg import solve
+
+from harness.core.seeds import generator
+from harness.experiment import benchmark_clips
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Reconstructor
+from harness.reconstruct.database import MotionDatabase
+
+NOTHING = "nothing"
+SECONDS = 4.0
+"""Of every held-out take."""
+_STATUS = Path("/proc/self/status")
+
+
+def run_alone(method: str, folder: Path, seed: int) -> int:
+    """The largest resident memory of a fresh process [bytes]; RuntimeError when it fails."""
+    command = [sys.executable, "-m", "harness.bench.peak_memory", method, str(folder), str(seed)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode:
+        raise RuntimeError(f"{method} alone: {done.stderr.strip()[-2000:]}")
+    return int(done.stdout)
+
+
+def alone(name: str, folder: Path, seed: int) -> int:
+    """The same of this process."""
+    _load_libraries()
+    body, shown = benchmark_clips.body(), benchmark_clips.trials(seed, SECONDS)
+    _follow(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), shown)
+    if name != NOTHING:
+        database = MotionDatabase.open(folder)
+        _follow(benchmark_clips.learner(name, database, seed), shown)
+    return peak_bytes()
+
+
+def _load_libraries() -> None:
+    """What any program that multiplies matrices and searches holds, whatever it learns from."""
+    import faiss
+
+    matrix = np.eye(160)
+    for some in (matrix, matrix.astype(np.float32)):
+        solve(some @ some, some, assume_a="pos")
+    np.linalg.eigh(matrix)
+    faiss.IndexFlatL2(8).add(np.zeros((1, 8), np.float32))
+
+
+def _follow(fitted: Reconstructor, shown: list[benchmark_clips.Trial]) -> None:
+    for trial in shown:
+        session = fitted.begin(trial.simulation.calibration)
+        for frame in trial.simulation.frames:
+            session.step(frame)
+
+
+def peak_bytes() -> int:
+    """Of this program; `getrusage` would count what the parent held when it started this one."""
+    if _STATUS.is_file():
+        line = next(line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM:"))
+        return 1024 * int(line.split()[1])
+    import resource
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+
+if __name__ == "__main__":
+    print(alone(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])))

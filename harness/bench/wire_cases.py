@@ -1,0 +1,31 @@
+"""The lines that `harness bench wire` tries, and the motion that goes over them."""
+
+from dataclasses import dataclass
+
+from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, size
+
+SCENARIO, CLIP = "demo", "boxing_p1_01"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Stations at a rate on a line."""
+
+    stations: int
+    rate_hz: float
+    items: tuple[int, ...]
+    kind: str
+    """pty, or tcp; a pty is paced at 115200 baud, TCP is not."""
+
+    @property
+    def name(self) -> str:
+        line = "pty at 115200" if self.kind == "pty" else "TCP, unpaced"
+        return f"{self.rate_hz:g} Hz x {self.stations}, {size(self.items)} bytes, {line}"
+
+
+CASES = (
+    Case(4, 75.0, STANDARD_LIST, "pty"),
+    Case(6, 50.0, STANDARD_LIST, "pty"),
+    Case(4, 120.0, SHORT_LIST, "pty"),
+    Case(4, 120.0, STANDARD_LIST, "tcp"),
+)

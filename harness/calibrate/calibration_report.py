@@ -1,0 +1,118 @@
+"""What a calibration found, in words and numbers: for the file that keeps it, and for whoever reads a screen."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from harness.calibrate.pose_calibration import EightPoses
+from harness.calibrate.poses import POSES
+from harness.calibrate.tpose_calibration import TPose
+
+Told = tuple[dict[str, Any], list[str]]
+"""For the file, and lines for the screen."""
+_OF_MOUNTS = ("mount_sd", "mount_bound", "residual")
+
+
+def of_poses(found: EightPoses) -> Told:
+    """A row for each bone, one for each station, and what else there is to say."""
+    names, stations = found.skeleton.names, found.calibration.stations
+    lengths = {
+        name: {"length_m": length, "sd_m": sd, "mean_m": mean, "bound_m": bound, "known": known, "from_prior": prior}
+        for name, length, sd, mean, bound, known, prior in zip(
+            names,
+            found.skeleton.length_m.tolist(),
+            found.length_sd_m.tolist(),
+            found.mean_m.tolist(),
+            found.length_bound_m.tolist(),
+            found.known.tolist(),
+            found.from_prior.tolist(),
+            strict=True,
+        )
+    }
+    deg = {name: np.rad2deg(getattr(found, f"{name}_rad")).tolist() for name in _OF_MOUNTS}
+    size_m = {name: getattr(found, f"{name}_m").tolist() for name in _OF_MOUNTS}
+    mounts = {
+        station: {f"{name}_{unit}": of[name][row] for name in _OF_MOUNTS for unit, of in (("m", size_m), ("deg", deg))}
+        for row, station in enumerate(stations)
+    }
+    miss_deg = {pose.name: deg for pose, deg in zip(POSES, np.rad2deg(found.pose_miss_rad).tolist(), strict=True)}
+    told = {
+        "seconds": found.seconds,
+        "miss_deg": float(np.rad2deg(found.miss_rad)),
+        "beside": found.beside,
+        "condition": found.condition,
+        "hints": list(found.hints),
+        "miss_deg_of_pose": miss_deg,
+        "stations": {name: _finite(row) for name, row in mounts.items()},
+        "bones": {name: _finite(row) for name, row in lengths.items()},
+    }
+    return told, [*_of_bones(lengths), "", *_of_mounts(mounts), "", *_of_fit(found, miss_deg)]
+
+
+def _of_bones(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    head = ["bone [mm]", "found", "sd", "mean skeleton", "bound alone", "told by trackers", ""]
+    rows = [
+        [
+            *(name, f"{1e3 * one['length_m']:.1f}", f"{1e3 * one['sd_m']:.1f}", f"{1e3 * one['mean_m']:.1f}"),
+            *(_mm(one["bound_m"]), f"{one['known']:.0%}", "from the prior" if one["from_prior"] else ""),
+        ]
+        for name, one in lengths.items()
+    ]
+    return _table([head, *rows])
+
+
+def _of_mounts(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
+    head = ["mount", "sd [mm]", "[deg]", "bound alone [mm]", "[deg]", "residual [mm]", "[deg]"]
+    rows = [
+        [
+            name,
+            *(word for key in _OF_MOUNTS for word in (_mm(one[f"{key}_m"]), f"{one[f'{key}_deg']:.2f}")),
+        ]
+        for name, one in mounts.items()
+    ]
+    return _table([head, *rows])
+
+
+def _of_fit(found: EightPoses, miss_deg: Mapping[str, float]) -> list[str]:
+    worst = max(miss_deg, key=lambda name: miss_deg[name])
+    return [
+        "bound alone: the Cramér-Rao bound of whoever knows nothing of people's bones and of where trackers are worn",
+        f"hinges missed the poses by {np.rad2deg(found.miss_rad):.1f} deg, {worst!r} by {miss_deg[worst]:.1f} deg",
+        f"trackers sit {found.beside:.1f} times as far from their nominal places as is usual",
+        f"condition number {found.condition:.3g}; poses held for {found.seconds:.1f} s all together",
+        *(f"hint: {hint}" for hint in found.hints),
+    ]
+
+
+def of_tpose(found: TPose) -> Told:
+    names = found.calibration.stations
+    stations = {
+        name: {"residual_m": residual_m, "moved_m": moved_m}
+        for name, residual_m, moved_m in zip(names, found.residual_m.tolist(), found.moved_m.tolist(), strict=True)
+    }
+    rows = [[name, _mm(one["residual_m"]), _mm(one["moved_m"])] for name, one in stations.items()]
+    heading_deg = float(np.rad2deg(found.heading_sd_rad))
+    lines = [
+        *_table([["station", "off the T-pose [mm]", "moved [mm]"], *rows]),
+        f"which way the performer faced is known to {heading_deg:.1f} deg; T-pose held for {found.seconds:.1f} s",
+    ]
+    return {"seconds": found.seconds, "heading_sd_deg": heading_deg, "stations": stations}, lines
+
+
+def _mm(length_m: float) -> str:
+    return f"{1e3 * length_m:.1f}" if np.isfinite(length_m) else "none"
+
+
+def _finite(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Without what has no bound: neither JSON nor a reader knows infinity."""
+    return {name: value for name, value in row.items() if np.isfinite(value)}
+
+
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    """The first column to the left, the others to the right."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  ".join([first.ljust(widths[0]), *(word.rjust(w) for word, w in zip(rest, widths[1:], strict=True))]).rstrip()
+        for first, *rest in rows
+    ]

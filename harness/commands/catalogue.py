@@ -1,0 +1,63 @@
+"""Everything that can be named on the command line or in a scenario, with a line about each."""
+
+from pathlib import Path
+
+from harness.experiment.cell_scheduler import planned_cells
+from harness.experiment.scenario import Scenario, load_scenario, shipped_placements, shipped_scenarios, variants
+from harness.experiment.sweep_config import expand, load_sweep, shipped_sweeps
+from harness.mocap import synthetic
+from harness.reconstruct import registry
+from harness.score.metrics import DEFINITIONS
+from harness.stream.inputs import COMBINATIONS
+from harness.study.placement.config import load_study
+
+
+def catalogue() -> dict[str, dict[str, str]]:
+    """Title -> name -> one line."""
+    return {
+        "methods": {name: _method(name) for name in registry.methods()},
+        "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
+        "placement studies": {path.stem: load_study(path).title for path in shipped_placements()},
+        "sweeps": {path.stem: _sweep(path) for path in shipped_sweeps()},
+        f"motion of the {synthetic.SOURCE}": {b: _range(synthetic.take_names(b)) for b in synthetic.BEHAVIOURS},
+        "inputs": dict(COMBINATIONS),
+        "noise": {
+            "clean": "what the tracker would say if it were perfect",
+            "noise": "white, slow and session errors, and the device's clock",
+            "default": "all of it: also excursions, echoes, short losses and the error of fast motion",
+        },
+        "metrics": {name: f"[{d.unit}] {d.text}" for name, d in DEFINITIONS.items()},
+    }
+
+
+def _method(name: str) -> str:
+    """What it does, what it needs, and where it comes from."""
+    method = registry.resolve(name)
+    examples = "examples" if method.needs_examples else "no examples"
+    said = [method.summary, f"needs {examples}, takes any inputs", registry.origin(name)]
+    return "; ".join(part for part in said if part)
+
+
+def _line(name: str) -> str:
+    scenario = load_scenario(name)
+    motion = scenario.motion
+    return (
+        f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
+        f"{len(scenario.wearing)} stations, {_errors(scenario)}; {len(scenario.methods)} methods"
+    )
+
+
+def _sweep(path: Path) -> str:
+    scenarios = expand(*load_sweep(path))
+    cells = sum(len(planned_cells(scenario)) for scenario in scenarios)
+    return f"{', '.join(dict.fromkeys(s.name for s in scenarios))}, {_errors(scenarios[0])}; {cells} cells"
+
+
+def _errors(scenario: Scenario) -> str:
+    """What is varied; without that the noise."""
+    varied = dict.fromkeys(key for combination, _ in variants(scenario) for key in combination)
+    return f"varies {', '.join(varied)}" if varied else f"noise {scenario.noise}"
+
+
+def _range(names: tuple[str, ...]) -> str:
+    return f"{len(names)} takes, {names[0]} to {names[-1]}"

@@ -1,0 +1,263 @@
+"""How far off calibration from eight poses is: simulated performers against their truth, the Cramér-Rao bound, and the
+mean skeleton, side by side (docs/methods.md H15)."""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.body.humanoid import build
+from harness.body.mounts import DEFAULTS, Mount
+from harness.calibrate.hold import NotStanding
+from harness.calibrate.pose_calibration import EightPoses, calibrate_poses
+from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.skeleton_prior import BoneSpace, bone_space
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats
+from harness.core.humanoid24 import standard_skeleton
+from harness.core.seeds import generator
+from harness.core.skeleton import Skeleton
+from harness.experiment.simulated_calibration import TrackerSession
+from harness.mocap.skeletons import skeletons
+from harness.mocap.sources import PEOPLE
+from harness.mocap.synthetic import population
+from harness.simulate import noise as noises
+from harness.simulate.held_poses import hold_times_s, holding
+from harness.simulate.mounting import strapped
+from harness.simulate.simulation import TrackerConfig, simulate
+from harness.stream.frame import TrackerFrame
+
+STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
+"""Of the first paper."""
+HOLD_S, MOVE_S, EDGE_S = 3.0, 1.5, 0.2
+"""A hold, the time to the next, and what is left out of a hold at either end [s]."""
+BESIDE_M = 0.01
+"""How far trackers sit from their nominal mounts on each axis, standard deviation; they are turned anyhow."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What one performer's calibration was off; N bones, S stations."""
+
+    length_m: Floats
+    """(N,) errors of lengths."""
+    length_sd_m: Floats
+    """(N,) their bound."""
+    from_prior: Bools
+    """(N,)"""
+    mean_m: Floats
+    """(N,) errors of the mean skeleton, of other people."""
+    mount_m: Floats
+    """(S,) errors of mounts in the frames of the bones that carry the trackers."""
+    elbow_m: Floats
+    """(S,) likewise, of a tracker on a wrist seen from the elbow: the joint between radius and wrist turns about their
+    common line, and no tracker tells where on that line it is."""
+    mount_sd_m: Floats
+    """(S,) bound of `mount_m`."""
+    turn_rad: Floats
+    """(S,) errors of orientation."""
+    turn_sd_rad: Floats
+    """(S,)"""
+    miss_rad: float
+    """How far poses were missed, as found."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of errors over performers and over bones or stations; mm or deg."""
+
+    what: str
+    unit: str
+    rms: float
+    median: float
+    worst: float
+    bound: float
+    """Root mean square of the Cramér-Rao bounds with what is known beforehand of people's bones and of mounts."""
+    mean_skeleton: float
+    """Root mean square of the mean skeleton's errors; NaN where it has none."""
+    count: int
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON, with None for what there is not."""
+        return {name: None if value != value else value for name, value in vars(self).items() if name != "what"}
+
+    def row(self) -> list[str]:
+        numbers = [self.rms, self.median, self.worst, self.bound, self.mean_skeleton]
+        return [f"{self.what} [{self.unit}]", *("" if np.isnan(x) else f"{x:.2f}" for x in numbers), str(self.count)]
+
+
+HEAD = ["error", "rms", "median", "worst", "bound", "mean skeleton", "values"]
+
+
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Performers one after another."""
+
+    miss_rad: float
+    noise: str
+    source: str
+    done: tuple[Trial, ...]
+    refused: dict[str, str]
+    """Performers who could not be calibrated, and why."""
+    seconds: tuple[float, ...]
+    """Processor time of each calibration."""
+
+    def spreads(self) -> list[Spread]:
+        """Of lengths: all, those that the trackers determine, those from the prior; of mounts; of orientations.
+
+        Empty when every performer was refused.
+        """
+        if not self.done:
+            return []
+        off, bound, mean, prior, mount, mount_sd, elbow, turn, turn_sd = (
+            np.array([getattr(trial, field) for trial in self.done])
+            for field in (
+                *("length_m", "length_sd_m", "mean_m", "from_prior"),
+                *("mount_m", "mount_sd_m", "elbow_m", "turn_rad", "turn_sd_rad"),
+            )
+        )
+        whole = np.ones(off.shape, dtype=bool)
+        kinds = ("bone lengths", whole), ("determined by trackers", ~prior), ("from the prior", prior)
+        lengths = [
+            _spread(what, "mm", *(1e3 * x[kept] for x in (off, bound, mean))) for what, kept in kinds if kept.any()
+        ]
+        none = np.full(mount.shape, np.nan)
+        return [
+            *lengths,
+            _spread("mounts", "mm", 1e3 * mount, 1e3 * mount_sd, none),
+            _spread("mounts, wrists from the elbow", "mm", 1e3 * elbow, none, none),
+            _spread("mounts turned", "deg", np.rad2deg(turn), np.rad2deg(turn_sd), none),
+        ]
+
+    def as_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return {
+            "performers": len(self.seconds),
+            "refused": self.refused,
+            "bones_of": self.source,
+            "noise": self.noise,
+            "miss_deg": float(np.rad2deg(self.miss_rad)),
+            "miss_found_deg": [float(np.rad2deg(trial.miss_rad)) for trial in self.done],
+            "seconds": list(self.seconds),
+            "errors": {spread.what: spread.as_dict() for spread in self.spreads()},
+        }
+
+    def lines(self) -> list[str]:
+        """For a terminal."""
+        told = [f"{len(self.seconds)} performers, bones learnt from {self.source}"]
+        told += [f"noise {self.noise!r}, poses missed by {np.rad2deg(self.miss_rad):.2f} deg"]
+        if self.done:
+            found = np.rad2deg([trial.miss_rad for trial in self.done])
+            told[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
+        rows = [HEAD, *(spread.row() for spread in self.spreads())]
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        table = ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+        return [*told, *(table if self.done else []), *(f"{name}: {why}" for name, why in self.refused.items())]
+
+
+def trials(
+    count: int,
+    *,
+    miss_rad: float = float(np.deg2rad(2.5)),
+    noise: str = "default",
+    seed: int = 1,
+    folder: Path | None = None,
+    own_directions: bool = True,
+    beside_m: float = BESIDE_M,
+    stations: Sequence[str] = STATIONS,
+) -> Trials:
+    """So many performers of whom nothing is known beforehand: drawn from the built-in spread, or the subjects of the
+    ASF files below `folder`, each with bones learnt from the others.
+
+    Without `own_directions` their bones are as long but point as the standard skeleton's. BadInput, BadFile,
+    UnknownName.
+    """
+    done, refused, seconds = [], {}, []
+    for number, (name, skeleton, space) in enumerate(people := _people(count, folder), 1):
+        own = skeleton if own_directions else _straightened(skeleton)
+        mounts = [DEFAULTS[station] for station in stations]
+        session = _session(f"{number} {name}", own, mounts, noise, seed, beside_m)
+        frames, began_s = held(session, miss_rad), time.process_time()
+        try:
+            done.append(_judged(calibrate_poses(frames, space, mounts), session))
+        except NotStanding as error:
+            refused[session.name] = str(error)
+        seconds.append(time.process_time() - began_s)
+    return Trials(miss_rad, noise, people[0][2].source, tuple(done), refused, tuple(seconds))
+
+
+def held(session: TrackerSession, miss_rad: float) -> list[list[TrackerFrame]]:
+    """What the tracker reports while the performer holds each of the eight poses."""
+    configurations = [configuration(pose, session.body.skeleton) for pose in POSES]
+    rng = generator(session.seed, "calibration trial", session.name)
+    take = holding(session.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=HOLD_S, move_s=MOVE_S)
+    seen = simulate(session.body, take, session.strapped, session.tracker, session.noise, seed=session.seed)
+    # By the host's clock, which hears of everything a little late.
+    holds = hold_times_s(len(POSES), HOLD_S, MOVE_S)
+    return [[f for f in seen.frames if a + EDGE_S <= f.received_s <= b - EDGE_S + 0.1] for a, b in holds]
+
+
+def _people(count: int, folder: Path | None) -> list[tuple[str, Skeleton, BoneSpace]]:
+    """Name, skeleton and the bones of others, of so many performers."""
+    if folder is None:
+        everyone = population(PEOPLE + count, seed=0)
+        space = bone_space(everyone[:PEOPLE], source=f"{PEOPLE} other people of the built-in spread")
+        return [(f"person {PEOPLE + n + 1}", skeleton, space) for n, skeleton in enumerate(everyone[PEOPLE:])]
+    known = skeletons(folder)
+    names = [list(known)[n % len(known)] for n in range(count)]
+    spaces = {name: _others(known, name) for name in set(names)}
+    return [(name, known[name], spaces[name]) for name in names]
+
+
+def _others(known: Mapping[str, Skeleton], name: str) -> BoneSpace:
+    others = [skeleton for other, skeleton in known.items() if other != name]
+    return bone_space(others, source=f"the {len(others)} other people of the library")
+
+
+def _session(
+    name: str, own: Skeleton, mounts: Sequence[Mount], noise: str, seed: int, beside_m: float
+) -> TrackerSession:
+    worn = strapped(mounts, beside_m=beside_m, turned_rad=np.pi, seed=seed, session=name)
+    tracker = TrackerConfig(slot_s=0.0) if noise == "clean" else TrackerConfig()
+    return TrackerSession(name, seed, build(own), tuple(mounts), worn, tracker, noises.level(noise))
+
+
+def _judged(found: EightPoses, session: TrackerSession) -> Trial:
+    true, own, known = session.exact, session.body.skeleton, found.calibration
+    off_m = known.mount_m - true.mount_m
+    elbow_m = np.array(off_m)
+    for row, bone in enumerate(known.bones):
+        if bone in ("lwrist", "rwrist"):
+            radius = own.index(f"{bone[0]}radius")
+            elbow_m[row] += found.skeleton.bone_m[radius] - own.bone_m[radius]
+    return Trial(
+        length_m=found.skeleton.length_m - own.length_m,
+        length_sd_m=found.length_sd_m,
+        from_prior=found.from_prior,
+        mean_m=found.mean_m - own.length_m,
+        mount_m=np.linalg.norm(off_m, axis=1),
+        elbow_m=np.linalg.norm(elbow_m, axis=1),
+        mount_sd_m=found.mount_sd_m,
+        turn_rad=rotations.angle_between_rad(known.bone_from_station, true.bone_from_station),
+        turn_sd_rad=found.mount_sd_rad,
+        miss_rad=found.miss_rad,
+    )
+
+
+def _straightened(skeleton: Skeleton) -> Skeleton:
+    """Bones as long, pointing as the standard skeleton's."""
+    standard = standard_skeleton()
+    return skeleton.with_bones(standard.bone_m * (skeleton.length_m / standard.length_m)[:, None])
+
+
+def _spread(what: str, unit: str, off: Floats, bound: Floats, mean: Floats) -> Spread:
+    size = np.abs(off)
+    return Spread(
+        what, unit, _rms(off), float(np.median(size)), float(size.max()), _rms(bound), _rms(mean), int(size.size)
+    )
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

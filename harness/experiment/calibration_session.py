@@ -1,0 +1,123 @@
+"""Somebody stands model for a calibration: what they are to hold, whether they do, and what is kept of it."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from harness import __version__
+from harness.body.humanoid import Body, build
+from harness.body.mounts import Mount
+from harness.calibrate import calibration_report
+from harness.calibrate.calibration_file import CalibrationFile
+from harness.calibrate.guided_calibration import HoldPoses, Say, Show
+from harness.calibrate.pose_calibration import calibrate_poses
+from harness.calibrate.pose_classifier import Likeness
+from harness.calibrate.pose_collector import PoseCollector
+from harness.calibrate.poses import POSES, CalibrationPose, configuration
+from harness.calibrate.skeleton_prior import BoneSpace, bone_space
+from harness.calibrate.tpose_calibration import calibrate_tpose
+from harness.core.arrays import Floats
+from harness.core.split import Part
+from harness.experiment.cells import source_of
+from harness.experiment.clip_evaluation import mounts_of
+from harness.experiment.playback import chosen, rehearse
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.stream.frame import TrackerFrame
+
+Kind = Literal["poses", "tpose"]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A calibration, and what there is to say of it."""
+
+    kept: CalibrationFile
+    lines: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Posing:
+    """A performer with these stations of a scenario on; UnknownName and BadFile as for a run of it."""
+
+    scenario: Path | str
+    stations: tuple[str, ...]
+    """In the order of the stream's rows."""
+    kind: Kind = "poses"
+    """Bones, mounts and room of eight poses; or mounts and room of the first alone, on a body that is known."""
+    clip: str | None = None
+    """Whose body that is, and of whose bones nothing may be known beforehand; None: the scenario's first, nobody."""
+    folder: Path | None = None
+    """Library of real motion, where the scenario needs one."""
+
+    @cached_property
+    def asked(self) -> Scenario:
+        """With no other stations, in this order."""
+        scenario = load_scenario(self.scenario)
+        worn = chosen(scenario, self.stations)
+        return replace(scenario, stations={name: scenario.stations[name] for name in worn}, worn=())
+
+    @property
+    def poses(self) -> tuple[CalibrationPose, ...]:
+        return POSES if self.kind == "poses" else POSES[:1]
+
+    @property
+    def mounts(self) -> tuple[Mount, ...]:
+        """Where the stations are said to be worn."""
+        return mounts_of(self.asked)
+
+    @cached_property
+    def body(self) -> Body:
+        """The performer's where it is known, otherwise the standard one."""
+        if self.kind == "poses":
+            return build()
+        return rehearse(self.scenario, clip=self.clip, folder=self.folder).body
+
+    @cached_property
+    def shown(self) -> list[Floats]:
+        """The poses (55,) of that body."""
+        return [configuration(pose, self.body.skeleton) for pose in self.poses]
+
+    @cached_property
+    def space(self) -> BoneSpace:
+        """What people's bones are like: the scenario's source knows some."""
+        motion = self.asked.motion
+        source = source_of(motion, self.folder, self.asked.seed)
+        people = source.people(without=source.subject(Part.parse(self.clip).clip) if self.clip else "")
+        return bone_space(list(people.values()), source=f"{len(people)} people ({source.title})")
+
+    def held(
+        self,
+        frames: Iterable[TrackerFrame],
+        say: Say,
+        show: Show | None = None,
+        watch: Say = lambda text: None,
+    ) -> PoseCollector:
+        """Lead the performer through the poses; NotStanding when the stream ends before the last."""
+        likeness = Likeness(self.body, self.mounts, self.shown)
+        collector = PoseCollector(self.stations, len(self.poses), likeness)
+        HoldPoses(collector, self.poses, self.shown, show).lead(frames, say, watch)
+        return collector
+
+    def found(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> Found:
+        """Solve for what the poses tell; `source` is where the frames come from, in words. NotStanding, BadInput."""
+        if self.kind == "poses":
+            eight = calibrate_poses(held, self.space, self.mounts)
+            calibration, skeleton, (words, lines) = (
+                eight.calibration,
+                eight.skeleton,
+                calibration_report.of_poses(eight),
+            )
+        else:
+            tpose = calibrate_tpose(held[0], self.body, self.mounts)
+            calibration, skeleton, (words, lines) = (
+                tpose.calibration,
+                self.body.skeleton,
+                calibration_report.of_tpose(tpose),
+            )
+        made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {__version__}"}
+        made |= {"source": source, "scenario": self.asked.name}
+        made |= {"others": self.space.source} if self.kind == "poses" else {}
+        return Found(CalibrationFile(calibration, skeleton, {**made, **words}), lines)

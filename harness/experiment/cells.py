@@ -1,0 +1,257 @@
+"""Cells: which there are, how one is made, and what became of it.
+
+A job is one test clip: simulated once for every combination of varied values, then shown to every method with every
+choice of inputs. Each of these is a cell, written whole or not at all, so that whoever runs jobs can be stopped at any
+moment and goes on where they were.
+"""
+
+import time
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.body.mounts import place
+from harness.core.arrays import Floats, Ints
+from harness.core.calibration import Calibration
+from harness.core.humanoid24 import standard_skeleton
+from harness.core.split import Part
+from harness.errors import HarnessError, was_interrupted
+from harness.experiment.clip_evaluation import Setting, mounts_of, noise_of
+from harness.experiment.reference_workload import EVERY, Reference
+from harness.experiment.scenario import Motion, Scenario, variants
+from harness.mocap.sources import MotionSource, open_source
+from harness.reconstruct import registry
+from harness.reconstruct.contract import Method, Reconstructor
+from harness.results import manifest, storage
+from harness.results.cell import as_row, cell_folder, read_row, varied_text
+from harness.score.score import score
+from harness.simulate.simulation import Simulation
+from harness.stream.codec.reader import WireFormat
+from harness.stream.inputs import Inputs, combination
+
+Progress = Callable[[str, int, int], None]
+"""Called with what was done last, how many cells are finished and how many were planned."""
+
+
+Varied = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One cell to come."""
+
+    scenario: Scenario
+    """With the varied values put in."""
+    varied: Varied
+    part: Part
+    method: str
+    inputs: str
+
+    def __str__(self) -> str:
+        """What the cell is called."""
+        besides = [text for text in (self.inputs, varied_text(self.varied)) if text not in ("", "pos+ori")]
+        return f"{self.method} on {self.part}" + (f" ({', '.join(besides)})" if besides else "")
+
+
+@dataclass(frozen=True)
+class Job:
+    """One test clip of a scenario; everything a worker process needs to know."""
+
+    scenario: Scenario
+    part: Part
+    behaviour: str
+    folder: Path | None
+    """The library of real motion."""
+    command: str
+    """The command that reproduces the run."""
+    chosen: tuple[int, ...] = ()
+    """Which of the scenario's variants, () for all: several workers may share the variants of one clip."""
+
+    def cells(self) -> list[Planned]:
+        """One for each combination of varied values, inputs and methods."""
+        return [
+            Planned(scenario, varied, self.part, method, inputs)
+            for varied, scenario in variants(self.scenario, self.chosen)
+            for inputs in scenario.inputs
+            for method in scenario.methods
+        ]
+
+
+@dataclass(frozen=True)
+class Ended:
+    """What became of one cell."""
+
+    cell: str
+    key: str = ""
+    """Of the finished cell."""
+    failure: str = ""
+    """Why there is none: a refusal in one line, or a traceback."""
+    refused: bool = False
+    row: Mapping[str, Any] | None = None
+    """Of the finished cell, as `results.cell.as_row` has it; also of one that was finished before."""
+    seconds: float = 0.0
+    """It took here, with what it made for the cells after it [s]; 0 for one that was finished before."""
+
+
+def run_job(job: Job, out: Path, stop: Path | None = None) -> Iterator[Ended]:
+    """Every cell of one clip, in order; a failure is reported in its place. It ends early once the file `stop` is."""
+    for cell in job.cells():
+        if stop is not None and stop.exists():
+            return
+        start = time.perf_counter()
+        try:
+            setting, method = _setting(job, cell.scenario), _method(cell.method)
+            key = setting.key(method, cell.method, cell.inputs, cell.varied)
+            if storage.has_cell(out, key):
+                yield Ended(str(cell), key, row=read_row(cell_folder(out, key)))
+                continue
+            made = judge(setting, method, cell, key, job.command)
+            storage.write_cell(out, made)
+            yield Ended(str(cell), key, row=as_row(made), seconds=time.perf_counter() - start)
+        except HarnessError as error:
+            yield Ended(str(cell), failure=str(error), refused=True)
+        except (Exception, SystemExit) as error:  # a method may raise anything: its cell fails, the run goes on
+            if was_interrupted(error):
+                raise KeyboardInterrupt from error
+            yield Ended(str(cell), failure=traceback.format_exc())
+
+
+_last: list[Setting] = []
+"""What this process worked at, for the next job may be of the same clip."""
+
+
+def _setting(job: Job, scenario: Scenario) -> Setting:
+    """Shares with the one before what may be shared."""
+    source, now = source_of(scenario.motion, job.folder, scenario.seed), None
+    for last in _last:
+        if last.source is source and (last.part, last.behaviour) == (job.part, job.behaviour):
+            now = last if last.scenario == scenario else last.under(scenario)
+    _last[:] = [now or Setting(scenario, source, job.part, job.behaviour)]
+    return _last[0]
+
+
+@cache
+def _method(name: str) -> Method:
+    """Whatever package it is of: to look through all that are installed takes longer than to write a cell."""
+    return registry.resolve(name)
+
+
+def judge(setting: Setting, method: Method, planned: Planned, key: str, command: str) -> storage.Cell:
+    """Fit, run causally over the stream, score."""
+    scenario, simulation = setting.scenario, setting.simulation
+    seen = combination(planned.inputs, simulation.stations)
+    known, fitted = setting.calibrated, setting.fitted(method, planned.method)
+    qpos, status, step_ms, cpu_ms = reconstruct(fitted, known.calibration, simulation, seen)
+    scores = score(
+        setting.body.skeleton,
+        scenario.tracker.rate_hz,
+        simulation.truth_qpos,
+        qpos,
+        simulation.frame_index,
+        status,
+        step_ms,
+        cpu_ms=cpu_ms,
+        estimate_skeleton=known.body.skeleton,
+    )
+    frames = simulation.frames
+    return storage.Cell(
+        key=key,
+        method=planned.method,
+        behaviour=setting.behaviour,
+        clip=str(setting.part),
+        motion_source=setting.source.title,
+        stations=simulation.stations,
+        mount=scenario.mount,
+        rate_hz=scenario.tracker.rate_hz,
+        inputs=planned.inputs,
+        protocol=scenario.motion.protocol if method.needs_examples else "none",
+        calibration=known.calibration.kind,
+        noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
+        seed=scenario.seed,
+        performer=setting.performer,
+        varied=planned.varied,
+        scenario=scenario.name,
+        defined_by=setting.inputs_of(method, planned.inputs),
+        scores=scores,
+        health=simulation.health,
+        calibration_errors=known.errors,
+        bone_m=setting.body.skeleton.bone_m,
+        estimate_bone_m=known.body.skeleton.bone_m,
+        source_hash=manifest.source_hash(),
+        reproduce=command,
+        notes=setting.notes(method),
+        time_s=simulation.truth_s[simulation.frame_index],
+        truth_qpos=simulation.truth_qpos[simulation.frame_index],
+        estimate_qpos=qpos,
+        frame_index=simulation.frame_index,
+        status=status,
+        step_ms=step_ms,
+        step_cpu_ms=cpu_ms[0],
+        reference_cpu_ms=cpu_ms[1],
+        quality=np.array([f.quality for f in frames]),
+        position_valid=np.array([f.position_valid for f in frames]),
+        orientation_valid=np.array([f.orientation_valid for f in frames]),
+        suspect=np.array([f.suspect for f in frames]),
+    )
+
+
+def reconstruct(
+    reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
+) -> tuple[Floats, Ints, Floats, tuple[Floats, Floats]]:
+    """Estimates (F, 55), status (F,), wall time of each step (F,), CPU time of each and of the reference (F,) [ms].
+
+    Reference work follows every so many steps. The step after it finds the method's data gone from the caches and is
+    not timed, NaN: times are of steps that follow a step. The truth stays on this side.
+    """
+    session, work = reconstructor.begin(calibration), Reference()
+    qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
+    for index, frame in enumerate(simulation.frames):
+        shown = inputs.masked(frame)
+        start_cpu, start = time.process_time(), time.perf_counter()
+        estimate = session.step(shown)
+        step_ms.append(1e3 * (time.perf_counter() - start))
+        cpu_ms.append(1e3 * (time.process_time() - start_cpu))
+        qpos.append(estimate.qpos)
+        status.append(estimate.status)
+        reference_ms.append(work.cpu_ms() if index % EVERY == EVERY - 1 else np.nan)
+    times_ms = np.array([step_ms, cpu_ms, reference_ms])
+    times_ms[:2, EVERY::EVERY] = np.nan
+    return np.array(qpos), np.array(status), times_ms[0], (times_ms[1], times_ms[2])
+
+
+def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:
+    """The motion that a scenario names; BadInput when it needs a library and none is named."""
+    return _opened(motion.source, folder, seed, motion.rate_hz or None)
+
+
+def forget_motion() -> None:
+    """Whoever begins a run calls this: files may have changed since the last one."""
+    _opened.cache_clear()
+    _method.cache_clear()
+    _last.clear()
+
+
+@lru_cache(maxsize=2)
+def _opened(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
+    """One for all the clips of a run: they share examples."""
+    return open_source(kind, folder, seed=seed, rate_hz=rate_hz)
+
+
+def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> None:
+    """Everything that a scenario names exists: clips, methods, inputs, bones, components. UnknownName, BadInput."""
+    withheld = {Part.parse(text).clip for text in scenario.motion.withheld}
+    for name in {part.clip for part in parts} | set(scenario.motion.examples) | withheld:
+        source.check(name)
+    for name in scenario.methods:
+        _method(name)
+    for name in scenario.inputs:
+        combination(name, tuple(scenario.wearing))
+    WireFormat(tuple(scenario.wearing), scenario.tracker.rate_hz, scenario.tracker.items)
+    for mount in mounts_of(scenario):
+        place(standard_skeleton(), mount)
+    scenario.disturbance.added(noise_of(scenario), tuple(scenario.wearing))

@@ -1,0 +1,212 @@
+"""Who runs the jobs of a study: this process, a pool of processes, or the workers of a Dask scheduler.
+
+All of them are used in one way: `each(function, tasks)` gives, as each task ends, which it was and what came of it.
+Dask's own transport pickles what it carries, so whoever can reach a scheduler can run code on it and its workers:
+a local one listens on loopback alone, any other is used only where it is named.
+"""
+
+import asyncio
+import logging
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import BrokenExecutor, CancelledError, Future
+from contextlib import contextmanager, redirect_stdout
+from functools import partial
+from importlib.util import find_spec
+from threading import Lock
+from typing import Any, Protocol, TypeVar
+
+from harness.core.workers import Pool, ctrl_c_ignored, keep_busy
+from harness.errors import BadInput, MissingExtra
+from harness.results.manifest import source_hash
+
+R = TypeVar("R")
+
+ANSWER_S = 5.0
+"""How long a scheduler may take to answer before it counts as none."""
+LOOK_S = 1.0
+"""How often it is asked whether it is there and how many workers it has."""
+LOCAL = {
+    "distributed.scheduler.allowed-failures": 1,  # of workers that die with a task; then `keep_busy` has it tried alone
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    "distributed.worker.profile.enabled": False,  # it would slow the steps that are timed
+    "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(
+        ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), 1
+    ),
+}
+"""Dask's settings for a cluster of our own."""
+
+
+class Each(Protocol):
+    """Calls a function with each of several tasks, somewhere."""
+
+    def __call__(
+        self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
+    ) -> Generator[tuple[int, Future[R]], None, None]: ...
+
+
+def processes(jobs: int) -> Each:
+    """So many worker processes, which stay for the next call; a single job needs none and is done in this one."""
+    return here if jobs == 1 else partial(_pooled, Pool(jobs))
+
+
+def _pooled(
+    pool: Pool, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
+) -> Generator[tuple[int, Future[R]], None, None]:
+    return pool(_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks])
+
+
+def here(
+    function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
+) -> Generator[tuple[int, Future[R]], None, None]:
+    """One after another, in this process."""
+    for which, task in enumerate(tasks):
+        future = Future[R]()
+        try:
+            future.set_result(function(*task))
+        except Exception as error:
+            future.set_exception(error)
+        yield which, future
+
+
+@contextmanager
+def dask(address: str, workers: int | None = None) -> Iterator[Each]:
+    """The workers of the scheduler at an address such as tcp://host:8786; `local` starts one on this machine, with so
+    many workers (by default one for each core), all of which end with this process.
+
+    Needs the extra `cluster`: MissingExtra. BadInput when no scheduler answers, or none any more. A task whose
+    workers die is begun again elsewhere, and in the end its future has BrokenExecutor. The function and its tasks
+    travel pickled; workers must have this very source of the harness, and see the same folders.
+    """
+    if find_spec("distributed") is None:
+        raise MissingExtra("A Dask cluster", "distributed", "cluster")
+    from distributed import Client
+    from distributed.utils import silence_logging_cmgr
+
+    with (
+        silence_logging_cmgr(logging.CRITICAL),
+        _scheduler(address, workers) as found,
+        Client(found, set_as_default=False) as client,
+    ):
+        yield partial(_each, client, address)
+
+
+@contextmanager
+def _scheduler(address: str, workers: int | None) -> Iterator[Any]:
+    """What a client connects to: the address, or a cluster of our own."""
+    if address != "local":
+        asyncio.run(_answers(address))
+        yield address
+        return
+    from dask import config
+    from distributed import LocalCluster
+
+    with config.set(LOCAL):
+        with ctrl_c_ignored():
+            cluster = LocalCluster(
+                n_workers=workers or os.cpu_count() or 1,
+                threads_per_worker=1,
+                host="127.0.0.1",
+                scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                memory_limit=0,  # the system's: Dask's own would pause and kill workers by share of the machine
+                silence_logs=logging.CRITICAL,
+            )
+        with cluster:
+            try:
+                yield cluster
+            except BaseException:  # such as Ctrl-C: Dask would give what runs some seconds to end
+                for nanny in cluster.workers.values():
+                    nanny.auto_restart = False
+                    if nanny.pid:
+                        os.kill(nanny.pid, signal.SIGKILL)
+                raise
+
+
+async def _answers(address: str) -> None:
+    """BadInput unless a scheduler does: a client of Dask's would wait for one that is mute."""
+    from distributed import Security, rpc
+
+    advice = "Start one with `dask scheduler`, which prints its address, or take --dask local."
+    try:
+        keys = Security().get_connection_args("client")  # of Dask's own configuration, where there are any
+        async with asyncio.timeout(ANSWER_S), rpc(address, connection_args=keys) as asked:
+            kind = (await asked.identity())["type"]
+    except Exception as error:  # whatever a stranger may answer
+        said = str(error).rstrip(".") or f"no answer in {ANSWER_S:g} s"
+        raise BadInput(f"No Dask scheduler at {address}: {said}.", advice) from error
+    if kind != "Scheduler":
+        raise BadInput(f"No Dask scheduler at {address}, but a {kind.lower()}.", advice)
+
+
+def _each(
+    client: Any, address: str, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
+) -> Generator[tuple[int, Future[R]], None, None]:
+    source, folder = source_hash(), os.getcwd()
+    room = _Room(client)
+
+    def submit(which: int) -> Future[R]:
+        return _followed(client.submit(_on_worker, source, folder, function, *tasks[which], pure=False))
+
+    try:
+        for which, future in keep_busy(submit, len(tasks), room.places, look_s=LOOK_S):
+            if isinstance(future.exception(), CancelledError):  # by no one here: the connection was lost
+                raise OSError("lost")
+            yield which, future
+    except OSError as error:
+        advice = "What was finished is kept, the same command goes on from there."
+        raise BadInput(f"The Dask scheduler at {address} is gone.", advice) from error
+
+
+class _Room:
+    """How many tasks a scheduler is given at a time: one for each worker, for those that wait in one that dies are
+    suspected too."""
+
+    def __init__(self, client: Any) -> None:
+        self._client, self._asked_s, self._places = client, -LOOK_S, 1
+
+    def places(self) -> int:
+        """OSError when the scheduler is gone."""
+        if self._client.status != "running":
+            raise OSError(self._client.status)
+        if time.monotonic() - self._asked_s >= LOOK_S:
+            self._places = max(1, len(self._client.nthreads()))
+            self._asked_s = time.monotonic()
+        return self._places
+
+
+def _followed(submitted: Any) -> Future[Any]:
+    """A future of Dask's as everyone's."""
+    from distributed.scheduler import KilledWorker
+
+    future = Future[Any]()
+
+    def end(submitted: Any) -> None:
+        try:
+            future.set_result(submitted.result())
+        except KilledWorker as error:
+            future.set_exception(BrokenExecutor(str(error)))
+        except BaseException as error:
+            future.set_exception(error)
+
+    submitted.add_done_callback(end)
+    return future
+
+
+_one_at_a_time = Lock()
+"""Of a worker, whose threads would spoil each other's times and output."""
+
+
+def _on_worker(source: str, folder: str, function: Callable[..., R], *task: Any) -> R:
+    """What a worker does, wherever it is; BadInput when it has other code, as after an edit, than whoever asks."""
+    if source_hash() != source:
+        advice = "Start both anew with the same one; what was finished is kept."
+        raise BadInput("A worker has another version of the harness than the program that it works for.", advice)
+    with _one_at_a_time, redirect_stdout(sys.stderr):
+        if folder not in sys.path:
+            sys.path.append(folder)  # a user's own method may lie where they work
+        return function(*task)

@@ -1,0 +1,151 @@
+"""A scenario's clip, or its performer standing model for a calibration, made ready to be worn outside a run: played by
+an emulator, tracked live, or recorded."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from harness.body import humanoid
+from harness.body.humanoid import Body
+from harness.body.mounts import Mount
+from harness.calibrate.calibration_file import CalibrationFile
+from harness.calibrate.poses import POSES, configuration
+from harness.core.calibration import Calibration
+from harness.core.motion import Take
+from harness.core.split import Part
+from harness.errors import BadInput, UnknownName
+from harness.experiment.cells import check_names, source_of
+from harness.experiment.clip_evaluation import Setting, mounts_of, noise_of, tracker_of
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.simulated_calibration import Calibrated
+from harness.simulate.loop import lap
+from harness.simulate.simulation import Simulation, TrackerConfig
+from harness.stream.codec.samples import Samples
+
+
+class Rehearsal:
+    """One clip of a scenario with some of its stations, or with `posing` the poses of a calibration, held before it in
+    the same session of the tracker; each part is made when it is first asked for."""
+
+    def __init__(self, setting: Setting, *, posing: bool = False) -> None:
+        self.setting, self.posing = setting, posing
+
+    @property
+    def scenario(self) -> Scenario:
+        """As asked for: stations, rate and noise are put in."""
+        return self.setting.scenario
+
+    @property
+    def tracker(self) -> TrackerConfig:
+        return tracker_of(self.scenario)
+
+    @property
+    def body(self) -> Body:
+        """The performer's, in truth."""
+        return self.setting.body
+
+    @property
+    def mounts(self) -> tuple[Mount, ...]:
+        """Where the stations are said to be worn."""
+        return mounts_of(self.scenario)
+
+    @property
+    def calibrated(self) -> Calibrated:
+        """What methods are told of trackers, room and body: the truth, until somebody calibrates."""
+        return self.setting.calibrated
+
+    @property
+    def calibration(self) -> Calibration:
+        """Of the trackers and the room, as methods are told."""
+        return self.calibrated.calibration
+
+    def going_by(self, kept: CalibrationFile) -> "Rehearsal":
+        """The same with methods told what a calibration found, for these stations; BadInput when it lacks one.
+
+        Where it has no skeleton the body is the scenario's.
+        """
+        chosen = kept.of(tuple(self.scenario.stations))
+        body = self.body if chosen.skeleton is None else humanoid.build(chosen.skeleton)
+        calibrated = Calibrated(chosen.calibration, body, {})
+        return Rehearsal(self.setting.going_by(calibrated), posing=self.posing)
+
+    @cached_property
+    def take(self) -> Take:
+        """What the performer does."""
+        if not self.posing:
+            return self.setting.take
+        how = self.scenario.calibrating
+        poses = [configuration(pose, self.body.skeleton) for pose in POSES]
+        return self.setting.session.model(poses, miss_rad=float(np.deg2rad(how.miss_deg)), hold_s=how.hold_s)
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The first lap as a run of the scenario sees it, with the truth."""
+        return self.setting.session.seen(self.take) if self.posing else self.setting.simulation
+
+    @cached_property
+    def samples(self) -> Samples:
+        """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
+        session, scenario = self.setting.session, self.scenario
+        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
+        noise, name = (session.lasting, session.name) if self.posing else (noise, "")
+        return lap(self.body, self.take, session.strapped, self.tracker, noise, seed=scenario.seed, session=name)
+
+
+def rehearse(
+    scenario: Path | str,
+    *,
+    clip: str | None = None,
+    stations: int | Sequence[str] | None = None,
+    rate_hz: float | None = None,
+    noise: str | None = None,
+    seed: int | None = None,
+    folder: Path | None = None,
+    posing: bool = False,
+) -> Rehearsal:
+    """A clip of a scenario (its first by default), with the first so many of its stations or those that are named.
+
+    What is not given is as the scenario has it, but for the calibration: `exact`, until somebody calibrates.
+    UnknownName, BadFile and BadInput as for a run of the scenario.
+    """
+    asked = load_scenario(scenario)
+    asked = replace(asked, stations=asked.wearing, worn=())
+    if stations is not None:
+        asked = replace(asked, stations={name: asked.stations[name] for name in chosen(asked, stations)})
+    if rate_hz is not None:
+        asked = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz))
+    if noise is not None:
+        asked = replace(asked, noise=noise)  # type: ignore[arg-type]  # `noise_of` refuses other names
+    if seed is not None:
+        asked = replace(asked, seed=seed)
+    asked = replace(asked, vary={}, inputs=("pos+ori",), calibration="exact")
+    part = Part.parse(clip or asked.motion.test[0])
+    source = source_of(asked.motion, folder, asked.seed)
+    check_names(asked, source, [part])
+    return Rehearsal(
+        Setting(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
+    )
+
+
+def chosen(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
+    """Names of the first so many stations of a scenario, or of those named; BadInput, UnknownName."""
+    names = list(scenario.wearing)
+    if isinstance(stations, int):
+        if not 1 <= stations <= len(names):
+            raise BadInput(f"{stations} stations of {len(names)}.", f"{scenario.name} has: {', '.join(names)}.")
+        return names[:stations]
+    for name in stations:
+        if name not in names:
+            raise UnknownName("station", name, names)
+    return stations
+
+
+def _behaviour(scenario: Scenario, part: Part) -> str:
+    """What a test clip shows; "" for a clip that the scenario does not judge."""
+    tested, behaviours = scenario.motion.test, scenario.motion.behaviours
+    if str(part) not in tested:
+        return ""
+    return behaviours[tested.index(str(part))] if len(behaviours) > 1 else behaviours[0]

@@ -1,0 +1,286 @@
+"""Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
+
+import itertools
+import tomllib
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from harness.core.fields import build, changed
+from harness.core.options import alternatives
+from harness.core.package_data import share_folder
+from harness.errors import BadFile, BadInput, UnknownName
+from harness.results.cell import varied_text
+from harness.results.expected_orders import Order
+from harness.simulate.disturbance import Disturbance
+from harness.simulate.link import TrackerConfig
+from harness.simulate.parameter_ranges import require
+from harness.stream.emulator.faults import Fault
+
+SCHEMA = 1
+_FIXED = ("schema", "name", "methods", "inputs", "vary", "order", "left_out", "fault")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Which clips are judged, and which may be learnt from."""
+
+    source: Literal["builtin", "cmu"]
+    """`cmu` is looked up below --mocap or HARNESS_MOCAP and refused without it."""
+    test: tuple[str, ...]
+    """Clip names; "13_17@0.20-0.40" is that share of the take (protocol block)."""
+    behaviours: tuple[str, ...]
+    """What the clips show: one word for all of them, or one for each."""
+    examples: tuple[str, ...] = ()
+    """Clips that methods may learn from; what the protocol forbids is left out clip by clip."""
+    withheld: tuple[str, ...] = ()
+    """Clips and parts of clips that nothing is learnt from under any protocol, nor within 1 s of them: the test clips,
+    while constants are chosen on others."""
+    thin_to: int = 0
+    """Keep so many frames of all examples together, evenly spaced: a sparse database (Kim et al. 2012); 0 keeps all."""
+    database: Literal["all", "behaviour"] = "all"
+    """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
+    protocol: Literal["block", "sequence", "subject"] = "sequence"
+    body: Literal["own", "standard", "common"] = "own"
+    """Judge on the performer's own proportions; or on the mean skeleton, `standard` with bones that point as the
+    performer's do, `common` with the recorded angles kept and the root's path scaled by the legs."""
+    longest_s: float = 0.0
+    """Only the first so many seconds of each test clip [s]; 0 is all of it."""
+    rate_hz: float = 0.0
+    """Rate of files that record none and that no index names [Hz]; 0 refuses them."""
+
+
+@dataclass(frozen=True)
+class Station:
+    """One tracker and where it is worn (see `harness.body.mounts.Mount`)."""
+
+    bone: str
+    along: float = 0.5
+    """Position along the bone, 0 at its joint to 1 at its far end."""
+    around_deg: float = 0.0
+    """Angle around the bone [deg]."""
+    stand_off_m: float = 0.01
+    """Distance of the tracker's origin from the skin [m]."""
+
+
+@dataclass(frozen=True)
+class Calibrating:
+    """How a performer stands model for a calibration, and how the trackers then really sit."""
+
+    miss_deg: float = 2.5
+    """How far each hinge, and the lean of the body, misses each pose, standard deviation [deg]."""
+    hold_s: float = 3.0
+    """How long each pose is held [s]."""
+    beside_m: float = 0.0
+    """How far trackers sit from their nominal mounts, standard deviation along each of their axes [m]. Part of the
+    simulated world, for every kind of calibration: `exact` knows it, the others have to find it."""
+    turned_deg: float = 0.0
+    """How far they are turned there, standard deviation about each of their axes [deg]; 180 is practically anyhow."""
+
+    def __post_init__(self) -> None:
+        require(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One experiment: every test clip, with every method and every choice of inputs."""
+
+    name: str
+    motion: Motion
+    stations: dict[str, Station]
+    methods: tuple[str, ...]
+    """By name, with options and alternatives in brackets (see `harness.core.options`)."""
+    schema: int = SCHEMA
+    seed: int = 1
+    inputs: tuple[str, ...] = ("pos+ori",)
+    worn: tuple[str, ...] = ()
+    """Which of the stations are worn, all of them if none is named: vary "worn" to compare sets of trackers. The stream
+    has no others, so that one that is not worn is not a lost one."""
+    calibration: Literal["exact", "tpose", "poses"] = "exact"
+    """What methods are told of trackers, room and body: the truth; what a T-pose tells of trackers and room (bone
+    lengths are known); or what eight poses tell of all three. Vary it to see what calibrating costs."""
+    calibrating: Calibrating = field(default_factory=Calibrating)
+    """How that is done."""
+    mount: str = "tibia"
+    """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
+    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+    """The device and its line."""
+    noise: Literal["clean", "noise", "default"] = "default"
+    profile: str = ""
+    """What tables call the noise when components are changed; "default*" and so on without a name."""
+    components: dict[str, Any] = field(default_factory=dict)
+    """Changes to the noise level (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
+    disturbance: Disturbance = field(default_factory=Disturbance)
+    """A fault that ends; vary "disturbance.kind" to see how methods get over it (see `harness.results.recovery`)."""
+    vary: dict[str, Any] = field(default_factory=dict)
+    """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
+    or with each combination of them when there are several keys."""
+    order: tuple[Order, ...] = ()
+    """What a paper expects of the errors (see `harness.results.expected_orders`)."""
+    left_out: dict[str, str] = field(default_factory=dict)
+    """Clips, behaviours or experiments that are not here though one would expect them, and why: for the record."""
+    fault: tuple[Fault, ...] = ()
+    """What goes wrong where an emulator plays the scenario (see `harness.stream.emulator`); runs know nothing of it."""
+
+    @property
+    def wearing(self) -> dict[str, Station]:
+        """The stations that are worn, in the order of the table."""
+        return {name: self.stations[name] for name in self.stations if not self.worn or name in self.worn}
+
+
+def load_scenario(path: Path | str) -> Scenario:
+    """The scenario in a TOML file, or the shipped one of that name. BadFile and UnknownName name the place."""
+    path = find_scenario(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadFile(path, f"not TOML: {error}", "a scenario", "`harness list` names the shipped ones.") from error
+    if content.get("kind") == "placement":
+        raise BadFile(path, "a placement study", "a scenario", "`harness placement` does it.")
+    content.setdefault("name", path.stem)
+    try:
+        scenario = build(Scenario, content, "scenario")
+        scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in alternatives(text)))
+    except (TypeError, ValueError) as error:
+        raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
+    check_scenario(path, scenario)
+    check_orders(path, scenario)
+    return scenario
+
+
+def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
+    """Every combination of the varied values and the scenario that it makes; one and nothing varied without any.
+    Only those at the places in `chosen`, if any are.
+
+    UnknownName for a key that does not exist, BadInput for one that cannot be varied or a value that does not fit.
+    """
+    choices = dict(leaves(scenario.vary))
+    for key, values in choices.items():
+        if key.split(".")[0] in _FIXED or key in ("motion.test", "motion.behaviours"):
+            raise BadInput(f"vary: {key} cannot be varied.", "Lists of methods, inputs and clips say it themselves.")
+        if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
+            raise BadInput(f"vary: {key} = {values!r} is no list of different values.", "For example: [0.0, 0.05].")
+    found = []
+    for place, combination in enumerate(itertools.product(*choices.values())):
+        if chosen and place not in chosen:
+            continue
+        varied = dict(zip(choices, combination, strict=True))
+        made = replace(scenario, vary={})
+        try:
+            for key, value in varied.items():
+                content: Any = value
+                for name in reversed(key.split(".")):
+                    content = {name: content}
+                made = changed(made, content, "scenario")
+        except (TypeError, ValueError) as error:
+            raise BadInput(f"vary: {error}.", "Values are those that the scenario's own key may have.") from error
+        found.append((varied, made))
+    return found
+
+
+def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys, whether TOML read them as one text or as tables inside tables."""
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            yield from leaves(value, f"{before}{key}.")
+        else:
+            yield f"{before}{key}", value
+
+
+def find_scenario(path: Path | str) -> Path:
+    """A file as named, or a shipped scenario by its bare name."""
+    given = Path(path)
+    if given.is_file():
+        return given
+    shipped = {p.stem: p for p in (*shipped_scenarios(), *shipped_placements())}
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
+        return shipped[given.stem]
+    if given.parent == Path() and not given.suffix:
+        raise UnknownName("scenario", str(path), shipped)
+    raise BadFile(given, "no such file", "a scenario in TOML", "`harness list` names the shipped ones.")
+
+
+def shipped_scenarios() -> list[Path]:
+    studies = shipped_placements()
+    return sorted(path for path in share_folder("scenarios").glob("*.toml") if path not in studies)
+
+
+def shipped_placements() -> list[Path]:
+    """Studies of where trackers go, which lie among the scenarios."""
+    return sorted(share_folder("scenarios").glob("placement_*.toml"))
+
+
+def check_scenario(path: Path, scenario: Scenario) -> None:
+    """What types cannot say."""
+
+    def refuse(found: str, expected: str, advice: str) -> None:
+        raise BadFile(path, found, expected, advice)
+
+    if scenario.schema != SCHEMA:
+        refuse(f"schema {scenario.schema}", f"schema {SCHEMA}", "This version of the harness reads no other.")
+    if not scenario.motion.test:
+        refuse("no test clips", "names in motion.test", "`harness mocap list` names what a library holds.")
+    if not scenario.stations:
+        refuse("no stations", "a table [stations] with at least one", "For example: head = { bone = 'head' }.")
+    if not scenario.methods:
+        refuse("no methods", "names in methods", "`harness list` names them.")
+    if not scenario.inputs:
+        refuse("no inputs", "names in inputs", "`harness list` names them.")
+    if scenario.name != Path(scenario.name).name:
+        refuse(f"name = {scenario.name!r}", "a plain name", "Results are written to a folder of that name.")
+    if len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
+        refuse(
+            f"{len(scenario.motion.behaviours)} behaviours for {len(scenario.motion.test)} test clips",
+            "one for all of them, or one for each",
+            "Give motion.behaviours one word.",
+        )
+    for varied, made in variants(scenario) if scenario.vary else ():
+        try:
+            check_scenario(path, made)
+        except BadFile as error:
+            refuse(f"{error.found} with {varied_text(varied)}", error.expected, error.advice)
+    for what, repeated in (
+        ("motion.test", scenario.motion.test),
+        ("methods", scenario.methods),
+        ("inputs", scenario.inputs),
+        ("worn", scenario.worn),
+    ):
+        if len(set(repeated)) < len(repeated):
+            refuse(f"{what} names something twice", "each name once", "Remove the second.")
+    for name in scenario.worn:
+        if name not in scenario.stations:
+            refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
+    if not 1.0 <= scenario.tracker.rate_hz <= 1000.0:
+        refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
+    for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):
+        if value < 0.0:
+            refuse(f"motion.{key} = {value}", "0 or more", "0 stands for all of it, or for none recorded.")
+    for name, station in scenario.stations.items():
+        if not 0.0 <= station.along <= 1.0:
+            refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
+        if station.stand_off_m < 0.0:
+            refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Trackers sit on the skin.")
+
+
+def check_orders(path: Path, scenario: Scenario) -> None:
+    """That the orders a file states are of what it runs; BadFile. Whoever replaces its methods need not mind them."""
+    for order in scenario.order:
+        where, what, known = f"the order of {order.source!r}", "methods", scenario.methods
+        if order.inputs:
+            what, known = "inputs", scenario.inputs
+        strange = [name for name in order.names if name not in known]
+        if order.inputs and order.method not in scenario.methods:
+            strange, what, known = [order.method], "methods", scenario.methods
+        faults = {
+            "has no source": not order.source,
+            "names neither or both of methods and inputs": bool(order.methods) == bool(order.inputs),
+            "names a method whose inputs it does not compare": bool(order.method) > bool(order.inputs),
+            "names fewer than two": len(order.names) < 2,
+            "names something twice": len(set(order.names)) < len(order.names),
+            f"names {', '.join(map(repr, strange))}, none of the scenario's {what}": bool(strange),
+            "gives a reason for what is no step of it": not set(order.why_not) <= set(order.steps),
+        }
+        for fault in (text for text, found in faults.items() if found):
+            advice = f"Known {what}: {', '.join(known)}. Reasons belong to {', '.join(map(repr, order.steps))}."
+            raise BadFile(path, f"{where} {fault}", "two or more methods, or inputs and their method", advice)

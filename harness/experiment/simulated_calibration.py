@@ -1,0 +1,143 @@
+"""What methods are told of trackers, room and body before a take, found as on a real day: from a stream in which the
+performer stands model, in the same session of the tracker; and how far from the truth that is."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from harness.body.humanoid import Body, build, tpose
+from harness.body.mounts import Mount
+from harness.calibrate.guided_calibration import HoldPoses
+from harness.calibrate.pose_calibration import calibrate_poses
+from harness.calibrate.pose_classifier import Likeness
+from harness.calibrate.pose_collector import PoseCollector
+from harness.calibrate.poses import POSES, configuration
+from harness.calibrate.skeleton_prior import BoneSpace
+from harness.calibrate.tpose_calibration import calibrate_tpose
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.motion import Take
+from harness.core.seeds import generator
+from harness.core.skeleton import Skeleton
+from harness.simulate.held_poses import holding
+from harness.simulate.noise import Noise
+from harness.simulate.simulation import Simulation, TrackerConfig, exact_calibration, simulate
+from harness.stream.frame import TrackerFrame
+
+
+@dataclass(frozen=True, eq=False)
+class TrackerSession:
+    """Everything that is true of a session, from the trackers being put on to their being taken off."""
+
+    name: str
+    """Of the take that it is for: errors that last for a session are those of this take."""
+    seed: int
+    body: Body
+    """The performer's."""
+    nominal: tuple[Mount, ...]
+    """Where trackers are said to be worn."""
+    strapped: tuple[Mount, ...]
+    """Where they really are."""
+    tracker: TrackerConfig
+    noise: Noise
+    """What goes wrong; what happens at one moment of the take does not happen while calibrating."""
+
+    @property
+    def exact(self) -> Calibration:
+        """The truth."""
+        return exact_calibration(self.body, self.strapped, self.tracker)
+
+    @property
+    def lasting(self) -> Noise:
+        """What goes wrong while calibrating too."""
+        return replace(self.noise, slip=(), displaced=(), turned=(), lost=())
+
+    def model(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> Take:
+        """The performer holding configurations (55,), at the world's origin and facing x to begin with.
+
+        How the n-th is missed does not depend on those after it.
+        """
+        rng = generator(self.seed, "standing model", self.name)
+        take = holding(self.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=hold_s)
+        return replace(take, name=f"{self.name} calibration")
+
+    def seen(self, take: Take) -> Simulation:
+        """A take for calibration as the tracker sees it."""
+        return simulate(self.body, take, self.strapped, self.tracker, self.lasting, seed=self.seed, session=self.name)
+
+    def standing_model(
+        self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float
+    ) -> tuple[TrackerFrame, ...]:
+        """The stream of `model`."""
+        return self.seen(self.model(configurations, miss_rad=miss_rad, hold_s=hold_s)).frames
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """What a method goes by."""
+
+    calibration: Calibration
+    body: Body
+    """With the bone lengths that are known or were found."""
+    errors: Mapping[str, float]
+    """How far that is from the truth, see `errors_of`; empty where it is the truth."""
+    notes: tuple[str, ...] = ()
+
+
+def exactly(session: TrackerSession) -> Calibrated:
+    """Nothing had to be found."""
+    return Calibrated(session.exact, session.body, {})
+
+
+def by_tpose(session: TrackerSession, *, miss_rad: float, hold_s: float) -> Calibrated:
+    """Mounts and room from a T-pose; bone lengths are known from elsewhere. NotStanding says what was wrong with it."""
+    pose = tpose(session.body.skeleton)
+    frames = session.standing_model([pose], miss_rad=miss_rad, hold_s=hold_s)
+    found = calibrate_tpose(frames, session.body, session.nominal)
+    errors = errors_of(found.calibration, session.body.skeleton, session)
+    return Calibrated(found.calibration, session.body, errors, (_note("T-pose, bone lengths known", errors),))
+
+
+def by_poses(session: TrackerSession, space: BoneSpace, *, miss_rad: float, hold_s: float) -> Calibrated:
+    """Bone lengths, mounts and room from eight poses and from what other people's bones are like: of the performer,
+    nothing is known but the stream. NotStanding when the poses cannot be found in it, or not be calibrated from."""
+    poses = [configuration(pose, session.body.skeleton) for pose in POSES]
+    frames = session.standing_model(poses, miss_rad=miss_rad, hold_s=hold_s)
+    nobody = build()
+    shown = [configuration(pose, nobody.skeleton) for pose in POSES]
+    stations = [mount.station for mount in session.nominal]
+    collector = PoseCollector(stations, len(POSES), Likeness(nobody, session.nominal, shown))
+    HoldPoses(collector, POSES).lead(frames, say=lambda text: None)
+    found = calibrate_poses(collector.held, space, session.nominal)
+    errors = errors_of(found.calibration, found.skeleton, session)
+    notes = (_note(f"eight poses, other bones learnt from {space.source}", errors),)
+    return Calibrated(found.calibration, build(found.skeleton), errors, notes)
+
+
+def errors_of(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:
+    """Of mounts, root mean square over stations [mm] and [deg]; of bone lengths, root mean square [mm]; of the room's
+    frame, its turn about the vertical [deg] and its origin [mm]."""
+    true = session.exact
+    beside_m = np.linalg.norm(found.mount_m - true.mount_m, axis=1)
+    turned_rad = rotations.angle_between_rad(found.bone_from_station, true.bone_from_station)
+    room = rotations.multiply(found.world_from_tracker, rotations.inverse(true.world_from_tracker))
+    return {
+        "mount_mm": 1e3 * _rms(beside_m),
+        "mount_deg": float(np.rad2deg(_rms(turned_rad))),
+        "length_mm": 1e3 * _rms(skeleton.length_m - session.body.skeleton.length_m),
+        "room_heading_deg": float(np.rad2deg(abs(rotations.yaw_rad(room)))),
+        "room_origin_mm": 1e3 * float(np.linalg.norm(found.tracker_origin_m - true.tracker_origin_m)),
+    }
+
+
+def _note(how: str, errors: Mapping[str, float]) -> str:
+    return (
+        f"calibrated by {how}: mounts {errors['mount_mm']:.0f} mm and {errors['mount_deg']:.1f} deg off, bone lengths "
+        f"{errors['length_mm']:.0f} mm (root mean square), room {errors['room_heading_deg']:.1f} deg about the vertical"
+    )
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,142 @@
+"""A sweep as its TOML file has it, and the scenarios that it comes to: scenario x clip x method x seed x any key."""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from harness.core.fields import build
+from harness.core.options import alternatives
+from harness.core.package_data import share_folder
+from harness.core.split import Part
+from harness.errors import BadFile, BadInput, UnknownName
+from harness.experiment.cells import check_names, source_of
+from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, find_scenario, leaves, load_scenario, variants
+
+_EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/studies/."
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What `harness sweep` reads; what it does not say is as the scenarios have it."""
+
+    name: str
+    scenarios: tuple[str, ...]
+    """Files beside the sweep, without their `.toml`, or shipped scenarios."""
+    schema: int = SCHEMA
+    methods: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    clips: tuple[str, ...] = ()
+    """Only these of the scenarios' test clips."""
+    seeds: tuple[int, ...] = ()
+    vary: dict[str, Any] = field(default_factory=dict)
+    """As a scenario's, besides what the scenarios vary themselves."""
+
+
+def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
+    """The sweep in a TOML file, or the shipped one of that name, and where it stands. BadFile, UnknownName."""
+    path = find_sweep(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadFile(path, f"not TOML: {error}", _EXPECTED, _ADVICE) from error
+    if "motion" in content:
+        raise BadFile(path, "a scenario", _EXPECTED, "`harness run` runs it; a sweep names it in `scenarios`.")
+    content.setdefault("name", path.stem)
+    try:
+        sweep = build(Sweep, content, "sweep")
+    except (TypeError, ValueError) as error:
+        raise BadFile(path, str(error), _EXPECTED, _ADVICE) from error
+    if sweep.schema != SCHEMA:
+        advice = "This version of the harness reads no other."
+        raise BadFile(path, f"schema {sweep.schema}", f"schema {SCHEMA}", advice)
+    if sweep.name != Path(sweep.name).name or not sweep.name:
+        raise BadFile(path, f"name = {sweep.name!r}", "a plain name", "Results are written to a folder of that name.")
+    if not sweep.scenarios:
+        raise BadFile(path, "no scenarios", "names in scenarios", "`harness list` names the shipped ones.")
+    for key in ("scenarios", "methods", "inputs", "clips", "seeds"):
+        named = getattr(sweep, key)
+        if len(set(named)) < len(named):
+            raise BadFile(path, f"{key} names something twice", "each name once", "Remove the second.")
+    return sweep, path
+
+
+def find_sweep(path: Path | str) -> Path:
+    """A file as named, or a shipped sweep by its bare name."""
+    given = Path(path)
+    if given.is_file():
+        return given
+    shipped = {file.stem: file for file in shipped_sweeps()}
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/studies")):
+        return shipped[given.stem]
+    if given.parent == Path() and not given.suffix:
+        raise UnknownName("sweep", str(path), shipped)
+    raise BadFile(given, "no such file", "a sweep in TOML", "Shipped ones are in scenarios/studies/.")
+
+
+def shipped_sweeps() -> list[Path]:
+    return sorted(share_folder("scenarios").glob("studies/*.toml"))
+
+
+def expand(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
+    """A scenario for each one named and each seed, whose variants, clips, inputs and methods are the sweep's cells.
+
+    `seed` replaces all seeds. BadFile, BadInput and UnknownName say what does not fit.
+    """
+    found = [load_scenario(_scenario_file(name, path.parent)) for name in sweep.scenarios]
+    clips = dict.fromkeys(clip for scenario in found for clip in scenario.motion.test)
+    for clip in sweep.clips:
+        if clip not in clips:
+            raise UnknownName("test clip of these scenarios", clip, clips)
+    out = []
+    for scenario in found:
+        seeds = sweep.seeds or (scenario.seed,)
+        for one in seeds if seed is None else (seed,):
+            made = replace(_changed(scenario, sweep), seed=one)
+            check_scenario(path, made)
+            out.append(made)
+    names = [scenario.name for scenario in found]
+    if len(set(names)) < len(names):
+        raise BadFile(path, f"scenarios called {', '.join(names)}", "names of their own", "Rename one.")
+    return out
+
+
+def check(scenarios: Sequence[Scenario], folder: Path | None) -> None:
+    """That everything exists which any variant names; BadInput, UnknownName. Hours of work are not begun in vain."""
+    for scenario in scenarios:
+        parts = [Part.parse(text) for text in scenario.motion.test]
+        for _, made in variants(scenario):
+            check_names(made, source_of(made.motion, folder, made.seed), parts)
+
+
+def _changed(scenario: Scenario, sweep: Sweep) -> Scenario:
+    motion = scenario.motion
+    behaviours = motion.behaviours * (1 if len(motion.behaviours) > 1 else len(motion.test))
+    kept = {c: b for c, b in zip(motion.test, behaviours, strict=True) if not sweep.clips or c in sweep.clips}
+    if not kept:
+        advice = f"Its test clips are: {', '.join(motion.test)}."
+        raise BadInput(f"The sweep has none of the clips of {scenario.name}.", advice)
+    methods = tuple(name for text in sweep.methods for name in alternatives(text))
+    return replace(
+        scenario,
+        motion=replace(motion, test=tuple(kept), behaviours=tuple(kept.values())),
+        methods=methods or scenario.methods,
+        inputs=sweep.inputs or scenario.inputs,
+        vary=_varied(scenario.vary, sweep.vary),
+        order=(),
+        left_out={},
+        fault=(),
+    )
+
+
+def _varied(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, Any]:
+    """Both, by dotted keys; what the sweep says of a key counts."""
+    return {**dict(leaves(theirs)), **dict(leaves(ours))}
+
+
+def _scenario_file(name: str, beside: Path) -> Path:
+    for file in (beside / name, beside / f"{name}.toml"):
+        if file.is_file():
+            return file
+    return find_scenario(name)

@@ -1,0 +1,51 @@
+"""Pictures of calibration poses: what the view shows a performer, each in a file, and all on one sheet."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from PIL import Image, ImageDraw, ImageFont
+
+from harness.calibrate.poses import CalibrationPose, configuration
+from harness.core.skeleton import Skeleton
+from harness.errors import BadInput
+from harness.live.viewer import View
+
+SHEET = "poses.png"
+_ACROSS, _PIXELS, _MARGIN, _TEXT = 4, 320, 34, 15
+_PAPER, _INK = "#f3f5f7", "#2b3138"
+_DRAWN_S = 60.0
+
+
+def draw_poses(poses: Sequence[CalibrationPose], own: Skeleton, folder: Path, *, force: bool) -> list[Path]:
+    """`pose_1.png` and so on, and the sheet; the paths. As for `--view frames`: BadFile for a folder with other
+    pictures of a view in it, BadInput where nothing can be drawn."""
+    view = View("frames", own, folder, force=force)
+    try:
+        drawn = []
+        for number, pose in enumerate(poses, 1):
+            view.show(number, configuration(pose, own))
+            picture, until_s = folder / f"{number:08d}.png", time.monotonic() + _DRAWN_S
+            while not picture.exists():
+                if time.monotonic() > until_s:
+                    raise BadInput(f"Nothing was drawn of pose {number}.", "Does this computer have OpenGL?")
+                time.sleep(0.02)
+            drawn.append(picture.replace(folder / f"pose_{number}.png"))
+    finally:
+        view.close()
+    sheet = folder / SHEET
+    _sheet([(path, f"{n}  {pose.name}") for n, (path, pose) in enumerate(zip(drawn, poses, strict=True), 1)], sheet)
+    return [*drawn, sheet]
+
+
+def _sheet(pictures: Sequence[tuple[Path, str]], path: Path) -> None:
+    """Rows of pictures with what they are called."""
+    rows = -(-len(pictures) // _ACROSS)
+    sheet = Image.new("RGB", (_ACROSS * _PIXELS, rows * (_PIXELS + _MARGIN)), _PAPER)
+    pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(_TEXT)
+    for place, (picture, name) in enumerate(pictures):
+        x, y = _PIXELS * (place % _ACROSS), (_PIXELS + _MARGIN) * (place // _ACROSS)
+        with Image.open(picture) as image:
+            sheet.paste(image.convert("RGB").resize((_PIXELS, _PIXELS)), (x, y))
+        pen.text((x + _PIXELS // 2, y + _PIXELS + _MARGIN // 2 - 4), name, fill=_INK, font=font, anchor="mm")
+    sheet.quantize(128).save(path, optimize=True)  # few colours: a third of the size

@@ -1,0 +1,273 @@
+"""`harness inspect`: what a motion file is, with evidence, and what is wrong with it.
+
+Where the evidence is ambiguous nothing is guessed: the error says what was missing and which option settles it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats, Ints
+from harness.core.humanoid24 import BONES
+from harness.core.motion import Clip
+from harness.core.skeleton import Skeleton, forward
+from harness.errors import BadFile, BadInput
+from harness.mocap import motion_checks
+from harness.mocap.inspection import Inspection
+from harness.mocap.library import INDEX, MotionLibrary, read_index, skeleton_file
+from harness.mocap.read.file_checks import check_size
+from harness.mocap.read.joint_clip import LEG
+
+if TYPE_CHECKING:
+    from harness.mocap.read.c3d import MarkerClip
+
+FORMATS = ("amc", "bvh", "npz", "c3d")
+LEG_M = (0.55, 1.15)
+"""Thigh and shin of people, together [m]; 20 skeletons of CMU have 0.74 to 0.90."""
+ROOT_IN_LEGS = (0.05, 5.0)
+"""Median height of the root over z = 0 in leg lengths; CMU's clips have 0.82 to 1.50."""
+UPRIGHT_SHARE = 0.4
+"""Share of frames with the head over the feet; the cartwheels of 49_08 have 0.59."""
+IN_FILE = "recorded in the file"
+FOOT_REACH = 0.12
+"""Joints no higher in the rest pose than this share of its height belong to the feet."""
+
+
+def inspect_file(
+    path: Path | str, *, rate_hz: float | None = None, unit: float | None = None, library: Path | str | None = None
+) -> Inspection:
+    """What the file is. `unit` is the length of 1 in it [m]; `library` holds an index that may name its rate,
+    and may hold the motion that the markers of a C3D file were recorded in.
+
+    BadFile for what cannot be read or understood; BadInput where an option must settle what the file does not say.
+    """
+    path = Path(path)
+    kind = path.suffix.lower().lstrip(".")
+    if kind == "asf":
+        raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC of it.")
+    if kind not in FORMATS:
+        raise BadFile(path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in FORMATS), "Rename it?")
+    if unit is not None and not 0.0 < unit < np.inf:
+        raise BadInput(f"A unit of {unit} m cannot be.", "Give the length of 1 in the file in metres (--unit).")
+    if kind == "amc":
+        return _inspect_amc(path, rate_hz, unit, library)
+    if rate_hz is not None:
+        raise BadInput(f"{path.name} records its own rate.", "Leave out --rate.")
+    if kind == "bvh":
+        return _inspect_bvh(path, unit)
+    if kind == "c3d":
+        return _inspect_c3d(path, unit, library)
+    if unit is not None:
+        raise BadInput(f"{path.name} is in metres, as all AMASS files are.", "Leave out --unit.")
+    from harness.mocap.read.amass import read_clip
+
+    found = inspect_clip(read_clip(path))
+    return replace(
+        found,
+        format="npz",
+        height_m=None,
+        rate_evidence=IN_FILE,
+        unit_evidence="AMASS is in metres",
+        up=f"z ({found.up})",
+    )
+
+
+def inspect_clip(clip: Clip) -> Inspection:
+    """The same checks for a clip in memory.
+
+    One that has the 24 bones is judged by these, toes, thumbs and fingers left out, and held to the joint limits.
+    """
+    skeleton = clip.skeleton
+    pose = forward(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
+    whole = set(BONES) <= set(skeleton.names)
+    kept = [skeleton.index(bone) for bone in (BONES if whole else skeleton.names)]
+    rest_m = _rest_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in kept)]]
+    points = Points(
+        names=("root", *(skeleton.names[b] for b in kept)),
+        position_m=np.concatenate([clip.root_m[:, None], pose.end_m[:, kept]], axis=1),
+        rest_m=rest_m,
+    )
+    facts = replace(_look(clip.name, points, clip.rate_hz), height_m=float(np.ptp(rest_m[:, 2])), notes=clip.notes)
+    if not whole:
+        return facts
+    leg = 0.5 * sum(float(skeleton.length_m[skeleton.index(bone)]) for bone in LEG)
+    above = float(np.median(clip.root_m[:, 2])) / leg
+    doubts = list(facts.doubts)
+    if not LEG_M[0] <= leg <= LEG_M[1]:
+        doubts.append(f"legs of {leg:.3g} m: is the unit right?")
+    if not ROOT_IN_LEGS[0] <= above <= ROOT_IN_LEGS[1]:
+        doubts.append(f"the root is {above:.3g} leg lengths above z = 0: are root and bones in one unit?")
+    evidence = f"legs of {leg:.2f} m"
+    facts = replace(facts, height_m=_standing_m(skeleton), unit_evidence=evidence, doubts=tuple(doubts))
+    if not motion_checks.has_the_hinges(skeleton):
+        return facts
+    share, most, hinge = motion_checks.outside_limits(skeleton, clip.angles_rad)
+    worst = f"{hinge} by {np.rad2deg(most):.1f} deg" if share else ""
+    return replace(facts, limits_share=share, limits_worst=worst)
+
+
+def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, library: Path | str | None) -> Inspection:
+    from harness.mocap.read.acclaim import read_amc, read_asf_file
+
+    check_size(path, "an AMC motion")
+    rate, evidence = (rate_hz, "as given") if rate_hz is not None else _rate_of_index(path, library)
+    whole = path.resolve()
+    asf = read_asf_file(skeleton_file(whole, whole.parents[min(2, len(whole.parents) - 1)]), unit_m=unit_m)
+    found = inspect_clip(read_amc(path, asf.skeleton, rate_hz=rate, unit_m=asf.unit_m))
+    why = "as given" if unit_m is not None else "length in the ASF's :units"
+    return replace(
+        found,
+        format="amc",
+        rate_evidence=evidence,
+        unit_m=asf.unit_m,
+        unit_evidence=f"{why}; {found.unit_evidence}",
+        up=f"y ({found.up})",
+    )
+
+
+def _inspect_bvh(path: Path, unit_m: float | None) -> Inspection:
+    from harness.mocap.read.bvh import is_cmu, read_bvh, to_cmu_clip
+
+    joint_clip = read_bvh(path, unit_m=unit_m)
+    if is_cmu(joint_clip):
+        found = inspect_clip(to_cmu_clip(joint_clip))
+    else:
+        position, _ = joint_clip.world()
+        found = _look(path.stem, Points(joint_clip.names, position, joint_clip.rest_m()), joint_clip.rate_hz)
+        found = replace(found, height_m=float(np.ptp(joint_clip.rest_m()[:, 2])))
+    return replace(
+        found,
+        format="bvh",
+        rate_evidence=IN_FILE,
+        unit_m=joint_clip.unit_m,
+        unit_evidence=joint_clip.unit_evidence,
+        up=f"y ({found.up})",
+    )
+
+
+def _inspect_c3d(path: Path, unit_m: float | None, library: Path | str | None) -> Inspection:
+    from harness.mocap.read.c3d import read_c3d
+
+    markers = read_c3d(path, unit_m=unit_m)
+    seen: Bools = np.isfinite(markers.position_m[..., 0])
+    if not seen.any():
+        raise BadFile(path, "no marker in any frame", "positions of markers", "Export it again.")
+    found = _look(path.stem, Points(markers.labels, markers.position_m, None), markers.rate_hz)
+    return replace(
+        found,
+        format="c3d",
+        rate_evidence=IN_FILE,
+        unit_m=markers.unit_m,
+        unit_evidence=markers.unit_evidence,
+        up=markers.up_evidence,
+        missing_share=float(1.0 - seen.mean()),
+        missing_markers=tuple(label for m, label in enumerate(markers.labels) if not seen[:, m].all()),
+        notes=() if library is None else _spreads(markers, MotionLibrary(library)),
+    )
+
+
+def _spreads(markers: "MarkerClip", library: MotionLibrary) -> tuple[str, ...]:
+    """How firmly each marker sits on its bone, if the library has the motion of the same take."""
+    if markers.name not in library.names():
+        return ()
+    from harness.mocap.read.c3d import marker_spreads
+
+    spreads = marker_spreads(markers, library.load(markers.name))
+    told = ", ".join(f"{s.label} {s.bone} {1000.0 * s.spread_m:.0f}" for s in spreads)
+    return (f"standard deviation of each marker about the bone that it follows in {markers.name} [mm]: {told}",)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Positions (T, P, 3) of joints or markers, and where the joints are in the rest pose, if that is known."""
+
+    names: tuple[str, ...]
+    position_m: Floats
+    rest_m: Floats | None
+
+
+def _look(name: str, points: Points, rate_hz: float) -> Inspection:
+    """The checks that need nothing but positions."""
+    feet, up, doubts = _feet_and_up(points)
+    floor_m, contact_share = motion_checks.floor(points.position_m, feet)
+    speed_m_s, joint, frame = motion_checks.fastest(points.names, points.position_m, rate_hz)
+    return Inspection(
+        name=name,
+        format="clip",
+        frames=len(points.position_m),
+        rate_hz=rate_hz,
+        rate_evidence="of the clip",
+        height_m=None,
+        up=up,
+        unit_m=1.0,
+        unit_evidence="metres",
+        floor_m=floor_m,
+        contact_share=contact_share,
+        fastest_m_s=speed_m_s,
+        fastest_joint=joint,
+        fastest_frame=frame,
+        spikes=motion_checks.spikes(points.names, points.position_m, rate_hz),
+        frozen=motion_checks.frozen(points.position_m),
+        missing_share=0.0,
+        missing_markers=(),
+        limits_share=None,
+        limits_worst="",
+        doubts=doubts,
+        notes=(),
+    )
+
+
+def _feet_and_up(points: Points) -> tuple[Ints, str, tuple[str, ...]]:
+    """Points of the feet, what says that z is up, and what says that it is not."""
+    if points.rest_m is None:
+        return np.arange(len(points.names)), "", ()
+    height = points.rest_m[:, 2]
+    tall = np.ptp(height)
+    feet = np.flatnonzero(height < height.min() + FOOT_REACH * tall)
+    head = int(height.argmax())
+    rise = points.position_m[:, head] - points.position_m[:, feet].mean(axis=1)
+    above = float(np.mean(rise[:, 2] > 0.5 * np.sqrt(np.sum(rise**2, axis=1))))
+    stands = bool(tall >= np.ptp(points.rest_m, axis=0).max() * 0.7)
+    up = f"the rest pose {'stands along it' if stands else 'does not stand along it'}; "
+    up += f"{points.names[head]} is over the feet in {100 * above:.0f} % of the frames"
+    doubts = []
+    if not stands:
+        doubts.append("the rest pose does not stand upright: is another axis up?")
+    if above < UPRIGHT_SHARE:
+        doubts.append(f"the body is upright in {100 * above:.0f} % of the frames only: is another axis up?")
+    return feet, up, tuple(doubts)
+
+
+def _rest_m(parents: Sequence[int], bone_m: Floats) -> Floats:
+    """(B + 1, 3) root and far ends in the rest pose [m]."""
+    rest = np.zeros((len(parents) + 1, 3))
+    for b, parent in enumerate(parents):
+        rest[b + 1] = rest[parent + 1] + bone_m[b]
+    return rest
+
+
+def _standing_m(skeleton: Skeleton) -> float:
+    """Height of the body with its legs and back straight, from the end of the head to the end of a foot [m]."""
+    back = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
+    length = {name: float(skeleton.length_m[skeleton.index(name)]) for name in (*back, *LEG)}
+    drop = sum(
+        float(-skeleton.bone_m[skeleton.index(bone), 2]) for bone in ("lhipjoint", "rhipjoint", "lfoot", "rfoot")
+    )
+    return sum(length[bone] for bone in back) + 0.5 * (sum(length[bone] for bone in LEG) + drop)
+
+
+def _rate_of_index(path: Path, library: Path | str | None) -> tuple[float, str]:
+    """The rate [Hz] by the index of `library`, or of a folder above the file; BadInput if none names the file."""
+    above = [folder for folder in path.resolve().parents if (folder / INDEX).is_file()]
+    for folder in [Path(library).resolve()] if library is not None else above[:1]:
+        if path.resolve().is_relative_to(folder):
+            row = read_index(folder / INDEX).get(path.resolve().relative_to(folder).as_posix(), {})
+            if row.get("fps"):
+                return float(row["fps"]), f"from {INDEX} of the library"
+    raise BadInput(
+        f"{path.name} does not say how many frames a second it has, as no AMC does, and no {INDEX} names it.",
+        "Give the rate (--rate HZ; CMU's clips have 120, some 60).",
+    )

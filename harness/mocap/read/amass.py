@@ -1,0 +1,175 @@
+"""AMASS archives (npz): the pose parameters of the SMPL body models, read as plain arrays.
+
+A file has `poses` (T, 3 J) axis-angle vectors, `trans` (T, 3) and its rate. J is 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X);
+the first 22 joints are the same body in all three (https://github.com/vchoutas/smplx, joint_names.py), and only these
+are used. The rest pose is a T: x left, y up, z forward; the root vector turns it into a world with z up.
+
+What is not in a file: bone lengths and the pelvis's place, which follow from `betas` through a licensed body model.
+So the motion is played on the mean skeleton of the 24 bones, the root stands at `trans` (the true pelvis is a constant
+vector of up to 0.25 m away), and the model's rest pose is taken to have its legs straight down and its arms along x.
+"""
+
+import lzma
+import math
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.motion import Clip
+from harness.errors import BadFile
+from harness.mocap.read.asf import WORLD_FROM_ASF
+from harness.mocap.read.file_checks import LARGEST, LIMIT_BYTES, check_size
+from harness.mocap.read.joint_clip import Drive, JointClip, JointMap, to_clip
+
+JOINTS: tuple[tuple[str, int], ...] = (
+    ("pelvis", -1),
+    ("left_hip", 0),
+    ("right_hip", 0),
+    ("spine1", 0),
+    ("left_knee", 1),
+    ("right_knee", 2),
+    ("spine2", 3),
+    ("left_ankle", 4),
+    ("right_ankle", 5),
+    ("spine3", 6),
+    ("left_foot", 7),
+    ("right_foot", 8),
+    ("neck", 9),
+    ("left_collar", 9),
+    ("right_collar", 9),
+    ("head", 12),
+    ("left_shoulder", 13),
+    ("right_shoulder", 14),
+    ("left_elbow", 16),
+    ("right_elbow", 17),
+    ("left_wrist", 18),
+    ("right_wrist", 19),
+)
+"""Name and parent of the joints that SMPL, SMPL-H and SMPL-X share, in the order of `poses`."""
+
+_WHAT = "an AMASS npz"
+_BROKEN = (
+    *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
+    *(OSError, EOFError, ValueError, OverflowError, NotImplementedError, RuntimeError),
+)
+"""What zipfile raises, as far as it is known, for damaged archives."""
+_WIDTHS = (72, 156, 165)
+_RATES = ("mocap_framerate", "mocap_frame_rate")
+
+
+def _turn(axis: int, angle_deg: float) -> tuple[float, float, float, float]:
+    w, x, y, z = rotations.exp(np.deg2rad(angle_deg) * np.eye(3)[axis])
+    return float(w), float(x), float(y), float(z)
+
+
+def _smpl_map() -> dict[str, Drive]:
+    """In the skeleton's rest pose the legs stand 20 deg out, and elbows bend forward and 30 deg up; in SMPL's not."""
+    drives = {
+        "root": Drive("pelvis"),
+        "lowerback": Drive("spine1"),
+        "upperback": Drive("spine2"),
+        "thorax": Drive("spine3"),
+        "lowerneck": Drive("neck"),
+        "upperneck": Drive("neck"),
+        "head": Drive("head"),
+    }
+    for side, s, out_deg in (("left", "l", -20.0), ("right", "r", 20.0)):
+        drives[f"{s}clavicle"] = Drive(f"{side}_collar")
+        drives[f"{s}humerus"] = Drive(f"{side}_shoulder", joint_from_bone=_turn(1, 30.0))
+        drives[f"{s}radius"] = Drive(f"{side}_elbow", joint_from_bone=_turn(1, 30.0))
+        drives[f"{s}wrist"] = Drive(f"{side}_elbow")
+        drives[f"{s}hand"] = Drive(f"{side}_wrist")
+        drives[f"{s}hipjoint"] = Drive("pelvis")
+        drives[f"{s}femur"] = Drive(f"{side}_hip", joint_from_bone=_turn(0, out_deg))
+        drives[f"{s}tibia"] = Drive(f"{side}_knee", joint_from_bone=_turn(0, out_deg))
+        drives[f"{s}foot"] = Drive(f"{side}_ankle", joint_from_bone=_turn(0, out_deg))
+    return drives
+
+
+SMPL_MAP: JointMap = _smpl_map()
+"""The forearm's twist goes to the wrist bone; toes are left out, for the 24 bones have none."""
+
+
+def read_npz(path: Path | str) -> JointClip:
+    """The motion of an AMASS file on the 22 body joints; offsets are zero, for the file has none. Raises BadFile.
+
+    Only the named arrays are read, as plain numbers; nothing in the archive is ever unpickled.
+    """
+    path = Path(path)
+    check_size(path, _WHAT)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            poses = _array(path, archive, "poses")
+            trans = _array(path, archive, "trans")
+            rate_hz = _rate_hz(path, archive)
+    except _BROKEN as error:
+        raise BadFile(path, f"a broken archive ({error})", _WHAT, "Fetch it again.") from error
+    frames = trans.shape[0] if trans.ndim else 0
+    if (
+        frames == 0
+        or trans.shape != (frames, 3)
+        or poses.ndim != 2
+        or poses.shape not in [(frames, w) for w in _WIDTHS]
+    ):
+        found = f"poses {poses.shape} and trans {trans.shape}"
+        raise BadFile(path, found, "(T, 72, 156 or 165) and (T, 3), T at least 1", "Is it another kind of npz?")
+    turn = rotations.exp(poses[:, : 3 * len(JOINTS)].reshape(frames, len(JOINTS), 3))
+    local = np.concatenate([turn[..., :1], turn[..., 1:] @ WORLD_FROM_ASF.T], axis=-1)
+    local[:, 0] = rotations.multiply(turn[:, 0], rotations.from_matrix(WORLD_FROM_ASF.T))
+    return JointClip(
+        name=path.stem,
+        subject=path.stem.split("_", 1)[0],
+        source=path.parent.name,
+        behaviour="",
+        names=tuple(name for name, _ in JOINTS),
+        parents=tuple(parent for _, parent in JOINTS),
+        offset_m=np.zeros((len(JOINTS), 3)),
+        rate_hz=rate_hz,
+        root_m=trans,
+        parent_from_joint=local,
+        notes=("root placed at trans; the pelvis of the body model is a constant vector away",),
+    )
+
+
+def read_clip(path: Path | str) -> Clip:
+    """An AMASS file as a clip on the mean skeleton of the 24 bones."""
+    return to_clip(read_npz(path), SMPL_MAP)
+
+
+def _rate_hz(path: Path, archive: zipfile.ZipFile) -> float:
+    present = [key for key in _RATES if f"{key}.npy" in archive.namelist()]
+    if not present:
+        raise BadFile(path, "no frame rate", " or ".join(_RATES), "Is it another kind of npz?")
+    rate = _array(path, archive, present[0])
+    if rate.size != 1 or not 0.0 < float(rate.flat[0]) < 1e5:
+        raise BadFile(path, f"{present[0]} of {rate.tolist()!s:.40}", "one rate above 0 Hz", "Fetch it again.")
+    return float(rate.flat[0])
+
+
+def _array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
+    """One array of real, finite numbers, the size that its header says and within the limit."""
+    if f"{key}.npy" not in archive.namelist():
+        have = ", ".join(name.removesuffix(".npy") for name in archive.namelist()[:12])
+        raise BadFile(path, f"no array {key} (but {have or 'none'})", f"poses, trans, {_RATES[0]}", f"Is it {_WHAT}?")
+    info = archive.getinfo(f"{key}.npy")
+    with archive.open(info) as file:
+        try:
+            version = np.lib.format.read_magic(file)
+            header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
+            shape, fortran, dtype = header(file)
+        except (ValueError, KeyError) as error:
+            raise BadFile(path, f"array {key} without a readable header", _WHAT, "Fetch it again.") from error
+        size = math.prod(shape) * dtype.itemsize
+        if dtype.kind not in "fiu" or size != info.file_size - file.tell() or size > LIMIT_BYTES:
+            found = f"array {key} of {dtype} {shape} in {info.file_size} bytes"
+            raise BadFile(path, found, f"plain numbers, at most {LIMIT_BYTES >> 20} MB", "Fetch it again.")
+        flat = np.frombuffer(file.read(), dtype=dtype)
+    values: Floats = flat.reshape(shape, order="F" if fortran else "C").astype(float)
+    if not bool(np.all(np.abs(values) < LARGEST)):
+        raise BadFile(path, f"a value of {key} that is no finite number", "finite numbers", "Fetch it again.")
+    return values

@@ -1,0 +1,162 @@
+"""BVH files: checked line by line here, their motion read by upc-pymotion, in world axes and metres.
+
+BVH records no unit of length. The size of the skeleton tells, if it is a person's: read in exactly one of the usual
+units its rest pose is 1.2 to 2.2 m tall. CMU's library in its "MotionBuilder-friendly" conversion has the unit of the
+ASF files, 1/0.45 inch. Axes are x left, y up, z forward, as in that conversion; a file whose rest pose says otherwise
+is refused. An End Site becomes a joint called after its parent, "Head_end".
+"""
+
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.motion import Clip
+from harness.errors import BadFile
+from harness.mocap.read.asf import INCH_M, WORLD_FROM_ASF
+from harness.mocap.read.bvh_text import BvhText, parse_bvh
+from harness.mocap.read.joint_clip import Drive, JointClip, JointMap, to_clip
+
+UNITS_M = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "inches": INCH_M, "ASF units": INCH_M / 0.45}
+HEIGHT_M = (1.2, 2.2)
+"""Rest poses of people lie in it [m]; no two of the units above can both be right."""
+
+
+def _cmu_map() -> dict[str, Drive]:
+    drives = {
+        "root": Drive("Hips"),
+        "lowerback": Drive("LowerBack", "Spine"),
+        "upperback": Drive("Spine", "Spine1"),
+        "thorax": Drive("Spine1", "Neck"),
+        "lowerneck": Drive("Neck", "Neck1"),
+        "upperneck": Drive("Neck1", "Head"),
+        "head": Drive("Head", "Head_end"),
+    }
+    for side, s in (("Left", "l"), ("Right", "r")):
+        drives[f"{s}clavicle"] = Drive(f"{side}Shoulder", f"{side}Arm")
+        drives[f"{s}humerus"] = Drive(f"{side}Arm", f"{side}ForeArm")
+        drives[f"{s}radius"] = Drive(f"{side}ForeArm", f"{side}Hand")
+        drives[f"{s}wrist"] = Drive(f"{side}Hand", f"{side}FingerBase")
+        drives[f"{s}hand"] = Drive(f"{side}FingerBase", f"{side}HandIndex1")
+        drives[f"{s}hipjoint"] = Drive(f"{side[0]}HipJoint", f"{side}UpLeg")
+        drives[f"{s}femur"] = Drive(f"{side}UpLeg", f"{side}Leg")
+        drives[f"{s}tibia"] = Drive(f"{side}Leg", f"{side}Foot")
+        drives[f"{s}foot"] = Drive(f"{side}Foot", f"{side}ToeBase")
+    return drives
+
+
+CMU_MAP: JointMap = _cmu_map()
+"""Joints of the "MotionBuilder-friendly" conversion of CMU's library. It has no thorax and wrist lengths."""
+
+
+def read_bvh(path: Path | str, *, unit_m: float | None = None) -> JointClip:
+    """The motion of a BVH file, frame by frame as it stands there.
+
+    `unit_m` is the length of 1 in the file [m]; without it the skeleton's size must tell. Raises BadFile with the line
+    for anything but a tree of joints with one root (6 channels, position first) and rotations (3 channels) below.
+    """
+    path = Path(path)
+    text = parse_bvh(path)
+    data = _through_pymotion(text)
+    rotation, position, *_ = data.get_data()
+    turned = np.zeros((len(position), len(text.joints), 4))
+    turned[..., 0] = 1.0
+    turned[:, [j for j, joint in enumerate(text.joints) if joint.channels]] = _in_world(rotation)
+    offset = np.array([joint.offset for joint in text.joints])
+    unit, evidence = (unit_m, "as given") if unit_m is not None else guess_unit(path, _rest_height(path, text))
+    return JointClip(
+        name=path.stem,
+        subject=path.stem.split("_", 1)[0],
+        source=path.parent.name,
+        behaviour="",
+        names=tuple(joint.name for joint in text.joints),
+        parents=tuple(joint.parent for joint in text.joints),
+        offset_m=offset @ WORLD_FROM_ASF.T * unit,
+        rate_hz=_rate_hz(text.frame_time_s),
+        root_m=position[:, 0] @ WORLD_FROM_ASF.T * unit,
+        parent_from_joint=turned,
+        unit_m=unit,
+        unit_evidence=evidence,
+    )
+
+
+def read_clip(path: Path | str, *, unit_m: float | None = None) -> Clip:
+    """A BVH file of CMU's conversion as a clip of the 24 bones, without the T-pose that it adds in front."""
+    joint_clip = read_bvh(path, unit_m=unit_m)
+    if not is_cmu(joint_clip):
+        advice = "For another skeleton write a joint map and use joints.to_clip."
+        raise BadFile(path, "other joints", "those of CMU's BVH conversion, Hips to Head", advice)
+    return to_cmu_clip(joint_clip)
+
+
+def is_cmu(joint_clip: JointClip) -> bool:
+    """Whether the file has the joints of CMU's conversion."""
+    return {joint for drive in CMU_MAP.values() for joint in (drive.joint, drive.tip) if joint} <= set(joint_clip.names)
+
+
+def to_cmu_clip(joint_clip: JointClip) -> Clip:
+    """The motion on the 24 bones, if its joints are those of CMU's conversion."""
+    if starts_in_t_pose(joint_clip):
+        joint_clip = replace(joint_clip.cut(1), notes=(*joint_clip.notes, "frame 1, an added T-pose, was left out"))
+    return to_clip(joint_clip, CMU_MAP)
+
+
+def starts_in_t_pose(joint_clip: JointClip) -> bool:
+    """Whether frame 1 was added: the root stands where it does in frame 2, but is not turned at all."""
+    if len(joint_clip) < 2:
+        return False
+    still = np.array_equal(joint_clip.root_m[0], joint_clip.root_m[1])
+    return still and bool(np.abs(joint_clip.parent_from_joint[0, 0, 1:]).max() < 1e-9)
+
+
+def guess_unit(path: Path, height: float) -> tuple[float, str]:
+    """The unit of length [m] in which a person of `height` is person-sized, and the evidence; BadFile if none is."""
+    low, high = HEIGHT_M
+    fits = [(name, unit) for name, unit in UNITS_M.items() if low <= height * unit <= high]
+    if len(fits) != 1:
+        found = f"a rest pose {height:.4g} tall, which fits none of {', '.join(UNITS_M)}"
+        raise BadFile(path, found, f"a person of {low} to {high} m", "Give the unit's length in metres (--unit).")
+    name, unit = fits[0]
+    return unit, f"{name}, the one usual unit in which its rest pose ({height * unit:.2f} m) is a person's"
+
+
+def _rest_height(path: Path, text: BvhText) -> float:
+    """Height of the rest pose in the file's unit; BadFile unless y is up and x is left in it."""
+    at = np.zeros((len(text.joints), 3))
+    for j, joint in enumerate(text.joints):
+        at[j] = np.asarray(joint.offset) + (at[joint.parent] if joint.parent >= 0 else 0.0)
+    size = np.ptp(at, axis=0)
+    if size[1] <= 0.0 or size[1] < size[2]:
+        found = "a rest pose that does not stand along y ({:.3g} x {:.3g} x {:.3g})".format(*size)
+        raise BadFile(path, found, "x left, y up, z forward", "Export it with Y up.")
+    left = [at[j, 0] for j, joint in enumerate(text.joints) if joint.name.startswith("Left")]
+    if left and np.mean(left) < 0.0:
+        raise BadFile(path, "left joints at negative x", "x left, y up, z forward", "Export it facing +z.")
+    return float(size[1])
+
+
+def _through_pymotion(text: BvhText) -> Any:
+    """What pymotion makes of the file, which it gets in a form that it is known to read."""
+    from pymotion.io.bvh import BVH
+
+    bvh = BVH()
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "motion.bvh"
+        file.write_text(text.canonical(), encoding="ascii")
+        bvh.load(str(file))
+    return bvh
+
+
+def _rate_hz(frame_time_s: float) -> float:
+    """Frames a second; a whole number where the frame time is one to the digits that files print (.0083333: 120)."""
+    rate_hz = 1.0 / frame_time_s
+    return float(round(rate_hz)) if abs(round(rate_hz) - rate_hz) < 1e-4 * rate_hz else rate_hz
+
+
+def _in_world(rotation: Floats) -> Floats:
+    """Quaternions (w, x, y, z) of the file's axes in the world's, which are a cyclic change of x, y and z."""
+    out: Floats = np.concatenate([rotation[..., :1], rotation[..., 1:] @ WORLD_FROM_ASF.T], axis=-1)
+    return out

@@ -1,0 +1,156 @@
+"""The text of a BVH file, checked line by line: a tree of joints, then frames of numbers."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from harness.errors import BadFile
+from harness.mocap.read.file_checks import check_last_line, number, numbers, read_lines
+
+LIMIT_BYTES = 64 * 2**20
+"""Largest BVH file that is read; about 80,000 frames of CMU's skeleton. Its words take ten times that in memory."""
+MOST_JOINTS = 1000
+
+_WHAT = "a BVH motion"
+_ROTATIONS = {"Xrotation", "Yrotation", "Zrotation"}
+_POSITIONS = {"Xposition", "Yposition", "Zposition"}
+
+
+@dataclass(frozen=True)
+class BvhJoint:
+    """A joint, or an End Site, which has no channels."""
+
+    name: str
+    parent: int
+    """Index of the parent; -1 for the root."""
+    offset: tuple[float, ...]
+    """From the parent [the file's unit]."""
+    channels: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class BvhText:
+    """A whole BVH file, known to be sound."""
+
+    joints: tuple[BvhJoint, ...]
+    """Parents before children, as in the file; End Sites among them."""
+    frame_time_s: float
+    frames: tuple[str, ...]
+    """One line of numbers each."""
+
+    def canonical(self) -> str:
+        """The same motion for a simple reader: a keyword a line, plain names, no End Sites, no blank lines."""
+        lines = ["HIERARCHY"]
+        chain: list[int] = []
+        for j, joint in enumerate(self.joints):
+            if not joint.channels:
+                continue
+            while chain and chain[-1] != joint.parent:
+                chain.pop()
+                lines.append("}")
+            chain.append(j)
+            lines += [f"{'ROOT' if joint.parent < 0 else 'JOINT'} j{j}", "{"]
+            lines.append("OFFSET " + " ".join(map(repr, joint.offset)))
+            lines.append(f"CHANNELS {len(joint.channels)} " + " ".join(joint.channels))
+        lines += ["}"] * len(chain)
+        lines += ["MOTION", f"Frames: {len(self.frames)}", f"Frame Time: {self.frame_time_s!r}", *self.frames]
+        return "\n".join(lines) + "\n"
+
+
+def parse_bvh(path: Path) -> BvhText:
+    """Read and check a BVH file; BadFile with the line for anything amiss."""
+    lines = [
+        (line, text.split()) for line, text in enumerate(read_lines(path, _WHAT, LIMIT_BYTES), start=1) if text.strip()
+    ]
+    motion = next((k for k, (_, words) in enumerate(lines) if words == ["MOTION"]), None)
+    if motion is None:
+        raise BadFile(path, "no line MOTION", _WHAT, "Is the file whole, and BVH?")
+    joints = _joints(_Words(path, lines[: motion + 1]))
+    frame_time_s, frames = _frames(path, lines[motion + 1 :], sum(len(joint.channels) for joint in joints))
+    check_last_line(path)
+    return BvhText(joints, frame_time_s, frames)
+
+
+class _Words:
+    """The words of the hierarchy one by one, braces standing alone; the last is MOTION."""
+
+    def __init__(self, path: Path, lines: list[tuple[int, list[str]]]) -> None:
+        self.path = path
+        self.line, self.word = 0, ""
+        self._rest = (
+            (line, word)
+            for line, words in lines
+            for word in " ".join(words).replace("{", " { ").replace("}", " } ").split()
+        )
+
+    def next(self) -> str:
+        """The next word; MOTION again at the end."""
+        self.line, self.word = next(self._rest, (self.line, "MOTION"))
+        return self.word
+
+    def expect(self, *wanted: str) -> None:
+        for want in wanted:
+            if self.next() != want:
+                raise self.unlike(want)
+
+    def triple(self, what: str) -> tuple[float, ...]:
+        return tuple(number(self.path, self.next(), what, self.line) for _ in range(3))
+
+    def unlike(self, expected: str) -> BadFile:
+        """The error that the word read last is not what was expected."""
+        return BadFile(self.path, f"{self.word[:40]!r}", expected, "Is the file whole, and BVH?", self.line)
+
+
+def _joints(words: _Words) -> tuple[BvhJoint, ...]:
+    joints: list[BvhJoint] = []
+    names: set[str] = set()
+    inside: list[int] = []
+    words.expect("HIERARCHY")
+    while words.next() != "MOTION" or inside or not joints:
+        kind = words.word
+        if kind == "}" and inside:
+            inside.pop()
+            continue
+        root = kind == "ROOT" and not joints
+        if not root and not (kind in ("JOINT", "End") and inside and joints[inside[-1]].channels):
+            raise words.unlike("JOINT, End Site or }" if inside else "one ROOT with its joints, then MOTION")
+        name = words.next() if kind != "End" else f"{joints[inside[-1]].name}_end"
+        if kind == "End":
+            words.expect("Site")
+        if name in names or name in ("{", "}", "MOTION") or len(joints) == MOST_JOINTS:
+            raise words.unlike(f"a new name, and at most {MOST_JOINTS} joints")
+        names.add(name)
+        words.expect("{", "OFFSET")
+        offset = words.triple(f"the offset of {name}")
+        channels = () if kind == "End" else _channels(words, root)
+        joints.append(BvhJoint(name, inside[-1] if inside else -1, offset, channels))
+        inside.append(len(joints) - 1)
+    return tuple(joints)
+
+
+def _channels(words: _Words, root: bool) -> tuple[str, ...]:
+    """Three rotations, for the root after three positions."""
+    count = 6 if root else 3
+    words.expect("CHANNELS", str(count))
+    channels = tuple(words.next() for _ in range(count))
+    if set(channels[-3:]) != _ROTATIONS or (root and set(channels[:3]) != _POSITIONS):
+        words.word = " ".join(channels)
+        raise words.unlike("each rotation once" + (" after each position once" if root else ""))
+    return channels
+
+
+def _frames(path: Path, lines: list[tuple[int, list[str]]], width: int) -> tuple[float, tuple[str, ...]]:
+    """Frame time [s] and the frames' lines: as many as announced, of `width` numbers each."""
+    last = lines[-1][0] if lines else None
+    if len(lines) < 2 or lines[0][1][0] != "Frames:" or lines[1][1][:2] != ["Frame", "Time:"]:
+        raise BadFile(path, "no frame count and time", "Frames: and Frame Time: after MOTION", "Is it whole?", last)
+    (count,) = numbers(path, lines[0][1][1:], 1, "the frame count", lines[0][0])
+    (frame_time_s,) = numbers(path, lines[1][1][2:], 1, "the frame time", lines[1][0])
+    if not 1e-5 < frame_time_s < 10.0:
+        raise BadFile(path, f"a frame time of {frame_time_s:g} s", "1e-5 to 10 s", "Correct it.", lines[1][0])
+    frames = lines[2:]
+    if not frames or len(frames) != count:
+        advice = "The file is cut; fetch it again." if len(frames) < count else "Correct the frame count."
+        raise BadFile(path, f"{len(frames)} frames", f"the {count:g} announced, at least 1", advice, last)
+    for line, words in frames:
+        numbers(path, words, width, "a frame", line)
+    return frame_time_s, tuple(" ".join(words) for _, words in frames)

@@ -1,0 +1,198 @@
+"""From where the trunk, feet and hands should be to the 48 hinge angles, for all frames of a take at once."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.synthetic import limb_ik
+from harness.mocap.synthetic.curves import larger, smaller
+from harness.mocap.synthetic.limb_ik import about, turned, unit
+from harness.mocap.synthetic.posture_noise import Manner
+
+Hand = tuple[Floats, Floats]
+SIDES = ("l", "r")
+LEFT = {"l": 1.0, "r": -1.0}
+"""Sign of a side along the world's y."""
+
+_SPINE = {"lowerback": (0.40, 0.28, 0.40), "upperback": (0.33, 0.42, 0.32), "thorax": (0.27, 0.30, 0.28)}
+"""Share of bend, twist and lean that each back bone takes; the low back bends most and twists least."""
+_NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
+_NECK_BIAS_RAD = {"lowerneck": -0.28, "upperneck": 0.20, "head": 0.08}
+"""The neck's S-shape when looking straight ahead, about the medians of real clips."""
+_CLAVICLE_RAD = 0.16
+_HANGING = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""Frame of an upper arm that hangs with the elbow bending forward, in the chest's frame (either side)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Foot:
+    """Where a foot's bone should be."""
+
+    toe_m: Floats
+    """(T, 3) far end of the foot bone, the ball of the foot."""
+    direction: Floats
+    """(T, 3) unit vector from ankle to ball."""
+    knee: Floats
+    """(T, 3) direction the knee bends to."""
+
+
+class Figure:
+    """A moving body that is filled in from the trunk outwards; `angles_rad` (T, 48) is complete after legs and arms."""
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        root_m: Floats,
+        pelvis: Floats,
+        spine: Floats,
+        gaze: Floats,
+        shoulders: Mapping[str, tuple[Floats, Floats]],
+        manner: Manner,
+    ) -> None:
+        """Pose the trunk of T frames.
+
+        `pelvis` (T, 3) yaw, pitch, roll [rad]; `spine` (T, 3) bend, twist and lean of the chest on the pelvis [rad];
+        `gaze` (T, 3) yaw, pitch and roll of the head in the world [rad]; `shoulders` lift and reach (T,) [rad];
+        `manner` what back, neck and hands do on top.
+        """
+        self.skeleton, self.root_m, self._manner = skeleton, root_m, manner
+        self.angles_rad = np.zeros((len(root_m), len(skeleton.axes)))
+        self.pelvis = about(2, pelvis[:, 0]) @ about(1, pelvis[:, 1]) @ about(0, pelvis[:, 2])
+        self._world: dict[str, Floats] = {}
+        self._end: dict[str, Floats] = {}
+        above, at = self.pelvis, root_m
+        for bone, share in _SPINE.items():
+            above, at = self._put(bone, above, at, spine * share + manner[bone])
+        self.chest, self.chest_m = above, at
+        self._neck(gaze)
+        for side in SIDES:
+            lift, reach = (_CLAVICLE_RAD * np.tanh(x / _CLAVICLE_RAD) for x in shoulders[side])
+            sign = LEFT[side]
+            self._put(f"{side}clavicle", self.chest, self.chest_m, np.stack([-sign * reach, sign * lift], axis=-1))
+
+    def _put(self, bone: str, above: Floats, at: Floats, angles: Floats) -> tuple[Floats, Floats]:
+        """Set a trunk bone's hinges; returns its world rotation and far end."""
+        b = self.skeleton.index(bone)
+        where = self.skeleton.dof_of_bone[b]
+        self.angles_rad[:, where] = angles
+        for d in reversed(range(where.start, where.stop)):
+            axis = self.skeleton.axes[d]
+            above = above @ about(int(np.argmax(axis)), self.angles_rad[:, d])
+        self._world[bone] = above
+        self._end[bone] = at + above @ self.skeleton.bone_m[b]
+        return self._world[bone], self._end[bone]
+
+    def _neck(self, gaze: Floats) -> None:
+        head = about(2, gaze[:, 0]) @ about(1, gaze[:, 1]) @ about(0, gaze[:, 2])
+        rest = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # hinge axes y, z, x of the neck's bones
+        wanted = limb_ik.euler_xyz(rest.T @ np.swapaxes(self.chest, -1, -2) @ head @ rest)
+        for bone, share in _NECK.items():
+            where = self.skeleton.dof_of_bone[self.skeleton.index(bone)]
+            self.angles_rad[:, where] = wanted * share + self._manner[bone] + [_NECK_BIAS_RAD[bone], 0.0, 0.0]
+
+    def shoulder_m(self, side: str) -> Floats:
+        """(T, 3) where the upper arm starts."""
+        return self._end[f"{side}clavicle"]
+
+    def around_m(self, yaw: Floats, ahead: Floats, left: Floats, up: Floats) -> Floats:
+        """(T, 3) the point so far ahead, left and above the top of the chest, as seen when facing `yaw` (T,) [rad]."""
+        c, s = np.cos(yaw), np.sin(yaw)
+        return self.chest_m + np.stack(
+            [c * ahead - s * left, s * ahead + c * left, np.broadcast_to(up, c.shape)], axis=-1
+        )
+
+    def hip_m(self, side: str) -> Floats:
+        """(T, 3) where the thigh starts."""
+        hip: Floats = self.root_m + self.pelvis @ self.skeleton.bone_m[self.skeleton.index(f"{side}hipjoint")]
+        return hip
+
+    def length_m(self, bone: str) -> float:
+        return float(self.skeleton.length_m[self.skeleton.index(bone)])
+
+    def arm_m(self, side: str) -> float:
+        """From shoulder to wrist."""
+        return sum(self.length_m(f"{side}{bone}") for bone in ("humerus", "radius", "wrist"))
+
+    def _set(self, bone: str, *angles: Floats) -> None:
+        self.angles_rad[:, self.skeleton.dof_of_bone[self.skeleton.index(bone)]] = np.stack(angles, axis=-1)
+
+    def leg(self, side: str, foot: Foot) -> None:
+        """Reach the foot; the knee bends towards `foot.knee`."""
+        thigh, shank = self.length_m(f"{side}femur"), self.length_m(f"{side}tibia")
+        hip = self.hip_m(side)
+        ankle = foot.toe_m - self.length_m(f"{side}foot") * foot.direction
+        bend = foot.knee + 0.35 * self.pelvis[:, :, 0]  # a knee points between hip and foot
+        knee = limb_ik.middle_joint(hip, ankle, bend, thigh, shank)
+        left = unit(np.cross(hip - ankle, bend))
+        rest = limb_ik.frame_of(self.skeleton, f"{side}femur")
+        femur, flexion = limb_ik.hinged(unit(knee - hip), unit(ankle - knee), left, rest)
+        self._three(f"{side}femur", np.swapaxes(self.pelvis, -1, -2) @ femur, rest)
+        self._set(f"{side}tibia", flexion)
+        tibia = femur @ rest @ about(0, flexion)
+        a, c = limb_ik.pointing(
+            rest.T @ self.skeleton.bone_m[self.skeleton.index(f"{side}foot")],
+            turned(np.swapaxes(tibia, -1, -2), foot.direction),
+        )
+        self._set(f"{side}foot", a, c)
+
+    def _three(self, bone: str, relative: Floats, rest: Floats) -> None:
+        self._set(bone, *np.unwrap(limb_ik.euler_xyz(rest.T @ relative @ rest), axis=0).T)
+
+    def arm(self, side: str, upper: Floats, elbow: Floats, turn: Floats, hand: Hand) -> None:
+        """Set an arm from its upper bone's world rotation (T, 3, 3) and the elbow's flexion (T,) [rad].
+
+        `turn` is the forearm's pronation; `hand` the wrist's flexion (towards the palm) and deviation (towards the
+        thumb), all (T,) [rad].
+        """
+        sign = LEFT[side]
+        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
+        above = self._world[f"{side}clavicle"]
+        self._three(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
+        self._set(f"{side}radius", elbow)
+        self._set(f"{side}wrist", -sign * turn + self._manner[f"{side}wrist"][:, 0])
+        loose = self._manner[f"{side}hand"]
+        self._set(f"{side}hand", hand[0] + loose[:, 0], -sign * hand[1] + loose[:, 1])
+
+    def hang(
+        self, side: str, swing: Floats, spread: Floats, twist: Floats, elbow: Floats, turn: Floats, hand: Hand
+    ) -> None:
+        """An arm that hangs from the chest: swung forward, spread sideways, twisted inward, elbow bent (T,) [rad]."""
+        sign = LEFT[side]
+        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
+        placed = about(1, -swing) @ about(0, sign * spread) @ about(2, -sign * twist)
+        self.arm(side, self.chest @ placed @ _HANGING @ rest.T, elbow, turn, hand)
+
+    def reach(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: Hand) -> None:
+        """An arm whose wrist is at `wrist_m` (T, 3) in the world, drawn in if too far; the elbow points `towards`."""
+        self.arm(side, *self._bent(side, wrist_m, towards), turn, hand)
+
+    def palm_turn(self, side: str, wrist_m: Floats, towards: Floats, palm: Floats) -> Floats:
+        """Pronation (T,) [rad] at which the palm of an arm that reaches so faces the world direction `palm` (T, 3).
+
+        Softly bounded to what a forearm can do.
+        """
+        upper, elbow = self._bent(side, wrist_m, towards)
+        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
+        facing = turned(np.swapaxes(upper @ rest @ about(0, elbow), -1, -2), palm)
+        down = -rest[2]
+        angle = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]) - np.arctan2(down[0], down[2]))
+        angle = -LEFT[side] * (angle - 2.0 * np.pi * np.round(np.median(angle) / (2.0 * np.pi)))
+        out: Floats = -0.4 + 1.3 * np.tanh((angle + 0.4) / 1.3)
+        return out
+
+    def _bent(self, side: str, wrist_m: Floats, towards: Floats) -> tuple[Floats, Floats]:
+        """World rotation (T, 3, 3) of the upper arm and flexion (T,) of the elbow that bring the wrist there."""
+        first = self.length_m(f"{side}humerus")
+        second = self.length_m(f"{side}radius") + self.length_m(f"{side}wrist")
+        shoulder = self.shoulder_m(side)
+        line = wrist_m - shoulder
+        distance = np.sqrt(np.sum(line**2, axis=-1, keepdims=True))
+        longest, shortest = 0.985 * (first + second), 0.32 * (first + second)
+        near = larger(smaller(distance, np.array(longest), 0.02), np.array(shortest), 0.02)
+        wrist = shoulder + line * (near / distance)
+        bent = limb_ik.middle_joint(shoulder, wrist, towards, first, second)
+        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
+        return limb_ik.hinged(unit(bent - shoulder), unit(wrist - bent), unit(np.cross(towards, line)), rest)

@@ -1,0 +1,109 @@
+"""Footwork of someone who keeps a stance: which foot steps when as the body shifts from place to place."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.synthetic import limb_ik
+from harness.mocap.synthetic.articulated_figure import SIDES, Foot
+from harness.mocap.synthetic.curves import ease, larger, smaller
+from harness.mocap.synthetic.foot_trajectory import Plant
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Where a foot stands relative to the place its owner stands at, facing forward."""
+
+    ahead_m: float
+    left_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True)
+class Shift:
+    """A move to another place and heading, one foot after the other."""
+
+    at_s: float
+    place_m: tuple[float, float]
+    yaw_rad: float
+    step_s: float = 0.26
+    gap_s: float = 0.05
+    lift_m: float = 0.035
+
+
+def steps(
+    rng: np.random.Generator, stance: Mapping[str, Stance], start: Shift, shifts: Sequence[Shift], end_s: float
+) -> dict[str, list[Plant]]:
+    """Plants of both feet; the foot on the side of the move goes first. Shifts must not overlap."""
+    where: dict[str, tuple[float, tuple[float, float], float]] = {}
+    plants: dict[str, list[Plant]] = {side: [] for side in SIDES}
+    for side in SIDES:
+        where[side] = (start.at_s - 10.0, *_foothold(rng, stance[side], start))
+    before = start
+    for shift in shifts:
+        move = np.subtract(shift.place_m, before.place_m)
+        c, s = np.cos(shift.yaw_rad), np.sin(shift.yaw_rad)
+        ahead, left = float(move[0] * c + move[1] * s), float(move[1] * c - move[0] * s)
+        order = sorted(SIDES, key=lambda side: -(stance[side].ahead_m * ahead + stance[side].left_m * left))
+        for n, side in enumerate(order):
+            on_s, ball, yaw = where[side]
+            off_s = shift.at_s + n * (shift.step_s + shift.gap_s)
+            plants[side].append(Plant(on_s, off_s, ball, yaw, 0.0, 0.30, shift.lift_m * rng.uniform(0.8, 1.2)))
+            where[side] = (off_s + shift.step_s, *_foothold(rng, stance[side], shift))
+        before = shift
+    for side in SIDES:
+        on_s, ball, yaw = where[side]
+        plants[side].append(Plant(on_s, max(end_s, on_s) + 10.0, ball, yaw))
+    return plants
+
+
+def _foothold(rng: np.random.Generator, stance: Stance, at: Shift) -> tuple[tuple[float, float], float]:
+    c, s = np.cos(at.yaw_rad), np.sin(at.yaw_rad)
+    ahead, left = stance.ahead_m + rng.normal(0.0, 0.015), stance.left_m + rng.normal(0.0, 0.015)
+    ball = (at.place_m[0] + c * ahead - s * left, at.place_m[1] + s * ahead + c * left)
+    return ball, at.yaw_rad + stance.yaw_rad + rng.normal(0.0, 0.03)
+
+
+def body_path(t: Floats, start: Shift, shifts: Sequence[Shift]) -> tuple[Floats, Floats]:
+    """Place (T, 2) [m] and heading (T,) [rad] of the body, which drifts over as the feet step."""
+    place = np.tile(np.array(start.place_m), (len(t), 1))
+    yaw = np.full(len(t), start.yaw_rad)
+    before = start
+    for shift in shifts:
+        lasts = 2.0 * shift.step_s + shift.gap_s
+        share = ease((t - shift.at_s + 0.08) / (lasts + 0.12))
+        place += share[:, None] * np.subtract(shift.place_m, before.place_m)
+        yaw += share * (shift.yaw_rad - before.yaw_rad)
+        before = shift
+    return place, yaw
+
+
+def pelvis_matrix(pelvis: Floats) -> Floats:
+    """(T, 3, 3) of yaw, pitch, roll (T, 3) [rad]."""
+    out: Floats = limb_ik.about(2, pelvis[:, 0]) @ limb_ik.about(1, pelvis[:, 1]) @ limb_ik.about(0, pelvis[:, 2])
+    return out
+
+
+def leg_m(skeleton: Skeleton) -> float:
+    """Length of thigh and shank together [m]."""
+    return float(sum(skeleton.length_m[skeleton.index(bone)] for bone in ("lfemur", "ltibia")))
+
+
+def highest_root_m(
+    skeleton: Skeleton, place_m: Floats, pelvis: Floats, feet: Mapping[str, Foot], straightest: float
+) -> Floats:
+    """(T,) how high the root may be over `place_m` (T, 2) before a leg is stretched beyond that share of its length."""
+    turned = pelvis_matrix(pelvis)
+    height = np.full(len(place_m), np.inf)
+    long = straightest * leg_m(skeleton)
+    for side in SIDES:
+        hip = turned @ skeleton.bone_m[skeleton.index(f"{side}hipjoint")]
+        ankle = feet[side].toe_m - float(skeleton.length_m[skeleton.index(f"{side}foot")]) * feet[side].direction
+        flat = np.sum((place_m + hip[:, :2] - ankle[:, :2]) ** 2, axis=1)
+        # beyond reach the leg hangs low rather than nowhere; plans keep clear of it
+        top = ankle[:, 2] + np.sqrt(larger(long**2 - flat, np.array(0.15), 0.05)) - hip[:, 2]
+        height = top if np.isinf(height[0]) else smaller(height, top, 0.02)
+    return height

@@ -1,0 +1,55 @@
+"""Gestures: punches, strokes, swings as sums of short curves on named channels, so that they may overlap."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.mocap.synthetic.curves import through
+
+Keys = Sequence[tuple[float, float]]
+"""(time after the start [s], value); values rest on the first before and the last after."""
+
+
+@dataclass(frozen=True)
+class Gesture:
+    """What one movement adds to each channel."""
+
+    at_s: float
+    parts: Mapping[str, Keys]
+
+    @property
+    def end_s(self) -> float:
+        return self.at_s + max(keys[-1][0] for keys in self.parts.values())
+
+    def varied(self, rng: np.random.Generator, size: float, slowness: float, spread: float = 0.06) -> "Gesture":
+        """The same movement at another size and speed, and never twice alike: `spread` is the relative variation."""
+        slow = slowness * rng.normal(1.0, 0.5 * spread)
+        big = size * rng.normal(1.0, 0.5 * spread)
+        return Gesture(
+            self.at_s,
+            {
+                name: [(dt * slow, value * big * rng.normal(1.0, spread)) for dt, value in keys]
+                for name, keys in self.parts.items()
+            },
+        )
+
+
+def timed(moments: Mapping[str, float], lag_s: float = 0.0, **values: float) -> Keys:
+    """Keys at named moments [s], at rest (0) at the first and last of them; `lag_s` delays those in between."""
+    names = list(moments)
+    keys = [(moments[name] + lag_s, value) for name, value in values.items()]
+    return sorted([(moments[names[0]], 0.0), *keys, (moments[names[-1]], 0.0)])
+
+
+def play(t: Floats, gestures: Iterable[Gesture]) -> Mapping[str, Floats]:
+    """Every channel (T,) as the sum of the gestures on it; a channel that nothing moves is 0."""
+    out: defaultdict[str, Floats] = defaultdict(lambda: np.zeros(len(t)))
+    for gesture in gestures:
+        for name, keys in gesture.parts.items():
+            first = int(np.searchsorted(t, gesture.at_s + keys[0][0]))
+            last = len(t) if keys[-1][1] else int(np.searchsorted(t, gesture.at_s + keys[-1][0]))
+            out[name][first:last] += through(t[first:last], [gesture.at_s + k[0] for k in keys], [k[1] for k in keys])
+    return out

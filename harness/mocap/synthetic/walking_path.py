@@ -1,0 +1,60 @@
+"""Where a walker goes: speed and heading over time, in the space of a room."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.mocap.synthetic.curves import ease, wander
+
+KINDS = ("round the room", "to and fro", "square left", "square right", "figure of eight", "wandering")
+_SLOWEST_M_S = 0.92
+"""Speed in a sharp turn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A path walked over time."""
+
+    place_m: Floats
+    """(T, 2)"""
+    yaw_rad: Floats
+    """(T,) heading."""
+    speed_m_s: Floats
+    """(T,)"""
+
+
+def course(rng: np.random.Generator, t: Floats, take: int) -> Course:
+    """The course of a take, centred; takes go through the kinds."""
+    kind = KINDS[(take - 1 + int(rng.integers(2))) % len(KINDS)]
+    usual = rng.uniform(0.95, 1.6)
+    yaw = rng.uniform(-np.pi, np.pi) + wander(rng, t, 4.0, 0.05)
+    slow = np.zeros(len(t))
+    start_s = float(t[0])
+    side = 1.0 if rng.random() < 0.5 else -1.0
+    while start_s < t[-1]:
+        angle, lasts_s, straight_s, side = _turn(rng, kind, side, usual)
+        share = (t - start_s - straight_s) / lasts_s
+        yaw += angle * ease(share)
+        sharp = min(abs(angle) / lasts_s / 1.6, 1.0)
+        slow = 1.0 - (1.0 - slow) * (1.0 - sharp * ease((share + 0.4) / 0.7) * ease((1.4 - share) / 0.7))
+        start_s += straight_s + lasts_s
+    speed = usual * (1.0 + wander(rng, t, 3.0, 0.02))
+    speed += (min(_SLOWEST_M_S, usual) - speed) * slow
+    velocity = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1) * speed[:, None]
+    place = np.concatenate([np.zeros((1, 2)), np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * (t[1] - t[0]), axis=0)])
+    return Course(place - 0.5 * (place.min(axis=0) + place.max(axis=0)), yaw, speed)
+
+
+def _turn(rng: np.random.Generator, kind: str, side: float, usual: float) -> tuple[float, float, float, float]:
+    """Angle [rad] of a turn, the time it takes [s], the straight before it [s], and the side of the turn after it."""
+    if kind == "round the room":
+        return side * 2.0 * np.pi, 2.0 * np.pi * rng.uniform(1.5, 2.3) / usual, 0.01, side
+    if kind == "to and fro":
+        return side * np.pi, rng.uniform(2.6, 3.2), rng.uniform(2.5, 4.5), -side
+    if kind in ("square left", "square right"):
+        left = 1.0 if kind == "square left" else -1.0
+        return left * 0.5 * np.pi, rng.uniform(1.3, 1.7), rng.uniform(1.8, 3.2), side
+    if kind == "figure of eight":
+        return side * 1.6 * np.pi, 1.6 * np.pi * rng.uniform(1.4, 1.9) / usual, rng.uniform(1.0, 1.8), -side
+    return side * rng.uniform(0.4, 1.8), rng.uniform(1.4, 2.2), rng.uniform(0.5, 2.5), float(rng.choice([-1.0, 1.0]))

@@ -1,0 +1,103 @@
+"""BVH: centimetres, x left, y up, z forward as in the common conversion of CMU's library; every bone is a joint.
+
+The joint called after a bone stands at the bone's near end; End Sites are the far ends of head, hands and feet. BVH has
+no times, so a frame without an estimate repeats the one before it, in truth and estimate alike.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats
+from harness.core.skeleton import Skeleton
+from harness.mocap.read.asf import WORLD_FROM_ASF
+from harness.mocap.write.posed_motion import Motion
+
+CENTIMETRES_PER_METRE = 100.0
+_ROTATION = "Zrotation Yrotation Xrotation"
+
+
+def bvh_files(motion: Motion) -> dict[str, str]:
+    """Ending -> text of the file."""
+    return {".bvh": "\n".join([*hierarchy(motion.skeleton), *_motion(motion)]) + "\n"}
+
+
+def euler_zyx_deg(rotation: Floats) -> Floats:
+    """(..., 3) angles (z, y, x) with R = Rz Ry Rx of matrices (..., 3, 3); x is zero where y is +-90 deg [deg]."""
+    r = np.asarray(rotation, dtype=float)
+    cos_y = np.hypot(r[..., 0, 0], r[..., 1, 0])
+    locked = cos_y < 1e-7
+    z = np.where(locked, np.arctan2(-r[..., 0, 1], r[..., 1, 1]), np.arctan2(r[..., 1, 0], r[..., 0, 0]))
+    y = np.arctan2(-r[..., 2, 0], cos_y)
+    x = np.where(locked, 0.0, np.arctan2(r[..., 2, 1], r[..., 2, 2]))
+    out: Floats = np.rad2deg(np.stack([z, y, x], axis=-1))
+    return out
+
+
+def hierarchy(skeleton: Skeleton) -> Iterator[str]:
+    """The first part of a file, line by line."""
+    offset_cm = skeleton.bone_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
+    children = {
+        p: [b for b, parent in enumerate(skeleton.parents) if parent == p] for p in (-1, *range(len(offset_cm)))
+    }
+
+    def joint(bone: int, at_cm: Floats, tab: str) -> Iterator[str]:
+        yield f"{tab}JOINT {skeleton.names[bone]}"
+        yield f"{tab}{{"
+        yield f"{tab}\tOFFSET {row(at_cm)}"
+        yield f"{tab}\tCHANNELS 3 {_ROTATION}"
+        for child in children[bone]:
+            yield from joint(child, offset_cm[bone], tab + "\t")
+        if not children[bone]:
+            yield f"{tab}\tEnd Site"
+            yield f"{tab}\t{{"
+            yield f"{tab}\t\tOFFSET {row(offset_cm[bone])}"
+            yield f"{tab}\t}}"
+        yield f"{tab}}}"
+
+    yield from ("HIERARCHY", "ROOT root", "{", "\tOFFSET 0.000000 0.000000 0.000000")
+    yield f"\tCHANNELS 6 Xposition Yposition Zposition {_ROTATION}"
+    for bone in children[-1]:
+        yield from joint(bone, np.zeros(3), "\t")
+    yield "}"
+
+
+def _motion(motion: Motion) -> Iterator[str]:
+    grid = np.arange(motion.frame_index[0], motion.frame_index[-1] + 1)
+    shown = np.searchsorted(motion.frame_index, grid, side="right") - 1
+    table = channels(
+        motion.skeleton, motion.joints_m[:, 0], rotations.to_matrix(motion.world_from_root), motion.world_from_bone
+    )
+    table[:, 3:] = np.unwrap(table[:, 3:], period=360.0, axis=0)
+    yield from ("MOTION", f"Frames: {len(grid)}", f"Frame Time: {1.0 / motion.rate_hz:.9f}")
+    yield from map(row, table[shown])
+
+
+def channels(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, world_from_bone: Floats) -> Floats:
+    """The numbers (F, 6 + 3 B) of frames: root (F, 3) [m], rotations (F, 3, 3), (F, B, 3, 3); angles within +-180."""
+    local = [world_from_root]
+    for bone, parent in enumerate(skeleton.parents):
+        above = world_from_root if parent < 0 else world_from_bone[:, parent]
+        local.append(np.swapaxes(above, -1, -2) @ world_from_bone[:, bone])
+    # joints are listed depth first, which the skeleton's order need not be
+    order = [0, *(1 + bone for bone in _depth_first(skeleton))]
+    turned = np.stack([local[j] for j in order], axis=1)
+    angles_deg = euler_zyx_deg(WORLD_FROM_ASF.T @ turned @ WORLD_FROM_ASF)
+    root_cm = root_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
+    return np.concatenate([root_cm, angles_deg.reshape(len(root_cm), -1)], axis=1)
+
+
+def _depth_first(skeleton: Skeleton) -> list[int]:
+    def below(parent: int) -> Iterator[int]:
+        for bone, above in enumerate(skeleton.parents):
+            if above == parent:
+                yield bone
+                yield from below(bone)
+
+    return list(below(-1))
+
+
+def row(values: Floats) -> str:
+    """As it stands in the file."""
+    return " ".join(f"{value:.6f}" for value in values)

@@ -1,0 +1,30 @@
+"""CSV: one row a frame, units in the column names; the estimate's table ends with its status and errors."""
+
+import csv
+import io
+
+import numpy as np
+
+from harness.mocap.write.posed_motion import Motion
+
+
+def csv_files(motion: Motion) -> dict[str, str]:
+    """Ending -> text of the file. World axes x forward, y left, z up; a value that is undefined is empty."""
+    columns = ["frame", "time_s", *(f"root_q{c}" for c in "wxyz")]
+    columns += [f"{name}_{axis}_m" for name in motion.joint_names for axis in "xyz"]
+    columns += [f"{name}_deg" for name in motion.skeleton.dof_names]
+    table = np.column_stack(
+        [
+            motion.time_s,
+            motion.world_from_root,
+            motion.joints_m.reshape(len(motion), -1),
+            np.rad2deg(motion.angles_rad),
+            *motion.extra.values(),
+        ]
+    )
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([*columns, *motion.extra])
+    for frame, row in zip(motion.frame_index, table, strict=True):
+        writer.writerow([int(frame), *("" if np.isnan(value) else f"{value:.9g}" for value in row)])
+    return {".csv": out.getvalue()}

@@ -1,0 +1,66 @@
+"""Write truth and estimates of a run for other programs: BVH players, OpenSim, tables, evo."""
+
+import os
+import re
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+from harness.errors import BadInput, UnknownName
+from harness.mocap.write.bvh import bvh_files
+from harness.mocap.write.csv_table import csv_files
+from harness.mocap.write.posed_motion import Exportable, Motion, truth_and_estimate
+from harness.mocap.write.trc import trc_files
+from harness.mocap.write.tum import tum_files
+
+FORMATS: dict[str, Callable[[Motion], dict[str, str]]] = {
+    "bvh": bvh_files,
+    "trc": trc_files,
+    "csv": csv_files,
+    "tum": tum_files,
+}
+_UNFINISHED = ".unfinished-"
+
+
+def export(cells: Iterable[Exportable], fmt: str, folder: Path, *, force: bool = False) -> list[Path]:
+    """Write every cell in one of FORMATS, `CLIP-METHOD-INPUTS.truth.*` and `.estimate.*`; returns the files.
+
+    The seconds of warm-up, which scores leave out, are written too. All files are written, or none. A cell without a
+    finite estimate has nothing to write and is left out. Raises UnknownName for another format, and
+    BadInput when a file exists (unless `force`), when the folder cannot be written and when there is nothing to write.
+    """
+    if fmt not in FORMATS:
+        raise UnknownName("export format", fmt, FORMATS)
+    ready: dict[Path, Path] = {}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for cell in cells:
+            stem = _stem(cell, {path.name for path in ready})
+            for kind, motion in truth_and_estimate(cell).items():
+                if len(motion):
+                    for ending, text in FORMATS[fmt](motion).items():
+                        path = folder / f"{stem}.{kind}{ending}"
+                        ready[path] = _prepared(path, text, force)
+        for path, beside in ready.items():
+            os.replace(beside, path)
+    except OSError as error:
+        raise BadInput(f"{folder} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
+    finally:
+        for beside in folder.glob(f"{_UNFINISHED}{os.getpid()}-*"):
+            beside.unlink()
+    if not ready:
+        raise BadInput("No cell of this run has an estimate to export.", "Run the scenario first.")
+    return list(ready)
+
+
+def _stem(cell: Exportable, taken: set[str]) -> str:
+    stem = re.sub(r"[^\w.+@-]", "_", f"{cell.clip}-{cell.method}-{cell.inputs}")
+    return f"{stem}-{cell.key[:8]}" if any(name.startswith(f"{stem}.") for name in taken) else stem
+
+
+def _prepared(path: Path, text: str, force: bool) -> Path:
+    """The text under another name: all files take their own at once, or none does."""
+    if path.exists() and not force:
+        raise BadInput(f"{path} exists.", "Name another folder with --out, or write over it with --force.")
+    beside = path.with_name(f"{_UNFINISHED}{os.getpid()}-{path.name}")
+    beside.write_text(text, encoding="utf-8", newline="")
+    return beside

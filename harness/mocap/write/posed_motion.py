@@ -1,0 +1,96 @@
+"""What is written for other programs: truth and estimate of a cell, posed once for all formats."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Ints
+from harness.core.humanoid24 import standard_skeleton, unpack
+from harness.core.skeleton import Skeleton, forward
+
+
+class Exportable(Protocol):
+    """The part of a run's cell that is written: F frames (see `harness.results.cell.Cell`)."""
+
+    @property
+    def key(self) -> str: ...
+    @property
+    def method(self) -> str: ...
+    @property
+    def clip(self) -> str: ...
+    @property
+    def inputs(self) -> str: ...
+    @property
+    def rate_hz(self) -> float: ...
+    @property
+    def bone_m(self) -> Floats: ...
+    @property
+    def estimate_bone_m(self) -> Floats: ...
+    @property
+    def time_s(self) -> Floats: ...
+    @property
+    def frame_index(self) -> Ints: ...
+    @property
+    def status(self) -> Ints: ...
+    @property
+    def truth_qpos(self) -> Floats: ...
+    @property
+    def estimate_qpos(self) -> Floats: ...
+    @property
+    def errors(self) -> Mapping[str, Floats]: ...
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """F posed frames; world axes x forward, y left, z up, metres and radians."""
+
+    skeleton: Skeleton
+    rate_hz: float
+    frame_index: Ints
+    """(F,) strictly increasing; a step of more than one is a gap."""
+    time_s: Floats
+    """(F,)."""
+    world_from_root: Floats
+    """(F, 4) unit quaternion (w, x, y, z)."""
+    angles_rad: Floats
+    """(F, D)."""
+    joints_m: Floats
+    """(F, B + 1, 3) the root, then each bone's far end."""
+    world_from_bone: Floats
+    """(F, B, 3, 3)."""
+    extra: Mapping[str, Floats]
+    """(F,) each: what a table may add, by column name."""
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """(B + 1,) a bone's name stands for its far end."""
+        return ("root", *self.skeleton.names)
+
+
+def truth_and_estimate(cell: Exportable) -> dict[str, Motion]:
+    """Both motions of a cell, each on its own skeleton, at the frames whose estimate is finite."""
+    known = np.isfinite(cell.estimate_qpos).all(axis=1)
+    extra = {"status": cell.status[known].astype(float)} | {name: e[known] for name, e in cell.errors.items()}
+    time_s, frame_index = cell.time_s[known], cell.frame_index[known]
+
+    def motion(qpos: Floats, bone_m: Floats, extra: Mapping[str, Floats]) -> Motion:
+        skeleton = standard_skeleton().with_bones(bone_m)
+        root_m, quaternion, angles_rad = unpack(qpos[known])
+        world_from_root = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
+        pose = forward(skeleton, root_m, world_from_root, angles_rad)
+        joints_m = np.concatenate([root_m[:, None], pose.end_m], axis=1)
+        return Motion(
+            skeleton, cell.rate_hz, frame_index, time_s, rotations.continuous(world_from_root),
+            angles_rad, joints_m, pose.world_from_bone, extra,
+        )  # fmt: skip
+
+    return {
+        "truth": motion(cell.truth_qpos, cell.bone_m, {}),
+        "estimate": motion(cell.estimate_qpos, cell.estimate_bone_m, extra),
+    }

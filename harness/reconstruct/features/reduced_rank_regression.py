@@ -1,0 +1,214 @@
+"""What posture to expect: one linear map of everything that is known, and in its terms a search and a local model.
+
+Known at a frame are the window of the last m answers (Liu et al. 2011, eq. 6 and 8) and the readings of the trackers
+(docs/methods.md G3). A ridge regression over the whole database turns both into the posture that goes with them; its
+leading directions are the coordinates z in which neighbours are sought and from which local models regress. So eq. 6's
+D_w is learnt rather than the identity: what says nothing about the posture does not count, and 40 numbers do.
+
+Readings are seen from above the station on the trunk, along its heading or, where its orientation is not measured,
+along one that the positions themselves define: a heading lent by the last answer feeds its error back. What was not
+read is replaced by what the rest of the evidence leads to expect of it, which for a linear map is the same as learning
+it without.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve
+
+from harness.body.humanoid import Body
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, Singles
+from harness.core.calibration import Calibration
+from harness.reconstruct.database import Windows
+from harness.reconstruct.features.anchor_frame import Bearing, View, anchor_of, twist_rad
+from harness.reconstruct.features.ground_step import readings
+from harness.reconstruct.features.virtual_trackers import Worn
+from harness.reconstruct.index import Found, Index, choose
+from harness.reconstruct.solver.ground_frame import POSTURE
+
+_CHUNK = 256
+"""Windows worked on at a time."""
+_HERE: Floats = np.zeros(3)
+"""A ground frame to stand on."""
+_MAPS = 64
+"""Combinations of silent stations whose maps are kept."""
+_LEARNT_FROM = 20_000
+"""Windows, evenly spread, that the map is learnt from."""
+_TOLD = 0.8
+"""Share of the heading that positions must tell to be asked for it: six stations told 0.94 or more, two below 0.78."""
+
+
+@dataclass(frozen=True)
+class Terms:
+    """In which terms postures are expected."""
+
+    window_weight: float = 0.3
+    """What a window's numbers are multiplied by, beside readings in metres."""
+    lever_m: float = 0.3
+    """A turn by one radian counts like so many metres."""
+    directions: int = 40
+    """Coordinates that are kept."""
+    ridge: float = 1e-5
+    """Of the map, as a share of the evidence's variance."""
+
+
+class Evidence:
+    """What is known before each frame of a database, for stations worn as a calibration says.
+
+    A row is the window before the frame (D), then each station's place (3) and two axes of its bone (6).
+    """
+
+    def __init__(
+        self, body: Body, windows: Windows, worn: Calibration, terms: Terms, bearing: Bearing | None = None
+    ) -> None:
+        """Seen along a `bearing`; None for along the anchor's own heading."""
+        self.terms, self.count, self.anchor, self.bearing = terms, len(worn.stations), anchor_of(worn.bones), bearing
+        self.windows, self._trackers = windows, Worn(body, worn)
+        self.size = windows.size + 9 * self.count
+        self._body, self._worn, self._by_positions = body, worn, dict[bytes, Evidence]()
+        self._expectations: dict[bytes, Expectation] = {}
+        rows = self._learnt_from()
+        self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE)
+        for known, after in self.parts(windows, rows):
+            self.mean += known.sum(axis=0) / len(rows)
+            self._mean_after += after.sum(axis=0) / len(rows)
+        self.scatter: Floats = np.zeros((self.size, self.size))
+        """(D + 9 S, D + 9 S) covariance of the evidence."""
+        self._shared = np.zeros((self.size, POSTURE))
+        for known, after in self.parts(windows, rows):
+            away = known - self.mean
+            self.scatter += away.T @ away / len(rows)
+            self._shared += away.T @ (after - self._mean_after) / len(rows)
+        windows.database.let_go()
+        self.least = terms.ridge * float(np.trace(self.scatter)) + 1e-12
+
+    def _learnt_from(self) -> Ints:
+        every = np.arange(len(self.windows))
+        return every if len(every) <= _LEARNT_FROM else np.linspace(0, len(every) - 1, _LEARNT_FROM).astype(np.int64)
+
+    def facing(self, usual: Bools) -> "Evidence":
+        """The same seen as a session sees it that has the `usual` readings (2 S,) of positions, then orientations."""
+        places = usual[: self.count]
+        if usual[self.count + self.anchor] or not places[self.anchor]:
+            return self
+        key = places.tobytes()
+        if key not in self._by_positions:
+            at_m = [at_m for _, at_m, _ in self._stood(self.windows, self._learnt_from())]
+            bearing = Bearing.learnt(np.concatenate(at_m), self.anchor, places)
+            told = bearing.told > _TOLD
+            seen = Evidence(self._body, self.windows, self._worn, self.terms, bearing) if told else self
+            self._by_positions[key] = seen
+        return self._by_positions[key]
+
+    def expectation(self, usual: Bools, index: str, wanted: int) -> "Expectation":
+        """The search for sessions that know the `usual` columns; made once."""
+        key = usual.tobytes()
+        if key not in self._expectations:
+            self._expectations[key] = Expectation(self, usual, index, wanted)
+        return self._expectations[key]
+
+    def parts(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
+        """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
+        for some, at_m, turned in self._stood(windows, rows):
+            after = windows.successors(some)[:, :POSTURE].astype(float)
+            facing = twist_rad(turned[:, self.anchor]) if self.bearing is None else self.bearing.heading_rad(at_m)
+            level = rotations.about_z(-facing)[:, None]
+            place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
+            axes = self.terms.lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
+            window = self.terms.window_weight * windows.gather(some)
+            read = np.concatenate([place, axes.reshape(*place.shape[:2], 6)], axis=2)
+            yield np.concatenate([window, read.reshape(len(some), -1)], axis=1), after
+
+    def _stood(self, windows: Windows, rows: Ints) -> Iterator[tuple[Ints, Floats, Floats]]:
+        """Rows (K,), station positions (K, S, 3) and orientations (K, S, 4), roots heading along x, chunk by chunk."""
+        for start in range(0, len(rows), _CHUNK):
+            some = rows[start : start + _CHUNK]
+            yield some, *self._trackers.at(windows.database.qpos(windows.frames[some] + 1, _HERE))
+
+    def known(self, window: Singles, position_m: Floats, turned: Floats, view: View) -> Floats:
+        """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""
+        read = readings(position_m, turned, np.array(view), self.terms.lever_m)
+        return np.concatenate([self.terms.window_weight * window, read])
+
+    def columns(self, measured: Bools) -> Bools:
+        """(D + 9 S,) which columns are known when these rows (2 S,) of positions, then orientations, are."""
+        window = np.ones(self.windows.size, bool)
+        places, turns = measured[: self.count], measured[self.count :]
+        return np.concatenate([window, np.repeat(np.stack([places, turns], axis=1), [3, 6], axis=1).reshape(-1)])
+
+    def directions(self, columns: Bools) -> Floats:
+        """(C, 40) from the known columns C to the leading directions of the posture that they lead to expect."""
+        scatter = self.scatter[np.ix_(columns, columns)]
+        damped = scatter + self.least * np.eye(len(scatter))
+        to_posture = solve(damped, self._shared[columns], assume_a="pos")
+        _, vector = np.linalg.eigh(to_posture.T @ scatter @ to_posture)
+        out: Floats = to_posture @ vector[:, ::-1][:, : self.terms.directions]
+        return out
+
+    def filled(self, columns: Bools, wanted: Bools) -> Floats:
+        """(C, W) from known columns to the wanted ones: themselves, or what the known ones lead to expect."""
+        damped = self.scatter[np.ix_(columns, columns)] + self.least * np.eye(int(columns.sum()))
+        out: Floats = solve(damped, self.scatter[np.ix_(columns, wanted)], assume_a="pos")
+        out[:, columns[wanted]] = np.eye(len(out))[:, wanted[columns]]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """`Vectors`: z of windows, worked out anew whenever it is asked for."""
+
+    evidence: Evidence
+    windows: Windows
+    usual: Bools
+    """(D + 9 S,) columns of the evidence that are known."""
+    directions: Floats
+    """(C, 40) from them to z."""
+
+    def __len__(self) -> int:
+        return len(self.windows)
+
+    @property
+    def size(self) -> int:
+        return int(self.directions.shape[1])
+
+    def gather(self, rows: Ints | slice) -> Singles:
+        wanted, start = np.arange(len(self))[rows], 0
+        out: Singles = np.empty((len(wanted), self.size), np.float32)
+        for known, _ in self.evidence.parts(self.windows, wanted):
+            out[start : start + len(known)] = (known - self.evidence.mean)[:, self.usual] @ self.directions
+            start += len(known)
+        self.windows.database.let_go()
+        return out
+
+
+class Expectation:
+    """The search among N windows, in terms of the postures that certain readings lead to expect."""
+
+    def __init__(self, evidence: Evidence, usual: Bools, index: str, wanted: int) -> None:
+        """For sessions that know the `usual` columns (D + 9 S,) as a rule and ask for so many neighbours."""
+        self.vectors = Expected(evidence, evidence.windows, usual, evidence.directions(usual))
+        self.index: Index = choose(index, self.vectors, wanted)
+        self._maps: dict[bytes, tuple[Floats, Floats]] = {}
+
+    def around(self, known: Floats, measured: Bools, count: int) -> Found:
+        """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.
+
+        What they differ by are z, or as much of it along other axes.
+        """
+        key = measured.tobytes()
+        found = self._maps.get(key)
+        if found is None:
+            if len(self._maps) >= _MAPS:
+                self._maps.clear()
+            found = self._maps[key] = self._map(self.vectors.evidence.columns(measured))
+        to_z, mean = found
+        return self.index.around((known @ to_z - mean).astype(np.float32), count)
+
+    def _map(self, columns: Bools) -> tuple[Floats, Floats]:
+        """(D + 9 S, 40) from evidence to z when some columns are known, the others count nothing; (40,) of the mean."""
+        vectors, evidence = self.vectors, self.vectors.evidence
+        to_z = np.zeros((evidence.size, vectors.size))
+        to_z[columns] = evidence.filled(columns, vectors.usual) @ vectors.directions
+        return to_z, evidence.mean @ to_z

@@ -1,0 +1,98 @@
+"""The mean posture of the examples, stood where the trackers are: what any method that learns has to beat."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.body.humanoid import Body, tpose
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate
+from harness.core.motion import Take
+from harness.errors import BadInput
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.solver.ground_frame import HINGES
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.residuals import Loss, Residuals
+from harness.reconstruct.solver.root_placement import nearest_placed
+from harness.reconstruct.solver.status_monitor import Coverage
+from harness.stream.frame import TrackerFrame
+
+
+def mean_posture(body: Body, examples: Sequence[Take] | MotionDatabase) -> Floats:
+    """(55,) the mean of the examples' hinge angles, rooted like the T-pose; BadInput without examples.
+
+    The mean of directions, in principal form and within the limits.
+    """
+    limits, total, count = HingeLimits(body), np.zeros((2, 48)), 0
+    for angles in _angles(limits, examples):
+        total += [np.sum(np.sin(angles), axis=0), np.sum(np.cos(angles), axis=0)]
+        count += len(angles)
+    if not count:
+        raise BadInput("The mean posture is learnt from examples, and there are none.", "Name some in the scenario.")
+    out = np.array(tpose(body.skeleton))
+    out[7:] = limits.clipped(limits.principal(np.arctan2(*total)))
+    return out
+
+
+def spread_rad(body: Body, examples: Sequence[Take] | MotionDatabase, about: Floats) -> Floats:
+    """(48,) root mean square of the examples' hinge angles about those of a configuration (55,)."""
+    limits, total, count = HingeLimits(body), np.zeros(48), 0
+    for angles in _angles(limits, examples):
+        away = np.remainder(angles - about[7:] + np.pi, 2.0 * np.pi) - np.pi
+        total += np.sum(away**2, axis=0)
+        count += len(angles)
+    return np.sqrt(total / count)
+
+
+def _angles(limits: HingeLimits, examples: Sequence[Take] | MotionDatabase) -> Iterator[Floats]:
+    """Principal hinge angles (T, 48), some at a time, for a database may be larger than memory."""
+    if isinstance(examples, MotionDatabase):
+        for run in examples.runs:
+            yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
+        examples.let_go()
+    else:
+        for take in examples:
+            yield limits.principal(take.qpos[:, 7:])
+
+
+@dataclass(frozen=True)
+class MeanPose:
+    """A `Method`."""
+
+    name: str = "mean_pose"
+    summary: str = "the examples' mean posture, stood where the trackers are: the null that learns"
+    needs_examples: bool = True
+
+    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedMeanPose":
+        """BadInput without examples."""
+        return FittedMeanPose(body, mean_posture(body, examples))
+
+
+@dataclass(frozen=True, eq=False)
+class FittedMeanPose:
+    """The body and its mean posture."""
+
+    body: Body
+    qpos: Floats
+    """(55,)"""
+
+    def begin(self, calibration: Calibration) -> "MeanPoseSession":
+        return MeanPoseSession(self, calibration)
+
+
+class MeanPoseSession:
+    """Moves the posture as a whole."""
+
+    def __init__(self, fitted: FittedMeanPose, calibration: Calibration) -> None:
+        self._residuals = Residuals(fitted.body, calibration, Loss())
+        self._coverage = Coverage()
+        self._qpos = fitted.qpos
+
+    def step(self, frame: TrackerFrame) -> Estimate:
+        status, any_seen = self._coverage.seen(frame)
+        if any_seen:
+            self._residuals.read(frame)
+            self._qpos = nearest_placed(self._residuals, self._qpos)
+        return Estimate(self._qpos, status)

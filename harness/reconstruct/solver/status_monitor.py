@@ -1,0 +1,32 @@
+"""Status of an estimate, from how many of the configured stations report (docs/methods.md E, "lost tracker")."""
+
+import numpy as np
+
+from harness.core.estimate import Status
+from harness.reconstruct.features.device_time import DeviceTime
+from harness.stream.frame import TrackerFrame
+
+LOST_AFTER_S = 0.5
+
+
+class Coverage:
+    """Watches one session's frames; a station reports when its position or its orientation is valid."""
+
+    def __init__(self, lost_after_s: float = LOST_AFTER_S) -> None:
+        self._lost_after_s = lost_after_s
+        self._time, self._enough_at_s = DeviceTime(), -np.inf
+
+    def seen(self, frame: TrackerFrame) -> tuple[Status, bool]:
+        """The status of this frame, and whether any station reports at all.
+
+        SOLVED with at least half of the stations, else HELD, else LOST once that has lasted too long.
+        """
+        now_s = self._time.of(frame)
+        count = int(np.count_nonzero(frame.position_valid | frame.orientation_valid))
+        if 2 * count >= len(frame.position_valid) and count:
+            self._enough_at_s = now_s
+            return Status.SOLVED, True
+        if self._enough_at_s == -np.inf:
+            self._enough_at_s = now_s
+        long_ago = now_s - self._enough_at_s > self._lost_after_s
+        return Status.LOST if long_ago else Status.HELD, count > 0

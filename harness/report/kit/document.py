@@ -1,0 +1,70 @@
+"""The frame of every page: one offline HTML file that asks nothing of anyone, with a heading, facts and sections."""
+
+import base64
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from harness.report.kit.markup import Markup, joined, scrolling, tag
+from harness.report.kit.style import Chart
+
+_POLICY = (
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
+    "base-uri 'none'; form-action 'none'"
+)
+Section = tuple[str, str, Markup]
+"""Title, name for links, content; one without content is left out."""
+
+
+def document(
+    *,
+    title: str,
+    kicker: str,
+    heading: str,
+    facts: Mapping[str, str],
+    missing: Sequence[str],
+    sections: Sequence[Section],
+    lead: Markup | None = None,
+) -> str:
+    """The whole file: it opens on the heading, then `lead`, the facts, what is missing and links to the sections."""
+    style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+    head = tag(
+        "head",
+        tag("meta", charset="utf-8"),
+        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
+        tag("title", title),
+        tag("style", Markup(style)),
+    )
+    shown = [(title, name, content) for title, name, content in sections if content]
+    links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in shown))
+    rows = [joined(tag("dt", title), tag("dd", text)) for title, text in facts.items()]
+    if missing:
+        gaps = [tag("span", text, tag("br")) for text in missing]
+        rows.append(joined(tag("dt", "Missing here"), tag("dd", *gaps, class_="missing")))
+    body = tag(
+        "body",
+        tag(
+            "header",
+            tag("p", kicker, class_="kicker"),
+            tag("h1", heading),
+            lead,
+            tag("dl", *rows, class_="facts"),
+            tag("nav", links, aria_label="sections"),
+        ),
+        tag("main", *(tag("section", tag("h2", title), content, id_=name) for title, name, content in shown)),
+    )
+    return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
+
+
+def pictured(chart: Chart, level: int = 0) -> Markup:
+    """A chart under a heading of this level, or with its title in the caption."""
+    image = tag("img", src=embedded(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
+    title = tag(f"h{level}", chart.title) if level else None
+    caption: Any = chart.caption if level else joined(tag("b", f"{chart.title}. "), chart.caption)
+    return joined(title, tag("figure", scrolling(image, chart.title), tag("figcaption", caption), class_="chart"))
+
+
+def embedded(content: bytes, kind: str) -> str:
+    """A file as an address that holds it."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,0 +1,85 @@
+"""The process that renders: `python -m harness.report.kit.render_worker JOB.npz ...`, started by `harness.report.kit.render_process`.
+
+Each job is a file of arrays (see `apart.Job`); every picture is there whole or not at all.
+"""
+
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import standard_skeleton
+from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
+from harness.report.kit.skeleton_player import heading_rad
+from harness.score.pair import Posed, posed
+
+STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
+"""Width and height in pixels; a movie's must be even."""
+
+
+def main(jobs: Sequence[str]) -> None:
+    for job in jobs:
+        with np.load(job, allow_pickle=False) as content:
+            true, believed = (standard_skeleton().with_bones(content[name]) for name in ("bone_m", "estimate_bone_m"))
+            truth, estimate = posed(true, content["truth_qpos"]), posed(believed, content["estimate_qpos"])
+            output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
+        beside = output.with_name(f".unfinished-{output.name}")
+        if fps:
+            movie(truth, estimate, fps, title, beside)
+        else:
+            strip(truth, estimate, beside)
+        os.replace(beside, output)
+
+
+def strip(truth: Posed, estimate: Posed, path: Path) -> None:
+    """Every frame side by side, in one PNG."""
+    from matplotlib.image import imsave
+
+    pictures = list(_pictures(truth, estimate, STRIP_SIZE))
+    imsave(path, np.ascontiguousarray(np.hstack(pictures)), format="png")
+
+
+def movie(truth: Posed, estimate: Posed, fps: float, title: str, path: Path) -> None:
+    """Every frame one after another with a caption, as H.264 that browsers play."""
+    import imageio_ffmpeg
+
+    options = {"fps": fps, "codec": "libx264", "quality": None, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
+    encoding = ["-crf", "22", "-preset", "veryfast", "-movflags", "+faststart", "-f", "mp4"]
+    writer = imageio_ffmpeg.write_frames(str(path), MOVIE_SIZE, **options, output_params=encoding)
+    writer.send(None)
+    try:
+        for frame, picture in enumerate(_pictures(truth, estimate, MOVIE_SIZE)):
+            writer.send(_captioned(picture, title, frame / fps))
+    finally:
+        writer.close()
+
+
+def _captioned(picture: Floats, title: str, time_s: float) -> bytes:
+    """The picture with what it shows and the time since its start, and which body is which."""
+    from PIL import Image, ImageDraw, ImageFont
+
+    image = Image.fromarray(picture)
+    pen, font = ImageDraw.Draw(image), ImageFont.load_default(17)
+    pen.text((20, 16), title, "#23282f", font)
+    pen.text((20, 40), f"{time_s:.2f} s", "#5d6773", font)
+    for place, (name, colour) in enumerate((("truth", TRUTH), ("estimate", ESTIMATE))):
+        pen.ellipse((20 + 90 * place, 606, 32 + 90 * place, 618), colour)
+        pen.text((38 + 90 * place, 602), name, "#23282f", font)
+    return image.tobytes()
+
+
+def _pictures(truth: Posed, estimate: Posed, size: tuple[int, int]) -> Iterator[Floats]:
+    """(height, width, 3) bytes of every frame."""
+    scene = Scene(truth.skeleton, estimate.skeleton, size, heading_rad(truth))
+    try:
+        for frame in range(len(truth.root_m)):
+            yield scene.picture(truth, estimate, frame)
+    finally:
+        scene.close()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,87 @@
+"""The interactive view of the worst seconds: joint centres of truth and estimate, packed for `scrubber.js`."""
+
+import base64
+import gzip
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core import rotations
+from harness.core.skeleton import Skeleton
+from harness.errors import MissingExtra
+from harness.report.kit.markup import Markup, joined, tag
+from harness.score.pair import Posed
+
+_MOST_FRAMES = 120
+"""Of one window; faster streams are thinned to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """One window to play."""
+
+    title: str
+    time_s: Sequence[float]
+    truth: Posed
+    estimate: Posed
+
+
+def scrubber(skeleton: Skeleton, shots: Sequence[Shot]) -> tuple[Markup, str]:
+    """The controls with all they need, or nothing and why not."""
+    if find_spec("plotly") is None:
+        return Markup(), str(MissingExtra("The interactive view", "plotly", "viz"))
+    from plotly.offline import get_plotlyjs
+
+    bones = [[parent + 1, bone + 1] for bone, parent in enumerate(skeleton.parents)]
+    data = {"bones": bones, "head": skeleton.index("head"), "shots": [_packed(shot) for shot in shots]}
+    script = Path(__file__).with_name("scrubber.js").read_text(encoding="utf-8")
+    choices = [tag("option", shot.title, value=n) for n, shot in enumerate(shots)]
+    page = joined(
+        tag("p", tag("label", "Show ", tag("select", *choices, id_="shot")), class_="controls"),
+        tag("div", id_="stage", role="img", aria_label="Truth and estimate as skeletons in 3-D; drag to turn"),
+        tag(
+            "p",
+            tag("button", "Play", id_="play", type_="button"),
+            tag("input", id_="frame", type_="range", min_=0, max_=0, value=0, step=1, aria_label="frame"),
+            tag("output", "loads when scrolled to", id_="where", for_="frame"),
+            tag("button", "Reset view", id_="reset", type_="button"),
+            class_="controls",
+        ),
+        tag("script", Markup(_compressed(json.dumps(data, separators=(",", ":")))), type_="text/plain", id_="shots"),
+        tag("script", Markup(_compressed(get_plotlyjs())), type_="text/plain", id_="plotly"),
+        tag("script", Markup(script)),
+    )
+    return page, ""
+
+
+def _packed(shot: Shot) -> dict[str, Any]:
+    """Whole millimetres: the first frame, then differences from frame to frame, which compress well."""
+    every = -(-len(shot.time_s) // _MOST_FRAMES)
+    time_ms = [round(1e3 * t) for t in shot.time_s[::every]]
+    return {
+        "time_ms": time_ms,
+        "heading_rad": heading_rad(shot.truth),
+        "truth": _steps(shot.truth, every),
+        "estimate": _steps(shot.estimate, every),
+    }
+
+
+def heading_rad(motion: Posed) -> float:
+    """Where the root's forward axis points on average, about the world's z [rad]."""
+    ahead = np.mean(rotations.to_matrix(motion.world_from_root)[:, :, 0], axis=0)
+    return float(np.arctan2(ahead[1], ahead[0]))
+
+
+def _steps(motion: Posed, every: int) -> list[list[int]]:
+    whole = np.rint(1e3 * motion.joints_m[::every]).astype(int).reshape(-1, 3 * motion.joints_m.shape[1])
+    steps: list[list[int]] = np.diff(whole, axis=0, prepend=0).tolist()
+    return steps
+
+
+def _compressed(text: str) -> str:
+    return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()

@@ -1,0 +1,180 @@
+"""What the page needs of a run: its summary, and of every cell the numbers that are drawn, without the poses."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats, Ints
+from harness.core.humanoid24 import standard_skeleton
+from harness.report.kit.style import STYLES
+from harness.results.cell import Cell, cell_folder, varied_text
+from harness.results.manifest import Manifest
+from harness.results.storage import read_cell, read_summary
+from harness.results.summary import GROUP
+from harness.score.angles import local_errors_deg
+from harness.score.pair import Pair, Posed, posed
+from harness.score.positions import joint_errors_mm
+
+Row = Mapping[str, Any]
+_GROUPS = ("methods", "behaviours")
+WORST_METRICS = (
+    "joint_angle_mean_deg",
+    "mpjre_deg",
+    "mpjpe_mm",
+    "mpjpe_root_mm",
+    "jitter_m_s3",
+    "foot_skate_mm_s",
+)
+"""Whose worst two seconds are shown."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One cell over time, F frames of S stations."""
+
+    key: str
+    series: str
+    """Name of the group that it belongs to, see `Run.series`."""
+    behaviour: str
+    clip: str
+    stations: tuple[str, ...]
+    health: Mapping[str, Any]
+    notes: tuple[str, ...]
+    time_s: Floats
+    scored: Bools
+    errors: Mapping[str, Floats]
+    """(F,) of each of WORST_METRICS; NaN where undefined."""
+    rotation_deg: Floats
+    """(N, 22) geodesic error of each hinged bone in the scored frames, float32."""
+    position_mm: Floats
+    """(N, 25) error of each joint centre in the scored frames, float32."""
+    quality: Floats
+    """(F, S)."""
+    position_valid: Bools
+    orientation_valid: Bools
+    suspect: Bools
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A finished run, ready to be shown."""
+
+    out: Path
+    manifest: Manifest
+    summary: Row
+    traces: tuple[Trace, ...]
+    whole: Row
+    """The summary with every combination of varied values; `summary` has the last one alone."""
+
+    @property
+    def name(self) -> str:
+        return str(self.manifest.inputs.get("name", self.out.name))
+
+    @property
+    def cells(self) -> Sequence[Row]:
+        """A row for each finished cell."""
+        rows: Sequence[Row] = self.summary["cells"]
+        return rows
+
+    @property
+    def varied(self) -> str:
+        """The varied values that are shown, as text; empty when the scenario varies none."""
+        return varied_text(self.cells[0]["varied"]) if self.cells else ""
+
+    @cached_property
+    def series(self) -> tuple[str, ...]:
+        """Names of the groups that are compared: methods, told apart by inputs, protocol, performer where they vary."""
+        return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
+
+    @cached_property
+    def ranked(self) -> tuple[str, ...]:
+        """The series, that with the least mean error first."""
+        errors = {self.series_of(row): row["metrics"][WORST_METRICS[0]]["mean"] for row in self.summary["methods"]}
+        return tuple(sorted(self.series, key=lambda name: np.inf if errors[name] is None else errors[name]))
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """The series that charts show: as many as colours and dashes tell apart, those with the least error."""
+        return tuple(name for name in self.series if name in self.ranked[:STYLES])
+
+    @cached_property
+    def behaviours(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(str(row["behaviour"]) for row in self.cells))
+
+    def trace(self, key: str) -> Trace:
+        return next(trace for trace in self.traces if trace.key == key)
+
+    def series_of(self, row: Row) -> str:
+        """Name of the group of a row of the summary."""
+        rows = self.whole["methods"]
+        parts = []
+        if len({r["inputs"] for r in rows}) > 1:
+            parts.append(str(row["inputs"]))
+        if len({r["protocol"] for r in rows if r["method"] == row["method"]}) > 1:
+            parts.append(f"protocol {row['protocol']}")
+        if len({r["performer"] for r in rows}) > 1:
+            parts.append(f"{row['performer'] or 'no'} performer")
+        return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+
+    def cell(self, key: str) -> Cell:
+        return read_cell(cell_folder(self.out, key))
+
+
+def read_run(out: Path) -> Run:
+    """Read it, one cell at a time; BadFile when the folder holds no run or a damaged one."""
+    manifest, whole = Manifest.read(out / "manifest.json"), read_summary(out)
+    run = Run(out, manifest, _last_varied(whole), (), whole)
+    keys = [str(row["key"]) for row in run.cells]
+    return replace(run, traces=tuple(_trace(run, run.cell(key)) for key in keys))
+
+
+def _last_varied(summary: Row) -> Row:
+    """The summary of the cells with the last combination of varied values."""
+    if not summary["cells"]:
+        return summary
+    last = summary["cells"][-1]["varied"]
+    parts = {name: [row for row in summary[name] if row["varied"] == last] for name in ("cells", *_GROUPS)}
+    return {**summary, **parts}
+
+
+def _trace(run: Run, cell: Cell) -> Trace:
+    pair = pair_of(cell)
+    return Trace(
+        key=cell.key,
+        series=run.series_of({name: getattr(cell, name) for name in GROUP}),
+        behaviour=cell.behaviour,
+        clip=cell.clip,
+        stations=cell.stations,
+        health=cell.health,
+        notes=cell.notes,
+        time_s=cell.time_s,
+        scored=cell.scores.scored,
+        errors={name: cell.errors[name] for name in WORST_METRICS},
+        rotation_deg=local_errors_deg(pair).astype(np.float32),
+        position_mm=joint_errors_mm(pair).astype(np.float32),
+        quality=cell.quality,
+        position_valid=cell.position_valid,
+        orientation_valid=cell.orientation_valid,
+        suspect=cell.suspect,
+    )
+
+
+def pair_of(cell: Cell) -> Pair:
+    """Truth and estimate of the scored frames."""
+    rows = cell.scores.scored
+    return Pair(*both_posed(cell, rows), cell.frame_index[rows], cell.rate_hz)
+
+
+def both_posed(cell: Cell, rows: Bools | Ints) -> tuple[Posed, Posed]:
+    """Truth and estimate at some of its frames, each on its own skeleton."""
+    true, believed = (standard_skeleton().with_bones(bone_m) for bone_m in (cell.bone_m, cell.estimate_bone_m))
+    return posed(true, cell.truth_qpos[rows]), posed(believed, cell.estimate_qpos[rows])
+
+
+def file_name(text: str) -> str:
+    """Letters, digits and underscores only."""
+    return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in text)

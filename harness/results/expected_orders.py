@@ -1,0 +1,106 @@
+"""Orders that a paper expects errors to come in, and whether they do.
+
+A scenario states them, the least error first:
+
+    [[order]]
+    methods = ["dynamic_map", "local_pca", "ik"]
+    source = "Liu et al. 2011, Fig. 6"
+    why_not = { "local_pca > ik" = "why, where it comes out so" }
+
+    [[order]]
+    inputs = ["pos+ori", "pos"]
+    method = "dynamic_map"
+    source = "Liu et al. 2011, boxing"
+
+Each is judged by means over the clips on which all that it names were measured, apart for behaviours, performers,
+varied values and, where methods are compared, inputs. Errors are compared as they are printed: a difference that
+tables do not show is none. `harness run` prints it below its table, `summary.json` lists it.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from harness.results.cell import varied_text
+
+METRIC, DECIMALS = "joint_angle_mean_deg", 2
+
+
+@dataclass(frozen=True)
+class Order:
+    """Of methods, or of one method's inputs."""
+
+    source: str
+    """Who expects it."""
+    methods: tuple[str, ...] = ()
+    inputs: tuple[str, ...] = ()
+    method: str = ""
+    """Whose inputs are compared."""
+    why_not: dict[str, str] = field(default_factory=dict)
+    """"a > b" -> why, for neighbours a and b of the order that come out the other way round."""
+
+    @property
+    def by(self) -> str:
+        """The column of summary.csv whose values are compared."""
+        return "inputs" if self.inputs else "method"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.inputs or self.methods
+
+    @property
+    def steps(self) -> list[str]:
+        """What may go wrong: "a > b" for each two neighbours."""
+        return [f"{less} > {more}" for less, more in pairwise(self.names)]
+
+
+def judged(orders: Sequence[Order], rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """For `summary.json`: of its `cells`, one for each order and setting.
+
+    Each says `source`, `method` (whose inputs are compared, or ""), `names`, the setting (`behaviour`, `inputs`,
+    `performer`, `varied`), on how many `clips` all were measured and on how many any, their `means_deg` or None,
+    whether it `holds` (None: not judged), and `why` it does not, step by step, or was not judged.
+    """
+    return [found for order in orders for found in _in_each_setting(order, rows)]
+
+
+def _in_each_setting(order: Order, rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+    settings: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        if row[order.by] in order.names and order.method in ("", row["method"]):
+            inputs = "" if order.inputs else row["inputs"]
+            key = (row["behaviour"], inputs, row["performer"], varied_text(row["varied"]))
+            settings.setdefault(key, []).append(row)
+    nothing: tuple[str, ...] = ("", "", "", "")
+    for (behaviour, inputs, performer, _), group in settings.items() or [(nothing, [])]:
+        yield {
+            "source": order.source,
+            "method": order.method,
+            "names": list(order.names),
+            "behaviour": behaviour,
+            "inputs": inputs,
+            "performer": performer,
+            "varied": group[0]["varied"] if group else {},
+            **_outcome(order, group),
+        }
+
+
+def _outcome(order: Order, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    errors: dict[str, dict[str, float]] = {name: {} for name in order.names}
+    for row in rows:
+        if row[METRIC] is not None:
+            errors[row[order.by]][row["clip"]] = row[METRIC]
+    shared = sorted(set.intersection(*(set(each) for each in errors.values())))
+    found = {"clips": len(shared), "clips_of_any": len({clip for each in errors.values() for clip in each})}
+    if not shared:
+        missing = [name for name, each in errors.items() if not each]
+        gap = f"{', '.join(missing)} not measured" if missing else "no clip on which all were measured"
+        return {**found, "means_deg": None, "holds": None, "why": [gap]}
+    means = [float(np.mean([each[clip] for clip in shared])) for each in errors.values()]
+    as_printed = [round(mean, DECIMALS) for mean in means]
+    wrong = [step for step, (less, more) in zip(order.steps, pairwise(as_printed), strict=True) if not less < more]
+    why = [f"{step}: {order.why_not.get(step, 'no reason is known')}" for step in wrong]
+    return {**found, "means_deg": means, "holds": not wrong, "why": why}

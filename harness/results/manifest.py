@@ -1,0 +1,140 @@
+"""What a result rests on: inputs, which must agree for two results to be comparable, and circumstances, listed beside.
+
+Circumstances (source, options, commit, versions, machine) are what a comparison of two results is about.
+"""
+
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from hashlib import blake2b
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import harness
+from harness.core.files import plain, read_json
+from harness.errors import BadFile
+from harness.score.metrics import VERSIONS
+
+PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "plotly", "ezc3d", "mink")
+"""Whose versions are listed; "absent" where not installed."""
+
+
+@dataclass(frozen=True)
+class Manifest:
+    """Of one run."""
+
+    inputs: Mapping[str, Any]
+    """Motion, body, stations, mounts, rate, protocol, examples, calibration, noise, seed."""
+    metric_versions: Mapping[str, int]
+    circumstances: Mapping[str, Any]
+    """Methods, command, source hash, commit, versions, platform."""
+
+    def as_dict(self) -> dict[str, Any]:
+        out: dict[str, Any] = plain(asdict(self))
+        return out
+
+    @classmethod
+    def read(cls, path: Path) -> "Manifest":
+        """From manifest.json; BadFile when it is none."""
+        content = read_json(path, "the manifest of a run")
+        try:
+            return cls(*(dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")))
+        except (KeyError, TypeError, ValueError) as error:
+            advice = "Is this a folder written by `harness run`?"
+            raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error
+
+    def differences(self, other: "Manifest") -> list[str]:
+        """Names of the inputs in which two runs differ, such as "motion.test"; none for one and the same run."""
+        mine, theirs = flat(plain(self.inputs)), flat(plain(other.inputs))
+        return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
+
+
+def of_run(
+    scenario: Mapping[str, Any], *, motion_source: str, command: str, constants: Mapping[str, str] | None = None
+) -> Manifest:
+    """The manifest of running a scenario here and now.
+
+    Methods, their `constants`, orders and what was left out are circumstances, all else is input.
+    """
+    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "order", "left_out")}
+    return Manifest(
+        inputs={**inputs, "motion_source": motion_source},
+        metric_versions=VERSIONS,
+        circumstances={
+            "methods": scenario.get("methods", ()),
+            "constants": constants or {},
+            "left_out": scenario.get("left_out", {}),
+            "command": command,
+            **here(),
+        },
+    )
+
+
+def here() -> dict[str, Any]:
+    """Source, commit, versions and machine."""
+    return {
+        "harness": harness.__version__,
+        "source_hash": source_hash(),
+        **_commit(Path(harness.__file__).parent.parent),
+        "python": platform.python_version(),
+        "packages": {name: _version(name) for name in PACKAGES},
+        "platform": platform.platform(),
+        "processor": _processor(),
+        "cpu_count": os.cpu_count(),
+    }
+
+
+@cache
+def source_hash() -> str:
+    """16 hex digits that stand for every Python file of the package."""
+    package = Path(harness.__file__).parent
+    state = blake2b(digest_size=8)
+    for file in sorted(package.rglob("*.py")):
+        state.update(f"{file.relative_to(package).as_posix()}\0".encode())
+        state.update(file.read_bytes() + b"\0")
+    return state.hexdigest()
+
+
+def _commit(root: Path) -> dict[str, Any]:
+    """Commit and whether files differ from it, when the package lies in its own checkout."""
+    git = shutil.which("git")
+    if git is None or not (root / ".git").exists():
+        return {"commit": None, "dirty": None}
+
+    def ask(*question: str) -> str | None:
+        done = subprocess.run([git, "-C", str(root), *question], capture_output=True, text=True, timeout=20)
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    status = ask("status", "--porcelain", "--", "harness", "models", "scenarios")
+    return {"commit": ask("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+
+
+def _processor() -> str:
+    """Its name and numbers, for virtual machines call many kinds the same."""
+    try:
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
+    except OSError:
+        return platform.processor() or platform.machine()
+    said = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in first.splitlines())}
+    numbers = [said[name] for name in ("cpu family", "model", "stepping") if name in said]
+    return " ".join([said.get("model name") or platform.machine(), *(["/".join(numbers)] if numbers else [])])
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "absent"
+
+
+def flat(content: Any, prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one, with dotted names."""
+    if not isinstance(content, dict) or not content:
+        return {prefix: content}
+    parts = [flat(value, f"{prefix}.{name}" if prefix else name) for name, value in content.items()]
+    return {name: value for part in parts for name, value in part.items()}

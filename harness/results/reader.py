@@ -1,0 +1,133 @@
+"""One side of a comparison: what a run, a sweep or a baseline measured, cell by cell."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from harness.core.files import read_json
+from harness.errors import BadFile, UnknownName
+from harness.results.cell import cell_folder
+from harness.results.index import INDEX, CellIndex
+from harness.results.manifest import Manifest
+from harness.results.storage import read_summary
+from harness.score.metrics import DEFINITIONS
+
+BASELINES = Path("results/baselines")
+CELLS = "cells.json"
+"""Of a baseline (see `baseline.save`)."""
+SCHEMA = 1
+_TEXTS = ("scenario", "clip", "method", "inputs", "protocol", "noise", "behaviour", "performer")
+_KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
+COUNTED = ("frames_matched", "frames_expected")
+_AGAIN = "Run, or save, it again."
+
+
+@dataclass(frozen=True)
+class JudgedCell:
+    """One method on one clip: what it is, what it rests on, what it scored."""
+
+    scenario: str
+    clip: str
+    seed: int
+    method: str
+    inputs: str
+    protocol: str
+    noise: str
+    varied: Mapping[str, Any]
+    """Scenario key -> value, of the keys that the scenario varies."""
+    behaviour: str
+    performer: str
+    """ "known", "new", or "" without examples (see `cell.Cell`)."""
+    defined_by: Mapping[str, Any]
+    """Everything that two results must agree on to be comparable."""
+    metrics: Mapping[str, float | None]
+    """By name; None is "not measured"."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Everything that one side has."""
+
+    title: str
+    """As the reader named it, such as "results/demo" or "baseline gate"."""
+    manifest: Manifest
+    cells: tuple[JudgedCell, ...]
+    """Those that are finished, in the order of their tables."""
+    planned: int
+    failed: tuple[str, ...] = ()
+    """Names of planned cells that failed."""
+
+
+def read_judged(where: Path | str) -> Judged:
+    """A run's folder, a sweep's, a baseline's, or the name of a baseline below `BASELINES`; a folder goes first.
+
+    BadFile for what is none of these, was written by another version or is damaged; UnknownName for a name.
+    """
+    folder = Path(where)
+    if not folder.is_dir():
+        known = sorted(path.parent.name for path in BASELINES.glob(f"*/{CELLS}"))
+        if folder.name != str(where):
+            raise BadFile(folder, "no such folder", "a run, a sweep or a baseline", "`harness run` writes one.")
+        if str(where) not in known:
+            raise UnknownName("folder or baseline", str(where), known)
+        folder = BASELINES / folder
+    if (folder / CELLS).is_file():
+        return _of_baseline(folder)
+    return _of_sweep(folder, str(where)) if (folder / INDEX).is_file() else _of_run(folder, str(where))
+
+
+def _of_run(folder: Path, title: str) -> Judged:
+    manifest, summary = Manifest.read(folder / "manifest.json"), read_summary(folder)
+    cells = tuple(_of_row(folder, row) for row in summary["cells"])
+    return Judged(title, manifest, cells, int(summary["cells_planned"]), tuple(summary["failures"]))
+
+
+def _of_sweep(folder: Path, title: str) -> Judged:
+    manifest = Manifest.read(folder / "manifest.json")
+    with CellIndex(folder, read_only=True) as index:
+        cells = tuple(_of_row(folder, row) for row in index.rows())
+        return Judged(title, manifest, cells, index.counts().planned, tuple(index.failures()))
+
+
+def _of_row(folder: Path, row: Mapping[str, Any]) -> JudgedCell:
+    if not row.get("scenario"):
+        found, advice = "cells that name no scenario", "An older version wrote it: run again with another --out."
+        raise BadFile(folder, found, "a run of this version of the harness", advice)
+    path = cell_folder(folder, row["key"]) / "cell.json"
+    defined_by = read_json(path, "a cell of a run").get("defined_by")
+    metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
+    return _cell(path, {**row, "defined_by": defined_by, "metrics": metrics})
+
+
+def _of_baseline(folder: Path) -> Judged:
+    path, expected = folder / CELLS, "the cells of a baseline"
+    content = read_json(path, expected)
+    if content.get("schema") != SCHEMA:
+        advice = "Another version of the harness saved it: use that one, or save the baseline again."
+        raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
+    try:
+        shared, parts, planned = content["shared"], content["parts"], int(content["planned"])
+        names, whole = content["metrics"], []
+        for cell in content["cells"]:
+            metrics = dict(zip(names, cell["metrics"], strict=True))
+            whole.append({**cell, "metrics": metrics, "defined_by": {**shared, **parts[cell["part"]]}})
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise BadFile(path, f"damaged ({error!r})", expected, _AGAIN) from error
+    cells = tuple(_cell(path, cell) for cell in whole)
+    if planned != len(cells):
+        raise BadFile(path, f"{len(cells)} cells of {planned}", expected, _AGAIN)
+    return Judged(f"baseline {folder.name}", Manifest.read(folder / "manifest.json"), cells, planned)
+
+
+def _cell(path: Path, content: Mapping[str, Any]) -> JudgedCell:
+    """BadFile for one that lacks something or has it as something else."""
+    for name, kind in _KINDS.items():
+        if not isinstance(content.get(name), kind):
+            raise BadFile(path, f"{name} is {content.get(name)!r}", f"a cell with a {kind.__name__} there", _AGAIN)
+    for name in (*COUNTED, *content["metrics"]):
+        value = content["metrics"].get(name)
+        if not (isinstance(value, int | float) and math.isfinite(value)) and (value is not None or name in COUNTED):
+            raise BadFile(path, f"{name} is {value!r}", "a cell with a number there", _AGAIN)
+    return JudgedCell(**{name: content[name] for name in _KINDS})

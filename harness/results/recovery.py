@@ -1,0 +1,223 @@
+"""How soon an error is itself again after a disturbance: cells that were disturbed against those that were not.
+
+A scenario asks for it by varying its disturbance, for example
+
+    [disturbance]
+    station = "right_hand"
+    from_s = 3.0
+    [vary]
+    "disturbance.kind" = ["none", "one_lost", "all_lost", "one_off", "all_turned", "start_off"]
+
+Both cells of a pair see the same motion and the same draws of noise (`core.seeds`). The measure is the mean error of
+joint angles over the second that begins 1 s after the last bad frame, divided by that of the undisturbed cell over
+the same frames; up to 1.5 counts as recovered. `harness run` prints it below its table, `summary.json` lists it.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Bools, Floats, Ints
+from harness.core.estimate import Status
+from harness.core.files import plain
+from harness.results.cell import Cell
+
+AT_MOST = 1.5
+"""Times the undisturbed error."""
+AFTER_S, OVER_S = 1.0, 1.0
+"""The error is taken from so long after the last bad frame, over so long [s]."""
+LOST_AFTER_S = 0.5
+"""Under half of the stations for longer than this is LOST, before that HELD [s]."""
+_SMOOTHED_S = 0.25
+_CLOSE_S = 0.05
+
+
+@dataclass(frozen=True)
+class Recovery:
+    """One disturbed cell beside its undisturbed one."""
+
+    method: str
+    inputs: str
+    protocol: str
+    behaviour: str
+    clip: str
+    disturbance: str
+    judged: int
+    """Frames of the second that is judged; 0 when the take ends before it does, and then nothing below is known."""
+    disturbed_deg: float
+    """Mean joint angle error of the frames that are judged."""
+    undisturbed_deg: float
+    during: float
+    """Times the undisturbed error while it lasted, from the first bad frame to the last."""
+    disturbed_mm: float
+    """Mean distance of the joint centres in the same frames."""
+    undisturbed_mm: float
+    back_after_s: float | None
+    """From the last bad frame until the error, smoothed over 0.25 s, is at most 1.5 times the undisturbed one and stays
+    so to the end of what is judged; None if it never is."""
+    status_right: float
+    """Share of frames, from the first bad one to the last judged one, whose status is what the readings call for."""
+
+    @property
+    def ratio(self) -> float:
+        return times(self.disturbed_deg, self.undisturbed_deg)
+
+
+@dataclass(frozen=True, eq=False)
+class _Course:
+    """What is kept of a cell."""
+
+    cell: Mapping[str, str]
+    disturbance: Mapping[str, Any]
+    time_s: Floats
+    error_deg: Floats
+    error_mm: Floats
+    status: Ints
+    reporting: Bools
+    """(F,) at least half of the stations."""
+
+
+class Recoveries:
+    """Add cells in any order, then ask for the pairs among them."""
+
+    def __init__(self) -> None:
+        self._courses: dict[str, dict[str, _Course]] = {}
+
+    def add(self, cell: Cell) -> None:
+        """Keep it if its scenario knows disturbances."""
+        if "disturbance" not in cell.defined_by:
+            return
+        disturbance = dict(cell.defined_by["disturbance"])
+        same = {name: value for name, value in cell.defined_by.items() if name != "disturbance"}
+        kind = disturbance["kind"]
+        settings = {name: value for name, value in disturbance.items() if name not in ("kind", "begins_s", "ends_s")}
+        names = ("method", "inputs", "protocol", "behaviour", "clip")
+        pair = json.dumps(plain({"method": cell.method, "same": same, "settings": settings}), sort_keys=True)
+        seen = (cell.position_valid | cell.orientation_valid).sum(axis=1)
+        self._courses.setdefault(pair, {})[kind] = _Course(
+            {name: str(getattr(cell, name)) for name in names},
+            disturbance,
+            cell.time_s,
+            cell.errors["joint_angle_mean_deg"],
+            cell.errors["mpjpe_mm"],
+            cell.status,
+            (2 * seen >= len(cell.stations)) & (seen > 0),
+        )
+
+    def pairs(self) -> list[Recovery]:
+        """Every disturbed cell whose undisturbed twin is there; `judged` is 0 for takes that end too soon."""
+        found = []
+        for courses in self._courses.values():
+            if (plain_course := courses.get("none")) is not None:
+                found += [_compared(course, plain_course) for kind, course in courses.items() if kind != "none"]
+        return found
+
+    def rows(self) -> list[dict[str, Any]]:
+        """For `summary.json`: the pairs, each with its ratio."""
+        return [{**asdict(recovery), "ratio": recovery.ratio} for recovery in self.pairs()]
+
+
+def _compared(course: _Course, undisturbed: _Course) -> Recovery:
+    begin_s, end_s = float(course.disturbance["begins_s"]), float(course.disturbance["ends_s"])
+    common, here, there = np.intersect1d(course.time_s, undisturbed.time_s, return_indices=True)
+    bad = common[common < end_s - 1e-9]
+    since_s = common - (bad[-1] if len(bad) else np.inf)
+    long_enough = len(since_s) > 0 and since_s[-1] > AFTER_S + OVER_S - 1e-9
+    until = (since_s <= AFTER_S + OVER_S + 1e-9) & long_enough
+    judged, during = until & (since_s > AFTER_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
+    disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
+    right = _right(course.time_s, course.reporting, course.status)
+    return Recovery(
+        **course.cell,
+        disturbance=str(course.disturbance["kind"]),
+        judged=int(np.count_nonzero(judged)),
+        disturbed_deg=_over(disturbed_deg, judged),
+        undisturbed_deg=_over(undisturbed_deg, judged),
+        during=times(_over(disturbed_deg, during), _over(undisturbed_deg, during)),
+        disturbed_mm=_over(course.error_mm[here], judged),
+        undisturbed_mm=_over(undisturbed.error_mm[there], judged),
+        back_after_s=_back_after_s(since_s, until & (since_s > 0.0), disturbed_deg, undisturbed_deg),
+        status_right=_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
+    )
+
+
+def times(error: float, undisturbed: float) -> float:
+    """How many times as large: 1 where both are zero, NaN where one is not finite."""
+    if undisturbed == 0.0:
+        return 1.0 if error == 0.0 else float("nan") if np.isnan(error) else float("inf")
+    return error / undisturbed
+
+
+def _over(values: Floats, rows: Bools) -> float:
+    return float(np.mean(values[rows])) if rows.any() else float("nan")
+
+
+def _back_after_s(since_s: Floats, after: Bools, disturbed_deg: Floats, undisturbed_deg: Floats) -> float | None:
+    rows = np.flatnonzero(after)
+    width = max(round(_SMOOTHED_S / float(np.median(np.diff(since_s[rows])))), 1) if len(rows) > 1 else 1
+    starts = rows[: max(len(rows) - width + 1, 0)]
+    good = [np.mean(disturbed_deg[i : i + width]) <= AT_MOST * np.mean(undisturbed_deg[i : i + width]) for i in starts]
+    first = len(good) - next((n for n, fine in enumerate(reversed(good)) if not fine), len(good))
+    return float(since_s[starts[first]]) if first < len(good) else None
+
+
+def _right(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
+    """(F,) whether the status is what the readings call for; close to 0.5 s both HELD and LOST are."""
+    enough_s = np.where(reporting, time_s, -np.inf)
+    enough_s[0] = time_s[0]
+    gone_s = time_s - np.maximum.accumulate(enough_s)
+    lost = (status == Status.LOST) & (gone_s > LOST_AFTER_S - _CLOSE_S)
+    held = (status == Status.HELD) & (gone_s < LOST_AFTER_S + _CLOSE_S)
+    out: Bools = np.where(reporting, status == Status.SOLVED, lost | held)
+    return out
+
+
+def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Of `summary.json`'s rows: one for each method, inputs and protocol, clips pooled.
+
+    Each has `clips`, `undisturbed_deg`, `status_right` (the least) and, under `after`, disturbance -> `ratio` of the
+    means over clips, `worst` ratio of a single clip, how many times as large the error is `during` it (mean over
+    clips), `back_after_s` of the slowest clip (None: one never was). Clips that end too soon are left out, and a
+    disturbance is None where all do.
+    """
+    groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row["method"], row["inputs"], row["protocol"]), []).append(row)
+    found = []
+    for (method, inputs, protocol), group in groups.items():
+        after: dict[str, Any] = dict.fromkeys(row["disturbance"] for row in group)
+        known = [row for row in group if row["judged"]]
+        for kind in dict.fromkeys(row["disturbance"] for row in known):
+            those = [row for row in known if row["disturbance"] == kind]
+            means = [_mean(those, name) for name in ("disturbed_deg", "undisturbed_deg")]
+            slowest = [row["back_after_s"] for row in those]
+            after[kind] = {
+                "ratio": times(*means),
+                "during": _mean(those, "during"),
+                "worst": float(np.max([_number(row["ratio"]) for row in those])),
+                "back_after_s": None if None in slowest else max(slowest),
+            }
+        found.append(
+            {
+                "method": method,
+                "inputs": inputs,
+                "protocol": protocol,
+                "clips": len({row["clip"] for row in known}),
+                "undisturbed_deg": _mean(known, "undisturbed_deg") if known else None,
+                "status_right": min((row["status_right"] for row in known), default=None),
+                "after": after,
+            }
+        )
+    return found
+
+
+def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
+    return float(np.mean([_number(row[name]) for row in rows]))
+
+
+def _number(value: float | None) -> float:
+    """JSON has no NaN: what was not finite comes back as null."""
+    return float("nan") if value is None else value

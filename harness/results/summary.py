@@ -1,0 +1,129 @@
+"""A run in one table: a row for each cell, and what each method comes to.
+
+Statistics rest on stored per-frame values. Two means are given, since they differ when takes differ in length: over
+sequences (mean and standard deviation of sequence means, as public evaluators print it) and over frames.
+"""
+
+import csv
+import io
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.files import plain
+from harness.results.cell import FURTHER, IDENTITY, Cell, as_row, varied_text
+from harness.score.metrics import DEFINITIONS, FRAME_METRICS
+from harness.score.score import pooled
+from harness.score.timing import step_relative, step_times_ms
+
+FIRST_METRICS = (
+    "frames_matched",
+    "frames_expected",
+    "joint_angle_mean_deg",
+    "joint_angle_rms_deg",
+    "mpjre_deg",
+    "mpjpe_mm",
+    "mpjpe_root_mm",
+    "jitter_m_s3",
+    "step_p50_ms",
+    "step_p99_ms",
+    "fps",
+)
+COLUMNS = (*IDENTITY, *FIRST_METRICS, *(name for name in DEFINITIONS if name not in FIRST_METRICS), *FURTHER, "key")
+"""Of summary.csv."""
+_COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
+GROUP = ("method", "inputs", "protocol", "performer", "varied")
+"""Cells that differ in these are never pooled."""
+
+
+def as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
+    """One line for each cell; empty where a metric was not measured, stations separated by blanks."""
+    out = io.StringIO()
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(COLUMNS)
+    table.writerows([_text(row[name]) for name in COLUMNS] for row in rows)
+    return out.getvalue()
+
+
+class Tally:
+    """Adds up cells one at a time, so that a run of any length fits in memory."""
+
+    def __init__(self, *by: str) -> None:
+        self.by = by
+        self._groups: dict[tuple[str, ...], _Group] = {}
+
+    def add(self, cell: Cell) -> None:
+        name = tuple(_text(plain(getattr(cell, field))) for field in self.by)
+        self._groups.setdefault(name, _Group()).add(cell)
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One for each group: what it is, how many sequences, frames and the statistics of every metric."""
+        return [{**group.named(self.by), **group.row()} for group in self._groups.values()]
+
+
+class _Group:
+    def __init__(self) -> None:
+        self.sequences: list[dict[str, Any]] = []
+        self.frames: dict[str, list[Floats]] = {name: [] for name in FRAME_METRICS}
+        self.step_ms: list[Floats] = []
+        self.cpu_ms: list[Floats] = []
+
+    def add(self, cell: Cell) -> None:
+        self.sequences.append(as_row(cell))
+        if cell.metrics["joint_angle_mean_deg"] is None:
+            return
+        for name, values in cell.scores.per_frame.items():
+            self.frames[name].append(values[cell.scores.scored].astype(np.float32))
+        timed = cell.scores.scored & (np.arange(len(cell)) > 0)
+        self.step_ms.append(cell.step_ms[timed])
+        self.cpu_ms.append(np.array([np.where(timed, cell.step_cpu_ms, np.nan), cell.reference_cpu_ms]))
+
+    def named(self, fields: Iterable[str]) -> dict[str, Any]:
+        """What all its cells share."""
+        return {field: self.sequences[0][field] for field in fields}
+
+    def row(self) -> dict[str, Any]:
+        counts = {name: sum(row[name] for row in self.sequences) for name in _COUNTS}
+        expected = counts["frames_expected"]
+        measured = [name for name in DEFINITIONS if name not in counts and name != "coverage"]
+        return {
+            "sequences": len(self.sequences),
+            **counts,
+            "coverage": counts["frames_matched"] / expected if expected else 0.0,
+            "metrics": {name: self._statistics(name) for name in measured},
+        }
+
+    def _statistics(self, name: str) -> dict[str, float | int | None]:
+        values = np.array([row[name] for row in self.sequences if row[name] is not None], dtype=float)
+        return {
+            "mean": float(values.mean()) if len(values) else None,
+            "sd": float(values.std(ddof=1)) if len(values) > 1 else None,
+            "sequences": len(values),
+            "frame_weighted": self._over_frames(name),
+        }
+
+    def _over_frames(self, name: str) -> float | None:
+        if name in self.frames:
+            columns = [values.astype(float) for values in self.frames[name]]
+            value = pooled(np.concatenate(columns), DEFINITIONS[name].pool) if columns else np.nan
+        else:
+            value = self._times().get(name, np.nan)
+        return float(value) if np.isfinite(value) else None
+
+    def _times(self) -> dict[str, float]:
+        if not self.step_ms:
+            return {}
+        relative = step_relative(*np.concatenate(self.cpu_ms, axis=1))
+        return {**step_times_ms(np.concatenate(self.step_ms)), "step_relative": relative}
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, list):
+        return " ".join(map(str, value))
+    if isinstance(value, Mapping):
+        return varied_text(value)
+    return f"{value:.9g}" if isinstance(value, float) else str(value)

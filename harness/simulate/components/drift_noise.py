@@ -1,0 +1,46 @@
+"""Slowly wandering errors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
+
+
+@dataclass(frozen=True)
+class Slow:
+    """First-order Gauss-Markov on each axis, stationary from the start.
+
+    1.5 mm is what Gilson et al. 2006 measured at rest; the angles are the maker's, unverified; a correlation time
+    of 0.2 to 2 s is inferred from ranges correcting inertia (docs/is900.md 13.1, 13.2 and 13.5). Gravity holds pitch
+    and roll better than ranges hold yaw.
+    """
+
+    position_m: float = 0.0015
+    """RMS on each axis [m]."""
+    pitch_roll_rad: float = float(np.deg2rad(0.25))
+    """RMS about each horizontal axis [rad]."""
+    yaw_rad: float = float(np.deg2rad(0.50))
+    """RMS about the vertical axis [rad]."""
+    correlation_s: float = 1.0
+    """Time after which the correlation is 1/e [s]."""
+
+    def __post_init__(self) -> None:
+        require(self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6))
+
+    def spoil(self, sensed: Sensed) -> None:
+        draws = [sensed.draw("slow", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
+        wander = gauss_markov(np.stack(draws, axis=1), float(np.exp(-1.0 / (sensed.rate_hz * self.correlation_s))))
+        sensed.move(self.position_m * wander[..., :3])
+        sensed.rotate(np.array([self.pitch_roll_rad, self.pitch_roll_rad, self.yaw_rad]) * wander[..., 3:])
+
+
+def gauss_markov(white: Floats, correlation: float) -> Floats:
+    """Sequences (N, ...) of unit variance and this correlation between neighbours, from white ones."""
+    out: Floats = white * np.sqrt(1.0 - correlation**2)
+    out[:1] = white[:1]
+    for k in range(1, len(out)):
+        out[k] += correlation * out[k - 1]
+    return out

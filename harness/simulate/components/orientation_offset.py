@@ -1,0 +1,32 @@
+"""Stations whose orientation is off by a constant angle for a while: iron near the magnetometers."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
+
+
+@dataclass(frozen=True)
+class Turned:
+    """Orientations turned about the vertical from one moment to another, positions as they are. A fault.
+
+    All stations turned alike agree with each other and contradict every position: the hard case.
+    """
+
+    stations: tuple[str, ...] = ()
+    """Which; () is every one."""
+    from_s: float = 0.0
+    to_s: float = math.inf
+    angle_rad: float = 0.0
+    """About the tracker's z axis [rad]."""
+
+    def __post_init__(self) -> None:
+        require(self, to_s=(self.from_s, math.inf))
+
+    def spoil(self, sensed: Sensed) -> None:
+        hit = sensed.during(self.stations, self.from_s, self.to_s)
+        sensed.rotate(hit[:, :, None] * np.array([0.0, 0.0, self.angle_rad]))
+        sensed.hits["turned"] = hit | sensed.hits.get("turned", False)

@@ -1,0 +1,23 @@
+"""Error that grows with speed."""
+
+from dataclasses import dataclass
+
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Ranges are measured at another moment than the record's: an error along the velocity.
+
+    Gilson et al. 2006 found errors that grow with speed; the size is inferred (docs/is900.md 13.3 and 13.5).
+    """
+
+    ahead_s: float = 0.002
+    """Motion that is added [s]; negative lags behind."""
+
+    def __post_init__(self) -> None:
+        require(self, ahead_s=(-1.0, 1.0))
+
+    def spoil(self, sensed: Sensed) -> None:
+        sensed.move(self.ahead_s * sensed.velocity_m_s)

@@ -1,0 +1,28 @@
+"""White noise of single records."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.simulate.parameter_ranges import require
+from harness.simulate.readings import Sensed
+
+
+@dataclass(frozen=True)
+class White:
+    """Independent from record to record, normal on each axis: the resolution floor (docs/is900.md 13.5, unverified)."""
+
+    position_m: float = 0.00075
+    """Standard deviation on each axis [m]."""
+    orientation_rad: float = float(np.deg2rad(0.05))
+    """Standard deviation about each axis [rad]."""
+
+    def __post_init__(self) -> None:
+        require(self, position_m=(0.0, 1.0), orientation_rad=(0.0, 1.0))
+
+    def spoil(self, sensed: Sensed) -> None:
+        draws = [sensed.draw("white", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
+        noise: Floats = np.stack(draws, axis=1)
+        sensed.move(self.position_m * noise[..., :3])
+        sensed.rotate(self.orientation_rad * noise[..., 3:])

@@ -1,0 +1,208 @@
+"""Truth into what a receiver would have got: the bytes of an IS-900, decoded as a driver decodes them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.body.humanoid import Body
+from harness.body.mounts import Mount, place
+from harness.body.soft_tissue import thickness_m
+from harness.core import rotations
+from harness.core.arrays import Bools, Floats, Ints, freeze
+from harness.core.calibration import Calibration
+from harness.core.motion import Take
+from harness.errors import BadInput
+from harness.simulate.link import TrackerConfig, transmit
+from harness.simulate.noise import Noise
+from harness.simulate.readings import GRAVITY_M_S2, Sensed
+from harness.simulate.trajectory import StationMotion, Trajectory
+from harness.stream.codec.capture import Capture
+from harness.stream.codec.reader import FrameReader, WireFormat
+from harness.stream.codec.records import Said, encode
+from harness.stream.frame import TrackerFrame
+
+__all__ = ["Simulation", "TrackerConfig", "sense", "simulate"]
+
+WORLD_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
+"""The tracker's axes are x forward, y right, z down (docs/is900.md 5.3): half a turn about x from the world's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A take as the tracker saw it, and the truth beside it. Frames carry nothing of the truth."""
+
+    wire_format: WireFormat
+    wire: Capture
+    """What came over the line, record by record."""
+    frames: tuple[TrackerFrame, ...]
+    """(F,) decoded from `wire`."""
+    frame_index: Ints
+    """(F,) for each of these, which of the E sampled frames it is."""
+    truth_s: Floats
+    """(E,) reference time of each sampled frame: the mean of its stations' true sampling times [s]."""
+    truth_qpos: Floats
+    """(E, 55) true configuration at that time."""
+    calibration: Calibration
+    health: dict[str, float]
+    """Counts and times of the stream, for the report."""
+
+    def __post_init__(self) -> None:
+        freeze(self, np.int64, frame_index=(len(self.frames),))
+        freeze(self, truth_s=("E",))
+        freeze(self, truth_qpos=(len(self.truth_s), "Q"))
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        return self.wire_format.stations
+
+    @property
+    def expected(self) -> int:
+        """Frames that were sampled, E."""
+        return len(self.truth_s)
+
+
+def simulate(
+    body: Body,
+    take: Take,
+    mounts: Sequence[Mount],
+    tracker: TrackerConfig,
+    noise: Noise,
+    *,
+    seed: int,
+    session: str = "",
+) -> Simulation:
+    """Wear trackers through a take. The calibration is `exact`: the mounts as they are and the tracker's true frame.
+
+    Takes of one `session` share the errors that last for one; without a name the take is its own session. BadInput when
+    the take is shorter than one period.
+    """
+    wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
+    trajectory = Trajectory(body, take)
+    time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
+    calibration = exact_calibration(body, mounts, tracker)
+    sensed = sense(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
+    sent, wire = _transmitted(sensed, wire_format, tracker)
+    reader = FrameReader(wire_format)
+    frames = (*reader.feed_all(wire), *reader.finish())
+    truth_s = time_s.mean(axis=1)
+    return Simulation(
+        wire_format=wire_format,
+        wire=wire,
+        frames=frames,
+        frame_index=_matched(frames, sensed.device_s),
+        truth_s=truth_s,
+        truth_qpos=trajectory.qpos(truth_s),
+        calibration=calibration,
+        health=_health(sensed, sent, wire, frames),
+    )
+
+
+def sampling_times_s(duration_s: float, tracker: TrackerConfig, stations: int) -> Floats:
+    """(E, S) when each station is sampled for each frame, within a take of this length [s]."""
+    turns_s = tracker.station_slot_s(stations) * np.arange(stations)
+    count = int(np.floor((duration_s - turns_s[-1]) * tracker.rate_hz + 1e-9)) + 1
+    if count < 1:
+        raise BadInput(f"A take of {duration_s:.3f} s is shorter than one frame.", "Take a longer one, or more of it.")
+    return np.arange(count)[:, None] / tracker.rate_hz + turns_s
+
+
+def exact_calibration(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calibration:
+    """The mounts as they are and the true frame of the tracker."""
+    places = [place(body.skeleton, mount) for mount in mounts]
+    return Calibration(
+        kind="exact",
+        stations=tuple(mount.station for mount in mounts),
+        bones=tuple(mount.bone for mount in mounts),
+        mount_m=np.array([mount_m for mount_m, _ in places]),
+        bone_from_station=np.array([bone_from_station for _, bone_from_station in places]),
+        world_from_tracker=WORLD_FROM_TRACKER,
+        tracker_origin_m=np.array(tracker.origin_m),
+    )
+
+
+def sense(
+    trajectory: Trajectory,
+    mounts: Sequence[Mount],
+    tracker: TrackerConfig,
+    noise: Noise,
+    time_s: Floats,
+    *,
+    seed: int,
+    take: str,
+    begins_s: float = 0.0,
+    session: str = "",
+) -> Sensed:
+    """What the tracker believes at the moments `time_s` (E, S) of a trajectory, before it goes over the line.
+
+    `begins_s` is the time of the trajectory's beginning, for the device's clock and for errors that have a moment.
+    """
+    calibration = exact_calibration(trajectory.body, mounts, tracker)
+    motion = trajectory.station_motion(calibration, time_s)
+    tracker_from_world = rotations.inverse(calibration.world_from_tracker)
+    skeleton = trajectory.body.skeleton
+    along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
+    sensed = Sensed(
+        seed=seed,
+        take=take,
+        stations=calibration.stations,
+        time_s=time_s + begins_s,
+        rate_hz=tracker.rate_hz,
+        velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
+        radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
+        flesh_m=np.array([thickness_m(mount.bone, mount.along) for mount in mounts]),
+        force_m_s2=_force_m_s2(motion, calibration),
+        position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
+        turn=rotations.multiply(tracker_from_world, motion.world_from_station),
+        quality=np.ones(time_s.shape),
+        device_s=time_s + begins_s,
+        session=session,
+    )
+    noise.spoil(sensed)
+    return sensed
+
+
+def _force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
+    """(E, S, 3) what a unit mass at each station bears, along its axes, beyond what it does in the rest pose."""
+    up = np.array([0.0, 0.0, GRAVITY_M_S2])
+    borne = rotations.rotate(rotations.inverse(motion.world_from_station), motion.acceleration_m_s2 + up)
+    out: Floats = borne - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
+    return out
+
+
+def _transmitted(sensed: Sensed, wire_format: WireFormat, tracker: TrackerConfig) -> tuple[Bools, Capture]:
+    """Which records (E*S,) got through the line, in the order of sampling, and what came out at its end."""
+    characters = np.tile(np.frombuffer(wire_format.characters, np.uint8), len(sensed.time_s))
+    said = Said(
+        sensed.device_s.ravel(), sensed.position_m.reshape(-1, 3), sensed.turn.reshape(-1, 4), sensed.quality.ravel()
+    )
+    table = encode(wire_format.items, characters, said, wire_format.settings)
+    sent, arrived_s = transmit(sensed.time_s.ravel() + tracker.latency_s, tracker)
+    ends = table.itemsize * np.arange(1, int(sent.sum()) + 1)
+    return sent, Capture(table[sent].tobytes(), ends, arrived_s[sent])
+
+
+def _matched(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
+    """The sampled frame (F,) that each decoded frame is, by what the device's clock (E, S) said then."""
+    began_s, pace_s = device_s[0], np.diff(device_s[:2, 0])
+    stamps_s = np.array([frame.measured_s for frame in frames]).reshape(-1, device_s.shape[1])
+    if len(pace_s) == 0:
+        return np.zeros(len(frames), dtype=np.int64)
+    frames_since: Floats = np.nanmean((stamps_s - began_s) / pace_s, axis=1)
+    return np.round(frames_since).astype(np.int64)
+
+
+def _health(sensed: Sensed, sent: Bools, wire: Capture, frames: Sequence[TrackerFrame]) -> dict[str, float]:
+    delay_s = wire.received_s - sensed.time_s.ravel()[sent]
+    counts = {f"{name}_share": float(np.mean(hit)) for name, hit in sensed.hits.items()}
+    return {
+        "frames_sampled": float(len(sensed.time_s)),
+        "frames_received": float(len(frames)),
+        "records_sent": float(sent.sum()),
+        "records_dropped": float(len(sent) - sent.sum()),
+        "readings_invalid": float(sum(int(np.sum(~frame.position_valid)) for frame in frames)),
+        "readings_suspect": float(sum(int(np.sum(frame.suspect)) for frame in frames)),
+        "latency_p50_ms": 1e3 * float(np.quantile(delay_s, 0.5)),
+        "latency_p99_ms": 1e3 * float(np.quantile(delay_s, 0.99)),
+        **counts,
+    }

@@ -1,0 +1,145 @@
+"""Data records to be sent: SI units into the items of an output list, and those into bytes (docs/is900.md 5)."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.core import rotations
+from harness.core.arrays import Floats, Ints
+from harness.errors import BadInput
+from harness.stream.codec import ascii_records as text
+from harness.stream.codec.items import BLANK, HEAD, fields, record_type
+
+Table = NDArray[Any]
+"""Records (N,) of one output list, with a field for each item (`items.record_type`)."""
+
+FULL_SCALE_M, FULL_SCALE_DEG = 3.0, 180.0
+"""Of the 16-bit format (section 5.2)."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How the device was told to write numbers."""
+
+    metres_per_unit: float = 0.01
+    """0.01 after `u` (centimetres), 0.0254 after `U` or power-on (inches)."""
+    seconds_per_tick: float = 1e-3
+    """1e-3 after `MT` or power-on, 1e-6 after `Mt`."""
+    binary: bool = True
+    """True after `f`; False (ASCII) after `F` or power-on."""
+    stylus_bytes: int = 2
+    """Of item 16, which has 1 or 2 by the source (section 14)."""
+
+    def __post_init__(self) -> None:
+        if not (self.metres_per_unit > 0.0 and self.seconds_per_tick > 0.0 and self.stylus_bytes in (1, 2)):
+            raise BadInput(f"Not a device's settings: {self}.", "Units are positive; item 16 has 1 or 2 bytes.")
+
+
+@dataclass(frozen=True, eq=False)
+class Said:
+    """What N records are to say."""
+
+    measured_s: Floats
+    """(N,) the device's clock [s]."""
+    position_m: Floats
+    """(N, 3)"""
+    tracker_from_station: Floats
+    """(N, 4) unit quaternions."""
+    quality: Floats
+    """(N,) 0 lost to 1 best."""
+    buttons: Ints | int = 0
+    """(N,) bits, 0 where all are up (item 22)."""
+    joystick: Ints | int = 127
+    """(N, 2) left to right and rear to front, 0 to 255, centre 127 (item 23)."""
+
+
+def encode(items: tuple[int, ...], stations: NDArray[np.uint8], said: Said, settings: Settings) -> Table:
+    """Records (N,) of these station characters (N,), of which `to_bytes` makes the bytes.
+
+    Nothing is said of cameras, lenses and the stylus: their items are 0, and the frame of a camera set is the
+    tracker's. Radio never loses a packet. UnknownName or BadInput for an item of unknown size.
+    """
+    table = np.zeros(len(stations), record_type(items, settings.stylus_bytes))
+    table["head"], table["station"], table["status"] = HEAD, stations, BLANK
+    for item in fields(items, settings.stylus_bytes):
+        if item.fixed:
+            table[item.name] = np.frombuffer(item.fixed, np.uint8) if item.count > 1 else item.fixed[0]
+        elif item.name in _COLUMNS:
+            table[item.name] = _COLUMNS[item.name](said, settings)
+    return table
+
+
+def to_bytes(items: tuple[int, ...], table: Table, settings: Settings) -> bytes:
+    """Records (N,) as they go over the wire, binary or ASCII."""
+    return table.tobytes() if settings.binary else text.write(items, table, settings.stylus_bytes)
+
+
+def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
+    """The two-byte form (N, 2k) of values (N, k) within -1 to 1 of full scale (section 5.2)."""
+    sixteen = np.clip(np.trunc(np.asarray(values) * 32768.0), -32768, 32767).astype(np.int64)
+    fourteen = (sixteen >> 2) & 0x3FFF
+    pairs = (
+        np.stack([fourteen & 0x7F, fourteen >> 7], axis=-1)
+        .astype(np.uint8)
+        .reshape(len(fourteen), 2 * fourteen.shape[1])
+    )
+    pairs[:, 0] |= 0x80
+    return pairs
+
+
+def unpack_14_bit(pairs: NDArray[np.uint8]) -> Floats:
+    """Values (N, k), -1 to 1 of full scale, of the two-byte form (N, 2k)."""
+    low, high = pairs[:, ::2].astype(np.uint16) & 0x7F, pairs[:, 1::2].astype(np.uint16) & 0x7F
+    out: Floats = ((low << 2) | (high << 9)).view(np.int16) / 32768.0
+    return out
+
+
+def yaw_pitch_roll_deg(turn: Floats) -> Floats:
+    """Angles (N, 3) [deg] about Z, the new Y and the new X that give these quaternions (N, 4) (section 5.3)."""
+    r = rotations.to_matrix(turn)
+    pitch = np.arcsin(np.clip(-r[:, 2, 0], -1.0, 1.0))
+    out: Floats = np.rad2deg(
+        np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), pitch, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
+    )
+    return out
+
+
+def from_yaw_pitch_roll_deg(angles: Floats) -> Floats:
+    """Quaternions (N, 4) of yaw about Z, then pitch about the new Y, then roll about the new X (N, 3) [deg]."""
+    half = np.deg2rad(angles)[:, :, None]
+    x, y, z = np.eye(3)
+    yaw, pitch, roll = (rotations.exp(half[:, i] * axis) for i, axis in enumerate((z, y, x)))
+    return rotations.multiply(rotations.multiply(yaw, pitch), roll)
+
+
+def cosines(turn: Floats, axis: int) -> Floats:
+    """The station's X, Y or Z axis (N, 3) in the tracker's frame, of quaternions (N, 4) (items 5, 6, 7)."""
+    out: Floats = rotations.to_matrix(turn)[:, :, axis]
+    return out
+
+
+_COLUMNS: dict[str, Callable[[Said, Settings], Any]] = {
+    "position": lambda said, settings: said.position_m / settings.metres_per_unit,
+    "yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
+    "x_cosines": lambda said, settings: cosines(said.tracker_from_station, 0),
+    "y_cosines": lambda said, settings: cosines(said.tracker_from_station, 1),
+    "z_cosines": lambda said, settings: cosines(said.tracker_from_station, 2),
+    "quaternion": lambda said, settings: said.tracker_from_station,
+    "position_16": lambda said, settings: pack_14_bit(said.position_m / FULL_SCALE_M),
+    "yaw_pitch_roll_16": lambda said, settings: pack_14_bit(
+        yaw_pitch_roll_deg(said.tracker_from_station) / FULL_SCALE_DEG
+    ),
+    "quaternion_16": lambda said, settings: pack_14_bit(said.tracker_from_station),
+    "time": lambda said, settings: said.measured_s / settings.seconds_per_tick,
+    "buttons": lambda said, settings: said.buttons,
+    "joystick": lambda said, settings: said.joystick,
+    "camera_position": lambda said, settings: said.position_m / settings.metres_per_unit,
+    "camera_yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
+    "quality": lambda said, settings: np.round(255.0 * np.clip(said.quality, 0.0, 1.0)),
+    "radio_integrity": lambda said, settings: 100,
+    "measurement_quality": lambda said, settings: np.round(100.0 * np.clip(said.quality, 0.0, 1.0)),
+}
+"""How each item is filled, in wire units; the others are 0."""

@@ -1,0 +1,230 @@
+"""A line to a device: a serial port by pyserial, or TCP by a socket of our own. Bytes, no meaning.
+
+pyserial's `socket://` loses bytes that come while it opens and those already read when the peer closes, and its
+`in_waiting` is 0 or 1; so TCP goes without it, and nothing here asks how much is waiting: reads take what is there.
+Where the operating system can wait for a port (everywhere but on Windows), a read waits in `select`.
+"""
+
+import contextlib
+import os
+import select
+import socket
+import sys
+import threading
+import time
+from abc import ABC, abstractmethod
+from typing import Protocol
+
+import serial
+
+from harness.errors import HarnessError
+from harness.stream.driver.transport_errors import no_connection, no_port, no_scheme, tcp_address
+
+if sys.platform == "win32":
+    _TROUBLE: tuple[type[Exception], ...] = (OSError, ValueError)
+else:
+    import termios
+
+    _TROUBLE = (OSError, ValueError, termios.error)
+CHUNK = 65536
+"""More than any operating system keeps for a port [bytes]."""
+WRITE_S, CONNECT_S = 2.0, 2.0
+"""A line that takes no byte for so long is lost; so is a host that does not answer [s]."""
+_NAP_S = 0.002
+"""Between two looks at a port that cannot be waited for [s]."""
+
+
+class LineLost(HarnessError):
+    """The line is gone: unplugged, closed by the other side, or closed by us."""
+
+    def __init__(self, port: str, why: str) -> None:
+        super().__init__(port, why)
+        self.port, self.why = self.args
+
+    def __str__(self) -> str:
+        return f"{self.port}: {self.why}."
+
+
+class Transport(Protocol):
+    """A line that is open. One thread reads; another may write or close meanwhile."""
+
+    @property
+    def name(self) -> str:
+        """As the user named it."""
+        ...
+
+    def read(self, timeout_s: float) -> bytes:
+        """What is there; waits for the first byte at most so long, then b"". LineLost when nothing can come."""
+        ...
+
+    def write(self, data: bytes) -> None:
+        """Send all of it; LineLost when the line does not take it."""
+        ...
+
+    def close(self) -> None:
+        """May be done twice, and while another thread reads: its read ends with LineLost."""
+        ...
+
+
+def open_transport(port: str, baud: int = 115200) -> Transport:
+    """Open `/dev/ttyUSB0`, `COM3`, a pty, `tcp://host:port` or `socket://host:port`, and nothing else.
+
+    A serial port is opened for this process alone: 8N1, no handshake, as every IS-900 client does (docs/is900.md 2).
+    BadInput when there is no such port or host, it is taken, or may not be opened.
+    """
+    if port.startswith(("tcp://", "socket://")):
+        return _Tcp(port, tcp_address(port))
+    if "://" in port:
+        raise no_scheme(port)
+    try:
+        opened = serial.Serial(port, baud, timeout=0, write_timeout=WRITE_S, exclusive=True)
+    except _TROUBLE as error:
+        raise no_port(port, baud, error) from error
+    return PolledPort(port, opened) if sys.platform == "win32" else WaitedPort(port, opened)
+
+
+class _Line(ABC):
+    """What the kinds of lines share: one reader at a time, and a close that a reader notices."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._reading = threading.RLock()
+        self._closed = threading.Event()
+
+    def read(self, timeout_s: float) -> bytes:
+        with self._reading:
+            try:
+                data = b"" if self._closed.is_set() else self._receive(timeout_s)
+            except _TROUBLE as error:
+                raise LineLost(self.name, self._reason(error)) from error
+            if self._closed.is_set():
+                raise LineLost(self.name, "closed")
+            return data
+
+    def write(self, data: bytes) -> None:
+        try:
+            self._send(data)
+        except _TROUBLE as error:
+            raise LineLost(self.name, self._reason(error)) from error
+
+    def close(self) -> None:
+        self._closed.set()
+        self._wake()
+        with self._reading:
+            self._shut()
+
+    def _reason(self, error: Exception) -> str:
+        return "closed" if self._closed.is_set() else f"the line is gone ({error})"
+
+    @abstractmethod
+    def _receive(self, timeout_s: float) -> bytes:
+        """What is there after a wait of at most so long."""
+
+    @abstractmethod
+    def _send(self, data: bytes) -> None: ...
+
+    def _wake(self) -> None:  # noqa: B027  # where nothing waits for long there is nothing to end
+        """End the wait of another thread."""
+
+    @abstractmethod
+    def _shut(self) -> None: ...
+
+
+class _Waited(_Line):
+    """A line whose descriptor can be waited for."""
+
+    def __init__(self, name: str, descriptor: int) -> None:
+        super().__init__(name)
+        self._descriptor = descriptor
+        self._woken, self._waker = socket.socketpair()
+
+    def _receive(self, timeout_s: float) -> bytes:
+        ready, _, _ = select.select([self._descriptor, self._woken.fileno()], [], [], max(timeout_s, 0.0))
+        if self._descriptor in ready:
+            return self._take()
+        self._look()
+        return b""
+
+    @abstractmethod
+    def _take(self) -> bytes:
+        """What is there, now that something is."""
+
+    def _look(self) -> None:  # a socket tells by itself
+        """Nothing came: OSError when nothing can."""
+
+    def _wake(self) -> None:
+        with contextlib.suppress(OSError):  # closed before
+            self._waker.send(b"x")
+
+    def _shut(self) -> None:
+        self._woken.close()
+        self._waker.close()
+
+
+class WaitedPort(_Waited):
+    """A serial port where the operating system can wait for it."""
+
+    def __init__(self, name: str, port: serial.Serial) -> None:
+        super().__init__(name, port.fileno())
+        self._port = port
+
+    def _take(self) -> bytes:
+        return bytes(self._port.read(CHUNK))
+
+    def _look(self) -> None:
+        if os.stat(self.name).st_rdev != os.fstat(self._descriptor).st_rdev:
+            raise OSError("the name stands for another port now")
+
+    def _send(self, data: bytes) -> None:
+        self._port.write(data)
+
+    def _shut(self) -> None:
+        self._port.close()
+        super()._shut()
+
+
+class PolledPort(_Line):
+    """A serial port on Windows: looked at every other millisecond."""
+
+    def __init__(self, name: str, port: serial.Serial) -> None:
+        super().__init__(name)
+        self._port = port
+
+    def _receive(self, timeout_s: float) -> bytes:
+        until_s = time.monotonic() + timeout_s
+        while True:
+            data = bytes(self._port.read(CHUNK))
+            if data or time.monotonic() >= until_s or self._closed.wait(_NAP_S):
+                return data
+
+    def _send(self, data: bytes) -> None:
+        self._port.write(data)
+
+    def _shut(self) -> None:
+        self._port.close()
+
+
+class _Tcp(_Waited):
+    """A TCP connection, small packets sent at once."""
+
+    def __init__(self, name: str, address: tuple[str, int]) -> None:
+        try:
+            self._socket = socket.create_connection(address, CONNECT_S)
+        except (OSError, UnicodeError) as error:
+            raise no_connection(name, address, error) from error
+        super().__init__(name, self._socket.fileno())
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.settimeout(WRITE_S)
+
+    def _take(self) -> bytes:
+        data = self._socket.recv(CHUNK)
+        if not data:
+            raise OSError("closed by the other side")
+        return data
+
+    def _send(self, data: bytes) -> None:
+        self._socket.sendall(data)
+
+    def _shut(self) -> None:
+        self._socket.close()
+        super()._shut()

@@ -1,0 +1,82 @@
+"""Why a line could not be opened: what, where, why, and what to try."""
+
+import errno
+import os
+import socket
+from urllib.parse import urlsplit
+
+from serial.tools import list_ports
+
+from harness.errors import BadInput
+from harness.stream.codec.items import BAUDS
+
+_BUSY = (errno.EBUSY, errno.EAGAIN)
+_SETTINGS = f"{', '.join(map(str, BAUDS[:-1]))} and {BAUDS[-1]}"
+
+
+def no_scheme(port: str) -> BadInput:
+    """For `spy://...` and other addresses that are not ours."""
+    return BadInput(
+        f"Port {port}: this kind of address is not known.",
+        "Name a serial port (/dev/ttyUSB0, COM3), tcp://HOST:PORT or socket://HOST:PORT.",
+    )
+
+
+def tcp_address(port: str) -> tuple[str, int]:
+    """Host and number of `tcp://host:port`; BadInput when either is missing."""
+    try:
+        parts = urlsplit(port)
+        host, number = parts.hostname, parts.port
+    except ValueError as error:
+        raise BadInput(f"Port {port}: {error}.", "Write tcp://HOST:PORT, as tcp://127.0.0.1:5005.") from error
+    if not host or not number:
+        raise BadInput(
+            f"Port {port}: host or port number is missing.", "Write tcp://HOST:PORT, as tcp://127.0.0.1:5005."
+        )
+    return host, number
+
+
+def no_connection(port: str, address: tuple[str, int], error: Exception) -> BadInput:
+    """A host that could not be reached."""
+    host, number = address
+    if isinstance(error, (socket.gaierror, UnicodeError)):
+        return BadInput(f"Port {port}: there is no host called {host}.", "Check the name, or give its address.")
+    if isinstance(error, TimeoutError):
+        return BadInput(f"Port {port}: {host} does not answer.", "Check the address, the cable and any firewall.")
+    if isinstance(error, ConnectionRefusedError):
+        return BadInput(
+            f"Port {port}: nothing listens at {host}, port {number}.",
+            "Start the device (or `harness emulate`) first, and check the number.",
+        )
+    return BadInput(f"Port {port}: {_said(error)}.", "Check the address and the network.")
+
+
+def no_port(port: str, baud: int, error: Exception) -> BadInput:
+    """A serial port that could not be opened."""
+    number = getattr(error, "errno", None)
+    if isinstance(error, ValueError):
+        return BadInput(f"Port {port} at {baud} baud: {error}.", f"An IS-900 speaks at {_SETTINGS}.")
+    if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV) or isinstance(error, FileNotFoundError):
+        here = ", ".join(sorted(known.device for known in list_ports.comports())) or "none"
+        return BadInput(f"Port {port}: there is no such port.", f"Serial ports of this computer: {here}.")
+    if number == errno.EACCES and os.name == "posix":
+        return BadInput(
+            f"Port {port}: permission denied.", f"Join the group that may open it ({_group(port)}), then log in anew."
+        )
+    if number in (*_BUSY, errno.EACCES):
+        return BadInput(f"Port {port}: another program has it open.", "Close that program; one alone may use the port.")
+    return BadInput(f"Port {port} cannot be used as a serial port: {_said(error)}.", "Name the port of the device.")
+
+
+def _said(error: Exception) -> str:
+    return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def _group(port: str) -> str:
+    """Who owns a port file, as far as can be told."""
+    try:
+        import grp
+
+        return grp.getgrgid(os.stat(port).st_gid).gr_name
+    except (ImportError, KeyError, OSError):
+        return "often dialout"

@@ -1,0 +1,73 @@
+"""Liu et al. 2011, Fig. 7: the error of each frame of one walk and one jump."""
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+
+import numpy as np
+
+from harness.results.findings import Claim, Experiment, Lines, Table
+from harness.study.papers.claims import errs_less
+from harness.study.papers.leave_one_out import METHODS, OURS, differences
+from harness.study.papers.paper_study import Study
+from harness.study.papers.tables import by_clip, error_lines
+
+RUN, INPUTS = "leave_one_out", "pos+ori"
+_JUDGED = (OURS, "local_pca", "ik")
+
+
+def frame_by_frame(study: Study) -> Experiment:
+    """Of the first walk and the first jump that the scenario lists: fixed before anything was run."""
+    claims: list[Claim] = []
+    rows: list[tuple[str, ...]] = []
+    figures: list[Lines] = []
+    for behaviour in ("walking", "jumping"):
+        motion = study.runs[RUN].motion
+        where = {"behaviour": behaviour, "inputs": INPUTS, "clip": motion.test[motion.behaviours.index(behaviour)]}
+        title = f"{behaviour}, {where['clip']}"
+        errors = {method: by_clip(study.rows(RUN, method=method, **where)) for method in METHODS}
+        claims += [
+            errs_less(f"{title}: {less} errs less than {more}", errors[less], errors[more])
+            for less, more in pairwise(_JUDGED)
+        ]
+        cells = {cell.method: cell for cell in study.cells(RUN, **where)}
+        if cells:
+            lines = error_lines(
+                title, {m: cells[m] for m in METHODS if m in cells}, caption="Joint angles, each frame."
+            )
+            figures.append(lines)
+            rows += _statistics(title, lines.series)
+    return Experiment(
+        name="frame_by_frame",
+        title="Frame by frame: one walk and one jump (Fig. 7)",
+        question=(
+            "How do errors run over time? The paper draws the error of each frame of one walking and one jumping "
+            "sequence for its method, local PCA and IK, without figures."
+        ),
+        differences=(
+            "The sequences are the first walk and the first jump of the list of clips; the paper's are its own. Both "
+            "positions and orientations are used; the paper's choice is not known.",
+            *differences(study),
+        ),
+        claims=tuple(claims),
+        tables=(
+            Table(
+                "Over the frames of each sequence",
+                ("sequence", "method", "mean [deg]", "95th percentile", "largest", f"frames where {OURS} errs less"),
+                tuple(rows),
+            ),
+        ),
+        figures=tuple(figures),
+        runs=(RUN,),
+        notes=("One sequence tells nothing of others: the order is judged over clips in the experiments before.",),
+    )
+
+
+def _statistics(title: str, series: Mapping[str, tuple[float | None, ...]]) -> Iterator[tuple[str, ...]]:
+    values = {method: np.array(column, dtype=float) for method, column in series.items()}
+    for method, column in values.items():
+        known = column[np.isfinite(column)]
+        figures = known.mean(), np.quantile(known, 0.95), known.max()
+        ours = values.get(OURS)
+        both = np.isfinite(column) & np.isfinite(ours) if ours is not None and method != OURS else None
+        below = "" if both is None or ours is None else f"{np.mean(ours[both] < column[both]):.0%}"
+        yield (title, method, *(f"{figure:.2f}" for figure in figures), below)

@@ -1,0 +1,26 @@
+"""Kim, Seol and Lee 2012, every experiment rerun (docs/methods.md B; scenarios/papers/kim2012).
+
+What claims are judged by was written down before anything was run. The paper prints no error as a number: its orders,
+and what it calls suitable, are held against intervals over clips.
+"""
+
+from functools import partial
+
+from harness.study.papers.five_stations import five_trackers
+from harness.study.papers.paper import Paper
+from harness.study.papers.published_speed import KIM2012, speed
+from harness.study.papers.sparse_database import extrapolation, sparse
+from harness.study.papers.station_choice import one_tracker, sensors
+
+PAPER = Paper(
+    "kim2012",
+    "Kim, Seol, Lee: Realtime performance animation using sparse 3D motion sensors, 2012",
+    experiments={
+        "sensors": sensors,
+        "sparse": sparse,
+        "extrapolation": extrapolation,
+        "one_tracker": one_tracker,
+        "five_trackers": five_trackers,
+        "speed": partial(speed, published=KIM2012),
+    },
+)

@@ -1,0 +1,264 @@
+"""A study of where trackers go, as its TOML file has it: candidates, what is tried, where else, and what papers say."""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from harness.compare.margins import MARGINS
+from harness.core.fields import build, changed
+from harness.core.options import alternatives
+from harness.core.package_data import share_folder
+from harness.errors import BadFile, BadInput, UnknownName
+from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario, shipped_placements
+from harness.score.metrics import DEFINITIONS
+from harness.study.placement.candidates import Candidate, Grid, Unit, chosen, units_of
+
+MOST_STATIONS = 12
+"""Of an IS-900 (docs/is900.md)."""
+
+
+@dataclass(frozen=True)
+class Ablate:
+    """Each unit left out of a set."""
+
+    full: tuple[str, ...] = ()
+    """Names of candidates, or of pairs; all of them by default."""
+
+
+@dataclass(frozen=True)
+class Add:
+    """Each unit added to a set."""
+
+    base: tuple[str, ...] = ()
+    of: tuple[str, ...] = ()
+    """What is added; by default every candidate."""
+
+
+@dataclass(frozen=True)
+class Greedy:
+    """One unit after another, each time the one that helps most."""
+
+    most: int
+    """Stations at the end."""
+    base: tuple[str, ...] = ()
+    of: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Exhaustive:
+    """Every set."""
+
+    most: int
+    """Stations."""
+    fewest: int = 1
+    of: tuple[str, ...] = ()
+    most_cells: int = 5000
+    """More are refused."""
+
+
+@dataclass(frozen=True)
+class Refine:
+    """The stations of a set moved along and around their bones, step by step."""
+
+    set: tuple[str, ...] = ()
+    """By default the best set of `size` stations that was tried."""
+    size: int = 0
+    along: tuple[float, ...] = (0.2, 0.1)
+    """Steps, the largest first, as shares of the bone's length."""
+    around_deg: tuple[float, ...] = (45.0, 22.5)
+    """As many [deg]."""
+    most_moves: int = 6
+
+
+@dataclass(frozen=True)
+class Condition:
+    """The same sets of trackers elsewhere."""
+
+    name: str
+    scenario: str = ""
+    """Another one, to which the study's own changes are not made; by default the study's with its changes."""
+    methods: tuple[str, ...] = ()
+    changes: dict[str, Any] = field(default_factory=dict)
+    """See `PlacementStudy`."""
+
+
+@dataclass(frozen=True)
+class Published:
+    """That a set suffices: that none of its size serves better, and that all candidates serve hardly better."""
+
+    text: str
+    """Such as "walking: both ankles and the pelvis suffice"."""
+    source: str
+    set: tuple[str, ...]
+    among: tuple[str, ...] = ()
+    """The candidates that the source knows, from which sets of as many are formed; by default all."""
+    margin: float = 0.1
+    """All of them err less by no more than this share of their error."""
+    why_not: str = ""
+    """What is known where it does not hold."""
+
+
+@dataclass(frozen=True)
+class PlacementStudy:
+    """What `harness placement` reads."""
+
+    name: str
+    kind: Literal["placement"]
+    title: str
+    scenario: str
+    """A file beside the study without its `.toml`, or a shipped scenario: motion, body, calibration, noise, tracker and
+    seed are its. Its stations, methods, inputs and what it varies are not used."""
+    methods: tuple[str, ...]
+    """What is minimised is the mean of their errors."""
+    schema: int = SCHEMA
+    metric: str = "joint_angle_mean_deg"
+    inputs: str = "pos+ori"
+    held_out: tuple[str, ...] = ()
+    """Clips on which nothing is chosen: what was chosen on the scenario's test clips is judged on these."""
+    link: bool = False
+    """So many stations run at the rate that the line carries them, at most the scenario's."""
+    changes: dict[str, Any] = field(default_factory=dict)
+    """To the scenario, such as changes.noise = "clean"; changes.components switches on slipping straps and flesh that
+    wobbles."""
+    candidate: tuple[Candidate, ...] = ()
+    grid: tuple[Grid, ...] = ()
+    ablate: Ablate | None = None
+    add: Add | None = None
+    greedy: Greedy | None = None
+    exhaustive: Exhaustive | None = None
+    refine: Refine | None = None
+    condition: tuple[Condition, ...] = ()
+    condition_size: int = 3
+    """The sets of so many stations that every condition ranks."""
+    claim: tuple[Published, ...] = ()
+
+    def units(self) -> tuple[Unit, ...]:
+        return units_of((*self.candidate, *self.grid))
+
+
+def find_study(path: Path | str) -> Path:
+    """A file as named, or a shipped study by its bare name."""
+    given = Path(path)
+    if given.is_file():
+        return given
+    shipped = {file.stem: file for file in shipped_placements()}
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
+        return shipped[given.stem]
+    if given.parent == Path() and not given.suffix:
+        raise UnknownName("placement study", str(path), shipped)
+    raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are scenarios/placement_*.toml.")
+
+
+def load_study(path: Path | str) -> PlacementStudy:
+    """BadFile and UnknownName name the place."""
+    path = find_study(path)
+    expected, advice = "a placement study", "See scenarios/placement_walking.toml."
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise BadFile(path, f"not TOML: {error}", expected, advice) from error
+    if content.get("kind") != "placement":
+        raise BadFile(path, f"kind = {content.get('kind', 'scenario')!r}", f'{expected}, kind = "placement"', advice)
+    content.setdefault("name", path.stem)
+    try:
+        study = build(PlacementStudy, content, "study")
+        study = replace(study, methods=tuple(name for text in study.methods for name in alternatives(text)))
+    except (TypeError, ValueError) as error:
+        raise BadFile(path, str(error), expected, advice) from error
+    if fault := _fault(study):
+        raise BadFile(path, *fault)
+    _check_names(study)
+    return study
+
+
+def _fault(study: PlacementStudy) -> tuple[str, str, str] | None:
+    """What types cannot say: what was found, what is expected, what to try."""
+    if study.schema != SCHEMA:
+        return f"schema {study.schema}", f"schema {SCHEMA}", "This version of the harness reads no other."
+    if study.name != Path(study.name).name:
+        return f"name = {study.name!r}", "a plain name", "Results are written to a folder of that name."
+    if not study.methods:
+        return "no methods", "names in methods", "`harness list` names them."
+    if study.metric not in DEFINITIONS:
+        raise UnknownName("metric", study.metric, MARGINS)
+    if study.metric not in MARGINS:
+        return f"metric = {study.metric!r}", "one that says how good an estimate is", f"Such are {', '.join(MARGINS)}."
+    if not (study.ablate or study.add or study.greedy or study.exhaustive or study.refine):
+        return "nothing to try", "[ablate], [add], [greedy], [exhaustive] or [refine]", "docs/studies.md explains them."
+    if study.refine and (not study.refine.along or len(study.refine.along) != len(study.refine.around_deg)):
+        return "refine: steps along and around", "as many of both, one at least", "They are taken in pairs."
+    if study.refine and min(*study.refine.along, *study.refine.around_deg) <= 0.0:
+        return "refine: a step that is not above 0", "steps above 0", "Leave `refine` out, or name larger steps."
+    for mode, table in (("greedy", study.greedy), ("exhaustive", study.exhaustive)):
+        if table and not 1 <= table.most <= MOST_STATIONS:
+            return f"{mode}.most = {table.most}", f"1 to {MOST_STATIONS} stations", "An IS-900 has no more."
+    names = [condition.name for condition in study.condition]
+    if len(set(names)) < len(names) or not all(names):
+        return f"conditions called {', '.join(names)}", "names of their own", "Rename one."
+    if len(set(study.held_out)) < len(study.held_out):
+        return "held_out names a clip twice", "each clip once", "Remove the second."
+    return None
+
+
+def _check_names(study: PlacementStudy) -> None:
+    """That every set is of candidates, and can be worn."""
+    units = study.units()
+    asked: list[tuple[str, tuple[str, ...]]] = [("ablate.full", study.ablate.full)] if study.ablate else []
+    for mode, table in (("add", study.add), ("greedy", study.greedy)):
+        asked += [(f"{mode}.base", table.base), (f"{mode}.of", table.of)] if table else []
+    asked += [("exhaustive.of", study.exhaustive.of)] if study.exhaustive else []
+    asked += [("refine.set", study.refine.set)] if study.refine else []
+    for claim in study.claim:
+        asked += [(f"the claim {claim.text!r}", claim.set), (f"the claim {claim.text!r}", claim.among)]
+    for where, names in asked:
+        found = chosen(names, units, where)
+        if where in ("ablate.full", "add.base", "refine.set") and names:
+            fits(sum(map(len, found)), where)
+
+
+def fits(stations: int, where: str) -> None:
+    """BadInput when nobody can wear so many."""
+    if not 1 <= stations <= MOST_STATIONS:
+        raise BadInput(f"{where}: {stations} stations.", f"An IS-900 has 1 to {MOST_STATIONS}: name some candidates.")
+
+
+def base_scenario(study: PlacementStudy, beside: Path, condition: Condition | None = None) -> Scenario:
+    """What the trackers are tried in: the scenario with the changes, all candidates as its stations, nothing varied."""
+    elsewhere = condition is not None and bool(condition.scenario)
+    named = condition.scenario if condition is not None and elsewhere else study.scenario
+    scenario = load_scenario(_scenario_file(named, beside))
+    methods = (condition.methods if condition is not None else ()) or study.methods
+    stations = {}
+    for unit in study.units():
+        for one in unit:
+            stations[one.name] = {"bone": one.bone, "along": one.along, "around_deg": one.around_deg}
+            stations[one.name]["stand_off_m"] = one.stand_off_m
+    scenario = replace(scenario, vary={}, order=(), worn=(), stations={}, inputs=(study.inputs,), methods=methods)
+    for where, content in (
+        ("stations", {"stations": stations}),
+        ("changes", {} if elsewhere else study.changes),
+        (f"changes of {condition.name!r}" if condition else "", condition.changes if condition else {}),
+    ):
+        scenario = _with(scenario, content, where)
+    check_scenario(Path(named), scenario)
+    return scenario
+
+
+def _with(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
+    if strange := [key for key in ("name", "methods", "inputs", "vary", "worn", "order") if key in content]:
+        raise BadInput(f"{where}: {', '.join(strange)}.", "The study has its own.")
+    try:
+        return changed(scenario, content, where)
+    except (TypeError, ValueError) as error:
+        raise BadInput(f"{error}.", "Values are those that the scenario's own keys may have.") from error
+
+
+def _scenario_file(name: str, beside: Path) -> Path | str:
+    """Beside the study, or shipped."""
+    for folder in (beside, share_folder("scenarios")):
+        file = folder / (name if name.endswith(".toml") else f"{name}.toml")
+        if file.is_file():
+            return file
+    return name

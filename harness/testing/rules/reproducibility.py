@@ -1,0 +1,101 @@
+"""Rules about answers that must be the same to the bit: again, beside another session, elsewhere, whatever follows."""
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.calibration import Calibration
+from harness.core.estimate import Estimate
+from harness.core.workers import call_each
+from harness.reconstruct.contract import Reconstructor, Session
+from harness.testing.contract_case import FRAMES, Frames, Trial, moved, qpos_of, told, turned
+from harness.testing.rules.assertions import same
+
+
+def is_deterministic(trial: Trial) -> str:
+    """The same examples and frames give the same answers."""
+    once, again = (qpos_of(told(trial.begun(1)[0], trial.frames)) for _ in range(2))
+    return same(once, again)
+
+
+def starts_from_nothing(trial: Trial) -> str:
+    """A session knows nothing of the one before it."""
+    reconstructor = trial.fitted()
+    once, again = (qpos_of(told(reconstructor.begin(trial.calibration), trial.frames)) for _ in range(2))
+    return same(once, again)
+
+
+def keeps_sessions_apart(trial: Trial) -> str:
+    """A session knows nothing of one beside it, whose frames run backwards."""
+    alone, ours, other = trial.begun(3)
+    plain, beside = qpos_of(told(alone, trial.frames)), []
+    for mine, theirs in zip(trial.frames, reversed(trial.frames), strict=True):
+        beside.append(ours.step(mine))
+        other.step(theirs)
+    return same(plain, qpos_of(beside))
+
+
+def bears_threads(trial: Trial) -> str:
+    """Two sessions step at the same moment, each in a thread of its own."""
+    alone, *both = trial.begun(3)
+    plain = qpos_of(told(alone, trial.frames))
+    together = threading.Barrier(len(both))
+    answers: list[list[Estimate]] = [[] for _ in both]
+    errors: list[BaseException] = []
+
+    def follow(session: Session, into: list[Estimate]) -> None:
+        try:
+            for frame in trial.frames:
+                together.wait()
+                into.append(session.step(frame))
+        except BaseException as error:  # told by the caller's thread
+            errors.append(error)
+            together.abort()
+
+    threads = [threading.Thread(target=follow, args=pair) for pair in zip(both, answers, strict=True)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for error in errors:
+        if not isinstance(error, threading.BrokenBarrierError):
+            raise error
+    for said in answers:
+        same(plain, qpos_of(said))
+    return "2 threads"
+
+
+def bears_another_process(trial: Trial) -> str:
+    """What was fitted is sent to another process, where it answers as it does here."""
+    task = trial.fitted(), trial.calibration, trial.frames
+    ((_, there),) = call_each(answers, [task], 1)
+    return same(answers(*task), there.result())
+
+
+def is_causal(trial: Trial) -> str:
+    """What comes later changes nothing that was said before; answers are read again once all is over."""
+    half = FRAMES // 2
+    later = [
+        replace(
+            turned(moved(frame, np.array([0.3, 0.3, 0.3])), 0.5),
+            received_s=frame.received_s + 0.1,
+            measured_s=frame.measured_s + 0.1,
+        )
+        for frame in trial.frames[half:]
+    ]
+    one, other = trial.begun(2)
+    spoken, estimates = [], []
+    for frame in trial.frames:
+        estimates.append(one.step(frame))
+        spoken.append(np.array(estimates[-1].qpos))
+    perturbed = qpos_of(told(other, [*trial.frames[:half], *later]))
+    plain = qpos_of(estimates)
+    same(plain[:half], perturbed[:half], "changed by later frames")
+    return same(np.array(spoken), plain, "changed after they were given")
+
+
+def answers(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
+    """(F, 55) of a new session."""
+    return qpos_of(told(fitted.begin(calibration), frames))
