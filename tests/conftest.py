@@ -9,6 +9,8 @@ from hypothesis import settings
 
 from harness.core.seeds import generator
 
+pytest_plugins = ["tests.scored_run"]
+
 settings.register_profile("fixed", derandomize=True)
 settings.load_profile("fixed")
 """The same examples in every run, so that a change is judged by what it changed; `--hypothesis-profile=default`, as
@@ -17,8 +19,8 @@ settings.load_profile("fixed")
 
 @pytest.fixture
 def rng(request: pytest.FixtureRequest) -> np.random.Generator:
-    """A generator of this test's own, the same in every run."""
-    return generator(1, request.node.nodeid)
+    """A generator that is seeded by the name of the test, so that moving a file changes no draw."""
+    return generator(1, request.node.name)
 
 
 @pytest.fixture(scope="session")

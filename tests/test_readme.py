@@ -31,7 +31,7 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     short_demo(tmp_path / "demo")
     code, gate = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
     assert len(code.splitlines()) < 40
-    assert 'harness_gate("upright:Upright"' in gate  # tests/testing/test_gate.py runs one
+    assert 'harness_gate("upright:Upright"' in gate  # tests/testing/test_regression_gate.py runs one
     (tmp_path / "upright.py").write_text(code)
     command = next(c for c in re.findall(r"`harness (run demo --methods [^`]*)`", README))
     monkeypatch.chdir(tmp_path)

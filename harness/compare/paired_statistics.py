@@ -4,7 +4,7 @@ The interval is the bias-corrected and accelerated bootstrap (BCa, Efron 1987) o
 study would draw anew; the frames of a clip are no independent witnesses. On few clips it is too narrow: nominal 95 %
 hold the truth in 83 to 91 % of simulated studies of 6 to 12 clips. Its level is therefore expanded by what a t interval
 is wider than a normal one of the 1/n variance (Hesterberg 2015, "expanded percentile"): 89 to 95 %, by how skewed and
-how heavy-tailed the differences are, 92 to 95 % for normal ones. `tests/score/test_paired.py` (slow) measures it.
+how heavy-tailed the differences are, 92 to 95 % for normal ones. `tests/compare/test_paired_statistics.py` (slow) measures it.
 """
 
 from collections.abc import Mapping

@@ -14,7 +14,7 @@ from harness.errors import BadFile, BadInput
 from harness.mocap import fetch
 from harness.mocap.fetch import fetch_cmu, sha256_of, shipped_sha256
 from harness.mocap.library import MotionLibrary
-from tests.mocap.synthetic import clip, write_clip
+from tests.mocap.sample_files import clip, write_clip
 
 
 class Site:

@@ -15,7 +15,7 @@ from harness.mocap.read import amass, bvh
 from harness.mocap.read.acclaim import read_amc, read_asf
 from harness.mocap.read.c3d_header import check_header
 from harness.mocap.read.joint_clip import JointClip
-from tests.mocap.synthetic import amass_arrays, amc_text, asf_text, bvh_text, clip
+from tests.mocap.sample_files import amass_arrays, amc_text, asf_text, bvh_text, clip
 
 SKELETON = standard_skeleton()
 QUICK = settings(

@@ -7,7 +7,7 @@ import pytest
 
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.library import MotionLibrary
-from tests.mocap.synthetic import amass_arrays, asf_text, bvh_text, clip, write_clip
+from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, write_clip
 
 INDEX = "path,subject,trial,behaviour,frames,fps,note\n91/91_01.amc,91,01,walking,24,60,limps\n"
 

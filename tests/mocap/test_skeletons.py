@@ -9,7 +9,7 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput
 from harness.mocap import synthetic
 from harness.mocap.skeletons import skeletons
-from tests.mocap.synthetic import asf_text
+from tests.mocap.sample_files import asf_text
 
 
 def test_copies_count_once_and_lengths_come_back_in_metres(tmp_path: Path) -> None:

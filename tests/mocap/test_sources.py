@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.mocap import synthetic
 from harness.mocap.sources import PEOPLE, open_source
-from tests.mocap.synthetic import asf_text
+from tests.mocap.sample_files import asf_text
 
 
 def test_a_library_s_people_are_its_skeletons_but_one(tmp_path: Path) -> None:

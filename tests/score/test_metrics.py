@@ -17,7 +17,7 @@ from harness.score import angles, contact, positions, timing
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.pair import Pair, hinged_bones, posed
 from harness.score.score import score
-from tests.score.conftest import FRAMES, RATE_HZ, Judge
+from tests.scored_run import FRAMES, RATE_HZ, Judge
 
 SKELETON = standard_skeleton()
 OWN_VALUE = ("jitter_m_s3", "foot_skate_mm_s", "penetration_mm", "float_mm")

@@ -1,0 +1,202 @@
+"""Held poses found in streams: all of them, in their order, whatever a performer does in between."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from harness.body import humanoid
+from harness.body.mounts import DEFAULTS
+from harness.body.retargeting import to_own_body
+from harness.calibrate.guided_calibration import HoldPoses
+from harness.calibrate.hold import stood_still
+from harness.calibrate.pose_classifier import Likeness
+from harness.calibrate.pose_collector import PoseCollector
+from harness.calibrate.poses import POSES, configuration
+from harness.core.arrays import Floats
+from harness.core.humanoid24 import pack, unpack
+from harness.core.seeds import generator
+from harness.mocap import synthetic
+from harness.simulate.held_poses import hold_times_s, holding
+from harness.simulate.noise import level
+from harness.simulate.simulation import TrackerConfig, simulate
+from harness.stream.frame import TrackerFrame
+from tests.calibrate.test_tpose_calibration import changed
+
+SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
+FOUR = ("left_hand", "right_hand", "left_ankle", "right_ankle")
+RATE_HZ = 25.0
+
+
+@cache
+def body() -> humanoid.Body:
+    return humanoid.build()
+
+
+def pose(number: int) -> Floats:
+    return configuration(POSES[number], body().skeleton)
+
+
+def arms_down() -> Floats:
+    """Somebody who rests."""
+    root_m, turn, angles_rad = unpack(pose(0)[None])
+    names = body().skeleton.dof_names
+    angles_rad[0, names.index("lhumerus.rz")] += np.deg2rad(75.0)
+    angles_rad[0, names.index("rhumerus.rz")] -= np.deg2rad(75.0)
+    return pack(root_m[0], turn[0], angles_rad[0])
+
+
+def stream(
+    configurations: Sequence[Floats],
+    stations: Sequence[str] = SIX,
+    noise: str = "default",
+    miss_deg: float = 2.5,
+    seed: int = 1,
+    who: humanoid.Body | None = None,
+) -> list[TrackerFrame]:
+    whose = who or body()
+    rng = generator(seed, "held")
+    take = holding(whose, configurations, miss_rad=float(np.deg2rad(miss_deg)), rng=rng, rate_hz=50.0)
+    mounts = [DEFAULTS[name] for name in stations]
+    return list(simulate(whose, take, mounts, TrackerConfig(rate_hz=RATE_HZ), level(noise), seed=seed).frames)
+
+
+@cache
+def eight(noise: str = "default") -> tuple[TrackerFrame, ...]:
+    return tuple(stream([pose(n) for n in range(8)], noise=noise))
+
+
+@cache
+def likeness(stations: tuple[str, ...] = SIX) -> Likeness:
+    return Likeness(body(), [DEFAULTS[name] for name in stations], [pose(n) for n in range(8)])
+
+
+def collected(
+    frames: Sequence[TrackerFrame], stations: tuple[str, ...] = SIX, *, blind: bool = False
+) -> tuple[PoseCollector, list[int]]:
+    """The collector after all frames, and what it said when."""
+    collector = PoseCollector(stations, 8, None if blind else likeness(stations))
+    said = [collector.add(frame) for frame in frames]
+    return collector, [number for number in said if number is not None]
+
+
+@pytest.mark.parametrize(("noise", "blind"), [("clean", False), ("default", True)])
+def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
+    collector, said = collected(eight(noise), blind=blind)
+    assert said == list(range(1, 9))
+    assert collector.done
+    assert not collector.passed
+    first_s = eight(noise)[0].received_s
+    for held, began_s, (from_s, to_s) in zip(collector.held, collector.began_s, hold_times_s(8), strict=True):
+        assert from_s - 0.3 < began_s < from_s + 0.6  # before it, the last bit of a movement is slow
+        assert held[-1].received_s - first_s < to_s + 0.1
+        still = stood_still(held, SIX)  # which is what it is for
+        if noise == "clean":
+            off_m = np.linalg.norm([frame.position_m - still.position_m for frame in held], axis=2)
+            assert off_m[~np.array([frame.suspect for frame in held])].max() < 0.035
+            assert np.median(off_m.max(axis=1)) < 1e-4
+
+
+@pytest.mark.parametrize(("stations", "miss_deg"), [(SIX, 5.0), (FOUR, 2.5), (FOUR, 5.0)])
+def test_poor_poses_of_other_people_are_taken(stations: tuple[str, ...], miss_deg: float) -> None:
+    """Nothing is known of the performer."""
+    clip = synthetic.generate("walking", "p3", 1, seed=1, duration_s=3.0)
+    who = to_own_body(clip)[0]
+    poses = [configuration(one, who.skeleton) for one in POSES]
+    _, said = collected(stream(poses, stations, miss_deg=miss_deg, seed=3, who=who), stations)
+    assert said == list(range(1, 9))
+
+
+@pytest.mark.parametrize("place", [0, 3, 8])
+def test_a_rest_is_no_pose(place: int) -> None:
+    poses = [pose(n) for n in range(8)]
+    frames = stream([*poses[:place], arms_down(), *poses[place:]])
+    collector, said = collected(frames)
+    assert said == list(range(1, 9))
+    (passed,) = collector.passed
+    assert passed.began_s == pytest.approx(4.5 * place, abs=0.6)
+    stills = [stood_still(held, SIX) for held in collector.held]
+    assert [likeness().nearest(still, stills[0]) for still in stills] == list(range(8))
+    wanted = "all 8 poses were taken before" if place == 8 else f"pose {place + 1} is wanted"
+    assert wanted in passed.why
+
+
+def test_a_repeated_pose_and_one_too_early_are_told() -> None:
+    order = [0, 1, 2, 1, 4, 3, 4, 5, 6, 7]
+    collector, said = collected(stream([pose(n) for n in order]))
+    assert said == list(range(1, 9))
+    assert [passed.why for passed in collector.passed] == [
+        "that looks like pose 2, and pose 4 is wanted",
+        "that looks like pose 5, and pose 4 is wanted",
+    ]
+
+
+@pytest.mark.parametrize("count", [7, 9])
+def test_another_number_of_holds(count: int) -> None:
+    poses = [pose(n % 8) for n in range(count)]
+    collector, _ = collected(stream(poses), blind=True)
+    assert collector.done == (count == 9)
+    assert len(collector.passed) == count - len(collector.held)
+    if count == 9:
+        assert collector.passed[0].began_s == pytest.approx(36.0, abs=0.6)
+        assert str(collector.passed[0]).endswith("s on: all 8 poses were taken before")
+
+
+def test_whoever_stops_early_is_told_what_there_was() -> None:
+    frames = eight()[: round(12.0 * RATE_HZ)]
+    told: list[str] = []
+    leading = HoldPoses(PoseCollector(SIX, 8, likeness()), POSES)
+    with pytest.raises(Exception, match="3 of 8 poses were held") as caught:
+        leading.lead(frames, told.append)
+    assert repr(POSES[3].name) in str(caught.value)
+    assert next(line for line in told if "taken" in line) == "pose 1 of 8 taken, held from 0.3 s on"
+    assert POSES[0].instruction in told[0]
+
+
+def test_whoever_walks_holds_nothing() -> None:
+    who, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=8.0, rate_hz=60.0))
+    mounts = [DEFAULTS[name] for name in SIX]
+    frames = simulate(who, take, mounts, TrackerConfig(rate_hz=RATE_HZ), level("default"), seed=1).frames
+    collector, said = collected(frames, blind=True)
+    assert not said
+    assert not collector.passed
+    assert collector.told.startswith("hold still: ")
+
+
+def between(frames: Sequence[TrackerFrame], from_s: float, to_s: float) -> list[int]:
+    """Numbers of the frames of some time, since the first."""
+    return [n for n, f in enumerate(frames) if from_s <= f.received_s - frames[0].received_s < to_s]
+
+
+def test_a_station_that_is_not_seen_is_named_and_waited_for() -> None:
+    frames = list(eight())
+    lost = between(frames, 4.5, 7.5)
+    silent = {"position_valid": False, "orientation_valid": False, "position_m": np.nan}
+    frames[lost[0] : lost[-1] + 1] = changed(frames[lost[0] : lost[-1] + 1], 2, **silent)
+    collector, told = PoseCollector(SIX, 8, likeness()), set()
+    for frame in frames:
+        collector.add(frame)
+        told.add(collector.told)
+    assert len(collector.held) == 1
+    assert "pose 3, and pose 2 is wanted" in collector.passed[0].why
+    assert any("'left_ankle' was silent or lost" in line for line in told)
+
+
+def test_short_losses_and_echoes_are_no_matter(rng: np.random.Generator) -> None:
+    frames = list(eight())
+    for number in rng.choice(len(frames), len(frames) // 5, replace=False).tolist():
+        values = {"position_valid": False} if number % 2 else {"position_m": [7.0, 0.0, 0.0]}
+        frames[number] = changed([frames[number]], int(rng.integers(6)), **values)[0]
+    _, said = collected(frames)
+    assert said == list(range(1, 9))
+
+
+def test_nothing_is_held_across_a_gap() -> None:
+    """Nobody knows what was done in it."""
+    frames = [frame for frame in eight() if frame.received_s < 2.0]
+    later = [replace(frame, received_s=frame.received_s + 60.0) for frame in frames]
+    collector, said = collected([*frames, *later])
+    assert not said
+    assert not collector.held

@@ -1,0 +1,131 @@
+"""`harness compare` and `harness baseline` as a user meets them: every exit code, JSON, the page, advice."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.results.reader import Judged
+from tests.compare.sides import manifest, side, write_run
+from tests.compare.test_comparison import ANGLE, STEADY, TORN
+
+SIDES = {
+    "main": side(),
+    "again": side(),
+    "worse": side(methods={"ik": STEADY}),
+    "torn": side(methods={"ik": TORN}),
+    "few": side(clips=5),
+    "other": side(scenario="other"),
+    "faster": side(defined_by={"tracker": {"rate_hz": 60.0, "items": [40, 2]}}),
+    "part": side(metrics={"frames_matched": 150}),
+    "holes": side(failed=["ik on walk_99"]),
+    "empty": Judged("empty", manifest(), (), 0),
+    "two": side(methods={"ik": 1.0, "mean_pose": STEADY}),
+}
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("sides")
+    for name, judged in SIDES.items():
+        write_run(folder / name, judged)
+    return folder
+
+
+@pytest.fixture
+def here(runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The place of work, with a run for each of the sides."""
+    monkeypatch.chdir(runs)
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "word", "said"),
+    [
+        ("main again", 0, "pass", "B is no worse than A"),
+        ("main worse", 1, "regressed", "B is worse than A"),
+        ("worse main", 0, "pass", "better"),
+        ("main torn", 3, "not comparable", "the interval holds zero"),
+        ("few few", 3, "not comparable", "too few clips: 5, of at least 6"),
+        ("main other", 3, "not comparable", "scenario: demo against other"),
+        ("main empty", 3, "not comparable", "no cell of A has a partner in B"),
+        ("main faster", 3, "not comparable", "tracker.rate_hz: 40 against 60"),
+        ("main faster --allow tracker.rate_hz", 0, "pass", "tracker.rate_hz: 40 against 60"),
+        ("main faster --allow", 0, "pass", "tracker.rate_hz"),
+        ("main other --allow scenario", 0, "pass", "no worse"),
+        ("main part", 3, "not comparable", "1200 of 1600 frames in B"),
+        ("main part --allow coverage", 0, "pass", "no worse"),
+        ("main few", 3, "not comparable", "3 cells are only in A"),
+        ("main holes", 4, "incomplete", "ik on walk_99"),
+        ("two --methods ik,mean_pose", 1, "regressed", "ik vs mean_pose"),
+        ("two --methods mean_pose,ik", 0, "pass", "mean_pose vs ik"),
+        ("main two --methods ik", 0, "pass", "no worse"),
+    ],
+)
+def test_exit_codes_and_words(
+    words: str, code: int, word: str, said: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["compare", "--metrics", ANGLE, *words.split()]) == code
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1] == word
+    assert said in "\n".join(lines)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("main", "--methods a,b"),
+        ("main nowhere", "no folder or baseline called 'nowhere'"),
+        ("main no/where", "no such folder"),
+        ("main again --metrics joint_angel_mean_deg", "Did you mean 'joint_angle_mean_deg'"),
+        ("main again --methods ki", "no method in main called 'ki'"),
+        ("main again --methods a,b,c", "names 3 methods"),
+        ("main faster --allow traker", "Did you mean 'tracker'"),
+    ],
+)
+def test_what_is_refused_says_why(words: str, said: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", *words.split()]) == 2
+    ended = capsys.readouterr()
+    assert ended.out.splitlines() == ["refused"]
+    assert said in ended.err
+    assert len(ended.err.splitlines()) == 1
+
+
+def test_an_interrupt_says_so(here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*given: object, **named: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("harness.compare.comparison.compare", interrupted)
+    assert main(["compare", "main", "again"]) == 130
+    assert capsys.readouterr().out.splitlines() == ["interrupted"]
+
+
+def test_a_baseline_is_saved_and_compared_by_its_name(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["baseline", "save", "yesterday", "main"]) == 0
+    assert capsys.readouterr().out.splitlines() == ["baseline: results/baselines/yesterday", "pass"]
+    assert main(["compare", "yesterday", "again", "--metrics", ANGLE]) == 0
+    assert main(["compare", "yesterday", "worse", "--metrics", ANGLE]) == 1
+    capsys.readouterr()
+    assert main(["baseline", "save", "yesterday", "worse"]) == 2
+    assert "--force" in capsys.readouterr().err
+    assert main(["baseline", "save", "yesterday", "worse", "--force", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"baseline": "results/baselines/yesterday", "outcome": "pass"}
+    assert main(["compare", "yesterday", "worse", "--metrics", ANGLE]) == 0
+    assert main(["baseline", "save", "../yesterday", "main"]) == 2
+    assert main(["baseline", "save", "holes", "holes"]) == 2
+    assert [path.name for path in (here / "results" / "baselines").iterdir()] == ["yesterday"]
+
+
+def test_json_has_every_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "main", "worse", "--metrics", ANGLE, "--json"]) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert said["outcome"] == "regressed"
+    (line,) = [line for line in said["differences"] if line["gated"]]
+    assert (line["verdict"], line["metric"], len(line["clips"])) == ("worse", ANGLE, 8)
+
+
+def test_a_page_is_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "main", "worse", "--metrics", ANGLE, "--html", "pages/worse.html"]) == 1
+    assert "page: pages/worse.html" in capsys.readouterr().out
+    assert "B is worse than A" in (here / "pages" / "worse.html").read_text()

@@ -1,0 +1,298 @@
+"""`harness record` and `harness replay` as a user meets them."""
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.experiment.playback import Rehearsal, rehearse
+from harness.stream.codec.blocks import CONFIGURED, HEADER, RECEIVED
+from harness.stream.driver import Is900, Wanted
+from harness.stream.emulator import EmulatorConfig, serving
+from harness.stream.recording.frame_table import COLUMNS
+from harness.stream.recording.recording import RecordingWriter, read_recording
+from harness.stream.recording.replay import RecordingStream
+from tests.interrupts import heeding_interrupts
+from tests.stream.recording.test_recording import newer
+from tests.stream.wire import same
+
+HARNESS = [sys.executable, "-m", "harness.cli"]
+CLIP = "boxing_p1_01"
+
+
+@pytest.fixture(scope="module")
+def played() -> Rehearsal:
+    return rehearse("demo", clip=CLIP, stations=4)
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("simulated") / "a.rec"
+    assert main(["record", "sim:demo", str(path), "--clip", CLIP, "--stations", "4", "--seconds", "1.49"]) == 0
+    return path
+
+
+@pytest.fixture
+def port(played: Rehearsal) -> Iterator[str]:
+    with serving(played.samples, tcp="127.0.0.1:0") as device:
+        yield device.name
+
+
+def refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    """The one line that a refusal says."""
+    capsys.readouterr()
+    assert main(words) == 2
+    said = capsys.readouterr()
+    assert said.out == "refused\n"
+    (line,) = said.err.splitlines()
+    return line
+
+
+def test_a_simulation_is_recorded_and_replayed(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    note = read_recording(simulated).note
+    assert (note["scenario"], note["clip"], note["seed"], note["rate_hz"]) == ("demo", CLIP, 1, 40.0)
+    assert main(["replay", str(simulated)]) == 0
+    text = capsys.readouterr().out
+    assert text.startswith("60 frames in 1.4")
+    assert text.endswith("pass\n")
+    for station in note["stations"]:
+        assert f"\n{station} " in text
+    assert main(["replay", str(simulated), "--json", "--speed", "100"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert (said["frames"], said["records"], said["lost"], said["outcome"]) == (60, 240, [], "pass")
+
+
+def test_frames_come_as_a_table(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(simulated), "--frames"]) == 0
+    said = capsys.readouterr()
+    *lines, word = said.out.splitlines()
+    assert word == "pass"
+    assert said.err.startswith("60 frames")
+    table = list(csv.DictReader(io.StringIO("\n".join(lines))))
+    frames = list(RecordingStream(simulated))
+    assert (tuple(table[0]), len(table)) == (COLUMNS, 4 * len(frames))
+    assert [float(row["x_m"]) for row in table[:4]] == frames[0].position_m[:, 0].tolist()
+    assert [float(row["received_s"]) for row in table[::4]] == [frame.received_s for frame in frames]
+    assert main(["replay", str(simulated), "--frames", "--json"]) == 0
+    *rows, last = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [row["qw"] for row in rows[:4]] == frames[0].tracker_from_station[:, 0].tolist()
+    assert last["outcome"] == "pass"
+
+
+def test_it_steps_by_lines_of_input(
+    simulated: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n\n"))
+    assert main(["replay", str(simulated), "--speed", "step", "--frames"]) == 0
+    assert len(capsys.readouterr().out.splitlines()) == 1 + 2 * 4 + 1
+
+
+def test_methods_are_scored_by_what_the_recording_says(simulated: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["replay", str(simulated), "--methods", "ik:previous"]) == 0
+    text = capsys.readouterr().out
+    assert f"played from demo, {CLIP}" in text
+    assert "ik:previous    20/20" in text
+    assert (
+        main(["replay", str(simulated), "--scenario", "demo", "--clip", CLIP, "--methods", "mean_pose", "--json"]) == 0
+    )
+    (judged,) = json.loads(capsys.readouterr().out)["methods"]
+    assert (judged["method"], judged["frames_matched"]) == ("mean_pose", 20)
+
+
+def test_damage_is_named_and_the_rest_is_played(
+    simulated: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = tmp_path / "cut.rec"
+    cut.write_bytes(simulated.read_bytes()[:-3])
+    assert main(["replay", str(cut)]) == 0
+    said = capsys.readouterr()
+    assert said.out.startswith("60 frames")
+    assert said.err.startswith("lost: the last 67 bytes are no whole block: cut off")
+
+
+def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    new, text, empty, bare = (tmp_path / name for name in ("new.rec", "a.txt", "empty.rec", "bare.rec"))
+    new.write_bytes(newer())
+    text.write_text("hello\n")
+    empty.touch()
+    bare.write_bytes(HEADER)
+    before = simulated.read_bytes()
+    for words, expected in (
+        (["replay", str(new)], "a recording of version 2; expected version 1 at most"),
+        (["replay", str(text)], "no recording; expected a recording by `harness record`"),
+        (["replay", str(empty)], "an empty file"),
+        (["replay", str(bare)], "the device was never set up in it"),
+        (["replay", str(tmp_path / "none.rec")], "no such file"),
+        (["replay", str(simulated), "--speed", "fast"], "Speed 'fast'. It is `step`, `max`, or a positive number"),
+        (["replay", str(simulated), "--methods", "il"], "no method called 'il'"),
+        (["replay", str(simulated), "--scenario", "dem"], "no scenario called 'dem'"),
+        (["replay", str(simulated), "--clip", "walking_p1_01", "--methods", "ik:previous"], "of another motion"),
+        (["record", "sim:dem", str(tmp_path / "b.rec")], "no scenario called 'dem'"),
+        (["record", "sim:demo", str(text)], "no recording"),
+        (["record", "sim:demo", str(new)], "a recording of version 2"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "13"], "13 stations of 6"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--seconds", "-1"], "--seconds -1."),
+        (["record", "sim:demo", str(simulated), "--clip", CLIP], "Record other stations into another file"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec")], "127.0.0.1:1"),
+        (["record", "/dev/nothing", str(tmp_path / "b.rec")], "there is no such port"),
+        (["record", str(tmp_path / "b.rec"), "/dev/null"], "The port comes first"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--seed", "3"], "--seed with tcp://127.0.0.1:1"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--baud", "9600"], "--baud with tcp://127.0.0.1:1"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--stations", ""], "names no station"),
+        (["record", "tcp://127.0.0.1:1", str(tmp_path / "b.rec"), "--items", "2,11,21,1"], "(--quality mp)"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "a,,b"], "names no station"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--stations", "²"], "no station called '²'"),
+        (["record", "sim:demo", str(tmp_path / "b.rec"), "--quality", "mp"], "--quality with sim:demo"),
+    ):
+        assert expected in refused(words, capsys), words
+    assert not (tmp_path / "b.rec").exists()
+    assert text.read_text() == "hello\n"
+    assert new.read_bytes() == newer()
+    assert simulated.read_bytes() == before
+
+
+def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Rehearsal, tmp_path: Path) -> None:
+    """Frame by frame, times of reception and all, through two connections into one file."""
+    live = []
+    for _ in range(2):
+        with (
+            RecordingWriter(tmp_path / "a.rec") as writer,
+            Is900(port, Wanted(stations=played.samples.stations), witness=writer) as device,
+        ):
+            frames = iter(device)
+            live.append([next(frames) for _ in range(60)])
+    replayed = list(RecordingStream(tmp_path / "a.rec"))
+    assert all(same(a, b) for a, b in zip(live[0], replayed, strict=False))
+    start = next(i for i, frame in enumerate(replayed) if frame.received_s == live[1][0].received_s)
+    again = replayed[start : start + 60]
+    assert [f.received_s for f in again] == [f.received_s for f in live[1]]
+    assert all((a.position_m == b.position_m).all() for a, b in zip(again, live[1], strict=True))
+
+
+def test_a_device_that_was_gone_replays_as_it_was_live(played: Rehearsal, tmp_path: Path) -> None:
+    """Bit by bit, device time and times of reception included, whether decoded at once or chunk by chunk."""
+    link, path, wanted = tmp_path / "link", tmp_path / "a.rec", Wanted(stations=played.samples.stations)
+    with RecordingWriter(path) as writer:
+        with serving(played.samples, pty=link):
+            device = Is900(str(link), wanted, witness=writer)
+            frames = iter(device)
+            live = [next(frames) for _ in range(40)]
+        with device, ThreadPoolExecutor() as beside:
+            rest = beside.submit(lambda: [next(frames) for _ in range(40)])
+            with serving(played.samples, pty=link):
+                live += rest.result(timeout=120.0)
+    assert [event["kind"] for event in read_recording(path).events][:2] == ["connected", "unplugged"]
+    for speed in ("max", 1e9):
+        stream = RecordingStream(path, speed)
+        replayed = list(stream)
+        assert all(same(one, other) for one, other in zip(live, replayed, strict=False))
+        assert len(replayed) >= len(live)
+        assert stream.counts["sessions"] == 2
+
+
+def test_seconds_end_a_recording(port: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.rec"
+    assert main(["record", port, str(path), "--seconds", "0.8", "--json"]) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said["outcome"] == "pass"
+    assert said["received_bytes"] > 0 < said["sent_bytes"]
+    stream = RecordingStream(path)
+    assert stream.stations == tuple("1234")
+    assert len(list(stream)) > 5
+
+
+def test_old_firmware_is_recorded_by_mp_and_refused_without(
+    played: Rehearsal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.rec"
+    with serving(played.samples, EmulatorConfig(firmware="4.1105"), tcp="127.0.0.1:0") as device:
+        assert "--quality mp" in refused(["record", device.name, str(path), "--seconds", "0.5"], capsys)
+        assert not path.exists()
+        assert main(["record", device.name, str(path), "--seconds", "0.5", "--quality", "mp"]) == 0
+    (wire,) = read_recording(path).formats
+    assert wire.items == (2, 11, 21, 1)
+
+
+def test_a_list_may_be_named(port: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    assert main(["record", port, str(path), "--seconds", "0.5", "--items", "40,18,19,21,1"]) == 0
+    (wire,) = read_recording(path).formats
+    assert wire.items == (40, 18, 19, 21, 1)
+
+
+@pytest.mark.parametrize(
+    "flag", [["--items", "40,²"], ["--baud", "²"], ["--rate", "-1"], ["--rate", "nan"], ["--quality", "best"]]
+)
+def test_a_flag_that_makes_no_sense_is_refused(flag: list[str], tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as raised:
+        main(["record", "tcp://127.0.0.1:1", str(tmp_path / "a.rec"), *flag])
+    assert raised.value.code == 2
+
+
+def recording(port: str, path: Path, begun: int = 2000) -> subprocess.Popen[str]:
+    """`harness record` in its own process, once it has set the device up and written so many bytes since."""
+    process = subprocess.Popen(
+        [*HARNESS, "record", port, str(path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=heeding_interrupts,
+    )
+    until_s = time.monotonic() + 300.0
+    while not path.exists() or len(path.read_bytes().partition(CONFIGURED.encode())[2]) < begun:
+        assert time.monotonic() < until_s
+        assert process.poll() is None
+        time.sleep(0.02)
+    return process
+
+
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_is_the_normal_end_of_a_recording(port: str, tmp_path: Path, stop: signal.Signals) -> None:
+    with recording(port, tmp_path / "a.rec") as process:
+        process.send_signal(stop)
+        out, err = process.communicate(timeout=120.0)
+    assert process.returncode == 0, err
+    assert out.splitlines()[-1] == "pass"
+    assert "Traceback" not in err
+    read = read_recording(tmp_path / "a.rec")
+    assert read.lost == ()
+    assert [block.payload for block in read.blocks() if block.kind == "sent"][-1] == b"c"
+
+
+def test_a_killed_recording_keeps_what_came(port: str, tmp_path: Path) -> None:
+    with recording(port, tmp_path / "a.rec", begun=6000) as process:
+        process.kill()
+    stream = RecordingStream(tmp_path / "a.rec")
+    assert len(stream.recording.lost) <= 1
+    received = sum(len(block.payload) for block in stream.recording.blocks() if block.kind == RECEIVED)
+    assert received > 2000
+    assert len(list(stream)) > 5
+
+
+def test_ctrl_c_ends_a_replay_without_a_word_too_many(simulated: Path) -> None:
+    with subprocess.Popen(
+        [*HARNESS, "replay", str(simulated), "--speed", "0.01", "--frames"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "PYTHONUNBUFFERED": "1"},
+        preexec_fn=heeding_interrupts,
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("received_s,")
+        assert ",left_hand," in process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=120.0)
+    assert process.returncode == 130
+    assert out.splitlines()[-1] == "interrupted"
+    assert "Traceback" not in err

@@ -1,0 +1,203 @@
+"""Two sides compared: outcomes and why, what is allowed, coverage, groups, clip means, directions."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.compare.comparison import EVERYTHING, Comparison, compare
+from harness.compare.margins import MARGINS
+from harness.errors import Outcome, UnknownName
+from harness.results.reader import Judged
+from harness.score.metrics import DEFINITIONS
+from tests.compare.sides import SIZES, cell, manifest, side
+
+ANGLE, *_ = SIZES
+STEADY = [1.1 + 0.01 * n for n in range(8)]
+"""Worse by 10 to 17 %, clip by clip."""
+TORN = [0.7, 1.4, 0.8, 1.3, 0.7, 1.4, 0.9, 1.2]
+
+
+def found(b: Judged, a: Judged | None = None, **options: Any) -> Comparison:
+    return compare(a or side(), b, **{"metrics": [ANGLE], **options})
+
+
+@pytest.mark.parametrize(
+    ("b", "outcome", "why"),
+    [
+        (side(), Outcome.PASS, "of 1 gated lines 1 are the same, 0 better"),
+        (side(methods={"ik": [1.0 - (t - 1.0) for t in STEADY]}), Outcome.PASS, "0 are the same, 1 better"),
+        (side(methods={"ik": STEADY}), Outcome.REGRESSED, f"1 of 1 gated lines are worse: ik {ANGLE}"),
+        (side(methods={"ik": TORN}), Outcome.NOT_COMPARABLE, "reaches beyond the margin"),
+        (side(clips=5), Outcome.NOT_COMPARABLE, "cells are only in A"),
+        (side(scenario="other"), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (scenario: demo against"),
+        (Judged("B", manifest(), (), 0), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (a side has no"),
+        (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, "nothing was measured on both sides"),
+        (side(defined_by={"calibration": "poses"}), Outcome.NOT_COMPARABLE, "inputs differ: calibration: none against"),
+        (side(failed=["ik on walk_99"]), Outcome.INCOMPLETE, "planned cells are missing: B: ik on walk_99"),
+        (replace(side(), planned=11), Outcome.INCOMPLETE, "B: 3 cells are not finished"),
+        (Judged("B", manifest(), (), 1, ("ik on walk_00",)), Outcome.INCOMPLETE, "ik on walk_00"),
+    ],
+)
+def test_outcomes(b: Judged, outcome: Outcome, why: str) -> None:
+    comparison = found(b)
+    assert comparison.outcome == outcome
+    assert why in comparison.why
+
+
+def test_worse_is_worse_whatever_else_is_missing_but_not_where_inputs_differ() -> None:
+    b = side(methods={"ik": STEADY}, failed=["ik on walk_99"])
+    assert found(b).outcome == Outcome.REGRESSED
+    assert found(b).failed == ("B: ik on walk_99",)
+    other = side(methods={"ik": STEADY}, defined_by={"calibration": "poses"})
+    assert found(other).outcome == Outcome.NOT_COMPARABLE
+    assert found(other).differences == ()
+
+
+def test_times_are_gated_between_equal_processors_alone() -> None:
+    metrics = {"step_relative": 2.0}
+    slower = side(metrics={"step_relative": 3.5})
+    for processor, outcome in (("Xeon", Outcome.REGRESSED), ("Opteron", Outcome.PASS)):
+        a = replace(side(metrics=metrics), manifest=manifest(processor="Xeon"))
+        b = replace(slower, manifest=manifest(processor=processor))
+        comparison = found(b, a, metrics=[ANGLE, "step_relative"])
+        assert comparison.outcome == outcome
+        (line,) = (line for line in comparison.differences if line.metric == "step_relative")
+        assert (line.gated, line.verdict) == (processor == "Xeon", "worse")
+        alone = found(b, a, metrics=["step_relative"])
+        assert alone.outcome == (Outcome.REGRESSED if processor == "Xeon" else Outcome.NOT_COMPARABLE)
+
+
+def test_a_result_beside_itself_differs_by_exactly_nothing() -> None:
+    a = side(methods={"ik": 1.0, "mean_pose": 3.0})
+    comparison = compare(a, a)
+    assert comparison.outcome == Outcome.PASS
+    assert {line.verdict for line in comparison.differences} == {"same"}
+    assert {(line.difference, line.low, line.high, line.p) for line in comparison.differences} == {(0.0, 0.0, 0.0, 1.0)}
+    assert comparison.circumstances == ()
+
+
+def test_six_clips_tell_and_five_do_not() -> None:
+    for clips, outcome in ((6, Outcome.PASS), (5, Outcome.NOT_COMPARABLE)):
+        assert found(side(clips=clips), side(clips=clips)).outcome == outcome
+    assert "too few clips: 5, of at least 6" in found(side(clips=5), side(clips=5)).why
+
+
+def test_clips_are_what_counts_and_their_cells_are_averaged() -> None:
+    """Seeds and varied values of one clip are no further witnesses."""
+    times = [1.0, 1.1, 1.3]
+    many = [cell("walk_01", times=t, seed=n) for n, t in enumerate(times)]
+    run = Judged("A", manifest(), (*side(clips=1).cells, *many), 4)
+    comparison = found(run, run)
+    (line,) = [line for line in comparison.differences if line.gated]
+    assert (comparison.matched, line.clips) == (4, ("walk_00", "walk_01"))
+    assert line.a[1] == pytest.approx(np.mean([c.metrics[ANGLE] or 0.0 for c in many]))
+    assert line.mean_a == pytest.approx(np.mean(line.a))
+
+
+def test_known_and_new_performers_inputs_and_protocols_are_never_pooled() -> None:
+    parts = [side(), side(performer="new", seed=2), side(inputs="pos"), side(protocol="block")]
+    run = Judged("A", manifest(), tuple(c for part in parts for c in part.cells), 32)
+    groups = [line.group for line in found(run, run).differences if line.gated]
+    texts = ["pos+ori, sequence, known", "pos+ori, sequence, new", "pos, sequence, known", "pos+ori, block, known"]
+    assert groups == texts
+
+
+def test_a_metric_that_should_rise_is_worse_when_it_falls() -> None:
+    cells = [replace(c, metrics={**c.metrics, "fps": 100.0 + n}) for n, c in enumerate(side().cells)]
+    slow = [replace(c, metrics={**c.metrics, "fps": 60.0 + n}) for n, c in enumerate(cells)]
+    a, b = (replace(side(), cells=tuple(each)) for each in (cells, slow))
+    (line,) = [line for line in found(b, a, metrics=["fps"]).differences if line.gated]
+    assert (line.verdict, line.difference, line.low, line.high) == ("worse", -40.0, -40.0, -40.0)
+    assert found(a, b, metrics=["fps"]).outcome == Outcome.PASS
+
+
+def test_two_methods_of_one_run() -> None:
+    run = side(methods={"ik": 1.0, "mean_pose": STEADY}, failed=["best_match on walk_00"])
+    comparison = compare(run, run, methods=("ik", "mean_pose"), metrics=[ANGLE])
+    assert (comparison.outcome, comparison.differences[0].method) == (Outcome.REGRESSED, "ik vs mean_pose")
+    assert compare(run, run, methods=("mean_pose", "ik"), metrics=[ANGLE]).outcome == Outcome.PASS
+    assert compare(run, run, methods=("ik", "ik"), metrics=[ANGLE]).differences[0].method == "ik"
+
+
+OTHER_RATE = {"tracker": {"rate_hz": 60.0, "items": [40, 2]}}
+
+
+@pytest.mark.parametrize("allow", [["tracker"], ["tracker.rate_hz"], ["seed", "tracker"], [EVERYTHING]])
+def test_inputs_that_are_allowed_may_differ(allow: list[str]) -> None:
+    b = side(defined_by=OTHER_RATE)
+    assert found(b).inputs_that_differ == ("tracker.rate_hz: 40 against 60",)
+    comparison = found(b, allow=allow)
+    assert (comparison.outcome, comparison.inputs_that_differ) == (Outcome.PASS, ())
+    assert comparison.allowed == ("tracker.rate_hz: 40 against 60",)
+
+
+def test_allowing_one_input_leaves_the_others_and_a_strange_name_is_refused() -> None:
+    b = side(defined_by={**OTHER_RATE, "calibration": "poses"})
+    assert found(b, allow=["tracker"]).inputs_that_differ == ("calibration: none against poses",)
+    with pytest.raises(UnknownName, match=r"'traker'.*Did you mean 'tracker'"):
+        found(b, allow=["traker"])
+
+
+def test_what_cells_pair_on_may_be_allowed_too() -> None:
+    b = side(scenario="other", seed=2)
+    assert found(b, allow=["scenario", "seed"]).outcome == Outcome.PASS
+    assert found(b, allow=["scenario"]).outcome == Outcome.NOT_COMPARABLE
+
+
+def test_many_inputs_inside_one_are_told_in_one_line() -> None:
+    b = side(defined_by={"examples": {f"run_{n}": "digest" for n in range(6)}})
+    assert found(b).inputs_that_differ == ("examples.walk_0: digest 0 against none (and 11 more of examples)",)
+
+
+@pytest.mark.parametrize(("matched", "told"), [(200, False), (199, True), (150, True)])
+def test_both_sides_must_cover_the_same(matched: int, told: bool) -> None:
+    b = side(metrics={"frames_matched": matched})
+    comparison = found(b)
+    assert (comparison.outcome == Outcome.NOT_COMPARABLE) == bool(comparison.coverage) == told
+    if told:
+        assert f"covers 1600 of 1600 frames in A, {8 * matched} of 1600 frames in B" in comparison.why
+    assert found(b, allow=["coverage"]).outcome == Outcome.PASS
+
+
+def test_both_sides_must_cover_enough() -> None:
+    for matched, outcome in ((190, Outcome.PASS), (189, Outcome.NOT_COMPARABLE)):
+        part = side(metrics={"frames_matched": matched})
+        assert found(part, part).outcome == outcome
+
+
+def test_what_one_side_alone_measured_is_told() -> None:
+    cells = side().cells
+    b = replace(side(), cells=(replace(cells[0], metrics={**cells[0].metrics, ANGLE: None}), *cells[1:]))
+    comparison = found(b)
+    assert comparison.outcome == Outcome.NOT_COMPARABLE
+    assert comparison.why == f"ik (pos+ori, sequence, known): {ANGLE} on one side alone in 1 of 8 cells"
+    assert comparison.differences[0].clips == tuple(f"walk_{n:02}" for n in range(1, 8))
+
+
+def test_cells_without_a_partner_are_named_and_may_be_allowed() -> None:
+    more = side(clips=9)
+    comparison = found(more)
+    assert (comparison.only_a, comparison.only_b) == ((), ("ik on walk_08 (demo, seed 1)",))
+    assert comparison.outcome == Outcome.NOT_COMPARABLE
+    assert found(more, allow=["cells"]).outcome == found(more, allow=[EVERYTHING]).outcome == Outcome.PASS
+    assert found(side(), more, allow=["cells"]).allowed == ("1 cell is only in A: ik on walk_08 (demo, seed 1)",)
+
+
+def test_circumstances_that_differ_are_listed() -> None:
+    a, b = (replace(side(), manifest=manifest(packages={"numpy": version})) for version in ("2.3", "2.4"))
+    assert found(b, a).circumstances == (("packages.numpy", "2.3", "2.4"),)
+
+
+def test_every_margin_is_of_a_metric_and_what_has_no_worse_is_refused() -> None:
+    assert set(MARGINS) <= set(DEFINITIONS)
+    for metric in ("jitter_true_m_s3", "lag_ms", "coverage", "nonsense"):
+        with pytest.raises(UnknownName, match="metric with a margin"):
+            found(side(), metrics=[metric])
+
+
+def test_margins_follow_the_reference_down_to_a_floor() -> None:
+    margin = MARGINS[ANGLE]
+    assert margin.of(10.0) == pytest.approx(10.0 * margin.relative)
+    assert margin.of(0.0) == margin.floor > 0.0

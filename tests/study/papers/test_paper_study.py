@@ -1,0 +1,201 @@
+"""A study measures, resumes after a kill, refuses another's folder, survives failures, and is read back as it was."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.cli import main
+from harness.core.files import TEMPORARY
+from harness.errors import BadInput, Outcome, UnknownName
+from harness.results.findings import Bars, Experiment, Lines, read_findings
+from harness.study.papers.paper import Paper, rerun
+from harness.study.papers.paper_study import Study, open_study, planned_cells, run_experiments
+from harness.study.papers.tables import by_clip
+from tests.interrupts import heeding_interrupts
+from tests.study.papers.tiny import BOUTS, TINY, WALKS
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("studies") / "tiny"
+    findings, outcome = rerun(TINY, out, command="harness paper tiny")
+    assert outcome is Outcome.PASS
+    assert read_findings(out / "findings.json") == findings
+    return out
+
+
+def test_findings_hold_what_the_cells_say(finished: Path) -> None:
+    findings = read_findings(finished / "findings.json")
+    walks, bouts = findings.experiments
+    study = Study(finished, "builtin", 1, TINY.plan("builtin", 1))
+    errors = {method: by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
+    assert {clip for each in errors.values() for clip in each} == set(WALKS.motion.test)
+    for cell in study.cells("walks"):
+        of_frames = float(np.mean(cell.errors["joint_angle_mean_deg"][cell.scores.scored]))
+        assert of_frames == pytest.approx(errors[cell.method][cell.clip], rel=1e-4)
+    claim = walks.claims[0]
+    assert (claim.clips, claim.verdict, claim.low) == (2, "cannot tell", None)
+    off = [errors["ik:previous"][clip] - errors["mean_pose"][clip] for clip in WALKS.motion.test]
+    assert claim.difference == pytest.approx(np.mean(off))
+    bars, lines = walks.figures
+    assert isinstance(bars, Bars)
+    assert isinstance(lines, Lines)
+    assert list(bars.series["mean_pose"]) == pytest.approx([np.mean(list(errors["mean_pose"].values()))])
+    drawn = np.array(lines.series["mean_pose"], float)
+    assert np.mean(drawn) == pytest.approx(errors["mean_pose"]["walking_p1_01"], rel=1e-4)
+    assert lines.x[0] >= 1.0  # the warm-up is not drawn
+    assert bouts.claims[0].clips == 1
+    assert walks.notes == ("4 cells",)
+
+
+def test_the_study_says_what_it_rests_on(finished: Path) -> None:
+    tables = {table.title.split(" (")[0]: table for table in read_findings(finished / "findings.json").tables}
+    (left_out,) = {row[1:] for row in tables["Left out"].rows}
+    assert left_out == ("walking_p3_01", "two clips are enough")
+    databases = {row[0]: row for row in tables["Clips: judged, and learnt from"].rows}
+    assert databases["walks"][2:] == ("walking_p1_01, walking_p2_01", "2: walking_p1_02, walking_p2_02", "1,600")
+    constants = {row[0]: row[1] for row in tables["Constants of the methods"].rows}
+    assert set(constants) == set(WALKS.methods)
+    manifest = json.loads((finished / "walks" / "manifest.json").read_text())
+    assert manifest["circumstances"]["constants"] == constants
+    assert manifest["circumstances"]["left_out"] == WALKS.left_out
+    assert manifest["inputs"]["motion"]["examples"] == list(WALKS.motion.examples)
+    assert manifest["inputs"]["seed"] == 1
+
+
+def made(out: Path) -> dict[str, int]:
+    cells = (path for path in out.glob("*/cells/*") if not path.name.startswith(TEMPORARY))
+    return {path.name: path.stat().st_mtime_ns for path in cells}
+
+
+def test_a_finished_study_runs_and_measures_nothing_again(finished: Path) -> None:
+    before, measured = made(finished), (finished / "measured" / "count.json").stat().st_mtime_ns
+    assert rerun(TINY, finished)[1] is Outcome.PASS
+    assert made(finished) == before
+    assert (finished / "measured" / "count.json").stat().st_mtime_ns == measured
+
+
+def stopped(out: Path, ending: signal.Signals) -> tuple[int, str]:
+    """The verb's exit code and all it printed, struck when the first cell was finished."""
+    command = [sys.executable, "-m", "tests.study.papers.tiny", "--out", str(out)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, preexec_fn=heeding_interrupts
+    ) as program:
+        until_s = time.monotonic() + 300.0
+        while not made(out) and time.monotonic() < until_s:
+            assert program.poll() is None, "it ended too soon"
+            time.sleep(0.005)
+        program.send_signal(ending)
+        said = program.communicate(timeout=120)[0]
+    assert made(out)
+    assert not (out / "findings.json").exists()
+    return program.returncode, said
+
+
+def test_a_killed_study_keeps_its_cells_and_goes_on(tmp_path: Path) -> None:
+    out = tmp_path / "tiny"
+    assert stopped(out, signal.SIGKILL)[0] == -signal.SIGKILL
+    kept = made(out)
+    assert rerun(TINY, out)[1] is Outcome.PASS
+    assert kept.items() <= made(out).items()
+    assert len(made(out)) == planned_cells(TINY.plan("builtin", 1)) == 6
+
+
+def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path) -> None:
+    code, said = stopped(tmp_path / "tiny", signal.SIGINT)
+    assert code == 130
+    assert "the same command goes on from there" in said
+    assert said.splitlines()[-1] == "interrupted"
+    assert "Traceback" not in said
+
+
+def test_a_folder_of_another_study_is_refused(finished: Path, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="seed: 1, not 2"):
+        rerun(TINY, finished, seed=2)
+    with pytest.raises(BadInput, match="paper: tiny, not other"):
+        rerun(replace(TINY, name="other"), finished)
+    with pytest.raises(BadInput, match="motion: built-in performer, not cmu"):
+        open_study(finished, {"paper": "tiny", "motion": "cmu", "seed": 1})
+    (tmp_path / "thesis.tex").write_text("years of work")
+    with pytest.raises(BadInput, match=r"thesis\.tex"):
+        rerun(TINY, tmp_path)
+    with pytest.raises(BadInput, match="is a file"):
+        rerun(TINY, tmp_path / "thesis.tex")
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_names_that_do_not_exist_are_refused_before_anything_is_written(tmp_path: Path) -> None:
+    wrong = replace(BOUTS, motion=replace(BOUTS.motion, test=("boxing_p9_01",)))
+    with pytest.raises(UnknownName):
+        rerun(replace(TINY, runs=(WALKS, wrong)), tmp_path / "tiny")
+    assert not (tmp_path / "tiny").exists()
+
+
+def test_what_fails_is_told_and_stops_nothing(tmp_path: Path) -> None:
+    """One method's cells, a run that is refused whole, and an experiment that cannot be judged."""
+    broken = replace(WALKS, methods=("mean_pose", "tests.experiment.test_engine:Broken"))
+    refused = replace(BOUTS, motion=replace(BOUTS.motion, longest_s=0.5))  # all of it warm-up
+
+    def judge(study: Study) -> Experiment:
+        raise ZeroDivisionError("by nothing")
+
+    paper = replace(TINY, runs=(broken, refused), experiments={"judge": judge, "bouts": TINY.experiments["bouts"]})
+    seen: list[tuple[int, int]] = []
+    findings, outcome = rerun(
+        paper, tmp_path / "tiny", progress=lambda last, done, planned: seen.append((done, planned))
+    )
+    assert outcome is Outcome.INCOMPLETE
+    assert len(made(tmp_path / "tiny")) == 2
+    judged, bouts = findings.experiments
+    assert "ZeroDivisionError: by nothing" in judged.notes[0]
+    assert bouts.claims[0].verdict == "not run"
+    assert "warm-up" in " ".join(bouts.notes)
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
+    assert seen[-1] == (8, 8)
+    study = Study(tmp_path / "tiny", "builtin", 1, {"walks": broken})
+    assert by_clip(study.rows("walks", method="tests.experiment.test_engine:Broken")) == {}
+    failures = run_experiments({"walks": broken}, tmp_path / "tiny")
+    assert len(failures) == 2
+    assert all("on purpose" in text for text in failures.values())
+
+
+def test_known_and_new_performers_are_never_pooled(finished: Path) -> None:
+    rows = Study(finished, "builtin", 1, {"walks": WALKS}).rows("walks", method="mean_pose")
+    assert len(by_clip(rows)) == 2
+    with pytest.raises(BadInput, match="performer"):
+        by_clip([rows[0], {**rows[1], "performer": "new"}])
+    with pytest.raises(BadInput, match="method"):
+        by_clip([rows[0], {**rows[1], "method": "ik"}])
+    with pytest.raises(BadInput, match="Two errors"):
+        by_clip([rows[0], rows[0]])
+
+
+def test_a_paper_without_runs_on_a_motion_says_so(tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no runs on builtin"):
+        rerun(Paper("unheard", "", {}), tmp_path / "out")
+
+
+def test_the_verb_prints_claims_and_where_the_report_lies(
+    finished: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("harness.study.papers.paper.paper", lambda name: TINY)
+    words = ["paper", "liu2011", "--out", str(finished), "--jobs", "1"]
+    assert main(words) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[-1] == "pass"
+    assert said[-2] == f"report: {finished / 'report.html'}"
+    assert any("mean_pose errs less" in line and "cannot tell" in line for line in said)
+    assert main([*words, "--json"]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["outcome"] == "pass"
+    assert content["experiments"][0]["claims"][0]["clips"] == 2
+    assert Path(content["report"]).is_file()
+    assert main([*words, "--seed", "2"]) == 2
+    assert "another study (seed: 1, not 2)" in capsys.readouterr().err
