@@ -12,7 +12,7 @@ from harness.core.estimate import Status
 from harness.core.humanoid24 import pack, standard_skeleton
 from harness.results import storage
 from harness.results.cell import IDENTITY
-from harness.score.score import Scores, score
+from harness.score.score import Scores, score_estimate
 
 RATE_HZ = 40.0
 FRAMES = 400
@@ -41,7 +41,7 @@ def judge(truth_qpos: Floats) -> Judge:
         step_ms = np.full(len(index), 2.0)
         skeleton = standard_skeleton()
         options = {"warm_up_s": 0.0, **options}
-        return score(skeleton, RATE_HZ, truth_qpos, estimate_qpos, index, status, step_ms, **options)
+        return score_estimate(skeleton, RATE_HZ, truth_qpos, estimate_qpos, index, status, step_ms, **options)
 
     return judged
 

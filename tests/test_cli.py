@@ -113,7 +113,7 @@ def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
         raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
-    for where in ("harness.experiment.playback.rehearse", "harness.experiment.engine.run"):
+    for where in ("harness.experiment.playback.prepare_playback", "harness.experiment.engine.run"):
         monkeypatch.setattr(where, interrupted)
     assert main(verb.split()) == expected
     said = capsys.readouterr()

@@ -11,13 +11,13 @@ import pytest
 
 import harness
 from harness.cli import build_parser, main
-from harness.commands.catalogue import catalogue
-from harness.core.options import alternatives
+from harness.commands.catalogue import build_catalogue
+from harness.core.options import expand_alternatives
 from harness.errors import Outcome
 from harness.experiment import engine
 from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
-from harness.report.run.text import table
+from harness.report.run.text import run_table
 from harness.results.storage import read_summary
 from tests.short_demo import short_demo
 
@@ -59,7 +59,7 @@ def test_the_entry_point_of_the_readme_gives_the_method_its_name(
     assert "upright" not in registry.methods()
     monkeypatch.syspath_prepend(str(tmp_path))
     assert registry.resolve("upright+ik").name == "upright+ik"
-    assert "upright" in catalogue()["methods"]
+    assert "upright" in build_catalogue()["methods"]
     monkeypatch.chdir(short_demo(tmp_path / "demo").parent)
     out = tmp_path / "run"
     assert main(["run", "demo", "--methods", "upright", "--no-report", "--out", str(out)]) == 0
@@ -70,7 +70,7 @@ def test_options_of_the_readme_are_those_of_the_method() -> None:
     (named,) = re.findall(r"`--methods '([^']*)'`", README)
     assert registry.resolve(named).name == named
     for text in re.findall(r"\(`(\w+\[[^`]*\|[^`]*\])`\)", README):
-        assert [registry.resolve(name).name for name in alternatives(text)] == alternatives(text)
+        assert [registry.resolve(name).name for name in expand_alternatives(text)] == expand_alternatives(text)
 
 
 @pytest.mark.parametrize(
@@ -85,7 +85,7 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, clip: str, behavi
     shown = README.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
     alone = replace(DEMO, motion=replace(DEMO.motion, test=(clip,), behaviours=(behaviour,)))
     assert engine.run(alone, tmp_path / "demo") is Outcome.PASS
-    made = table(read_summary(tmp_path / "demo"))
+    made = run_table(read_summary(tmp_path / "demo"))
     rows, again = ([line.split() for line in text.splitlines() if "/" in line] for text in (shown, made))
     assert len(rows) == 1 + len(DEMO.methods) * len(DEMO.motion.test)  # the title first
     of_it = [row for row in rows[1:] if row[0] == behaviour]

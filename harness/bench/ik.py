@@ -15,39 +15,39 @@ from dataclasses import dataclass
 import mink
 import numpy as np
 
-from harness.bench.rows import Row
+from harness.bench.rows import BenchmarkRow
 from harness.body import humanoid, mounts
 from harness.body.kinematics import Kinematics
-from harness.body.retargeting import to_own_body
+from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.humanoid24 import pack
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
+from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
-RATE_HZ, TURN = 40.0, 40
+RATE_HZ, FRAMES_PER_TURN = 40.0, 40
 NOISE_M, NOISE_RAD = 0.75e-3, float(np.deg2rad(0.05))
 """White noise per record of the default levels."""
 STOPPING = Stopping(step=1e-4, decrease=1e-4, most_steps=30)
-SQUARES = Loss(robust=False)
+LEAST_SQUARES = Loss(robust=False)
 MINK_DAMPING = 3.0
 """Where mink leaves the least residual on these targets: with less it never settles on noise, with more it crawls."""
 
-Follower = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
+TimedSolver = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
 """Takes a frame and a pose to start from to a configuration (55,) and the seconds that it took."""
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
+class IKBenchmarkCase:
     """What all contenders are given. The tracker's frame is the world's."""
 
     body: humanoid.Body
@@ -56,41 +56,43 @@ class Setting:
     frames: list[TrackerFrame]
     starts: Floats
     """(T, 55) for each frame the true pose of the one before."""
-    examples: tuple[Take, ...]
+    examples: tuple[BodyMotion, ...]
     """Another walk of the same performer."""
 
 
-def bench_ik(seed: int = 1, frames: int = 400) -> list[Row]:
+def bench_ik(seed: int = 1, frames: int = 400) -> list[BenchmarkRow]:
     """Throughput of `ik` as it is used; then of its solver beside mink's, prior and robust loss off."""
-    setting = make_setting(seed, frames)
-    contenders = {"used": used(setting), "bare": bare(setting), "mink": with_mink(setting)}
+    setting = make_case(seed, frames)
+    contenders = {"used": registered_ik(setting), "bare": plain_solver(setting), "mink": mink_solver(setting)}
     seconds = {name: np.zeros(frames) for name in contenders}
     poses = {name: np.zeros((frames, setting.starts.shape[1])) for name in contenders}
-    for turn in range(0, frames, TURN):
+    for turn in range(0, frames, FRAMES_PER_TURN):
         for name, follow in contenders.items():
-            for frame in range(turn, min(turn + TURN, frames)):
+            for frame in range(turn, min(turn + FRAMES_PER_TURN, frames)):
                 poses[name][frame], seconds[name][frame] = follow(setting.frames[frame], setting.starts[frame])
-    per_turn = {name: np.add.reduceat(spent, np.arange(0, frames, TURN)) for name, spent in seconds.items()}
-    fps = {name: TURN / float(np.median(spent)) for name, spent in per_turn.items()}
+    per_turn = {name: np.add.reduceat(spent, np.arange(0, frames, FRAMES_PER_TURN)) for name, spent in seconds.items()}
+    fps = {name: FRAMES_PER_TURN / float(np.median(spent)) for name, spent in per_turn.items()}
     ratio = float(np.median(per_turn["mink"] / per_turn["bare"]))
-    ours, theirs = (left_over(setting, poses[name]) for name in ("bare", "mink"))
+    ours, theirs = (residual_errors(setting, poses[name]) for name in ("bare", "mink"))
     return [
-        Row("ik, six trackers, converged", fps["used"], "frames/s", "", ">= 1500"),
-        Row("ik without prior and robust loss", fps["bare"], "frames/s", f"mink {fps['mink']:.0f} frames/s", ""),
-        Row("ik / mink", ratio, "x", "the same targets", ">= 3"),
-        Row("tracker residual, cost", ours[0], "", f"mink {theirs[0]:.4f}", "<= mink"),
-        Row("tracker residual, position", ours[1], "mm RMS", f"mink {theirs[1]:.4f} mm", "<= mink"),
-        Row("tracker residual, orientation", ours[2], "deg RMS", f"mink {theirs[2]:.4f} deg", "<= mink"),
+        BenchmarkRow("ik, six trackers, converged", fps["used"], "frames/s", "", ">= 1500"),
+        BenchmarkRow(
+            "ik without prior and robust loss", fps["bare"], "frames/s", f"mink {fps['mink']:.0f} frames/s", ""
+        ),
+        BenchmarkRow("ik / mink", ratio, "x", "the same targets", ">= 3"),
+        BenchmarkRow("tracker residual, cost", ours[0], "", f"mink {theirs[0]:.4f}", "<= mink"),
+        BenchmarkRow("tracker residual, position", ours[1], "mm RMS", f"mink {theirs[1]:.4f} mm", "<= mink"),
+        BenchmarkRow("tracker residual, orientation", ours[2], "deg RMS", f"mink {theirs[2]:.4f} deg", "<= mink"),
     ]
 
 
-def make_setting(seed: int, frames: int) -> Setting:
+def make_case(seed: int, frames: int) -> IKBenchmarkCase:
     """A walk, and readings of it in the frame of the world."""
-    who = synthetic.performers()[0]
+    who = synthetic.performer_names()[0]
     clip = synthetic.generate("walking", who, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
-    worn = tuple(mounts.DEFAULTS[station] for station in STATIONS)
-    body = humanoid.build(clip.skeleton, worn)
-    on_bones = [mounts.place(body.skeleton, mount) for mount in worn]
+    worn = tuple(mounts.DEFAULT_MOUNTS[station] for station in STATIONS)
+    body = humanoid.build_body(clip.skeleton, worn)
+    on_bones = [mounts.locate_mount(body.skeleton, mount) for mount in worn]
     calibration = Calibration(
         "exact",
         STATIONS,
@@ -103,13 +105,13 @@ def make_setting(seed: int, frames: int) -> Setting:
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)[:frames]
     qpos[:, 7:] = HingeLimits(body).principal(qpos[:, 7:])
     rng, kinematics = generator(seed, "bench", "ik"), Kinematics(body)
-    readings = [_reading(kinematics, calibration, q, t / RATE_HZ, rng) for t, q in enumerate(qpos)]
+    readings = [_noisy_frame(kinematics, calibration, q, t / RATE_HZ, rng) for t, q in enumerate(qpos)]
     other = synthetic.generate("walking", who, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
-    example = to_own_body(other)[1]
-    return Setting(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), (example,))
+    example = retarget_to_own_body(other)[1]
+    return IKBenchmarkCase(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), (example,))
 
 
-def _reading(
+def _noisy_frame(
     kinematics: Kinematics, worn: Calibration, qpos: Floats, time_s: float, rng: np.random.Generator
 ) -> TrackerFrame:
     kinematics.set(qpos)
@@ -128,7 +130,7 @@ def _reading(
     )
 
 
-def used(setting: Setting) -> Follower:
+def registered_ik(setting: IKBenchmarkCase) -> TimedSolver:
     """The registered method: cold start, then always from its own last pose."""
     session = Ik().fit(setting.body, setting.examples, np.random.default_rng(0)).begin(setting.calibration)
 
@@ -140,10 +142,10 @@ def used(setting: Setting) -> Follower:
     return follow
 
 
-def bare(setting: Setting) -> Follower:
+def plain_solver(setting: IKBenchmarkCase) -> TimedSolver:
     """Its solver alone."""
-    residuals = Residuals(setting.body, setting.calibration, SQUARES)
-    solver = Solver(residuals, HingeLimits(setting.body), STOPPING)
+    residuals = Residuals(setting.body, setting.calibration, LEAST_SQUARES)
+    solver = IKSolver(residuals, HingeLimits(setting.body), STOPPING)
 
     def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         begin = time.perf_counter()
@@ -154,15 +156,18 @@ def bare(setting: Setting) -> Follower:
     return follow
 
 
-def with_mink(setting: Setting) -> Follower:
+def mink_solver(setting: IKBenchmarkCase) -> TimedSolver:
     """mink's differential inverse kinematics with daqp, one full step after another."""
     model, limits = copy.copy(setting.body.model), HingeLimits(setting.body)
     model.jnt_limited[1:] = np.isfinite(limits.high_rad)
     configuration = mink.Configuration(model)
-    weights = {"position_cost": 1.0 / SQUARES.position_sigma_m, "orientation_cost": 1.0 / SQUARES.orientation_sigma_rad}
+    weights = {
+        "position_cost": 1.0 / LEAST_SQUARES.position_sigma_m,
+        "orientation_cost": 1.0 / LEAST_SQUARES.orientation_sigma_rad,
+    }
     tasks = [mink.FrameTask(station, "site", **weights) for station in setting.calibration.stations]
     kept = [mink.ConfigurationLimit(model, gain=1.0)]
-    judge = Residuals(setting.body, setting.calibration, SQUARES)
+    judge = Residuals(setting.body, setting.calibration, LEAST_SQUARES)
 
     def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         configuration.update(start)
@@ -186,9 +191,9 @@ def with_mink(setting: Setting) -> Follower:
     return follow
 
 
-def left_over(setting: Setting, poses: Floats) -> tuple[float, float, float]:
+def residual_errors(setting: IKBenchmarkCase, poses: Floats) -> tuple[float, float, float]:
     """Mean cost; RMS distances over frames and trackers [mm], [deg]."""
-    judge, costs, distances = Residuals(setting.body, setting.calibration, SQUARES), [], []
+    judge, costs, distances = Residuals(setting.body, setting.calibration, LEAST_SQUARES), [], []
     for frame, qpos in zip(setting.frames, poses, strict=True):
         judge.read(frame)
         costs.append(judge.place(qpos))

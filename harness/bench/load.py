@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.bench.rows import Row
+from harness.bench.rows import BenchmarkRow
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
@@ -15,17 +15,17 @@ from harness.mocap.read import amc
 FRAMES = 5000
 
 
-def bench_load(seed: int = 1, repeats: int = 5) -> list[Row]:
+def bench_load(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
     """Medians over `repeats` of reading one file of random angles, written for the purpose."""
     skeleton = standard_skeleton()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.amc"
         path.write_text(amc_text(skeleton, generator(seed, "bench", "load")))
-        seconds = np.array([[_loading(path, skeleton), _splitting(path)] for _ in range(repeats)])
+        seconds = np.array([[_time_loading(path, skeleton), _time_splitting(path)] for _ in range(repeats)])
     load_s, split_s = np.median(seconds, axis=0)
     return [
-        Row(f"load a {FRAMES}-frame AMC", float(load_s), "s", f"splitting its text {split_s:.3f} s", "<= 1"),
-        Row("load / split", float(load_s / split_s), "x", "the same runs", ""),
+        BenchmarkRow(f"load a {FRAMES}-frame AMC", float(load_s), "s", f"splitting its text {split_s:.3f} s", "<= 1"),
+        BenchmarkRow("load / split", float(load_s / split_s), "x", "the same runs", ""),
     ]
 
 
@@ -40,7 +40,7 @@ def amc_text(skeleton: Skeleton, rng: np.random.Generator) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _loading(path: Path, skeleton: Skeleton) -> float:
+def _time_loading(path: Path, skeleton: Skeleton) -> float:
     start = time.perf_counter()
     clip = amc.read_amc(path, skeleton, rate_hz=120.0)
     seconds = time.perf_counter() - start
@@ -49,7 +49,7 @@ def _loading(path: Path, skeleton: Skeleton) -> float:
     return seconds
 
 
-def _splitting(path: Path) -> float:
+def _time_splitting(path: Path) -> float:
     start = time.perf_counter()
     for line in path.read_text().splitlines():
         [float(word) for word in line.split()[1:] if word]

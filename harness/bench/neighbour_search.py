@@ -14,34 +14,34 @@ from typing import Any
 
 import numpy as np
 
-from harness.bench.rows import Row
+from harness.bench.rows import BenchmarkRow
 from harness.body import humanoid, mounts
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Ints, Singles
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.experiment import benchmark_clips
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.example_features import LocalExamples, Weights
-from harness.reconstruct.index import INDEXES, Graph, Lookup, Table, Vectors
+from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
+from harness.reconstruct.index import INDEXES, ArrayVectors, Lookup, NeighbourGraph, Vectors
 from harness.reconstruct.index.inverted_file import cells_for, probes_for
-from harness.reconstruct.index.selection import SMALL, best_for
+from harness.reconstruct.index.selection import FLAT_MAX_VECTORS, best_index
 from harness.reconstruct.methods.dynamic_map import DynamicMap
 from harness.reconstruct.methods.local_pca import LocalPca
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 SIZES = (6_600, 66_000)
-TURN, TURNS = 40, 2
+QUERIES_PER_TURN, TURNS_PER_CLIP = 40, 2
 """Queries in a row, and how often, in each of five held-out takes."""
 POSES, EXAMPLES, NEIGHBOURS = 2, 100, 8
-JUDGE = "flat"
+EXACT_INDEX = "flat"
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class SearchProblem:
     """Something to search in, and queries in the order in which they come."""
 
     name: str
@@ -54,72 +54,81 @@ class Search:
     """(N,) whether the next vector is that of the next moment; None where nobody follows."""
 
 
-def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[Row]:
+def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[BenchmarkRow]:
     """Medians over the queries, for sets of so many frames of every kind."""
-    body = humanoid.build()
-    held_out = benchmark_clips.held_out(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
-    rows: list[Row] = []
+    body = humanoid.build_body()
+    held_out = benchmark_clips.generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
+    rows: list[BenchmarkRow] = []
     for size in sizes:
-        database = MotionDatabase.build(body, benchmark_clips.makers(size, seed))
-        for kind in KINDS:
-            rows += _compared(kind(body, database, held_out))
+        database = MotionDatabase.build(body, benchmark_clips.make_take_factories(size, seed))
+        for kind in PROBLEMS:
+            rows += _compare_indexes(kind(body, database, held_out))
     return rows
 
 
-def poses(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """The last answers, as windows: `dynamic_map:window`."""
     windows = database.windows(POSES, followed=True)
-    queries = [_alone(body, take).windows(POSES, followed=True).gather(_FOLLOWED) for take in held_out]
-    return Search(f"{POSES} poses", windows, queries, EXAMPLES, windows.follows)
+    queries = [
+        _single_motion_database(body, take).windows(POSES, followed=True).gather(_QUERY_FRAMES) for take in held_out
+    ]
+    return SearchProblem(f"{POSES} poses", windows, queries, EXAMPLES, windows.follows)
 
 
-def readings(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """What six stations read: `kernel_cca`, `weighted_blend`."""
-    worn, queries = _worn(body), list[Singles]()
-    examples = LocalExamples(body, database, worn, Weights(), "flat", NEIGHBOURS)
+    worn, queries = _exact_calibration(body), list[Singles]()
+    examples = ExampleFeatures(body, database, worn, FeatureWeights(), "flat", NEIGHBOURS)
     for take in held_out:
-        asked = LocalExamples(body, _alone(body, take), worn, Weights(), "flat", NEIGHBOURS).gather(_FOLLOWED)
+        asked = ExampleFeatures(
+            body, _single_motion_database(body, take), worn, FeatureWeights(), "flat", NEIGHBOURS
+        ).gather(_QUERY_FRAMES)
         turned = asked[:, 3 * len(STATIONS) : 7 * len(STATIONS)].reshape(len(asked), -1, 4)
         turned *= np.copysign(1.0, np.vecdot(turned, examples.hemisphere * turned.dtype.type(1.0)))[..., None]
         queries.append(asked)
-    return Search(f"{len(STATIONS)} stations", Table(examples.gather(slice(None))), queries, NEIGHBOURS, None)
+    return SearchProblem(
+        f"{len(STATIONS)} stations", ArrayVectors(examples.gather(slice(None))), queries, NEIGHBOURS, None
+    )
 
 
-def both(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """The last answers beside what six stations read: `local_pca`."""
-    method, worn = LocalPca(), _worn(body)
+    method, worn = LocalPca(), _exact_calibration(body)
 
     def vectors(learnt: MotionDatabase) -> Vectors:
         return method.fit_database(body, learnt, generator(0, "bench")).seen_through(worn)[1]
 
-    queries = [vectors(_alone(body, take)).gather(_FOLLOWED) for take in held_out]
-    return Search("poses and stations", vectors(database), queries, method.neighbours, None)
+    queries = [vectors(_single_motion_database(body, take)).gather(_QUERY_FRAMES) for take in held_out]
+    return SearchProblem("poses and stations", vectors(database), queries, method.neighbours, None)
 
 
-def evidence(body: Body, database: MotionDatabase, held_out: Sequence[Take]) -> Search:
+def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """What both lead to expect: `dynamic_map`."""
     method = DynamicMap()
-    known = method.fit_database(body, database, generator(0, "bench")).evidence(_worn(body))
+    known = method.fit_database(body, database, generator(0, "bench")).evidence(_exact_calibration(body))
     vectors = known.expectation(np.ones(known.size, bool), method.index, method.neighbours).vectors
-    asked = [replace(vectors, windows=_alone(body, take).windows(method.poses, followed=True)) for take in held_out]
-    return Search("evidence", vectors, [z.gather(_FOLLOWED) for z in asked], method.neighbours, None)
+    asked = [
+        replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, followed=True))
+        for take in held_out
+    ]
+    return SearchProblem("evidence", vectors, [z.gather(_QUERY_FRAMES) for z in asked], method.neighbours, None)
 
 
-KINDS = (poses, readings, both, evidence)
-_FOLLOWED = np.arange(1, 1 + TURN * TURNS)
+PROBLEMS = (pose_problem, reading_problem, pose_and_reading_problem, feature_problem)
+_QUERY_FRAMES = np.arange(1, 1 + QUERIES_PER_TURN * TURNS_PER_CLIP)
 """Frames of a held-out take that are asked for."""
 
 
-def _alone(body: Body, take: Take) -> MotionDatabase:
+def _single_motion_database(body: Body, take: BodyMotion) -> MotionDatabase:
     return MotionDatabase.build(body, [take])
 
 
-def _worn(body: Body) -> Calibration:
-    places = [mounts.place(body.skeleton, mounts.DEFAULTS[station]) for station in STATIONS]
+def _exact_calibration(body: Body) -> Calibration:
+    places = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in STATIONS]
     return Calibration(
         "exact",
         STATIONS,
-        tuple(mounts.DEFAULTS[station].bone for station in STATIONS),
+        tuple(mounts.DEFAULT_MOUNTS[station].bone for station in STATIONS),
         np.array([mount_m for mount_m, _ in places]),
         np.array([turned for _, turned in places]),
         rotations.IDENTITY,
@@ -127,40 +136,44 @@ def _worn(body: Body) -> Calibration:
     )
 
 
-def _compared(search: Search) -> list[Row]:
+def _compare_indexes(search: SearchProblem) -> list[BenchmarkRow]:
     """Exact search is the judge, and the reference for speed."""
     indexes = {name: kind(search.vectors, search.count) for name, kind in INDEXES.items()}
-    begin: dict[str, Callable[[], Lookup]] = {name: partial(_same, index) for name, index in indexes.items()}
-    if len(search.vectors) > SMALL:
-        begin["faiss"] = partial(_same, FaissFile(search.vectors, search.count))
+    begin: dict[str, Callable[[], Lookup]] = {
+        name: partial(_stateless_lookup, index) for name, index in indexes.items()
+    }
+    if len(search.vectors) > FLAT_MAX_VECTORS:
+        begin["faiss"] = partial(_stateless_lookup, FaissInvertedFile(search.vectors, search.count))
     if search.follows is not None:
-        begin["graph"] = Graph(search.vectors, search.follows, indexes["inverted_file"]).follow
+        begin["graph"] = NeighbourGraph(search.vectors, search.follows, indexes["inverted_file"]).follow
     seconds: dict[str, list[float]] = {name: [] for name in begin}
     hits: dict[str, list[float]] = {name: [] for name in begin}
     for queries in search.queries:
         sessions = {name: start() for name, start in begin.items()}
-        for turn in range(0, len(queries), TURN):
-            some = queries[turn : turn + TURN]
-            true = [set(indexes[JUDGE].nearest(query, search.count)[0].tolist()) for query in some]
+        for turn in range(0, len(queries), QUERIES_PER_TURN):
+            some = queries[turn : turn + QUERIES_PER_TURN]
+            true = [set(indexes[EXACT_INDEX].nearest(query, search.count)[0].tolist()) for query in some]
             for name, session in sessions.items():
                 for query, wanted in zip(some, true, strict=True):
                     start_s = time.perf_counter()
                     rows, _ = session.nearest(query, search.count)
                     seconds[name].append(time.perf_counter() - start_s)
                     hits[name].append(len(wanted.intersection(rows.tolist())) / len(wanted))
-    best, out = best_for(len(search.vectors), search.vectors.size, search.count), []
-    judge_us = 1e6 * float(np.median(seconds[JUDGE]))
+    best, out = best_index(len(search.vectors), search.vectors.size, search.count), []
+    judge_us = 1e6 * float(np.median(seconds[EXACT_INDEX]))
     for name in begin:
         what = f"{name}, {search.name}, {len(search.vectors):,} frames"
         held = name == best
         beside = f"all looked at {judge_us:,.0f} us"
-        out.append(Row(what, 1e6 * float(np.median(seconds[name])), "us/query", beside, "<= 200" if held else ""))
+        out.append(
+            BenchmarkRow(what, 1e6 * float(np.median(seconds[name])), "us/query", beside, "<= 200" if held else "")
+        )
         share = float(np.mean(hits[name]))
-        out.append(Row(f"{what}, recall@{search.count}", share, "", "exact search", ">= 0.95" if held else ""))
+        out.append(BenchmarkRow(f"{what}, recall@{search.count}", share, "", "exact search", ">= 0.95" if held else ""))
     return out
 
 
-class FaissFile:
+class FaissInvertedFile:
     """faiss's inverted file of as many cells, all numbers of each vector in half precision: a `Lookup`."""
 
     def __init__(self, vectors: Vectors, wanted: int) -> None:
@@ -179,6 +192,6 @@ class FaissFile:
         return rows[0], squared[0]
 
 
-def _same(index: Lookup) -> Lookup:
+def _stateless_lookup(index: Lookup) -> Lookup:
     """One without memory is its own session."""
     return index

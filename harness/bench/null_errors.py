@@ -20,17 +20,17 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.files import read_json, write_json
-from harness.results.reader import Judged, JudgedCell, read_judged
+from harness.results.reader import CellResult, ResultSet, load_results
 
 METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3")
 KINDS = ("settings", "draws")
 FILE = Path(__file__).with_suffix(".json")
-Cells = Mapping[str, JudgedCell]
+CellsByClip = Mapping[str, CellResult]
 """By clip."""
 
 
 @dataclass(frozen=True, eq=False)
-class Population:
+class ErrorPopulation:
     """M methods, K metrics, C clips."""
 
     methods: tuple[str, ...]
@@ -39,42 +39,42 @@ class Population:
     """(M, K, C, 2) of A and of B."""
 
 
-def population(kind: str) -> Population:
+def load_population(kind: str) -> ErrorPopulation:
     """One of `KINDS`, as stored."""
     content = read_json(FILE, "errors of equally good sides")[kind]
     errors = [
         [np.array([sides["a"].split(), sides["b"].split()], float).T for sides in metrics.values()]
         for metrics in content["errors"].values()
     ]
-    return Population(tuple(content["errors"]), tuple(content["clips"]), np.array(errors))
+    return ErrorPopulation(tuple(content["errors"]), tuple(content["clips"]), np.array(errors))
 
 
 def main(run: str, again: str) -> None:
     """Store what two runs measured; BadFile for what is no run."""
-    one, other = _columns(read_judged(run)), _columns(read_judged(again))
+    one, other = _cells_by_method(load_results(run)), _cells_by_method(load_results(again))
     moved = {method.partition("[")[0]: method for method in one if "[" in method}
     content = {
-        "settings": _together({method: (one[method], one[by]) for method, by in moved.items()}),
-        "draws": _together({method: (one[method], other[method]) for method in moved}),
+        "settings": _pair_errors({method: (one[method], one[by]) for method, by in moved.items()}),
+        "draws": _pair_errors({method: (one[method], other[method]) for method in moved}),
     }
     write_json(FILE, content)
 
 
-def _columns(side: Judged) -> dict[str, dict[str, JudgedCell]]:
+def _cells_by_method(side: ResultSet) -> dict[str, dict[str, CellResult]]:
     """Method -> clip -> cell."""
-    found: dict[str, dict[str, JudgedCell]] = {}
+    found: dict[str, dict[str, CellResult]] = {}
     for cell in side.cells:
         found.setdefault(cell.method, {})[cell.clip] = cell
     return found
 
 
-def _together(sides: Mapping[str, tuple[Cells, Cells]]) -> dict[str, Any]:
+def _pair_errors(sides: Mapping[str, tuple[CellsByClip, CellsByClip]]) -> dict[str, Any]:
     """Six digits of every error on the clips that all have, a text for each side, method and metric."""
     clips = [
         clip for clip in next(iter(sides.values()))[0] if all(clip in one for pair in sides.values() for one in pair)
     ]
 
-    def text(cells: Cells, metric: str) -> str:
+    def text(cells: CellsByClip, metric: str) -> str:
         return " ".join(f"{cells[clip].metrics[metric]:.6g}" for clip in clips)
 
     errors = {

@@ -19,13 +19,13 @@ from harness.reconstruct import registry
 from harness.reconstruct.contract import Reconstructor
 from harness.reconstruct.database import MotionDatabase
 
-NOTHING = "nothing"
-SECONDS = 4.0
+NO_METHOD = "nothing"
+CLIP_S = 4.0
 """Of every held-out take."""
 _STATUS = Path("/proc/self/status")
 
 
-def run_alone(method: str, folder: Path, seed: int) -> int:
+def measure_peak_bytes(method: str, folder: Path, seed: int) -> int:
     """The largest resident memory of a fresh process [bytes]; RuntimeError when it fails."""
     command = [sys.executable, "-m", "harness.bench.peak_memory", method, str(folder), str(seed)]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -34,14 +34,14 @@ def run_alone(method: str, folder: Path, seed: int) -> int:
     return int(done.stdout)
 
 
-def alone(name: str, folder: Path, seed: int) -> int:
+def run_method(name: str, folder: Path, seed: int) -> int:
     """The same of this process."""
     _load_libraries()
-    body, shown = benchmark_clips.body(), benchmark_clips.trials(seed, SECONDS)
-    _follow(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), shown)
-    if name != NOTHING:
+    body, shown = benchmark_clips.build_common_body(), benchmark_clips.generate_held_out_clips(seed, CLIP_S)
+    _run_sessions(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), shown)
+    if name != NO_METHOD:
         database = MotionDatabase.open(folder)
-        _follow(benchmark_clips.learner(name, database, seed), shown)
+        _run_sessions(benchmark_clips.fit_named_method(name, database, seed), shown)
     return peak_bytes()
 
 
@@ -56,7 +56,7 @@ def _load_libraries() -> None:
     faiss.IndexFlatL2(8).add(np.zeros((1, 8), np.float32))
 
 
-def _follow(fitted: Reconstructor, shown: list[benchmark_clips.Trial]) -> None:
+def _run_sessions(fitted: Reconstructor, shown: list[benchmark_clips.BenchmarkClip]) -> None:
     for trial in shown:
         session = fitted.begin(trial.simulation.calibration)
         for frame in trial.simulation.frames:
@@ -74,4 +74,4 @@ def peak_bytes() -> int:
 
 
 if __name__ == "__main__":
-    print(alone(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])))
+    print(run_method(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 
 
 @dataclass(frozen=True)
-class Row:
+class BenchmarkRow:
     """A figure of one run; figures of different runs or machines are compared through `reference` only."""
 
     name: str
@@ -25,7 +25,7 @@ class Row:
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "more"} | dict(self.more)
 
 
-def as_text(rows: Sequence[Row]) -> str:
+def format_rows(rows: Sequence[BenchmarkRow]) -> str:
     """A table of rows, one a line."""
     lines = [("what", "measured", "", "held to", "measured against, in the same run")]
     lines += [

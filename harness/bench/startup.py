@@ -6,22 +6,22 @@ import time
 
 import numpy as np
 
-from harness.bench.rows import Row
+from harness.bench.rows import BenchmarkRow
 
 
-def bench_startup(repeats: int = 7) -> list[Row]:
+def bench_startup(repeats: int = 7) -> list[BenchmarkRow]:
     """Medians of interleaved runs, so that a busy moment hits both alike."""
     bare = [sys.executable, "-c", "pass"]
     help_text = [sys.executable, "-m", "harness.cli", "--help"]
-    seconds = np.array([[_seconds(bare), _seconds(help_text)] for _ in range(repeats)])
+    seconds = np.array([[_time_command(bare), _time_command(help_text)] for _ in range(repeats)])
     bare_s, help_s = np.median(seconds, axis=0)
     return [
-        Row("harness --help", float(help_s), "s", f"bare interpreter {bare_s:.3f} s", "< 0.3"),
-        Row("harness --help / bare interpreter", float(help_s / bare_s), "x", "the same runs", ""),
+        BenchmarkRow("harness --help", float(help_s), "s", f"bare interpreter {bare_s:.3f} s", "< 0.3"),
+        BenchmarkRow("harness --help / bare interpreter", float(help_s / bare_s), "x", "the same runs", ""),
     ]
 
 
-def _seconds(command: list[str]) -> float:
+def _time_command(command: list[str]) -> float:
     start = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - start

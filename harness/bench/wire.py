@@ -17,38 +17,38 @@ from typing import Any
 
 import numpy as np
 
-from harness.bench.rows import Row
-from harness.bench.wire_cases import CASES, CLIP, SCENARIO, Case
+from harness.bench.rows import BenchmarkRow
+from harness.bench.wire_cases import CASES, CLIP, SCENARIO, WireCase
 from harness.core.arrays import Bools, Floats
-from harness.experiment.playback import rehearse
+from harness.experiment.playback import prepare_playback
 from harness.stream.codec import ascii_records
 from harness.stream.codec.decoder import Decoder
 from harness.stream.codec.items import STATION_CHARACTERS, record_type
 from harness.stream.codec.reader import FrameReader
-from harness.stream.codec.records import Settings
+from harness.stream.codec.records import RecordFormat
 
 METHOD = "dynamic_map"
 SECONDS, LONG_S = 15.0, 600.0
 """Of each line; ten minutes of it with --large."""
-_TICK_S = Settings().seconds_per_tick
+_TICK_S = RecordFormat().seconds_per_tick
 
 
-def bench_wire(seed: int = 1, *, large: bool = False, repeats: int = 7) -> list[Row]:
+def bench_wire(seed: int = 1, *, large: bool = False, repeats: int = 7) -> list[BenchmarkRow]:
     """Decoding, then each line for its time."""
-    rows = _decoding(seed, repeats)
+    rows = _decoding_rows(seed, repeats)
     for case in CASES:
         with tempfile.TemporaryDirectory(prefix="harness-wire-") as folder:
-            rows += _on_the_line(case, LONG_S if large else SECONDS, seed, Path(folder))
+            rows += _bench_line(case, LONG_S if large else SECONDS, seed, Path(folder))
     return rows
 
 
-def _decoding(seed: int, repeats: int) -> list[Row]:
+def _decoding_rows(seed: int, repeats: int) -> list[BenchmarkRow]:
     """Records per second of one core: runs of them in both formats, and one at a time as a port gives them."""
-    played = rehearse(SCENARIO, clip=CLIP, seed=seed).simulation
+    played = prepare_playback(SCENARIO, clip=CLIP, seed=seed).simulation
     wire, items = played.wire_format, played.wire_format.items
     binary = played.wire.data * 10
     table = np.frombuffer(binary, record_type(items))
-    text = ascii_records.write(items, table)
+    text = ascii_records.format_records(items, table)
     one = [played.wire.data[at : at + table.itemsize] for at in range(0, len(played.wire.data), table.itemsize)]
     lists = dict.fromkeys(wire.characters, items)
 
@@ -59,27 +59,29 @@ def _decoding(seed: int, repeats: int) -> list[Row]:
 
     contenders: tuple[tuple[Callable[[], object], int], ...] = (
         (lambda: Decoder(lists).feed(binary), len(table)),
-        (lambda: Decoder(lists, Settings(binary=False)).feed(text), len(table)),
+        (lambda: Decoder(lists, RecordFormat(binary=False)).feed(text), len(table)),
         (lambda: FrameReader(wire).feed_all(played.wire), len(one)),
         (singly, len(one)),
     )
-    seconds = np.array([[_seconds(work) for work, _ in contenders] for _ in range(repeats)])
+    seconds = np.array([[_time_call(work) for work, _ in contenders] for _ in range(repeats)])
     rate = [count / s for (_, count), s in zip(contenders, np.median(seconds, axis=0).tolist(), strict=True)]
     return [
-        Row("decoding binary records", rate[0], "records/s", "38 bytes, in runs", ">= 200000"),
-        Row("decoding ASCII records", rate[1], "records/s", f"{len(text) // len(table)} bytes, in runs", ">= 200000"),
-        Row("binary records into frames", rate[2], "records/s", "in runs", ""),
-        Row("the same, one record at a time", 1e6 / rate[3], "us/record", "as a port gives them", ""),
+        BenchmarkRow("decoding binary records", rate[0], "records/s", "38 bytes, in runs", ">= 200000"),
+        BenchmarkRow(
+            "decoding ASCII records", rate[1], "records/s", f"{len(text) // len(table)} bytes, in runs", ">= 200000"
+        ),
+        BenchmarkRow("binary records into frames", rate[2], "records/s", "in runs", ""),
+        BenchmarkRow("the same, one record at a time", 1e6 / rate[3], "us/record", "as a port gives them", ""),
     ]
 
 
-def _seconds(work: Callable[[], object]) -> float:
+def _time_call(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
 
 
-def _on_the_line(case: Case, seconds: float, seed: int, folder: Path) -> list[Row]:
+def _bench_line(case: WireCase, seconds: float, seed: int, folder: Path) -> list[BenchmarkRow]:
     port = str(folder / "tracker") if case.kind == "pty" else "127.0.0.1:0"
     pace = "paced" if case.kind == "pty" else "unpaced"
     asked = [str(folder / "sent.npz"), str(seed), str(case.stations), str(case.rate_hz), case.kind, pace, port]
@@ -91,15 +93,15 @@ def _on_the_line(case: Case, seconds: float, seed: int, folder: Path) -> list[Ro
     )
     try:
         name = device.stdout.readline().strip() if device.stdout else ""
-        said = _live(name, case, seconds, seed, folder / "poses.csv")
+        said = _run_live(name, case, seconds, seed, folder / "poses.csv")
     finally:
         device.communicate()
     if device.returncode:
         raise RuntimeError(f"the emulator ended with {device.returncode}")
-    return _rows(case, seconds, said, np.load(folder / "sent.npz"), folder / "poses.csv")
+    return _line_rows(case, seconds, said, np.load(folder / "sent.npz"), folder / "poses.csv")
 
 
-def _live(port: str, case: Case, seconds: float, seed: int, poses: Path) -> dict[str, Any]:
+def _run_live(port: str, case: WireCase, seconds: float, seed: int, poses: Path) -> dict[str, Any]:
     command = [sys.executable, "-m", "harness.cli", "live", "--port", port, "--scenario", SCENARIO, "--clip", CLIP]
     command += ["--stations", str(case.stations), "--rate", str(case.rate_hz), "--method", METHOD]
     command += ["--items", ",".join(map(str, case.items)), "--seconds", str(seconds), "--seed", str(seed)]
@@ -109,34 +111,36 @@ def _live(port: str, case: Case, seconds: float, seed: int, poses: Path) -> dict
     return dict(json.loads(done.stdout))
 
 
-def _rows(case: Case, seconds: float, said: dict[str, Any], sent: Any, poses: Path) -> list[Row]:
+def _line_rows(case: WireCase, seconds: float, said: dict[str, Any], sent: Any, poses: Path) -> list[BenchmarkRow]:
     table = np.frombuffer(sent["data"].tobytes(), record_type(case.items))
-    begin = _last_zero(table["time"])  # before it the driver measured the device's rate
+    begin = _last_clock_reset(table["time"])  # before it the driver measured the device's rate
     table, due_s, written_s = table[begin:], sent["due_s"][begin:], sent["written_s"][begin:]
     station = np.frombuffer(STATION_CHARACTERS, np.uint8).searchsorted(table["station"])
     stamp_s = table["time"].astype(float) * _TICK_S
-    posed_s = _posed(poses, case.stations)
+    posed_s = _pose_times(poses, case.stations)
     ready_s = np.array([posed_s[s].get(t, np.nan) for s, t in zip(station.tolist(), stamp_s.tolist(), strict=True)])
-    lost, way_s = _lost_and_way(written_s, ready_s)
+    lost, way_s = _losses_and_latency(written_s, ready_s)
     late_ms = 1e3 * (written_s - due_s)[~np.isnan(written_s)]
     floor = said["floor"]
     beside = f"timer p99 {floor['timer']['p99_ms']:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
     p50, p99, most = (1e3 * float(np.quantile(way_s, share)) for share in (0.5, 0.99, 1.0))
     heard = f"of {int(np.sum(~np.isnan(ready_s)))} in {seconds:g} s"
     return [
-        Row(f"{case.name}: records without a pose", float(lost.sum()), "", heard, "0"),
-        Row(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", beside, ""),
-        Row(f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {beside}", "<= 10"),
+        BenchmarkRow(f"{case.name}: records without a pose", float(lost.sum()), "", heard, "0"),
+        BenchmarkRow(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", beside, ""),
+        BenchmarkRow(
+            f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {beside}", "<= 10"
+        ),
     ]
 
 
-def _last_zero(time: Floats) -> int:
+def _last_clock_reset(time: Floats) -> int:
     """The first record after the device's clock was set to zero last."""
     back = np.flatnonzero(np.diff(time) < 0.0)
     return int(back[-1]) + 1 if len(back) else 0
 
 
-def _posed(poses: Path, stations: int) -> list[dict[float, float]]:
+def _pose_times(poses: Path, stations: int) -> list[dict[float, float]]:
     """For each station, when the pose was ready [s] that a stamp of the device's went into."""
     out: list[dict[float, float]] = [{} for _ in range(stations)]
     with poses.open(newline="") as file:
@@ -148,7 +152,7 @@ def _posed(poses: Path, stations: int) -> list[dict[float, float]]:
     return out
 
 
-def _lost_and_way(written_s: Floats, ready_s: Floats) -> tuple[Bools, Floats]:
+def _losses_and_latency(written_s: Floats, ready_s: Floats) -> tuple[Bools, Floats]:
     """Which records between the first and the last that were posed were not (N,), and from the last byte of each
     frame to its pose [s]."""
     posed = np.flatnonzero(~np.isnan(ready_s))

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 
-from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, size
+from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, record_size
 
 SCENARIO, CLIP = "demo", "boxing_p1_01"
 
 
 @dataclass(frozen=True)
-class Case:
+class WireCase:
     """Stations at a rate on a line."""
 
     stations: int
@@ -20,12 +20,12 @@ class Case:
     @property
     def name(self) -> str:
         line = "pty at 115200" if self.kind == "pty" else "TCP, unpaced"
-        return f"{self.rate_hz:g} Hz x {self.stations}, {size(self.items)} bytes, {line}"
+        return f"{self.rate_hz:g} Hz x {self.stations}, {record_size(self.items)} bytes, {line}"
 
 
 CASES = (
-    Case(4, 75.0, STANDARD_LIST, "pty"),
-    Case(6, 50.0, STANDARD_LIST, "pty"),
-    Case(4, 120.0, SHORT_LIST, "pty"),
-    Case(4, 120.0, STANDARD_LIST, "tcp"),
+    WireCase(4, 75.0, STANDARD_LIST, "pty"),
+    WireCase(6, 50.0, STANDARD_LIST, "pty"),
+    WireCase(4, 120.0, SHORT_LIST, "pty"),
+    WireCase(4, 120.0, STANDARD_LIST, "tcp"),
 )

@@ -13,16 +13,16 @@ from threading import Thread
 import numpy as np
 
 from harness.bench.wire_cases import CLIP, SCENARIO
-from harness.experiment.playback import rehearse
-from harness.stream.emulator import EmulatorConfig, Sent, serving
+from harness.experiment.playback import prepare_playback
+from harness.stream.emulator import EmulatorConfig, SentMessage, serve_emulator
 
 
 def main(into: str, seed: str, stations: str, rate_hz: str, kind: str, pace: str, port: str) -> None:
-    played = rehearse(SCENARIO, clip=CLIP, stations=int(stations), rate_hz=float(rate_hz), seed=int(seed))
-    kept: list[Sent] = []
+    played = prepare_playback(SCENARIO, clip=CLIP, stations=int(stations), rate_hz=float(rate_hz), seed=int(seed))
+    kept: list[SentMessage] = []
     config = EmulatorConfig(paced=pace == "paced", seed=int(seed))
     where = {"pty": Path(port)} if kind == "pty" else {"tcp": port}
-    with serving(played.samples, config, on_sent=kept.append, **where) as device:
+    with serve_emulator(played.samples, config, on_sent=kept.append, **where) as device:
         print(device.name, flush=True)
         waiting = Thread(target=sys.stdin.read)
         waiting.start()

@@ -46,7 +46,7 @@ _HAND_SHARE, _FOOT_SHARE = 0.0061, 0.0137
 
 
 @dataclass(frozen=True, eq=False)
-class Shape:
+class BodyGeom:
     """One geom in the frame of its bone."""
 
     bone: str
@@ -72,7 +72,7 @@ def body_scale(skeleton: Skeleton) -> float:
 
 
 @lru_cache(maxsize=64)
-def shapes(skeleton: Skeleton) -> tuple[Shape, ...]:
+def body_geoms(skeleton: Skeleton) -> tuple[BodyGeom, ...]:
     """The geoms of the 24 bones and the root, in the order of the bodies."""
     scale = body_scale(skeleton)
     mass_kg = _STANDARD_MASS_KG * scale**2
@@ -117,7 +117,7 @@ def _foot_axes(skeleton: Skeleton, side: str) -> tuple[Floats, Floats, Floats]:
     return ahead, down, np.cross(ahead, down)
 
 
-def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[Shape]:
+def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[BodyGeom]:
     """A sole of two capsules from heel to toe, and an instep."""
     ahead, down, across = _foot_axes(skeleton, side)
     bone, share = f"{side}foot", mass_kg * _FOOT_SHARE / 3
@@ -130,7 +130,7 @@ def _foot(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> list[S
     return parts
 
 
-def _hand(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> Shape:
+def _hand(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> BodyGeom:
     """A flat ellipsoid from the wrist to the finger tips, palm down in the rest pose."""
     along = _unit(skeleton.bone_m[skeleton.index(f"{side}hand")])
     across = _unit(np.array([1.0, 0.0, 0.0]) - along[0] * along)
@@ -138,7 +138,7 @@ def _hand(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> Shape:
     size = scale * np.array([0.043, 0.017, 0.092])
     bone = f"{side}hand"
     turn = rotations.from_matrix(frame)
-    return Shape(bone, bone, "ellipsoid", 0.085 * scale * along, turn, size, mass_kg * _HAND_SHARE)
+    return BodyGeom(bone, bone, "ellipsoid", 0.085 * scale * along, turn, size, mass_kg * _HAND_SHARE)
 
 
 def _trunk(
@@ -146,19 +146,19 @@ def _trunk(
     row: tuple[str, str, float, float, tuple[float, float], tuple[float, float, float]],
     scale: float,
     mass_kg: float,
-) -> Shape:
+) -> BodyGeom:
     bone, name, share, along, (forward, up), size = row
     vector = np.zeros(3) if bone == "root" else skeleton.bone_m[skeleton.index(bone)]
     centre = along * vector + scale * np.array([forward, 0.0, up])
-    return Shape(bone, name, "ellipsoid", centre, rotations.IDENTITY, scale * np.array(size), mass_kg * share)
+    return BodyGeom(bone, name, "ellipsoid", centre, rotations.IDENTITY, scale * np.array(size), mass_kg * share)
 
 
-def _capsule(bone: str, name: str, start_m: Floats, stop_m: Floats, radius_m: float, mass_kg: float) -> Shape:
+def _capsule(bone: str, name: str, start_m: Floats, stop_m: Floats, radius_m: float, mass_kg: float) -> BodyGeom:
     span = stop_m - start_m
     length = float(np.sqrt(span @ span))
     turn = _turn_z_to(span / length) if length > 0.0 else rotations.IDENTITY
     size = np.array([radius_m, max(0.5 * length, _LEAST_M), 0.0])
-    return Shape(bone, name, "capsule", 0.5 * (start_m + stop_m), turn, size, mass_kg)
+    return BodyGeom(bone, name, "capsule", 0.5 * (start_m + stop_m), turn, size, mass_kg)
 
 
 def _turn_z_to(direction: Floats) -> Floats:

@@ -4,11 +4,11 @@ import numpy as np
 
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Floats
-from harness.core.hinges import are_gimbal, hinge_angles, twin
+from harness.core.hinges import are_gimbal, equivalent_euler_angles, hinge_angles
 from harness.core.skeleton import Skeleton
 
 
-def pointing_alike(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
+def match_bone_directions(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
     """Hinge angles (T, 48) with which the bones of `target` point as those of `own` do at `qpos` (T, 55).
 
     Bones that agree about their direction in the rest pose keep their angles. A bone with three hinges is turned
@@ -16,7 +16,7 @@ def pointing_alike(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
     one nearest to the own.
     """
     _, world_from_root, angles_rad = humanoid24.unpack(qpos)
-    meant = skeleton.forward(own, *humanoid24.unpack(qpos)).world_from_bone
+    meant = skeleton.forward_kinematics(own, *humanoid24.unpack(qpos)).world_from_bone
     root, limits_rad = rotations.to_matrix(world_from_root), humanoid24.limits_rad()
     out, turned = np.array(angles_rad), np.empty_like(meant)
     for bone, parent in enumerate(target.parents):
@@ -26,12 +26,12 @@ def pointing_alike(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
         if len(axes):
             wanted = meant[:, bone] @ _shortest_turn(target.bone_m[bone], own.bone_m[bone])
             local = np.swapaxes(above, 1, 2) @ wanted
-            fitted = _nearest_name(axes, hinge_angles(axes, rotations.from_matrix(local)), start)
+            fitted = _nearest_euler_angles(axes, hinge_angles(axes, rotations.from_matrix(local)), start)
             if len(axes) < 3:
                 low, high = limits_rad[where].T
                 fitted = np.clip(fitted, np.minimum(low, start), np.maximum(high, start))
             out[:, where] = fitted
-        turned[:, bone] = above @ skeleton.bone_rotation(target, bone, out)
+        turned[:, bone] = above @ skeleton.local_rotation(target, bone, out)
     return out
 
 
@@ -44,18 +44,18 @@ def _shortest_turn(a: Floats, b: Floats) -> Floats:
     return rotations.to_matrix(half / np.sqrt(half @ half))
 
 
-def _nearest_name(axes: Floats, angle_rad: Floats, near_rad: Floats) -> Floats:
+def _nearest_euler_angles(axes: Floats, angle_rad: Floats, near_rad: Floats) -> Floats:
     """The same rotations (T, N), each angle within half a turn of `near_rad`; of twins the nearer one."""
-    found = _nearest(angle_rad, near_rad)
+    found = _nearest_turn(angle_rad, near_rad)
     if not are_gimbal(axes):
         return found
-    other = _nearest(twin(angle_rad), near_rad)
+    other = _nearest_turn(equivalent_euler_angles(angle_rad), near_rad)
     closer = np.sum((found - near_rad) ** 2, axis=1) <= np.sum((other - near_rad) ** 2, axis=1)
     out: Floats = np.where(closer[:, None], found, other)
     return out
 
 
-def _nearest(angle_rad: Floats, near_rad: Floats) -> Floats:
+def _nearest_turn(angle_rad: Floats, near_rad: Floats) -> Floats:
     """The same angles, whole turns added so that they lie within half a turn of `near_rad`."""
     out: Floats = angle_rad - 2 * np.pi * np.round((angle_rad - near_rad) / (2 * np.pi))
     return out

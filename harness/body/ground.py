@@ -13,7 +13,7 @@ LOW_WITHIN_M, LOW_WITHIN_S = 0.03, 0.3
 """and no higher than this above the lowest that it gets within this time: at the top of a jump it is."""
 FLOOR_WITHIN_M = 0.08
 """The floor of a clip is looked for within this distance of z = 0 (CMU's lie within 6 cm)."""
-SETTLE_S = 0.5
+SMOOTHING_S = 0.5
 """Standard deviation of the window over which a height correction is smoothed."""
 
 
@@ -26,7 +26,7 @@ def sole_heights_m(own: Skeleton, pose: Pose) -> Floats:
     return np.stack(heights, axis=1)
 
 
-def stance(own: Skeleton, pose: Pose, rate_hz: float) -> Bools:
+def detect_stance(own: Skeleton, pose: Pose, rate_hz: float) -> Bools:
     """(T, 2) whether the left and right foot carries the body: the lower one, slow and low for a while."""
     if len(pose.end_m) < 2:
         return np.zeros((len(pose.end_m), 2), dtype=bool)
@@ -46,14 +46,14 @@ def floor_m(heights_m: Floats, standing: Bools) -> float:
     return float(np.median(near)) if near.size else 0.0
 
 
-def settled(error_m: Floats, standing: Bools, rate_hz: float) -> Floats:
+def smooth_sole_error(error_m: Floats, standing: Bools, rate_hz: float) -> Floats:
     """(T,) slowly varying mean of a sole error (T, 2) over the frames in stance; 0 without any."""
     share = np.sum(standing, axis=1).astype(float)
     if not share.any():
         return np.zeros(len(share))
     total = np.sum(np.where(standing, error_m, 0.0), axis=1)
     mean = float(np.sum(total) / np.sum(share))
-    width = SETTLE_S * rate_hz
+    width = SMOOTHING_S * rate_hz
     near_total, near_share = (gaussian_filter1d(x, width, mode="constant") for x in (total - mean * share, share))
     out: Floats = mean + near_total / (near_share + 1e-3)
     return out

@@ -69,17 +69,17 @@ class Kinematics:
         return out
 
 
-def pose(own: Skeleton, qpos: Floats) -> skeleton.Pose:
+def pose_from_qpos(own: Skeleton, qpos: Floats) -> skeleton.Pose:
     """Forward kinematics of configurations (T, 55), in plain numpy."""
-    return skeleton.forward(own, *humanoid24.unpack(qpos))
+    return skeleton.forward_kinematics(own, *humanoid24.unpack(qpos))
 
 
 def bone_poses(own: Skeleton, qpos: Floats) -> tuple[Floats, Floats]:
     """Joints (T, 24, 3) [m] and `world_from_bone` (T, 24, 4) of configurations (T, 55); signs continuous in time."""
-    at = pose(own, qpos)
+    at = pose_from_qpos(own, qpos)
     return at.start_m, rotations.continuous(rotations.from_matrix(at.world_from_bone))
 
 
 def joint_centres_m(own: Skeleton, qpos: Floats) -> Floats:
     """(T, 25, 3) the root, then the far end of each bone, of configurations (T, 55) [m]."""
-    return np.concatenate([qpos[:, None, :3], pose(own, qpos).end_m], axis=1)
+    return np.concatenate([qpos[:, None, :3], pose_from_qpos(own, qpos).end_m], axis=1)

@@ -20,13 +20,13 @@ _HINGE_DAMPING_NMS, _HINGE_ARMATURE_KGM2 = 1.0, 0.01
 """What keeps an unpowered fall tame; kinematics do not see them."""
 
 
-def mjcf() -> str:
+def humanoid_mjcf() -> str:
     """The text of humanoid24.xml: the standard skeleton, before scaling."""
     own, limits_deg = humanoid24.standard_skeleton(), np.rad2deg(humanoid24.limits_rad())
     top = ET.Element("mujoco", model="humanoid24")
     ET.SubElement(top, "compiler", angle="degree", autolimits="true")
     ET.SubElement(top, "option", timestep="0.004", integrator="implicitfast")
-    _look(top)
+    _add_appearance(top)
     world = ET.SubElement(top, "worldbody")
     ET.SubElement(world, "light", pos="0 0 4", dir="0 0 -1", type="directional")
     ET.SubElement(world, "camera", name="front", pos="3.6 1.3 1.3", mode="targetbody", target="upperback", fovy="36")
@@ -38,8 +38,8 @@ def mjcf() -> str:
     )
     nodes = {"root": ET.SubElement(world, "body", name="root", pos="0 0 1")}
     ET.SubElement(nodes["root"], "freejoint", name="root")
-    _add_flesh(nodes["root"], "root", own)
-    for bone, start_m in enumerate(humanoid.joints_m(own)):
+    _add_geoms(nodes["root"], "root", own)
+    for bone, start_m in enumerate(humanoid.joint_offsets_m(own)):
         name, parent = own.names[bone], own.parents[bone]
         nodes[name] = ET.SubElement(
             nodes["root" if parent < 0 else own.names[parent]], "body", name=name, pos=_text(start_m)
@@ -53,15 +53,15 @@ def mjcf() -> str:
                 axis=_text(own.axes[dof]),
                 range=_text(limits_deg[dof]),
             )
-        _add_flesh(nodes[name], name, own)
+        _add_geoms(nodes[name], name, own)
     keys = ET.SubElement(top, "keyframe")
     ET.SubElement(keys, "key", name="tpose", qpos=_text(humanoid.tpose(own)))
     ET.indent(top)
     return ET.tostring(top, encoding="unicode") + "\n"
 
 
-def _add_flesh(node: ET.Element, bone: str, own: Skeleton) -> None:
-    for shape in anatomy.shapes(own):
+def _add_geoms(node: ET.Element, bone: str, own: Skeleton) -> None:
+    for shape in anatomy.body_geoms(own):
         if shape.bone == bone:
             ET.SubElement(
                 node,
@@ -75,7 +75,7 @@ def _add_flesh(node: ET.Element, bone: str, own: Skeleton) -> None:
             )
 
 
-def _look(top: ET.Element) -> None:
+def _add_appearance(top: ET.Element) -> None:
     """Defaults, colours and light. Flesh meets the floor but not itself."""
     default = ET.SubElement(top, "default")
     ET.SubElement(
@@ -98,4 +98,4 @@ def _text(numbers: Sequence[float] | Floats) -> str:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(mjcf())
+    sys.stdout.write(humanoid_mjcf())

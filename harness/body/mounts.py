@@ -21,7 +21,7 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 
 _GEOM = {"capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID}
-_FAR_M = 1.0
+_RAY_START_M = 1.0
 """Farther from any bone than its skin."""
 
 
@@ -47,7 +47,7 @@ def _mount(station: str, bone: str, along: float, around_deg: float) -> Mount:
     return Mount(station, bone, along, math.radians(around_deg))
 
 
-DEFAULTS: Mapping[str, Mount] = MappingProxyType(
+DEFAULT_MOUNTS: Mapping[str, Mount] = MappingProxyType(
     {
         mount.station: mount
         for mount in (
@@ -68,7 +68,7 @@ DEFAULTS: Mapping[str, Mount] = MappingProxyType(
 """The stations that scenarios name: six of the first paper, five of the second, and the foot option."""
 
 
-def place(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
+def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     """Origin (3,) [m] and orientation `bone_from_station` (4,) of a station in the frame of its bone.
 
     Raises UnknownName for the bone and BadInput where the bone has no flesh at that place.
@@ -79,7 +79,7 @@ def place(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
             f"Station {mount.station!r} cannot sit on {mount.bone}, which has no length.", "Choose a neighbouring bone."
         )
     along = skeleton.bone_m[bone] / skeleton.length_m[bone]
-    facing = _facing(along)
+    facing = _zero_direction(along)
     outward = math.cos(mount.around_rad) * facing + math.sin(mount.around_rad) * np.cross(along, facing)
     axis_m = mount.along * skeleton.bone_m[bone]
     skin_m = _skin_m(skeleton, mount.bone, axis_m, outward)
@@ -94,7 +94,7 @@ def place(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     return axis_m + (skin_m + mount.stand_off_m) * outward + beside_m, turned
 
 
-def _facing(along: Floats) -> Floats:
+def _zero_direction(along: Floats) -> Floats:
     """The unit vector at angle 0: square to the bone, forward, or up for a bone that points forward."""
     reference = np.array([0.0, 0.0, 1.0]) if abs(along[0]) > math.sqrt(0.5) else np.array([1.0, 0.0, 0.0])
     square = reference - (reference @ along) * along
@@ -105,7 +105,7 @@ def _facing(along: Floats) -> Floats:
 def _skin_m(skeleton: Skeleton, bone: str, axis_m: Floats, outward: Floats) -> float | None:
     """Distance from the bone's axis to the outermost skin, found by a ray from outside; None where there is none."""
     carriers = {bone} | ({"root"} if bone in ("lhipjoint", "rhipjoint") else set())
-    eye = axis_m + _FAR_M * outward
+    eye = axis_m + _RAY_START_M * outward
     hits = [
         mujoco.mju_rayGeom(
             shape.centre_m,
@@ -115,8 +115,8 @@ def _skin_m(skeleton: Skeleton, bone: str, axis_m: Floats, outward: Floats) -> f
             -outward,
             _GEOM[shape.kind],
         )
-        for shape in anatomy.shapes(skeleton)
+        for shape in anatomy.body_geoms(skeleton)
         if shape.bone in carriers
     ]
-    depths = [_FAR_M - hit for hit in hits if 0.0 <= hit < _FAR_M]
+    depths = [_RAY_START_M - hit for hit in hits if 0.0 <= hit < _RAY_START_M]
     return max(depths, default=None)

@@ -9,29 +9,31 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from harness.body.anatomy import shapes
+from harness.body.anatomy import body_geoms
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 
-_PAPER, _FLOOR, _LINES, _SHADOW = "#f3f5f7", "#e6eaee", "#c9d1d8", "#c3ccd4"
-_GRID_M, _REACH_M = 0.5, 5.0
-_AWAY_M = 4.6
+_BACKGROUND, _FLOOR, _LINES, _SHADOW = "#f3f5f7", "#e6eaee", "#c9d1d8", "#c3ccd4"
+_GRID_M, _FLOOR_RADIUS_M = 0.5, 5.0
+_CAMERA_DISTANCE_M = 4.6
 
 
-class Stage:
+class RenderScene:
     """One plotter for many pictures: a floor, lights, and a camera that goes along."""
 
     def __init__(self, size: tuple[int, int], heading_rad: float, *, off_screen: bool = True) -> None:
         """`size` in pixels; `heading_rad` is where the body faces, to see it from ahead and from the side."""
         self.plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
-        self.plotter.background_color = pv.Color(_PAPER)
+        self.plotter.background_color = pv.Color(_BACKGROUND)
         self.plotter.enable_anti_aliasing("msaa", multi_samples=8)
         self._disc = self.plotter.add_mesh(pv.Disc(inner=0.0, outer=40.0, c_res=48), color=_FLOOR, lighting=False)
         self._grid = self.plotter.add_mesh(_grid(), color=_LINES, lighting=False, line_width=1.0)
         camera = self.plotter.camera
         camera.focal_point = (0.0, 0.0, 0.0)
-        camera.position = tuple(_AWAY_M * np.array([np.cos(heading_rad - 0.7), np.sin(heading_rad - 0.7), 0.22]))
+        camera.position = tuple(
+            _CAMERA_DISTANCE_M * np.array([np.cos(heading_rad - 0.7), np.sin(heading_rad - 0.7), 0.22])
+        )
         camera.up = (0.0, 0.0, 1.0)
         camera.view_angle = 27.0
         for direction, strength in (((0.4, 0.6, 1.0), 0.85), ((-0.6, -0.5, 0.5), 0.35), ((0.2, -0.8, 0.3), 0.4)):
@@ -66,12 +68,12 @@ class Stage:
         self.plotter.close()
 
 
-class Figure:
+class BodyMesh:
     """A body of capsules and ellipsoids, drawn as one mesh whose points follow the bones, and its shadow."""
 
     def __init__(self, plotter: "pv.Plotter", skeleton: Skeleton, colour: str, girth: float, opacity: float) -> None:
         self._parts, meshes, first = [], [], 0
-        for shape in shapes(skeleton):
+        for shape in body_geoms(skeleton):
             mesh = _mesh(shape.kind, shape.size_m, girth)
             turn = rotations.to_matrix(shape.bone_from_shape)
             mesh.points = mesh.points @ turn.T + shape.centre_m
@@ -119,8 +121,8 @@ def _mesh(kind: str, size_m: Floats, girth: float) -> "pv.PolyData":
 
 def _grid() -> "pv.PolyData":
     """Lines every half metre, within a circle."""
-    offsets = np.arange(-_REACH_M + _GRID_M, _REACH_M, _GRID_M)
-    half = np.sqrt(_REACH_M**2 - offsets**2)
+    offsets = np.arange(-_FLOOR_RADIUS_M + _GRID_M, _FLOOR_RADIUS_M, _GRID_M)
+    half = np.sqrt(_FLOOR_RADIUS_M**2 - offsets**2)
     ends = []
     for offset, reach in zip(offsets, half, strict=True):
         ends += [[offset, -reach, 0.002], [offset, reach, 0.002], [-reach, offset, 0.002], [reach, offset, 0.002]]

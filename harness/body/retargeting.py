@@ -9,7 +9,7 @@ from harness.body import bone_directions, ground, humanoid
 from harness.body.humanoid import Body
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Bools, Floats
-from harness.core.motion import Clip, Take
+from harness.core.motion import BodyMotion, Clip
 from harness.core.skeleton import Pose, Skeleton
 
 _LEGS = ("lfemur", "ltibia", "rfemur", "rtibia")
@@ -41,13 +41,13 @@ class RetargetReport:
     sink_mm: float
 
 
-def to_own_body(clip: Clip) -> tuple[Body, Take]:
+def retarget_to_own_body(clip: Clip) -> tuple[Body, BodyMotion]:
     """The clip on the body scaled to its own skeleton: nothing is changed, fingers and toes are left out."""
     own, angles_rad = _humanoid_part(clip)
-    return humanoid.build(own), _take(clip, humanoid24.pack(clip.root_m, clip.world_from_root, angles_rad))
+    return humanoid.build_body(own), _body_motion(clip, humanoid24.pack(clip.root_m, clip.world_from_root, angles_rad))
 
 
-def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
+def retarget_to_common_body(clip: Clip, target: Skeleton) -> tuple[BodyMotion, RetargetReport]:
     """The clip on the body of another skeleton, and what that cost.
 
     The root's path grows with the legs. Bones point as the performer's do where their hinges allow it. The root
@@ -56,18 +56,20 @@ def to_common_body(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
     """
     own, kept_rad = _humanoid_part(clip)
     turns = clip.world_from_root
-    meant = _Meant.on(target, own, kept_rad, clip)
-    angles_rad = bone_directions.pointing_alike(own, humanoid24.pack(clip.root_m, turns, kept_rad), target)
-    turned = skeleton.turned(target, turns, angles_rad)
-    moved = skeleton.placed(target, meant.root_m, turned)
+    meant = _RetargetGoal.on(target, own, kept_rad, clip)
+    angles_rad = bone_directions.match_bone_directions(own, humanoid24.pack(clip.root_m, turns, kept_rad), target)
+    turned = skeleton.world_rotations(target, turns, angles_rad)
+    moved = skeleton.pose_from_rotations(target, meant.root_m, turned)
     root_m = meant.root_m + _best_offset_m(meant.joints_m - moved.end_m, turns)
-    moved = skeleton.placed(target, root_m, turned)
-    root_m[:, 2] += ground.settled(meant.soles_m - ground.sole_heights_m(target, moved), meant.standing, clip.rate_hz)
-    moved = skeleton.placed(target, root_m, turned)
-    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
+    moved = skeleton.pose_from_rotations(target, root_m, turned)
+    root_m[:, 2] += ground.smooth_sole_error(
+        meant.soles_m - ground.sole_heights_m(target, moved), meant.standing, clip.rate_hz
+    )
+    moved = skeleton.pose_from_rotations(target, root_m, turned)
+    return _body_motion(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
 
 
-def with_angles_kept(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport]:
+def retarget_with_same_angles(clip: Clip, target: Skeleton) -> tuple[BodyMotion, RetargetReport]:
     """The clip's own angles, to the bit, on the body of another skeleton, and what that cost.
 
     The root's path grows with the legs and is lowered once, so that half of the soles in stance are below where the
@@ -75,16 +77,16 @@ def with_angles_kept(clip: Clip, target: Skeleton) -> tuple[Take, RetargetReport
     """
     own, angles_rad = _humanoid_part(clip)
     turns = clip.world_from_root
-    meant = _Meant.on(target, own, angles_rad, clip)
-    moved = skeleton.forward(target, meant.root_m, turns, angles_rad)
+    meant = _RetargetGoal.on(target, own, angles_rad, clip)
+    moved = skeleton.forward_kinematics(target, meant.root_m, turns, angles_rad)
     soles_m = (ground.sole_heights_m(target, moved) - meant.soles_m)[meant.standing]
     root_m = meant.root_m - np.array([0.0, 0.0, np.median(soles_m) if soles_m.size else 0.0])
-    moved = skeleton.placed(target, root_m, moved.world_from_bone)
-    return _take(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
+    moved = skeleton.pose_from_rotations(target, root_m, moved.world_from_bone)
+    return _body_motion(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
 
 
 @dataclass(frozen=True, eq=False)
-class _Meant:
+class _RetargetGoal:
     """What a clip asks of a common body: the performer's joints and soles, enlarged by the legs, over z = 0."""
 
     clip: Clip
@@ -106,9 +108,9 @@ class _Meant:
     """(T, 2)"""
 
     @classmethod
-    def on(cls, target: Skeleton, own: Skeleton, kept_rad: Floats, clip: Clip) -> "_Meant":
-        seen = skeleton.forward(own, clip.root_m, clip.world_from_root, kept_rad)
-        soles_m, standing = ground.sole_heights_m(own, seen), ground.stance(own, seen, clip.rate_hz)
+    def on(cls, target: Skeleton, own: Skeleton, kept_rad: Floats, clip: Clip) -> "_RetargetGoal":
+        seen = skeleton.forward_kinematics(own, clip.root_m, clip.world_from_root, kept_rad)
+        soles_m, standing = ground.sole_heights_m(own, seen), ground.detect_stance(own, seen, clip.rate_hz)
         floor_m, scale = ground.floor_m(soles_m, standing), _leg_m(target) / _leg_m(own)
         level_m = np.array([0.0, 0.0, floor_m])
         root_m, joints_m = scale * (clip.root_m - level_m), scale * (seen.end_m - level_m)
@@ -118,7 +120,7 @@ class _Meant:
     def report(self, moved: Pose) -> RetargetReport:
         """How far a motion of the common body is from it."""
         clip, target, scale = self.clip, self.target, self.scale
-        plain = skeleton.forward(target, scale * clip.root_m, clip.world_from_root, self.kept_rad)
+        plain = skeleton.forward_kinematics(target, scale * clip.root_m, clip.world_from_root, self.kept_rad)
         deviation_mm = 1e3 * np.linalg.norm(moved.end_m - self.joints_m, axis=2)
         feet_mm, plain_feet_mm = (
             1e3 * (ground.sole_heights_m(target, pose) - self.soles_m)[self.standing] for pose in (moved, plain)
@@ -132,17 +134,17 @@ class _Meant:
             deviation_mm=float(np.mean(deviation_mm)),
             deviation_p95_mm=float(np.percentile(deviation_mm, 95)),
             proportions_mm=_proportions_mm(self.own, self.seen, target, scale, clip),
-            float_plain_mm=_beyond(plain_feet_mm),
-            sink_plain_mm=_beyond(-plain_feet_mm),
-            float_mm=_beyond(feet_mm),
-            sink_mm=_beyond(-feet_mm),
+            float_plain_mm=_percentile95(plain_feet_mm),
+            sink_plain_mm=_percentile95(-plain_feet_mm),
+            float_mm=_percentile95(feet_mm),
+            sink_mm=_percentile95(-feet_mm),
         )
 
 
 def _humanoid_part(clip: Clip) -> tuple[Skeleton, Floats]:
     """The 24 bones of the clip's skeleton and their (T, 48) angles; UnknownName or BadInput if it has not got them."""
     own, dofs = clip.skeleton.subset(humanoid24.BONES)
-    humanoid.require(own)
+    humanoid.require_humanoid(own)
     return own, clip.angles_rad[:, dofs]
 
 
@@ -164,7 +166,7 @@ def _proportions_mm(own: Skeleton, seen: Pose, target: Skeleton, scale: float, c
     return float(1e3 * np.mean(np.linalg.norm(residual_m, axis=2)))
 
 
-def _beyond(error_mm: Floats) -> float:
+def _percentile95(error_mm: Floats) -> float:
     """The 95th percentile, not below 0; NaN of nothing."""
     return max(0.0, float(np.percentile(error_mm, 95))) if error_mm.size else float("nan")
 
@@ -173,5 +175,5 @@ def _leg_m(own: Skeleton) -> float:
     return float(sum(own.length_m[own.index(bone)] for bone in _LEGS) / 2)
 
 
-def _take(clip: Clip, qpos: Floats) -> Take:
-    return Take(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz, qpos)
+def _body_motion(clip: Clip, qpos: Floats) -> BodyMotion:
+    return BodyMotion(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz, qpos)

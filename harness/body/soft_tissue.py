@@ -36,7 +36,7 @@ THICKNESS_M: Mapping[str, tuple[float, float]] = MappingProxyType(
 """Bone, of both sides -> at its joint and at its far end [m]."""
 
 
-def thickness_m(bone: str, along: float) -> float:
+def tissue_thickness_m(bone: str, along: float) -> float:
     """Between the bone and the skin at this place along it, 0 at its joint to 1 at its far end [m]; UnknownName."""
     if bone not in humanoid24.BONES:
         raise UnknownName("bone", bone, humanoid24.BONES)

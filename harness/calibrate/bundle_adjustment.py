@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.calibrate.station_kinematics import Chain, Reached
-from harness.calibrate.unknowns import Shared, Solution, moved
+from harness.calibrate.station_kinematics import StationKinematics, StationPoses
+from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns, apply_step
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 
 
 @dataclass(frozen=True, eq=False)
-class Expected:
+class ResidualScales:
     """What residuals are from, and the standard deviations by which they are measured."""
 
     miss_rad: float
@@ -24,7 +24,7 @@ class Expected:
     beside: float
     """Of trackers from their nominal mounts, in units of `unknowns.ALONG_M` and `ACROSS_M`."""
     flesh_m: Floats
-    """(S, 3) of the nominal mounts, as `Shared.nominal_m` takes it."""
+    """(S, 3) of the nominal mounts, as `SharedUnknowns.nominal_m` takes it."""
     place_m: float
     """Of a station's typical place in a pose, on each axis."""
     turn_rad: float
@@ -32,7 +32,7 @@ class Expected:
 
 
 @dataclass(frozen=True, eq=False)
-class Normal:
+class NormalEquations:
     """Normal equations about a solution, in X shared and P times Y own unknowns."""
 
     shared: Floats
@@ -50,14 +50,16 @@ class Normal:
         """Shared (X,) and own (P, Y)."""
         own: Floats = self.own * (1.0 + damping * np.eye(self.own.shape[1]))
         solved = _solve(own, np.concatenate([self.across, self.own_slope[..., None]], axis=2))
-        reduced = self.shared * (1.0 + damping * np.eye(len(self.shared))) - _product(self.across, solved[..., :-1])
-        slope = self.shared_slope - _product(self.across, solved[..., -1:])[:, 0]
+        reduced = self.shared * (1.0 + damping * np.eye(len(self.shared))) - _summed_product(
+            self.across, solved[..., :-1]
+        )
+        slope = self.shared_slope - _summed_product(self.across, solved[..., -1:])[:, 0]
         shared = _solve(reduced, slope)
         return shared, solved[..., -1] - solved[..., :-1] @ shared
 
     def information(self) -> Floats:
         """(X, X) about what is shared when the poses are not known."""
-        out = self.shared - _product(self.across, _solve(self.own, self.across))
+        out = self.shared - _summed_product(self.across, _solve(self.own, self.across))
         return 0.5 * (out + out.T)
 
     def variances(self) -> tuple[Floats, Floats]:
@@ -69,17 +71,17 @@ class Normal:
         return covariance, own
 
 
-class Bundle:
+class BundleAdjustment:
     """Typical places (P, S, 3) and orientations (P, S, 3, 3) of stations in P poses whose hinges (P, D) are known
     but for a miss; z is upward."""
 
-    def __init__(self, shared: Shared, asked_rad: Floats, place_m: Floats, turn: Floats) -> None:
+    def __init__(self, shared: SharedUnknowns, asked_rad: Floats, place_m: Floats, turn: Floats) -> None:
         self.shared, self.asked_rad, self.place_m, self.turn = shared, asked_rad, place_m, turn
-        self.chain = Chain(shared.like, shared.carriers)
+        self.chain = StationKinematics(shared.like, shared.carriers)
         self.hinges: Ints = np.flatnonzero(self.chain.turns.any(axis=0))
         """(H,) those that turn a station. Of the others nothing is told: they are as asked."""
 
-    def start(self) -> Solution:
+    def start(self) -> CalibrationSolution:
         """Mean bones and nominal mounts, poses as asked, where stations are and however straps then fit best."""
         skeleton = self.shared.space.mean_skeleton(self.shared.like)
         mount_m = self.shared.nominal_m(skeleton.bone_m, self.shared.flesh_m(skeleton.bone_m))
@@ -87,37 +89,37 @@ class Bundle:
         upright = np.tile(np.eye(3), (poses, 1, 1))
         straight = np.tile(np.eye(3), (stations, 1, 1))
         at = self.chain.reach(skeleton.bone_m, np.zeros((poses, 3)), upright, self.asked_rad, mount_m, straight)
-        heading_rad = np.array([level_turn_rad(a, b) for a, b in zip(at.place_m, self.place_m, strict=True)])
+        heading_rad = np.array([heading_between_rad(a, b) for a, b in zip(at.place_m, self.place_m, strict=True)])
         root = rotations.to_matrix(rotations.about_z(heading_rad))
         carried = root[:, None] @ at.world_from_station
-        return Solution(
+        return CalibrationSolution(
             bone_m=skeleton.bone_m,
             weights_m=np.zeros(len(self.shared.space.modes)),
             mount_m=mount_m,
-            bone_from_station=mean_turns(np.swapaxes(carried, -1, -2) @ self.turn),
+            bone_from_station=mean_rotations(np.swapaxes(carried, -1, -2) @ self.turn),
             root_m=self.place_m.mean(axis=1) - (root @ at.place_m.mean(axis=1)[..., None])[..., 0],
             world_from_root=root,
             angles_rad=self.asked_rad,
         )
 
-    def moved(self, at: Solution, step: tuple[Floats, Floats]) -> Solution:
-        return moved(at, self.shared, *step, self.hinges)
+    def moved(self, at: CalibrationSolution, step: tuple[Floats, Floats]) -> CalibrationSolution:
+        return apply_step(at, self.shared, *step, self.hinges)
 
-    def reach(self, at: Solution) -> Reached:
+    def reach(self, at: CalibrationSolution) -> StationPoses:
         return self.chain.reach(
             at.bone_m, at.root_m, at.world_from_root, at.angles_rad, at.mount_m, at.bone_from_station
         )
 
-    def off(self, reached: Reached) -> tuple[Floats, Floats]:
+    def off(self, reached: StationPoses) -> tuple[Floats, Floats]:
         """From where stations should be to where they were: (P, S, 3) [m], and turns (P, S, 3) in world axes [rad]."""
         turn = self.turn @ np.swapaxes(reached.world_from_station, -1, -2)
         return self.place_m - reached.place_m, rotations.log(rotations.from_matrix(turn))
 
-    def missed(self, at: Solution) -> Floats:
+    def missed(self, at: CalibrationSolution) -> Floats:
         """(P, 2 + H) lean, as its sine, and hinges from what was asked [rad]."""
-        return np.concatenate([_lean(at)[0], (at.angles_rad - self.asked_rad)[:, self.hinges]], axis=1)
+        return np.concatenate([_tilt(at)[0], (at.angles_rad - self.asked_rad)[:, self.hinges]], axis=1)
 
-    def cost(self, at: Solution, given: Expected, weight: Floats) -> float:
+    def cost(self, at: CalibrationSolution, given: ResidualScales, weight: Floats) -> float:
         """Sum of squared residuals; `weight` (P, S, 2) of each place and turn."""
         place_m, turn_rad = self.off(self.reach(at))
         read = weight[..., 0] * np.sum((place_m / given.place_m) ** 2, axis=2)
@@ -125,21 +127,21 @@ class Bundle:
         expected, _ = self.shared.expected(at, given.beside, given.flesh_m)
         return float(np.sum(read) + np.sum((self.missed(at) / given.miss_rad) ** 2) + expected @ expected)
 
-    def normal(self, at: Solution, given: Expected, weight: Floats) -> Normal:
+    def normal(self, at: CalibrationSolution, given: ResidualScales, weight: Floats) -> NormalEquations:
         """About a solution; arguments as of `cost`."""
         residual, shared, own = self._readings(at, np.sqrt(weight) / [given.place_m, given.turn_rad])
         expected, slope = self.shared.expected(at, given.beside, given.flesh_m)
         missed, missed_slope = self.missed(at) / given.miss_rad, self._missed_slope(at) / given.miss_rad
         flipped, missed_flipped = np.swapaxes(own, 1, 2), np.swapaxes(missed_slope, 1, 2)
-        return Normal(
-            shared=_product(shared, shared) + slope.T @ slope,
+        return NormalEquations(
+            shared=_summed_product(shared, shared) + slope.T @ slope,
             across=flipped @ shared,
             own=flipped @ own + missed_flipped @ missed_slope,
-            shared_slope=_product(shared, residual[..., None])[:, 0] - slope.T @ expected,
+            shared_slope=_summed_product(shared, residual[..., None])[:, 0] - slope.T @ expected,
             own_slope=(flipped @ residual[..., None] - missed_flipped @ missed[..., None])[..., 0],
         )
 
-    def _readings(self, at: Solution, scale: Floats) -> tuple[Floats, Floats, Floats]:
+    def _readings(self, at: CalibrationSolution, scale: Floats) -> tuple[Floats, Floats, Floats]:
         """Residuals (P, 6 S) of places and turns times `scale` (P, S, 2), and how what is predicted changes with
         shared (P, 6 S, X) and own unknowns (P, 6 S, 6 + H)."""
         layout, reached = self.shared, self.reach(at)
@@ -163,29 +165,29 @@ class Bundle:
             (own * scale[..., None]).reshape(*rows, own.shape[-1]),
         )
 
-    def _missed_slope(self, at: Solution) -> Floats:
+    def _missed_slope(self, at: CalibrationSolution) -> Floats:
         """(P, 2 + H, 6 + H) of `missed`."""
         count = len(self.hinges)
         slope = np.zeros((len(at.root_m), 2 + count, 6 + count))
-        slope[:, :2, 3:6] = _lean(at)[1]
+        slope[:, :2, 3:6] = _tilt(at)[1]
         slope[:, 2:, 6:] = np.eye(count)
         return slope
 
 
-def level_turn_rad(from_m: Floats, to_m: Floats) -> float:
+def heading_between_rad(from_m: Floats, to_m: Floats) -> float:
     """The turn about the vertical that takes points (S, 3) nearest to others, each about its mean."""
     a, b = ((points - points.mean(axis=0))[:, :2] @ [1.0, 1.0j] for points in (from_m, to_m))
     return float(np.angle(np.vdot(a, b)))
 
 
-def mean_turns(turns: Floats) -> Floats:
+def mean_rotations(turns: Floats) -> Floats:
     """(S, 3, 3) the rotations nearest to the mean over the first axis of (P, S, 3, 3)."""
     u, _, v = np.linalg.svd(turns.mean(axis=0))
     u[..., -1] *= np.linalg.det(u @ v)[..., None]
     return np.asarray(u @ v)
 
 
-def _lean(at: Solution) -> tuple[Floats, Floats]:
+def _tilt(at: CalibrationSolution) -> tuple[Floats, Floats]:
     """(P, 2) how far roots are off upright, as its sine, and how that changes with small turns (P, 2, 3)."""
     up = at.world_from_root[:, 2]
     turned = np.swapaxes(at.world_from_root, 1, 2) @ np.cross(np.eye(3), [0.0, 0.0, 1.0])
@@ -196,7 +198,7 @@ def _solve(matrix: Floats, right: Floats) -> Floats:
     return np.asarray(np.linalg.solve(matrix, right), dtype=float)
 
 
-def _product(a: Floats, b: Floats) -> Floats:
+def _summed_product(a: Floats, b: Floats) -> Floats:
     """Sum over the first two axes: (P, R, X) and (P, R, Z) to (X, Z)."""
     out: Floats = a.reshape(-1, a.shape[-1]).T @ b.reshape(-1, b.shape[-1])
     return out

@@ -22,20 +22,20 @@ from harness.errors import BadFile, BadInput, HarnessError
 
 SCHEMA = 1
 EXPECTED = "a calibration"
-_HOW = "`harness calibrate` writes one; docs/calibration.md has the format."
-_UNIT = 1e-6
+_ADVICE = "`harness calibrate` writes one; docs/calibration.md has the format."
+_UNIT_TOLERANCE = 1e-6
 """A quaternion's length is 1 within this; copied by hand to seven digits it still is."""
 _LONGEST_M = 1.0
 """No bone of a person is longer."""
-_BARE = frozenset(string.ascii_letters + string.digits + "_-")
+_BARE_KEY_CHARACTERS = frozenset(string.ascii_letters + string.digits + "_-")
 """What a key of TOML may be made of without quotes."""
-_HEAD = """\
+_HEAD_COMMENT = """\
 # Where trackers are worn, by whom, and how the tracker's frame stands in the room. Written by `harness calibrate`.
 # Metres and unit quaternions (w, x, y, z); `a_from_b` takes b into a. docs/calibration.md says how to use it."""
-_ROOM = "# The tracker's frame in the world: z is up, and the performer stood at the origin facing x."
-_STATION = "# Its origin in the frame of the bone that carries it, and how it is turned there."
-_BONES = "# From each bone's joint to its far end, in the rest pose: x forward, y left, z up."
-_TOLD = "# For whoever reads this; nothing is taken from here."
+_ROOM_COMMENT = "# The tracker's frame in the world: z is up, and the performer stood at the origin facing x."
+_STATION_COMMENT = "# Its origin in the frame of the bone that carries it, and how it is turned there."
+_BONES_COMMENT = "# From each bone's joint to its far end, in the rest pose: x forward, y left, z up."
+_DIAGNOSTICS_COMMENT = "# For whoever reads this; nothing is taken from here."
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,31 +69,31 @@ class CalibrationFile:
 
 
 @dataclass(frozen=True)
-class _Room:
+class _RoomTable:
     world_from_tracker: tuple[float, float, float, float]
     tracker_origin_m: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class _Station:
+class _StationTable:
     bone: str
     mount_m: tuple[float, float, float]
     bone_from_station: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)
-class _Content:
+class _FileContent:
     """The file as TOML has it."""
 
     schema: int
     kind: str
-    room: _Room
-    station: dict[str, _Station]
+    room: _RoomTable
+    station: dict[str, _StationTable]
     bone_m: dict[str, tuple[float, float, float]] | None = None
     told: dict[str, Any] = field(default_factory=dict)
 
 
-def require_place(path: Path, *, force: bool) -> None:
+def require_writable(path: Path, *, force: bool) -> None:
     """BadFile when a calibration cannot be written there, or would be written over."""
     if path.exists() and not path.is_file():
         raise BadFile(path, "it is no file", "a place for a calibration", "Name another.")
@@ -104,8 +104,8 @@ def require_place(path: Path, *, force: bool) -> None:
 
 
 def write_calibration(path: Path, kept: CalibrationFile, *, force: bool = False) -> None:
-    """There whole or not at all; BadFile as `require_place` says, BadInput for a skeleton of other joints."""
-    require_place(path, force=force)
+    """There whole or not at all; BadFile as `require_writable` says, BadInput for a skeleton of other joints."""
+    require_writable(path, force=force)
     target = path.resolve()  # what a link points to is replaced, not the link
     beside = target.with_name(f".unfinished-{target.name}")
     text = "\n".join(_lines(kept)) + "\n"
@@ -124,21 +124,21 @@ def read_calibration(path: Path | str) -> CalibrationFile:
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise BadFile(path, f"it cannot be read ({error.strerror})", EXPECTED, _HOW) from error
+        raise BadFile(path, f"it cannot be read ({error.strerror})", EXPECTED, _ADVICE) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", EXPECTED, _HOW) from error
+        raise BadFile(path, f"not TOML: {error}", EXPECTED, _ADVICE) from error
     schema = content.get("schema")
     if schema != SCHEMA:
         advice = "This version of the harness reads no other."
         raise BadFile(path, "no schema" if schema is None else f"schema {schema!r}", f"schema {SCHEMA}", advice)
     try:
-        told = build(_Content, content, "calibration")
+        told = build(_FileContent, content, "calibration")
         return CalibrationFile(_calibration(told), _skeleton(told), told.told)
     except (TypeError, ValueError, HarnessError) as error:
-        raise BadFile(path, str(error).rstrip("."), EXPECTED, _HOW) from error
+        raise BadFile(path, str(error).rstrip("."), EXPECTED, _ADVICE) from error
 
 
-def _calibration(content: _Content) -> Calibration:
+def _calibration(content: _FileContent) -> Calibration:
     """ValueError for what cannot be."""
     if not content.station:
         raise ValueError("no stations")
@@ -161,7 +161,7 @@ def _calibration(content: _Content) -> Calibration:
     )
 
 
-def _skeleton(content: _Content) -> Skeleton | None:
+def _skeleton(content: _FileContent) -> Skeleton | None:
     """ValueError for other bones than the body's, or for lengths that nobody has."""
     if content.bone_m is None:
         return None
@@ -177,16 +177,16 @@ def _skeleton(content: _Content) -> Skeleton | None:
 
 def _require_unit(key: str, quaternion: Sequence[float]) -> None:
     length = float(np.linalg.norm(quaternion))
-    if abs(length - 1.0) > _UNIT:
+    if abs(length - 1.0) > _UNIT_TOLERANCE:
         raise ValueError(f"{key} is no unit quaternion: its length is {length:.6g}")
 
 
 def _lines(kept: CalibrationFile) -> Iterator[str]:
     known = kept.calibration
-    yield from (_HEAD, f"schema = {SCHEMA}", f"kind = {_value(known.kind)}", "", _ROOM, "[room]")
+    yield from (_HEAD_COMMENT, f"schema = {SCHEMA}", f"kind = {_value(known.kind)}", "", _ROOM_COMMENT, "[room]")
     yield f"world_from_tracker = {_value(known.world_from_tracker.tolist())}"
     yield f"tracker_origin_m = {_value(known.tracker_origin_m.tolist())}"
-    yield from ("", _STATION)
+    yield from ("", _STATION_COMMENT)
     for row, name in enumerate(known.stations):
         yield f"[station.{_key(name)}]"
         yield f"bone = {_value(known.bones[row])}"
@@ -195,13 +195,15 @@ def _lines(kept: CalibrationFile) -> Iterator[str]:
         yield ""
     if kept.skeleton is not None:
         standard = standard_skeleton()
-        if kept.skeleton.names != standard.names or not np.allclose(kept.skeleton.axes, standard.axes, atol=_UNIT):
+        if kept.skeleton.names != standard.names or not np.allclose(
+            kept.skeleton.axes, standard.axes, atol=_UNIT_TOLERANCE
+        ):
             raise BadInput("A skeleton of other joints than the body's.", "Calibrate on the standard body's joints.")
-        yield from (_BONES, "[bone_m]")
+        yield from (_BONES_COMMENT, "[bone_m]")
         for bone, vector_m in zip(BONES, kept.skeleton.bone_m.tolist(), strict=True):
             yield f"{bone} = {_value(vector_m)}"
         yield ""
-    yield from (_TOLD, *_table("told", kept.told))
+    yield from (_DIAGNOSTICS_COMMENT, *_table("told", kept.told))
 
 
 def _table(name: str, content: Mapping[str, Any]) -> Iterator[str]:
@@ -217,7 +219,7 @@ def _table(name: str, content: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _key(name: str) -> str:
-    return name if name and set(name) <= _BARE else _value(name)
+    return name if name and set(name) <= _BARE_KEY_CHARACTERS else _value(name)
 
 
 def _value(value: Any) -> str:

@@ -5,16 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from harness.calibrate.pose_calibration import EightPoses
+from harness.calibrate.pose_calibration import PoseCalibration
 from harness.calibrate.poses import POSES
-from harness.calibrate.tpose_calibration import TPose
+from harness.calibrate.tpose_calibration import TPoseCalibration
 
-Told = tuple[dict[str, Any], list[str]]
+CalibrationReport = tuple[dict[str, Any], list[str]]
 """For the file, and lines for the screen."""
-_OF_MOUNTS = ("mount_sd", "mount_bound", "residual")
+_MOUNT_FIELDS = ("mount_sd", "mount_bound", "residual")
 
 
-def of_poses(found: EightPoses) -> Told:
+def report_pose_calibration(found: PoseCalibration) -> CalibrationReport:
     """A row for each bone, one for each station, and what else there is to say."""
     names, stations = found.skeleton.names, found.calibration.stations
     lengths = {
@@ -30,10 +30,12 @@ def of_poses(found: EightPoses) -> Told:
             strict=True,
         )
     }
-    deg = {name: np.rad2deg(getattr(found, f"{name}_rad")).tolist() for name in _OF_MOUNTS}
-    size_m = {name: getattr(found, f"{name}_m").tolist() for name in _OF_MOUNTS}
+    deg = {name: np.rad2deg(getattr(found, f"{name}_rad")).tolist() for name in _MOUNT_FIELDS}
+    size_m = {name: getattr(found, f"{name}_m").tolist() for name in _MOUNT_FIELDS}
     mounts = {
-        station: {f"{name}_{unit}": of[name][row] for name in _OF_MOUNTS for unit, of in (("m", size_m), ("deg", deg))}
+        station: {
+            f"{name}_{unit}": of[name][row] for name in _MOUNT_FIELDS for unit, of in (("m", size_m), ("deg", deg))
+        }
         for row, station in enumerate(stations)
     }
     miss_deg = {pose.name: deg for pose, deg in zip(POSES, np.rad2deg(found.pose_miss_rad).tolist(), strict=True)}
@@ -47,10 +49,10 @@ def of_poses(found: EightPoses) -> Told:
         "stations": {name: _finite(row) for name, row in mounts.items()},
         "bones": {name: _finite(row) for name, row in lengths.items()},
     }
-    return told, [*_of_bones(lengths), "", *_of_mounts(mounts), "", *_of_fit(found, miss_deg)]
+    return told, [*_bone_lines(lengths), "", *_mount_lines(mounts), "", *_fit_lines(found, miss_deg)]
 
 
-def _of_bones(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _bone_lines(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
     head = ["bone [mm]", "found", "sd", "mean skeleton", "bound alone", "told by trackers", ""]
     rows = [
         [
@@ -62,19 +64,19 @@ def _of_bones(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
     return _table([head, *rows])
 
 
-def _of_mounts(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
+def _mount_lines(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
     head = ["mount", "sd [mm]", "[deg]", "bound alone [mm]", "[deg]", "residual [mm]", "[deg]"]
     rows = [
         [
             name,
-            *(word for key in _OF_MOUNTS for word in (_mm(one[f"{key}_m"]), f"{one[f'{key}_deg']:.2f}")),
+            *(word for key in _MOUNT_FIELDS for word in (_mm(one[f"{key}_m"]), f"{one[f'{key}_deg']:.2f}")),
         ]
         for name, one in mounts.items()
     ]
     return _table([head, *rows])
 
 
-def _of_fit(found: EightPoses, miss_deg: Mapping[str, float]) -> list[str]:
+def _fit_lines(found: PoseCalibration, miss_deg: Mapping[str, float]) -> list[str]:
     worst = max(miss_deg, key=lambda name: miss_deg[name])
     return [
         "bound alone: the Cramér-Rao bound of whoever knows nothing of people's bones and of where trackers are worn",
@@ -85,7 +87,7 @@ def _of_fit(found: EightPoses, miss_deg: Mapping[str, float]) -> list[str]:
     ]
 
 
-def of_tpose(found: TPose) -> Told:
+def report_tpose_calibration(found: TPoseCalibration) -> CalibrationReport:
     names = found.calibration.stations
     stations = {
         name: {"residual_m": residual_m, "moved_m": moved_m}

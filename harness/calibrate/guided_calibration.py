@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING, Protocol
 
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
-from harness.calibrate.hold import NotStanding
+from harness.calibrate.hold import UnusableHold
 from harness.calibrate.pose_collector import HOLD_S, PoseCollector
-from harness.calibrate.tpose_calibration import SECONDS, TPoseCollector, calibrate_tpose
+from harness.calibrate.tpose_calibration import TPOSE_S, TPoseCollector, calibrate_tpose
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.stream.frame import TrackerFrame
@@ -15,42 +15,42 @@ from harness.stream.frame import TrackerFrame
 if TYPE_CHECKING:
     from harness.calibrate.poses import CalibrationPose
 
-Say = Callable[[str], None]
+Notifier = Callable[[str], None]
 """Tells the user something, in a line."""
-ATTEMPTS = 5
+MAX_ATTEMPTS = 5
 """A T-pose may fail so often; what keeps failing needs another remedy than patience [choice]."""
 
 
 class Calibrator(Protocol):
     """Makes a calibration of the first frames of a stream."""
 
-    def begin(self, say: Say) -> None:
+    def begin(self, say: Notifier) -> None:
         """Tell the user what to do."""
         ...
 
-    def add(self, frame: TrackerFrame, say: Say) -> Calibration | None:
+    def add(self, frame: TrackerFrame, say: Notifier) -> Calibration | None:
         """The calibration, once there is enough to go by; HarnessError when there will be none."""
         ...
 
 
-class StandInTPose:
+class TPoseCalibrator:
     """A `Calibrator`: the first seconds in which the performer stands in T-pose."""
 
-    def __init__(self, body: Body, mounts: Sequence[Mount], attempts: int = ATTEMPTS) -> None:
+    def __init__(self, body: Body, mounts: Sequence[Mount], attempts: int = MAX_ATTEMPTS) -> None:
         self._body, self._mounts = body, mounts
         self._left = attempts
         self._collector = TPoseCollector()
 
-    def begin(self, say: Say) -> None:
-        say(f"calibration: stand in T-pose, arms out to the sides, palms down, for {SECONDS:g} s")
+    def begin(self, say: Notifier) -> None:
+        say(f"calibration: stand in T-pose, arms out to the sides, palms down, for {TPOSE_S:g} s")
 
-    def add(self, frame: TrackerFrame, say: Say) -> Calibration | None:
+    def add(self, frame: TrackerFrame, say: Notifier) -> Calibration | None:
         """NotStanding after the last attempt."""
         if not self._collector.add(frame):
             return None
         try:
             found = calibrate_tpose(self._collector.frames, self._body, self._mounts)
-        except NotStanding as error:
+        except UnusableHold as error:
             self._left -= 1
             if self._left == 0:
                 raise
@@ -62,11 +62,11 @@ class StandInTPose:
         return found.calibration
 
 
-Show = Callable[[int, Floats], None]
+PoseDisplay = Callable[[int, Floats], None]
 """Shows the performer a pose: its number, from 1, and configuration (55,). OSError when it no longer can."""
 
 
-class HoldPoses:
+class PoseGuide:
     """Leads a performer through poses, one after another; `collector.held` has what was held.
 
     `shown` are their configurations (55,), for `show`.
@@ -77,12 +77,12 @@ class HoldPoses:
         collector: PoseCollector,
         poses: "Sequence[CalibrationPose]",
         shown: Sequence[Floats] = (),
-        show: Show | None = None,
+        show: PoseDisplay | None = None,
     ) -> None:
         self.collector, self._poses, self._shown, self._show = collector, poses, shown, show
         self._passed = 0
 
-    def lead(self, frames: Iterable[TrackerFrame], say: Say, watch: Say = lambda text: None) -> None:
+    def lead(self, frames: Iterable[TrackerFrame], say: Notifier, watch: Notifier = lambda text: None) -> None:
         """Until the last pose is taken; NotStanding when the stream ends before. `watch` is told of every moment."""
         self._wanted(say)
         for frame in frames:
@@ -96,9 +96,9 @@ class HoldPoses:
                 if self.collector.done:
                     return
                 self._wanted(say)
-        raise not_all(self.collector, self._poses)
+        raise incomplete_poses_error(self.collector, self._poses)
 
-    def _wanted(self, say: Say) -> None:
+    def _wanted(self, say: Notifier) -> None:
         number = len(self.collector.held)
         pose = self._poses[number]
         say(f"pose {number + 1} of {len(self._poses)}, {pose.name}: {pose.instruction}")
@@ -110,13 +110,13 @@ class HoldPoses:
                 self._show = None
 
 
-def not_all(collector: PoseCollector, poses: "Sequence[CalibrationPose]") -> NotStanding:
+def incomplete_poses_error(collector: PoseCollector, poses: "Sequence[CalibrationPose]") -> UnusableHold:
     """What was held, of a stream that ended before all poses were."""
     taken = ", ".join(f"{at_s:.1f} s" for at_s in collector.began_s)
     held = f"{len(collector.held)} of {len(poses)} poses were held" + (f", at {taken}" if taken else "")
     passed = "; ".join(map(str, collector.passed))
     wanted = poses[len(collector.held)]
-    return NotStanding(
+    return UnusableHold(
         f"The stream ended before calibration was done: {held}{f'; {passed}' if passed else ''}.",
         f"Hold each pose still for {HOLD_S:g} s, in order; the next was {wanted.name!r}.",
     )

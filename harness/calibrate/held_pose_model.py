@@ -14,24 +14,24 @@ from scipy.linalg import block_diag
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import Mount, place
+from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 
-MISS_RAD = float(np.deg2rad(2.5))
+POSE_ERROR_RAD = float(np.deg2rad(2.5))
 """How far each hinge, and the lean of the whole body, is off the pose, standard deviation [choice]: some six bones bear
 a forearm, which then points 6 deg elsewhere."""
-ALONG_M, ACROSS_M = 0.03, 0.015
+MOUNT_ALONG_SD_M, MOUNT_ACROSS_SD_M = 0.03, 0.015
 """How far trackers sit from their nominal mounts, standard deviation along the bone and on the two axes across it:
 straps slide along a limb, flesh is known better [choice]."""
-FREE, _MISSED = [0, 1, 2, 5], [3, 4, *range(6, 54)]
+FREE_DOFS, _POSE_ERROR_DOFS = [0, 1, 2, 5], [3, 4, *range(6, 54)]
 """Directions of MuJoCo's velocities: root position and turn about the vertical; lean and hinges."""
-_VAGUE = 1e-6
+_PRIOR_INFORMATION = 1e-6
 """Information that stands for knowing nothing (a kilometre, a thousand radians), where stations do not tell either."""
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class HeldPoseFit:
     """How S measured places fit."""
 
     heading_rad: float
@@ -44,13 +44,13 @@ class Fit:
     """Squared residual in units of the model's spread; 3 S - 4 on average when the model holds."""
 
 
-class Stance:
+class HeldPoseModel:
     """S stations on a body that holds a pose (55,), upright."""
 
     def __init__(self, body: Body, mounts: Sequence[Mount], pose: Floats) -> None:
         kinematics = Kinematics(body)
         bones = [body.skeleton.index(mount.bone) for mount in mounts]
-        placed = [place(body.skeleton, mount) for mount in mounts]
+        placed = [locate_mount(body.skeleton, mount) for mount in mounts]
         self.mount_m = np.array([mount_m for mount_m, _ in placed])
         kinematics.set(pose)
         self.place_m, _ = kinematics.station_poses(bones, self.mount_m, np.array([turn for _, turn in placed]))
@@ -60,16 +60,19 @@ class Stance:
         linear, angular = np.zeros((2, len(mounts), 3, kinematics.nv))
         kinematics.jacobians(bones, self.place_m, linear, angular)
         self._root_m = np.array(pose[:3])
-        self._free: Floats = linear[:, :, FREE].reshape(-1, len(FREE))
-        missed = linear[:, :, _MISSED].reshape(-1, len(_MISSED))
-        self._turned: Floats = MISS_RAD**2 * angular[:, :, _MISSED] @ missed.T
+        self._free: Floats = linear[:, :, FREE_DOFS].reshape(-1, len(FREE_DOFS))
+        missed = linear[:, :, _POSE_ERROR_DOFS].reshape(-1, len(_POSE_ERROR_DOFS))
+        self._turned: Floats = POSE_ERROR_RAD**2 * angular[:, :, _POSE_ERROR_DOFS] @ missed.T
         """(S, 3, 3 S) covariance of how the bones are turned and where the stations are."""
         bone_m = body.skeleton.bone_m[bones] / body.skeleton.length_m[bones][:, None]
         along = rotations.rotate(self.world_from_bone, bone_m)
-        blocks = ACROSS_M**2 * np.eye(3) + (ALONG_M**2 - ACROSS_M**2) * along[:, :, None] * along[:, None]
+        blocks = (
+            MOUNT_ACROSS_SD_M**2 * np.eye(3)
+            + (MOUNT_ALONG_SD_M**2 - MOUNT_ACROSS_SD_M**2) * along[:, :, None] * along[:, None]
+        )
         self._beside: Floats = block_diag(*blocks)
-        self._precision = _inverse(MISS_RAD**2 * missed @ missed.T + self._beside)
-        self._room = _inverse(self._free.T @ self._precision @ self._free + _VAGUE * np.eye(len(FREE)))
+        self._precision = _inverse(POSE_ERROR_RAD**2 * missed @ missed.T + self._beside)
+        self._room = _inverse(self._free.T @ self._precision @ self._free + _PRIOR_INFORMATION * np.eye(len(FREE_DOFS)))
         """(4, 4) covariance of where the performer stands and faces, given the stations."""
 
     @property
@@ -77,9 +80,9 @@ class Stance:
         """How well these stations tell which way the performer faces, standard deviation [rad]."""
         return float(np.sqrt(self._room[3, 3]))
 
-    def fit(self, measured_m: Floats) -> Fit:
+    def fit(self, measured_m: Floats) -> HeldPoseFit:
         """Of places (S, 3) measured in a frame whose z axis is up."""
-        heading_rad = _level_turn_rad(measured_m, self.place_m)
+        heading_rad = _heading_between_rad(measured_m, self.place_m)
         shift_m = np.mean(self.place_m - rotations.rotate(rotations.about_z(heading_rad), measured_m), axis=0)
         for _ in range(20):
             residual = self._residual(measured_m, heading_rad, shift_m)
@@ -91,7 +94,7 @@ class Stance:
             if np.abs(step).max() < 1e-10:
                 break
         residual = self._residual(measured_m, heading_rad, shift_m)
-        return Fit(
+        return HeldPoseFit(
             heading_rad=float(np.angle(np.exp(1j * heading_rad))),
             origin_m=shift_m,
             residual_m=residual.reshape(-1, 3),
@@ -110,7 +113,7 @@ class Stance:
         return out
 
 
-def _level_turn_rad(from_m: Floats, to_m: Floats) -> float:
+def _heading_between_rad(from_m: Floats, to_m: Floats) -> float:
     """The turn about the vertical that takes points (S, 3) nearest to others, each about its mean."""
     a, b = ((points - points.mean(axis=0))[:, :2] @ [1.0, 1.0j] for points in (from_m, to_m))
     return float(np.angle(np.vdot(a, b)))

@@ -21,17 +21,17 @@ LEAST_SHARE = 0.5
 SWAY_M, SWAY_RAD = 0.03, float(np.deg2rad(5.0))
 """The device itself is off by up to 3 cm for seconds (docs/is900.md 13.1, GIL), and nobody stands stiller than that
 with arms held out; 5 deg is 3 cm at a third of a metre [choice]."""
-NOISE_WIDTHS = 5.0
+NOISE_SDS = 5.0
 """On top of it, so many standard deviations of a single reading, as this very stream shows them [choice]."""
 _ROUNDS, _CONVERGED_RAD = 30, 1e-7
 
 
-class NotStanding(BadInput):
+class UnusableHold(BadInput):
     """A few seconds that cannot be calibrated from; the performer can try again."""
 
 
 @dataclass(frozen=True, eq=False)
-class Still:
+class HoldReadings:
     """Typical readings of S stations over some seconds."""
 
     seconds: float
@@ -48,14 +48,14 @@ class Still:
         freeze(self, position_m=("S", 3), tracker_from_station=("S", 4), moved_m=("S",), turned_rad=("S",))
 
 
-def stood_still(frames: Sequence[TrackerFrame], stations: Sequence[str], pose: str = "T-pose") -> Still:
+def measure_hold(frames: Sequence[TrackerFrame], stations: Sequence[str], pose: str = "T-pose") -> HoldReadings:
     """Typical readings; NotStanding when they are too few or somebody moved, BadInput for other stations.
 
     `pose` is what the performer is asked to hold.
     """
     seconds = span_s(frames)
     if seconds < LEAST_S or len(frames) < LEAST_FRAMES:
-        raise NotStanding(
+        raise UnusableHold(
             f"{len(frames)} frames within {seconds:.1f} s are too few to calibrate from.",
             f"Hold the pose ({pose}) for {LEAST_S:g} s or more while the tracker streams.",
         )
@@ -68,10 +68,10 @@ def stood_still(frames: Sequence[TrackerFrame], stations: Sequence[str], pose: s
     turn = np.array([frame.tracker_from_station for frame in frames])
     usable = _usable(frames, position_m, turn)
     _require_readings(frames, usable.mean(axis=0), stations, pose)
-    rows = [_of_one(position_m[usable[:, s], s], turn[usable[:, s], s]) for s in range(len(stations))]
+    rows = [_typical_reading(position_m[usable[:, s], s], turn[usable[:, s], s]) for s in range(len(stations))]
     at_m, turned, moved_m, turned_rad, limit_m, limit_rad = (np.array(column) for column in zip(*rows, strict=True))
     _require_stillness(stations, moved_m, limit_m, turned_rad, limit_rad, pose)
-    return Still(seconds, at_m, turned, moved_m, turned_rad)
+    return HoldReadings(seconds, at_m, turned, moved_m, turned_rad)
 
 
 def span_s(frames: Sequence[TrackerFrame]) -> float:
@@ -92,16 +92,16 @@ def median_rotation(turn: Floats) -> Floats:
     return middle / np.linalg.norm(middle)
 
 
-def _of_one(position_m: Floats, turn: Floats) -> tuple[Floats, Floats, float, float, float, float]:
+def _typical_reading(position_m: Floats, turn: Floats) -> tuple[Floats, Floats, float, float, float, float]:
     """Typical position and orientation of one station's readings (N, 3), (N, 4), how far it strayed, how far it may."""
     at_m, middle = np.median(position_m, axis=0), median_rotation(turn)
     off = rotations.log(rotations.multiply(rotations.inverse(middle), turn))
     moved_m, turned_rad = (float(np.quantile(np.linalg.norm(x, axis=1), 0.75)) for x in (position_m - at_m, off))
-    limit_m, limit_rad = SWAY_M + NOISE_WIDTHS * _noise(position_m), SWAY_RAD + NOISE_WIDTHS * _noise(off)
+    limit_m, limit_rad = SWAY_M + NOISE_SDS * _noise_sd(position_m), SWAY_RAD + NOISE_SDS * _noise_sd(off)
     return at_m, middle, moved_m, turned_rad, limit_m, limit_rad
 
 
-def _noise(readings: Floats) -> float:
+def _noise_sd(readings: Floats) -> float:
     """Standard deviation of a single reading (N, 3) on an axis: from second differences, in which steady motion
     cancels, by their median, which echoes leave alone."""
     second = np.diff(readings, n=2, axis=0)
@@ -131,7 +131,7 @@ def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: S
         why = "told no position"
     elif suspect > 1.0 - LEAST_SHARE:
         why, advice = "sent records in doubt", "Check the line, the output lists and which stations are on."
-    raise NotStanding(
+    raise UnusableHold(
         f"Station {stations[worst]!r} {why}: {share[worst]:.0%} of its readings are of use; {LEAST_SHARE:.0%} must be.",
         f"{advice} Then hold the pose again ({pose}).",
     )
@@ -143,7 +143,7 @@ def _require_stillness(
     worst = int(np.argmax(np.maximum(moved_m / limit_m, turned_rad / limit_rad)))
     if moved_m[worst] <= limit_m[worst] and turned_rad[worst] <= limit_rad[worst]:
         return
-    raise NotStanding(
+    raise UnusableHold(
         f"Station {stations[worst]!r} moved: it strayed by {1e3 * moved_m[worst]:.0f} mm and "
         f"{np.rad2deg(turned_rad[worst]):.0f} deg, where {1e3 * limit_m[worst]:.0f} mm and "
         f"{np.rad2deg(limit_rad[worst]):.0f} deg are sway and noise.",

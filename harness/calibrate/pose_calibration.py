@@ -13,14 +13,14 @@ import numpy as np
 from harness.body import ground, kinematics
 from harness.body.mounts import Mount
 from harness.calibrate import pose_checks, station_orientation
-from harness.calibrate.bundle_adjustment import Bundle
-from harness.calibrate.bundle_fit import Fit, fit
-from harness.calibrate.hold import Still, stood_still
-from harness.calibrate.poses import POSES, angles_rad
-from harness.calibrate.skeleton_prior import BoneSpace
-from harness.calibrate.tpose_calibration import LEVEL
-from harness.calibrate.uncertainty import Knowledge, knowledge
-from harness.calibrate.unknowns import Shared
+from harness.calibrate.bundle_adjustment import BundleAdjustment
+from harness.calibrate.bundle_fit import BundleFit, fit_bundle
+from harness.calibrate.hold import HoldReadings, measure_hold
+from harness.calibrate.poses import POSES, pose_angles_rad
+from harness.calibrate.skeleton_prior import SkeletonPrior
+from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
+from harness.calibrate.uncertainty import CalibrationUncertainty, estimate_uncertainty
+from harness.calibrate.unknowns import SharedUnknowns
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.calibration import Calibration
@@ -30,14 +30,14 @@ from harness.stream.frame import TrackerFrame
 
 FLOOR_M, FLOOR_RAD = 5e-5, float(np.deg2rad(0.005))
 """No typical reading is better than this [choice]; what the readings of each hold scatter comes on top."""
-FROM_PRIOR = 0.9
+LEAST_VARIANCE_REDUCTION = 0.9
 """A length is called "from the prior" unless the trackers take away this share of its variance among people."""
-_AXIS_PER_QUANTILE = 1.0 / 2.027
+_SD_PER_QUARTILE = 1.0 / 2.027
 """Three quarters of normal readings lie within 2.027 standard deviations of an axis of their mean (chi, 3 degrees)."""
 
 
 @dataclass(frozen=True, eq=False)
-class EightPoses:
+class PoseCalibration:
     """What eight poses told; N bones, S stations."""
 
     calibration: Calibration
@@ -85,7 +85,9 @@ class EightPoses:
         freeze(self, mount_bound_m=(stations,), mount_bound_rad=(stations,), pose_miss_rad=("P",))
 
 
-def calibrate_poses(held: Sequence[Sequence[TrackerFrame]], space: BoneSpace, mounts: Sequence[Mount]) -> EightPoses:
+def calibrate_poses(
+    held: Sequence[Sequence[TrackerFrame]], space: SkeletonPrior, mounts: Sequence[Mount]
+) -> PoseCalibration:
     """Skeleton, mounts and room from the frames of each of the eight holds, in the order of `poses.POSES`.
 
     `mounts` are in the order of the stream's stations: about where trackers sit, in any orientation. NotStanding names
@@ -97,42 +99,44 @@ def calibrate_poses(held: Sequence[Sequence[TrackerFrame]], space: BoneSpace, mo
             f"Hold these, one after another: {', '.join(pose.name for pose in POSES)}.",
         )
     names = [mount.station for mount in mounts]
-    still = [stood_still(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
+    still = [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
     like = humanoid24.standard_skeleton()
-    asked_rad = np.array([angles_rad(pose, like) for pose in POSES])
-    turn = rotations.multiply(LEVEL, np.array([one.tracker_from_station for one in still]))
-    place_m = rotations.rotate(LEVEL, np.array([one.position_m for one in still]))
-    bundle = Bundle(Shared(like, space, mounts), asked_rad, place_m, rotations.to_matrix(turn))
-    pose_checks.require_one_room(bundle)
-    found = fit(bundle, *_scatter(still))
-    pose_checks.require_poses(bundle, found)
-    return _told(bundle, found, knowledge(bundle, found), sum(one.seconds for one in still))
+    asked_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
+    turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([one.tracker_from_station for one in still]))
+    place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([one.position_m for one in still]))
+    bundle = BundleAdjustment(SharedUnknowns(like, space, mounts), asked_rad, place_m, rotations.to_matrix(turn))
+    pose_checks.require_no_boresight(bundle)
+    found = fit_bundle(bundle, *_reading_sd(still))
+    pose_checks.require_poses_held(bundle, found)
+    return _assemble(bundle, found, estimate_uncertainty(bundle, found), sum(one.seconds for one in still))
 
 
-def _scatter(still: Sequence[Still]) -> tuple[float, float]:
+def _reading_sd(still: Sequence[HoldReadings]) -> tuple[float, float]:
     """Standard deviations of typical places [m] and orientations [rad] on an axis, from how readings scatter in a hold.
 
     The device's errors wander over a second, so that a typical reading of a few is hardly better than any one.
     """
-    moved_m = float(np.median([one.moved_m for one in still])) * _AXIS_PER_QUANTILE
-    turned_rad = float(np.median([one.turned_rad for one in still])) * _AXIS_PER_QUANTILE
+    moved_m = float(np.median([one.moved_m for one in still])) * _SD_PER_QUARTILE
+    turned_rad = float(np.median([one.turned_rad for one in still])) * _SD_PER_QUARTILE
     return float(np.hypot(FLOOR_M, moved_m)), float(np.hypot(FLOOR_RAD, turned_rad))
 
 
-def _told(bundle: Bundle, found: Fit, known: Knowledge, seconds: float) -> EightPoses:
+def _assemble(
+    bundle: BundleAdjustment, found: BundleFit, known: CalibrationUncertainty, seconds: float
+) -> PoseCalibration:
     at, mounts = found.solution, bundle.shared.mounts
     skeleton = bundle.shared.like.with_bones(at.bone_m)
     bone_from_station = rotations.from_matrix(at.bone_from_station)
-    world_from_level, shift_m = _room(skeleton, found)
+    world_from_level, shift_m = _world_from_level(skeleton, found)
     off_m, off_rad = bundle.off(bundle.reach(at))
-    return EightPoses(
+    return PoseCalibration(
         calibration=Calibration(
             kind="poses",
             stations=tuple(mount.station for mount in mounts),
             bones=tuple(mount.bone for mount in mounts),
             mount_m=at.mount_m,
             bone_from_station=bone_from_station,
-            world_from_tracker=rotations.multiply(world_from_level, LEVEL),
+            world_from_tracker=rotations.multiply(world_from_level, LEVEL_FROM_TRACKER),
             tracker_origin_m=shift_m,
         ),
         skeleton=skeleton,
@@ -140,7 +144,7 @@ def _told(bundle: Bundle, found: Fit, known: Knowledge, seconds: float) -> Eight
         length_sd_m=known.length_sd_m,
         length_bound_m=known.length_bound_m,
         known=known.share,
-        from_prior=known.share < FROM_PRIOR,
+        from_prior=known.share < LEAST_VARIANCE_REDUCTION,
         mount_sd_m=known.mount_sd_m,
         mount_sd_rad=known.mount_sd_rad,
         mount_bound_m=known.mount_bound_m,
@@ -151,18 +155,18 @@ def _told(bundle: Bundle, found: Fit, known: Knowledge, seconds: float) -> Eight
         pose_miss_rad=found.pose_miss_rad,
         beside=found.expected.beside,
         condition=known.condition,
-        hints=station_orientation.strapped(skeleton, mounts, bone_from_station),
+        hints=station_orientation.strap_hints(skeleton, mounts, bone_from_station),
         seconds=seconds,
     )
 
 
-def _room(skeleton: Skeleton, found: Fit) -> tuple[Floats, Floats]:
+def _world_from_level(skeleton: Skeleton, found: BundleFit) -> tuple[Floats, Floats]:
     """World from level axes: turn (4,) and shift (3,) by which the first pose stands at the origin and faces x. Every
     pose has its lower sole on the floor; the floor is where half of them stand higher."""
     at = found.solution
     root = rotations.from_matrix(at.world_from_root)
     qpos = humanoid24.pack(at.root_m, root, at.angles_rad)
-    soles_m = np.min(ground.sole_heights_m(skeleton, kinematics.pose(skeleton, qpos)), axis=1)
+    soles_m = np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos)), axis=1)
     turn = rotations.about_z(-float(rotations.yaw_rad(root[0])))
     origin_m = np.array([*at.root_m[0, :2], np.median(soles_m)])
     return turn, -rotations.rotate(turn, origin_m)

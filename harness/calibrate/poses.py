@@ -30,21 +30,21 @@ class CalibrationPose:
     """Hinge, such as "lhumerus.rz", to its angle; the others are 0."""
 
 
-def angles_rad(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
+def pose_angles_rad(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
     """(48,) hinges in the skeleton's order."""
     return np.deg2rad([pose.angles_deg.get(name, 0.0) for name in skeleton.dof_names])
 
 
 def configuration(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
     """(55,) of this body in the pose: upright at the world's origin, facing x, its lower sole on the floor."""
-    qpos = humanoid24.pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), angles_rad(pose, skeleton))
-    qpos[2] = -float(np.min(ground.sole_heights_m(skeleton, kinematics.pose(skeleton, qpos[None]))))
+    qpos = humanoid24.pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), pose_angles_rad(pose, skeleton))
+    qpos[2] = -float(np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos[None]))))
     return qpos
 
 
 _LEGS = {"lfemur.rz": -20.0, "rfemur.rz": 20.0}
 """Upright; the rest pose has them 20 deg apart."""
-_HANGING = {
+_ARMS_DOWN = {
     **{"lhumerus.rx": -29.0, "lhumerus.ry": 17.0, "lhumerus.rz": 58.0},
     **{"rhumerus.rx": -29.0, "rhumerus.ry": -17.0, "rhumerus.rz": -58.0},
 }
@@ -71,7 +71,7 @@ POSES: tuple[CalibrationPose, ...] = (
         "Let the arms hang, round the upper back, chin to the chest.",
         {
             **{"upperback.rx": 10.0, "thorax.rx": 20.0, "lowerneck.rx": 20.0, "upperneck.rx": 15.0, "head.rx": 10.0},
-            **_HANGING,
+            **_ARMS_DOWN,
         },
     ),
     _pose(
@@ -124,7 +124,7 @@ POSES: tuple[CalibrationPose, ...] = (
             **{"lowerback.rx": 35.0, "upperback.rx": 20.0, "thorax.rx": 5.0},
             **{"lowerback.ry": 15.0, "upperback.ry": 10.0, "thorax.ry": 5.0},
             **{"lowerneck.ry": 10.0, "upperneck.ry": 10.0, "head.ry": 10.0},
-            **_HANGING,
+            **_ARMS_DOWN,
             **{"lwrist.ry": -60.0, "rwrist.ry": -60.0},
         },
     ),

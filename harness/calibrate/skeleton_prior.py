@@ -15,12 +15,12 @@ from harness.core.arrays import Floats, Ints, freeze
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 
-LEAST_REST_M = 1e-3
+LEAST_RESIDUAL_SD_M = 1e-3
 """Nobody's bones are known better than this from other bones [choice]."""
 
 
 @dataclass(frozen=True, eq=False)
-class BoneSpace:
+class SkeletonPrior:
     """N bones, B modes of their lengths, normal statistics of lengths and of directions."""
 
     mean_m: Floats
@@ -60,7 +60,7 @@ class BoneSpace:
         return like.with_bones(self.mean_m[:, None] * self.direction)
 
 
-def bone_space(skeletons: Sequence[Skeleton], modes: int = 5, source: str = "") -> BoneSpace:
+def fit_skeleton_prior(skeletons: Sequence[Skeleton], modes: int = 5, source: str = "") -> SkeletonPrior:
     """The statistics of a population; BadInput when it has fewer people than modes and one more."""
     count = len(skeletons)
     if modes < 0 or count < modes + 2:
@@ -72,7 +72,7 @@ def bone_space(skeletons: Sequence[Skeleton], modes: int = 5, source: str = "") 
     if any(skeleton.names != names for skeleton in skeletons):
         raise BadInput("Skeletons of different bones have no common space.", "Take their 24 bones first.")
     bone_m = np.array([skeleton.bone_m for skeleton in skeletons])
-    both_m = np.concatenate([bone_m, bone_m[:, _other_side(names)] * [1.0, -1.0, 1.0]])
+    both_m = np.concatenate([bone_m, bone_m[:, _mirrored_bones(names)] * [1.0, -1.0, 1.0]])
     length_m = np.sqrt(np.sum(both_m**2, axis=2))
     mean_m = length_m.mean(axis=0)
     _, size, rows = np.linalg.svd(length_m - mean_m, full_matrices=False)
@@ -81,11 +81,11 @@ def bone_space(skeletons: Sequence[Skeleton], modes: int = 5, source: str = "") 
     # Modes fit the people that they come from: others lie farther from them.
     rest = (whole - variance[:modes] @ rows[:modes] ** 2) * count / (count - modes)
     direction, across, across_m = _directions(both_m, count)
-    return BoneSpace(
+    return SkeletonPrior(
         mean_m=mean_m,
         modes=rows[:modes],
         spread_m=np.sqrt(variance[:modes]),
-        rest_m=np.sqrt(np.maximum(rest, LEAST_REST_M**2)),
+        rest_m=np.sqrt(np.maximum(rest, LEAST_RESIDUAL_SD_M**2)),
         direction=direction,
         across=across,
         across_m=across_m,
@@ -104,7 +104,7 @@ def _directions(both_m: Floats, count: int) -> tuple[Floats, Floats, Floats]:
     return direction, axes[:, 1:], size[:, 1:] / np.sqrt(2.0 * (count - 1))
 
 
-def _other_side(names: Sequence[str]) -> Ints:
+def _mirrored_bones(names: Sequence[str]) -> Ints:
     """(N,) index of the bone on the other side; its own for a bone of the middle."""
     swap = {"l": "r", "r": "l"}
     twins = [swap.get(name[0], "") + name[1:] for name in names]

@@ -15,7 +15,7 @@ from harness.core.skeleton import Skeleton
 
 
 @dataclass(frozen=True, eq=False)
-class Reached:
+class StationPoses:
     """P poses of S stations, B bones and D hinges."""
 
     place_m: Floats
@@ -32,7 +32,7 @@ class Reached:
     """(P, 3)"""
 
 
-class Chain:
+class StationKinematics:
     """The bones between the root and stations on these bones (S,)."""
 
     def __init__(self, skeleton: Skeleton, bones: Sequence[int] | Ints) -> None:
@@ -60,7 +60,7 @@ class Chain:
         angles_rad: Floats,
         mount_m: Floats,
         bone_from_station: Floats,
-    ) -> Reached:
+    ) -> StationPoses:
         """Of bone vectors (B, 3), roots (P, 3) and (P, 3, 3), hinges (P, D), mounts (S, 3) and (S, 3, 3)."""
         poses, skeleton = len(root_m), self.skeleton
         sine, cosine = np.sin(angles_rad)[:, :, None, None], np.cos(angles_rad)[:, :, None, None]
@@ -77,20 +77,20 @@ class Chain:
             turned[:, bone] = turn
         carried = turned[:, self.bones]
         place = joint[:, self.bones] + (carried @ mount_m[:, :, None])[..., 0]
-        return Reached(place, carried @ bone_from_station, turned, joint, axis, root_m)
+        return StationPoses(place, carried @ bone_from_station, turned, joint, axis, root_m)
 
-    def of_bones(self, at: Reached, bones: Ints, vectors: Floats) -> Floats:
+    def of_bones(self, at: StationPoses, bones: Ints, vectors: Floats) -> Floats:
         """(P, S, 3, G) how places change with what is added to these bones (G,) along these vectors (G, 3); turns of
         stations do not."""
         along = (at.world_from_bone[:, bones] @ vectors[:, :, None])[:, None, :, :, 0]
         return np.swapaxes(along * self.passes[:, bones, None], -1, -2)
 
-    def of_mounts(self, at: Reached) -> Floats:
+    def of_mounts(self, at: StationPoses) -> Floats:
         """(P, S, 3, 3) how places change with the station's own mount."""
         out: Floats = at.world_from_bone[:, self.bones]
         return out
 
-    def of_roots(self, at: Reached) -> tuple[Floats, Floats]:
+    def of_roots(self, at: StationPoses) -> tuple[Floats, Floats]:
         """(P, S, 3, 6) how places and turns change with shifts and small turns of the root in world axes."""
         place, turn = np.zeros((2, *at.place_m.shape, 6))
         place[..., :3] = turn[..., 3:] = np.eye(3)
@@ -98,7 +98,7 @@ class Chain:
         place[..., 3:] = np.swapaxes(np.cross(np.eye(3), reach_m[..., None, :]), -1, -2)
         return place, turn
 
-    def of_hinges(self, at: Reached) -> tuple[Floats, Floats]:
+    def of_hinges(self, at: StationPoses) -> tuple[Floats, Floats]:
         """(P, S, 3, D) how places and turns change with hinge angles."""
         reach_m = at.place_m[:, :, None] - at.joint_m[:, None, self._hinge_bone]
         turn = at.hinge_axis[:, None] * self.turns[:, :, None]

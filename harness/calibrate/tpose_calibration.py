@@ -16,19 +16,19 @@ from scipy.special import gammaincinv
 from harness.body.anatomy import body_scale
 from harness.body.humanoid import Body, tpose
 from harness.body.mounts import Mount
-from harness.calibrate.held_pose_model import FREE, Fit, Stance
-from harness.calibrate.hold import NotStanding, span_s, stood_still
+from harness.calibrate.held_pose_model import FREE_DOFS, HeldPoseFit, HeldPoseModel
+from harness.calibrate.hold import UnusableHold, measure_hold, span_s
 from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.stream.frame import TrackerFrame
 
-SECONDS = 3.0
-LEVEL: Floats = np.array([0.0, 1.0, 0.0, 0.0])
+TPOSE_S = 3.0
+LEVEL_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 """World from tracker but for the heading: x forward, y right, z down are half a turn about x from the world's axes."""
 CONFIDENCE = 0.99
 """A performer who misses the T-pose as `stance` says is refused once in a hundred times [choice]."""
-ODDS = 100.0
+EXCHANGE_ODDS = 100.0
 """Stations are called exchanged when their places are a T-pose that way, and so much more likely [choice]."""
 HEADING_SD_RAD = float(np.deg2rad(20.0))
 """Stations that tell the heading less well than this do not tell it [choice]."""
@@ -37,7 +37,7 @@ _STATURE_M = 1.755
 
 
 @dataclass(frozen=True, eq=False)
-class TPose:
+class TPoseCalibration:
     """What a T-pose told; S stations."""
 
     calibration: Calibration
@@ -56,7 +56,7 @@ class TPose:
 
 def calibrate_tpose(
     frames: Sequence[TrackerFrame], body: Body, mounts: Sequence[Mount], pose: Floats | None = None
-) -> TPose:
+) -> TPoseCalibration:
     """Calibration from frames of a performer in T-pose; trackers sit near their nominal mounts, in any orientation.
 
     `mounts` are in the order of the stream's stations. `pose` (55,) is what the performer holds, where and facing
@@ -64,19 +64,19 @@ def calibrate_tpose(
     BadInput for stations that are not the stream's.
     """
     names = [mount.station for mount in mounts]
-    still = stood_still(frames, names)
-    stance = Stance(body, mounts, tpose(body.skeleton) if pose is None else pose)
-    level_m = rotations.rotate(LEVEL, still.position_m)
+    still = measure_hold(frames, names)
+    stance = HeldPoseModel(body, mounts, tpose(body.skeleton) if pose is None else pose)
+    level_m = rotations.rotate(LEVEL_FROM_TRACKER, still.position_m)
     fit = stance.fit(level_m)
     if stance.heading_sd_rad > HEADING_SD_RAD:
-        raise NotStanding(
+        raise UnusableHold(
             f"Stations {', '.join(names)} do not tell which way the performer faces in T-pose.",
             "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
         )
-    _require_sides(stance, level_m, fit, mounts)
+    _require_no_exchange(stance, level_m, fit, mounts)
     _require_pose(fit, names, body)
     beside_m, turned = stance.explained(fit.residual_m)
-    world_from_tracker = rotations.multiply(rotations.about_z(fit.heading_rad), LEVEL)
+    world_from_tracker = rotations.multiply(rotations.about_z(fit.heading_rad), LEVEL_FROM_TRACKER)
     bone_from_world = rotations.inverse(rotations.multiply(rotations.exp(turned), stance.world_from_bone))
     world_from_station = rotations.multiply(world_from_tracker, still.tracker_from_station)
     calibration = Calibration(
@@ -89,13 +89,13 @@ def calibrate_tpose(
         tracker_origin_m=fit.origin_m,
     )
     residual_m = np.linalg.norm(fit.residual_m, axis=1)
-    return TPose(calibration, residual_m, still.moved_m, still.seconds, stance.heading_sd_rad)
+    return TPoseCalibration(calibration, residual_m, still.moved_m, still.seconds, stance.heading_sd_rad)
 
 
 class TPoseCollector:
     """Keeps the last seconds of a stream; when they are no T-pose, more frames may follow."""
 
-    def __init__(self, seconds: float = SECONDS) -> None:
+    def __init__(self, seconds: float = TPOSE_S) -> None:
         self.seconds = seconds
         self.frames: deque[TrackerFrame] = deque()
 
@@ -107,10 +107,10 @@ class TPoseCollector:
         return span_s(self.frames) >= self.seconds
 
 
-def _require_sides(stance: Stance, level_m: Floats, fit: Fit, mounts: Sequence[Mount]) -> None:
+def _require_no_exchange(stance: HeldPoseModel, level_m: Floats, fit: HeldPoseFit, mounts: Sequence[Mount]) -> None:
     """NotStanding when two stations, or all left and right ones, exchanged make a far likelier T-pose."""
     everyone = list(range(len(mounts)))
-    exchanges = [[pair] for pair in combinations(everyone, 2)] + [_mirrored(mounts)]
+    exchanges = [[pair] for pair in combinations(everyone, 2)] + [_left_right_pairs(mounts)]
     best, which = fit.chi_square, exchanges[-1]
     for exchange in exchanges:
         rows = list(everyone)
@@ -118,16 +118,16 @@ def _require_sides(stance: Stance, level_m: Floats, fit: Fit, mounts: Sequence[M
             rows[a], rows[b] = b, a
         if (cost := stance.fit(level_m[rows]).chi_square) < best:
             best, which = cost, exchange
-    if best > _limit(len(mounts)) or fit.chi_square - best < 2.0 * np.log(ODDS):
+    if best > _chi_square_limit(len(mounts)) or fit.chi_square - best < 2.0 * np.log(EXCHANGE_ODDS):
         return
     told = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
-    raise NotStanding(
+    raise UnusableHold(
         f"Stations look exchanged: {told}.",
         "Check which tracker is worn where, or name the stations the other way round; then hold the T-pose again.",
     )
 
 
-def _mirrored(mounts: Sequence[Mount]) -> list[tuple[int, int]]:
+def _left_right_pairs(mounts: Sequence[Mount]) -> list[tuple[int, int]]:
     """Pairs of stations on the same bone of the left and of the right side."""
     bones = [mount.bone for mount in mounts]
     return [
@@ -137,13 +137,13 @@ def _mirrored(mounts: Sequence[Mount]) -> list[tuple[int, int]]:
     ]
 
 
-def _require_pose(fit: Fit, names: Sequence[str], body: Body) -> None:
+def _require_pose(fit: HeldPoseFit, names: Sequence[str], body: Body) -> None:
     """NotStanding when nobody who tries to stand in T-pose with this body would have stations there."""
-    if fit.chi_square <= _limit(len(names)):
+    if fit.chi_square <= _chi_square_limit(len(names)):
         return
     residual_m = np.linalg.norm(fit.residual_m, axis=1)
     rms_m, worst = float(np.sqrt(np.mean(residual_m**2))), int(np.argmax(residual_m))
-    raise NotStanding(
+    raise UnusableHold(
         f"The stance is no T-pose of this body: stations are {1e3 * rms_m:.0f} mm from their places (root mean square, "
         f"{rms_m / (_STATURE_M * body_scale(body.skeleton)):.1%} of the stature), {names[worst]!r} most with "
         f"{1e3 * residual_m[worst]:.0f} mm.",
@@ -151,7 +151,7 @@ def _require_pose(fit: Fit, names: Sequence[str], body: Body) -> None:
     )
 
 
-def _limit(stations: int) -> float:
+def _chi_square_limit(stations: int) -> float:
     """The squared residual, in units of the model's spread, that a T-pose stays within."""
-    degrees = max(3 * stations - len(FREE), 1)
+    degrees = max(3 * stations - len(FREE_DOFS), 1)
     return float(2.0 * gammaincinv(0.5 * degrees, CONFIDENCE))  # chi2.ppf without scipy.stats, which loads for a second

@@ -4,19 +4,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.calibrate.bundle_adjustment import Bundle
-from harness.calibrate.bundle_fit import Fit
+from harness.calibrate.bundle_adjustment import BundleAdjustment
+from harness.calibrate.bundle_fit import BundleFit
 from harness.core.arrays import Floats
 
-_TELLS_NOTHING, _ROUNDING = 1e-4, 1e-10
+_UNINFORMATIVE, _ROUNDING = 1e-4, 1e-10
 """Readings tell nothing of a combination when they have less than this share of what is known of it beforehand, or of
 the best known combination, which rounding leaves."""
-_WIDE = 100.0
+_UNKNOWN_MOUNT_SPREAD = 100.0
 """Spread of the trackers about their nominal mounts, in its units, that stands for not knowing where they sit."""
 
 
 @dataclass(frozen=True, eq=False)
-class Knowledge:
+class CalibrationUncertainty:
     """N bones, S stations."""
 
     length_sd_m: Floats
@@ -30,31 +30,31 @@ class Knowledge:
     condition: float
 
 
-def knowledge(bundle: Bundle, found: Fit) -> Knowledge:
+def estimate_uncertainty(bundle: BundleAdjustment, found: BundleFit) -> CalibrationUncertainty:
     """By the normal equations at the solution: misses of the poses are unknown and marginalised."""
     shared, at, given = bundle.shared, found.solution, found.expected
     _, slope = shared.expected(at, given.beside, given.flesh_m)
     whole = found.normal.information()
     readings = whole - slope.T @ slope
-    _, wide = shared.expected(at, _WIDE, given.flesh_m)
+    _, wide = shared.expected(at, _UNKNOWN_MOUNT_SPREAD, given.flesh_m)
     lengths = shared.length_slope(at)
     prior_m2 = np.diag(shared.space.covariance_m2)
-    scale = _scale(slope)
+    scale = _prior_sd(slope)
     sd, alone = found.covariance, _inverse(readings, scale)
     strange = lengths @ np.linalg.inv(readings + wide.T @ wide) @ lengths.T
-    return Knowledge(
+    return CalibrationUncertainty(
         length_sd_m=np.sqrt(np.diag(lengths @ sd @ lengths.T)),
         length_bound_m=np.sqrt(_variance(lengths, alone, scale)),
         share=1.0 - np.diag(strange) / prior_m2,
-        mount_sd_m=_size(np.diag(sd)[shared.mount]),
-        mount_sd_rad=_size(np.diag(sd)[shared.turn]),
-        mount_bound_m=_size(_variance(np.eye(shared.count)[shared.mount], alone, scale)),
-        mount_bound_rad=_size(_variance(np.eye(shared.count)[shared.turn], alone, scale)),
+        mount_sd_m=_total_sd(np.diag(sd)[shared.mount]),
+        mount_sd_rad=_total_sd(np.diag(sd)[shared.turn]),
+        mount_bound_m=_total_sd(_variance(np.eye(shared.count)[shared.mount], alone, scale)),
+        mount_bound_rad=_total_sd(_variance(np.eye(shared.count)[shared.turn], alone, scale)),
         condition=float(np.linalg.cond(whole * np.outer(scale, scale))),
     )
 
 
-def _scale(slope: Floats) -> Floats:
+def _prior_sd(slope: Floats) -> Floats:
     """(X,) what is known of each unknown beforehand [its unit]; 1 where nothing is."""
     information = np.sum(slope**2, axis=0)
     return np.where(information > 0.0, 1.0 / np.sqrt(np.maximum(information, 1e-300)), 1.0)
@@ -63,7 +63,7 @@ def _scale(slope: Floats) -> Floats:
 def _inverse(information: Floats, scale: Floats) -> tuple[Floats, Floats]:
     """Covariance (X, X) of what is told, and directions (X, K) of which nothing is."""
     value, vector = np.linalg.eigh(information * np.outer(scale, scale))
-    told = value > max(_TELLS_NOTHING, _ROUNDING * float(value[-1]))
+    told = value > max(_UNINFORMATIVE, _ROUNDING * float(value[-1]))
     vector = vector * scale[:, None]
     return (vector[:, told] / value[told]) @ vector[:, told].T, vector[:, ~told]
 
@@ -76,7 +76,7 @@ def _variance(rows: Floats, alone: tuple[Floats, Floats], scale: Floats) -> Floa
     return np.where(part > 1e-4, np.inf, told)
 
 
-def _size(variance: Floats) -> Floats:
+def _total_sd(variance: Floats) -> Floats:
     """(S,) root of the sum over three axes (3 S,)."""
     out: Floats = np.sqrt(np.sum(variance.reshape(-1, 3), axis=1))
     return out

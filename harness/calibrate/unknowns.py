@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.body.mounts import Mount, place
-from harness.calibrate.skeleton_prior import BoneSpace
+from harness.body.mounts import Mount, locate_mount
+from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
 
-ALONG_M, ACROSS_M = 0.03, 0.015
+MOUNT_ALONG_SD_M, MOUNT_ACROSS_SD_M = 0.03, 0.015
 """How far trackers sit from their nominal mounts, standard deviation along the bone and on the two axes across it, as
 `stance` has it; here the spread of the very trackers that are worn is estimated in units of it."""
 _LEAST_ACROSS_M = 1e-6
@@ -21,7 +21,7 @@ _LEAST_ACROSS_M = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class CalibrationSolution:
     """Values of everything that is sought; N bones, B modes, S stations, P poses, D hinges."""
 
     bone_m: Floats
@@ -46,11 +46,11 @@ class Solution:
         return out
 
 
-class Shared:
+class SharedUnknowns:
     """The X unknowns that all poses share: G bone coordinates (along each bone's mean direction, and across it where
     people differ), B mode weights, then S mounts and S small turns of stations in their own axes."""
 
-    def __init__(self, like: Skeleton, space: BoneSpace, mounts: Sequence[Mount]) -> None:
+    def __init__(self, like: Skeleton, space: SkeletonPrior, mounts: Sequence[Mount]) -> None:
         self.like, self.space, self.mounts = like, space, tuple(mounts)
         self.carriers: Ints = np.array([like.index(mount.bone) for mount in mounts], dtype=np.int64)
         vectors = np.concatenate([space.direction[:, None], space.across], axis=1)
@@ -69,7 +69,7 @@ class Shared:
     def flesh_m(self, bone_m: Floats) -> Floats:
         """(S, 3) from the bones (N, 3) to the nominal mounts on the skin: of a body with these bones."""
         skeleton = self.like.with_bones(bone_m)
-        nominal_m = np.array([place(skeleton, mount)[0] for mount in self.mounts])
+        nominal_m = np.array([locate_mount(skeleton, mount)[0] for mount in self.mounts])
         return nominal_m - self._along[:, None] * bone_m[self.carriers]
 
     def nominal_m(self, bone_m: Floats, flesh_m: Floats) -> Floats:
@@ -77,7 +77,7 @@ class Shared:
         out: Floats = self._along[:, None] * bone_m[self.carriers] + flesh_m
         return out
 
-    def expected(self, at: Solution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
+    def expected(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
         """Residuals (R,) in units of what is expected beforehand, and slopes (R, X).
 
         `beside` is the trackers' spread about the nominal mounts in units of ALONG_M and ACROSS_M.
@@ -86,37 +86,37 @@ class Shared:
         residuals, slopes = zip(*parts, strict=True)
         return np.concatenate(residuals), np.concatenate(slopes)
 
-    def length_slope(self, at: Solution) -> Floats:
+    def length_slope(self, at: CalibrationSolution) -> Floats:
         """(N, X) how bone lengths change."""
         out = np.zeros((len(at.bone_m), self.count))
         along = (at.bone_m / at.length_m[:, None])[self.bone_of]
         out[self.bone_of, np.arange(len(self.vector))] = np.sum(along * self.vector, axis=1)
         return out
 
-    def _lengths(self, at: Solution) -> tuple[Floats, Floats]:
+    def _lengths(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
         """What the modes leave of the lengths."""
         slope = self.length_slope(at)
         slope[:, self.weights] = -self.space.modes.T
         left_m = at.length_m - self.space.mean_m - at.weights_m @ self.space.modes
         return left_m / self.space.rest_m, slope / self.space.rest_m[:, None]
 
-    def _weights(self, at: Solution) -> tuple[Floats, Floats]:
+    def _weights(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
         slope = np.zeros((len(at.weights_m), self.count))
         slope[:, self.weights] = np.diag(1.0 / self.space.spread_m)
         return at.weights_m / self.space.spread_m, slope
 
-    def _across(self, at: Solution) -> tuple[Floats, Floats]:
+    def _across(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
         """How far bones point from the mean direction."""
         slope = np.zeros((len(self.vector), self.count))
         slope[:, self.bones] = np.diag(1.0 / self._coordinate_m)
         return np.sum(at.bone_m[self.bone_of] * self.vector, axis=1) / self._coordinate_m, slope
 
-    def expected_mounts(self, at: Solution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
+    def expected_mounts(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
         """How far trackers sit from their nominal mounts on these bones, along bones as they point on average, and
         across."""
         along = self.space.direction[self.carriers]
         onto = along[:, :, None] * along[:, None]
-        root = (np.eye(3) / ACROSS_M + (1.0 / ALONG_M - 1.0 / ACROSS_M) * onto) / beside
+        root = (np.eye(3) / MOUNT_ACROSS_SD_M + (1.0 / MOUNT_ALONG_SD_M - 1.0 / MOUNT_ACROSS_SD_M) * onto) / beside
         slope = np.zeros((len(self.mounts), 3, self.count))
         for j, bone in enumerate(self.carriers):
             own = np.flatnonzero(self.bone_of == bone)
@@ -126,22 +126,24 @@ class Shared:
         return (root @ off_m[..., None]).ravel(), (root @ slope).reshape(-1, self.count)
 
 
-def moved(at: Solution, shared: Shared, step: Floats, own: Floats, hinges: Ints) -> Solution:
+def apply_step(
+    at: CalibrationSolution, shared: SharedUnknowns, step: Floats, own: Floats, hinges: Ints
+) -> CalibrationSolution:
     """One step of what is shared (X,) and of each pose's root and these hinges (P, 6 + H) from a solution."""
     angles_rad = np.array(at.angles_rad)
     angles_rad[:, hinges] += own[:, 6:]
     bone_m = np.array(at.bone_m)
     np.add.at(bone_m, shared.bone_of, step[shared.bones, None] * shared.vector)
-    return Solution(
+    return CalibrationSolution(
         bone_m=bone_m,
         weights_m=at.weights_m + step[shared.weights],
         mount_m=at.mount_m + step[shared.mount].reshape(-1, 3),
-        bone_from_station=at.bone_from_station @ _turns(step[shared.turn].reshape(-1, 3)),
+        bone_from_station=at.bone_from_station @ _rotation_matrices(step[shared.turn].reshape(-1, 3)),
         root_m=at.root_m + own[:, :3],
-        world_from_root=_turns(own[:, 3:6]) @ at.world_from_root,
+        world_from_root=_rotation_matrices(own[:, 3:6]) @ at.world_from_root,
         angles_rad=angles_rad,
     )
 
 
-def _turns(vectors_rad: Floats) -> Floats:
+def _rotation_matrices(vectors_rad: Floats) -> Floats:
     return rotations.to_matrix(rotations.exp(vectors_rad))

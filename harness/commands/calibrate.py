@@ -8,29 +8,29 @@ from typing import TYPE_CHECKING
 
 from harness.commands.common import (
     Verbs,
-    add_line,
+    add_line_flags,
     add_verb,
-    ended_by_sigterm,
-    line_wanted,
-    names_of,
-    positive,
-    positive_number,
-    progress,
-    say,
-    stations_of,
-    talk,
+    line_options,
+    parse_names,
+    parse_stations,
+    positive_float,
+    positive_int,
+    print_result,
+    print_status,
+    show_progress,
+    sigterm_as_interrupt,
 )
 from harness.errors import BadInput, Outcome, was_interrupted
 
 if TYPE_CHECKING:
-    from harness.calibrate.guided_calibration import Show
-    from harness.experiment.calibration_session import Found
+    from harness.calibrate.guided_calibration import PoseDisplay
+    from harness.experiment.calibration_session import CalibrationOutcome
 
 _SOURCES = ("recording", "live", "simulate", "sheet")
-_WORN = ("scenario", "stations", "kind", "clip", "out")
-_OF = {
-    "recording": _WORN,
-    "live": (*_WORN, "port", "rate", "items", "baud", "quality", "view", "pictures"),
+_SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")
+_FLAGS_BY_SOURCE = {
+    "recording": _SESSION_FLAGS,
+    "live": (*_SESSION_FLAGS, "port", "rate", "items", "baud", "quality", "view", "pictures"),
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }
@@ -39,13 +39,15 @@ _OF = {
 
 def add_calibrate(verbs: Verbs) -> None:
     text = "find mounts and bone lengths from a performer who holds eight poses, or mounts from a T-pose"
-    verb = add_verb(verbs, "calibrate", text, calibrate, "seed", "mocap")
+    verb = add_verb(verbs, "calibrate", text, run_calibrate, "seed", "mocap")
     text = "recording (see `harness record`) of somebody who holds the poses"
     verb.add_argument("recording", nargs="?", type=Path, metavar="RECORDING", help=text)
     verb.add_argument(
         "--live", action="store_true", help="from the tracker at --port; the performer is shown the poses"
     )
-    verb.add_argument("--simulate", type=positive, metavar="N", help="N simulated performers, and how far off each was")
+    verb.add_argument(
+        "--simulate", type=positive_int, metavar="N", help="N simulated performers, and how far off each was"
+    )
     verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files")
     verb.add_argument("--port", help="/dev/ttyUSB0, COM3, the link of an emulator's pty, tcp://HOST:PORT")
     text = "names the stations and where they are worn (see `harness list`)"
@@ -58,8 +60,8 @@ def add_calibrate(verbs: Verbs) -> None:
     verb.add_argument("--out", type=Path, metavar="FILE", help="the calibration to write, in TOML")
     verb.add_argument("--force", action="store_true", help="write over files that exist")
     text = "frames per second, where the device does not tell"
-    verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
-    add_line(verb)
+    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
+    add_line_flags(verb)
     text = "show the poses: in a window, or as PNG files in the folder --pictures"
     verb.add_argument("--view", choices=["window", "frames"], help=text)
     verb.add_argument("--pictures", type=Path, metavar="DIR", help="folder of --view frames")
@@ -68,26 +70,28 @@ def add_calibrate(verbs: Verbs) -> None:
     verb.add_argument("--noise", metavar="LEVEL", help="of --simulate: clean, noise or default (default default)")
 
 
-def calibrate(args: argparse.Namespace) -> Outcome:
+def run_calibrate(args: argparse.Namespace) -> Outcome:
     given = [name for name in _SOURCES if getattr(args, name)]
     if len(given) != 1:
         found = "Nothing to calibrate from" if not given else f"{len(given)} sources: {', '.join(given)}"
         raise BadInput(f"{found}.", "Name a RECORDING, or say one of --live, --simulate N, --sheet DIR.")
-    for name in sorted({name for names in _OF.values() for name in names} - set(_OF[given[0]])):
+    for name in sorted(
+        {name for names in _FLAGS_BY_SOURCE.values() for name in names} - set(_FLAGS_BY_SOURCE[given[0]])
+    ):
         if getattr(args, name) is not None:
-            users = " or ".join(source for source, names in _OF.items() if name in names)
+            users = " or ".join(source for source, names in _FLAGS_BY_SOURCE.items() if name in names)
             raise BadInput(f"--{name} with {given[0]}.", f"It is for {users}: leave it out.")
-    action = {"sheet": _sheet, "simulate": _trial}.get(given[0], _found)
-    with ended_by_sigterm():
+    action = {"sheet": _draw_sheet, "simulate": _measure_accuracy}.get(given[0], _calibrate_performer)
+    with sigterm_as_interrupt():
         try:
             return action(args)
         except (KeyboardInterrupt, Exception) as error:
             if not was_interrupted(error):
                 raise
-            return say(args, {}, "stopped; nothing is calibrated", outcome=Outcome.INTERRUPTED)
+            return print_result(args, {}, "stopped; nothing is calibrated", outcome=Outcome.INTERRUPTED)
 
 
-def _sheet(args: argparse.Namespace) -> Outcome:
+def _draw_sheet(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.poses import POSES
     from harness.core.humanoid24 import standard_skeleton
     from harness.live.pose_sheet import draw_poses
@@ -95,90 +99,96 @@ def _sheet(args: argparse.Namespace) -> Outcome:
     paths = draw_poses(POSES, standard_skeleton(), args.sheet, force=args.force)
     poses = [{"name": pose.name, "instruction": pose.instruction} for pose in POSES]
     lines = [f"{number}  {pose.name}: {pose.instruction}" for number, pose in enumerate(POSES, 1)]
-    return say(args, {"poses": poses, "pictures": [str(path) for path in paths]}, *lines, f"drawn in {args.sheet}")
+    return print_result(
+        args, {"poses": poses, "pictures": [str(path) for path in paths]}, *lines, f"drawn in {args.sheet}"
+    )
 
 
-def _trial(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.calibration_accuracy import trials
-    from harness.simulate.noise import level
+def _measure_accuracy(args: argparse.Namespace) -> Outcome:
+    from harness.experiment.calibration_accuracy import measure_calibration_accuracy
+    from harness.simulate.noise import noise_preset
 
     given = {"noise": args.noise, "seed": args.seed}
     if args.miss is not None:
         if not 0.0 <= args.miss <= 45.0:
             raise BadInput(f"--miss {args.miss:g}.", "Hinges miss poses by 0 to 45 deg.")
         given["miss_rad"] = math.radians(args.miss)
-    level(args.noise or "default")  # refuses what is none before anybody holds a pose
-    found = trials(
+    noise_preset(args.noise or "default")  # refuses what is none before anybody holds a pose
+    found = measure_calibration_accuracy(
         args.simulate, **{key: value for key, value in given.items() if value is not None}, folder=args.mocap
     )
     outcome = Outcome.PASS if not found.refused else Outcome.INCOMPLETE
-    return say(args, found.as_dict(), *found.lines(), outcome=outcome)
+    return print_result(args, found.as_dict(), *found.lines(), outcome=outcome)
 
 
-def _found(args: argparse.Namespace) -> Outcome:
-    from harness.calibrate.calibration_file import require_place, write_calibration
+def _calibrate_performer(args: argparse.Namespace) -> Outcome:
+    from harness.calibrate.calibration_file import require_writable, write_calibration
 
     if args.out is None:
         raise BadInput("--out is missing.", "Name the file to write: --out me.toml.")
     if args.pictures is not None and args.view != "frames":
         raise BadInput("--pictures without --view frames.", "Say both, or neither.")
-    require_place(args.out, force=args.force)
-    found = _of_device(args) if args.live else _of_recording(args)
+    require_writable(args.out, force=args.force)
+    found = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
     write_calibration(args.out, found.kept, force=args.force)
     content = {"file": str(args.out), **found.kept.told}
-    return say(args, content, *found.lines, "", f"{args.out}: written")
+    return print_result(args, content, *found.lines, "", f"{args.out}: written")
 
 
-def _of_device(args: argparse.Namespace) -> "Found":
-    from harness.experiment.calibration_session import Posing
-    from harness.experiment.playback import chosen
+def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
+    from harness.experiment.calibration_session import CalibrationSession
+    from harness.experiment.playback import select_stations
     from harness.experiment.scenario import load_scenario
-    from harness.live.viewer import View
-    from harness.stream.driver import Is900, Wanted
+    from harness.live.viewer import ViewerOutput
+    from harness.stream.driver import DriverConfig, Is900
 
     for name in ("port", "scenario"):
         if getattr(args, name) is None:
             raise BadInput(f"--live without --{name}.", "It takes both.")
-    stations = tuple(chosen(load_scenario(args.scenario), stations_of(args)))
-    posing = Posing(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
+    stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args)))
+    posing = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
-        show: Show | None = None
+        show: PoseDisplay | None = None
         if args.view is not None:
-            view = View(args.view, posing.body.skeleton, args.pictures, force=args.force)
+            view = ViewerOutput(args.view, posing.body.skeleton, args.pictures, force=args.force)
             opened.callback(view.close)
-            talk(view.told)
+            print_status(view.told)
             show = view.show
-        wanted = Wanted(stations=stations, rate_hz=args.rate, **line_wanted(args))
-        device = opened.enter_context(Is900(args.port, wanted, on_event=lambda event: talk(f"line: {event.text}")))
+        wanted = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
+        device = opened.enter_context(
+            Is900(args.port, wanted, on_event=lambda event: print_status(f"line: {event.text}"))
+        )
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
-        talk(f"{device.identification or 'an IS-900'} at {args.port}; stations {worn}; Ctrl-C ends it")
-        collector = posing.held(device, talk, show, progress)
-    talk("solving")
+        print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {worn}; Ctrl-C ends it")
+        collector = posing.held(device, print_status, show, show_progress)
+    print_status("solving")
     return posing.found(collector.held, f"the tracker at {args.port}")
 
 
-def _of_recording(args: argparse.Namespace) -> "Found":
-    from harness.experiment.calibration_session import Posing
-    from harness.experiment.score_recording import stations_in
+def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
+    from harness.experiment.calibration_session import CalibrationSession
+    from harness.experiment.score_recording import name_recorded_stations
     from harness.stream.recording.replay import RecordingStream
 
     stream = RecordingStream(args.recording)
     for lost in stream.recording.lost:
-        talk(f"lost: {lost}")
+        print_status(f"lost: {lost}")
     note = stream.recording.note
     scenario, clip = args.scenario or note.get("scenario"), args.clip or note.get("clip")
     if scenario is None:
         raise BadInput(
             f"Nothing says how trackers are worn in {args.recording}.", "Name the scenario: --scenario NAME."
         )
-    names = None if args.stations is None else names_of(args.stations)
-    posing = Posing(scenario, stations_in(stream, scenario, names), args.kind or "poses", clip, args.mocap)
+    names = None if args.stations is None else parse_names(args.stations)
+    posing = CalibrationSession(
+        scenario, name_recorded_stations(stream, scenario, names), args.kind or "poses", clip, args.mocap
+    )
     frames = iter(stream)
-    collector = posing.held(frames, talk)
+    collector = posing.held(frames, print_status)
     if args.kind != "tpose":  # one more is one too many, or one before it was none
         before = len(collector.passed)
         for frame in frames:
             collector.add(frame)
         for passed in collector.passed[before:]:
-            talk(str(passed))
+            print_status(str(passed))
     return posing.found(collector.held, str(args.recording))

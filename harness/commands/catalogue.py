@@ -2,25 +2,27 @@
 
 from pathlib import Path
 
-from harness.experiment.cell_scheduler import planned_cells
+from harness.experiment.cell_scheduler import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_placements, shipped_scenarios, variants
-from harness.experiment.sweep_config import expand, load_sweep, shipped_sweeps
+from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
-from harness.stream.inputs import COMBINATIONS
-from harness.study.placement.config import load_study
+from harness.stream.inputs import INPUT_COMBINATIONS
+from harness.study.placement.config import load_placement_study
 
 
-def catalogue() -> dict[str, dict[str, str]]:
+def build_catalogue() -> dict[str, dict[str, str]]:
     """Title -> name -> one line."""
     return {
-        "methods": {name: _method(name) for name in registry.methods()},
-        "scenarios": {path.stem: _line(path.stem) for path in shipped_scenarios()},
-        "placement studies": {path.stem: load_study(path).title for path in shipped_placements()},
-        "sweeps": {path.stem: _sweep(path) for path in shipped_sweeps()},
-        f"motion of the {synthetic.SOURCE}": {b: _range(synthetic.take_names(b)) for b in synthetic.BEHAVIOURS},
-        "inputs": dict(COMBINATIONS),
+        "methods": {name: _describe_method(name) for name in registry.methods()},
+        "scenarios": {path.stem: _describe_scenario(path.stem) for path in shipped_scenarios()},
+        "placement studies": {path.stem: load_placement_study(path).title for path in shipped_placements()},
+        "sweeps": {path.stem: _describe_sweep(path) for path in shipped_sweeps()},
+        f"motion of the {synthetic.SOURCE}": {
+            b: _describe_takes(synthetic.take_names(b)) for b in synthetic.BEHAVIOURS
+        },
+        "inputs": dict(INPUT_COMBINATIONS),
         "noise": {
             "clean": "what the tracker would say if it were perfect",
             "noise": "white, slow and session errors, and the device's clock",
@@ -30,7 +32,7 @@ def catalogue() -> dict[str, dict[str, str]]:
     }
 
 
-def _method(name: str) -> str:
+def _describe_method(name: str) -> str:
     """What it does, what it needs, and where it comes from."""
     method = registry.resolve(name)
     examples = "examples" if method.needs_examples else "no examples"
@@ -38,26 +40,26 @@ def _method(name: str) -> str:
     return "; ".join(part for part in said if part)
 
 
-def _line(name: str) -> str:
+def _describe_scenario(name: str) -> str:
     scenario = load_scenario(name)
     motion = scenario.motion
     return (
         f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
-        f"{len(scenario.wearing)} stations, {_errors(scenario)}; {len(scenario.methods)} methods"
+        f"{len(scenario.wearing)} stations, {_describe_noise(scenario)}; {len(scenario.methods)} methods"
     )
 
 
-def _sweep(path: Path) -> str:
-    scenarios = expand(*load_sweep(path))
-    cells = sum(len(planned_cells(scenario)) for scenario in scenarios)
-    return f"{', '.join(dict.fromkeys(s.name for s in scenarios))}, {_errors(scenarios[0])}; {cells} cells"
+def _describe_sweep(path: Path) -> str:
+    scenarios = expand_sweep(*load_sweep(path))
+    cells = sum(len(cell_names(scenario)) for scenario in scenarios)
+    return f"{', '.join(dict.fromkeys(s.name for s in scenarios))}, {_describe_noise(scenarios[0])}; {cells} cells"
 
 
-def _errors(scenario: Scenario) -> str:
+def _describe_noise(scenario: Scenario) -> str:
     """What is varied; without that the noise."""
     varied = dict.fromkeys(key for combination, _ in variants(scenario) for key in combination)
     return f"varies {', '.join(varied)}" if varied else f"noise {scenario.noise}"
 
 
-def _range(names: tuple[str, ...]) -> str:
+def _describe_takes(names: tuple[str, ...]) -> str:
     return f"{len(names)} takes, {names[0]} to {names[-1]}"

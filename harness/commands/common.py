@@ -13,7 +13,7 @@ from typing import Any
 from harness.errors import BadInput, Outcome
 
 Verbs = Any  # argparse's subparsers object has no public type
-FEWEST = 4
+DEFAULT_STATION_COUNT = 4
 """Stations of a device where nothing is said: VRPN takes no more (docs/is900.md 11.1)."""
 Action = Callable[[argparse.Namespace], Outcome]
 
@@ -32,40 +32,42 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
         verb.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
     if "jobs" in flags:
         text = "clips at the same time (default 1; the demo's is 2)"
-        verb.add_argument("--jobs", type=positive, default=1, metavar="N", help=text)
+        verb.add_argument("--jobs", type=positive_int, default=1, metavar="N", help=text)
     if "mocap" in flags:
         text = "library of real motion (default: the HARNESS_MOCAP variable)"
         verb.add_argument("--mocap", type=Path, metavar="DIR", help=text)
     return verb
 
 
-def add_line(verb: argparse.ArgumentParser) -> None:
-    """The flags of a verb that opens a device's line; `line_wanted` reads them."""
-    verb.add_argument("--items", type=items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)")
-    verb.add_argument("--baud", type=positive, help="of a serial port (default: found out)")
+def add_line_flags(verb: argparse.ArgumentParser) -> None:
+    """The flags of a verb that opens a device's line; `line_options` reads them."""
+    verb.add_argument(
+        "--items", type=parse_items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)"
+    )
+    verb.add_argument("--baud", type=positive_int, help="of a serial port (default: found out)")
     text = "where lost stations show: in the records (item 40), or in answers to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
 
 
-def line_wanted(args: argparse.Namespace) -> dict[str, Any]:
+def line_options(args: argparse.Namespace) -> dict[str, Any]:
     """What those flags ask of the driver, the rest left out; BadInput."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port; leave it out.")
     return {name: getattr(args, name) for name in ("items", "baud", "quality") if getattr(args, name) is not None}
 
 
-def whole(text: str) -> bool:
+def is_whole_number(text: str) -> bool:
     """Whether these are digits 0 to 9 and nothing else; `isdigit` alone takes `²` too."""
     return text.isascii() and text.isdecimal()
 
 
-def positive(text: str) -> int:
-    if not whole(text) or int(text) < 1:
+def positive_int(text: str) -> int:
+    if not is_whole_number(text) or int(text) < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no positive whole number")
     return int(text)
 
 
-def positive_number(text: str) -> float:
+def positive_float(text: str) -> float:
     try:
         value = float(text)
     except ValueError:
@@ -75,24 +77,24 @@ def positive_number(text: str) -> float:
     return value
 
 
-def items(text: str) -> tuple[int, ...]:
+def parse_items(text: str) -> tuple[int, ...]:
     """An output list."""
     codes = text.split(",")
-    if not all(whole(code.strip()) for code in codes):
+    if not all(is_whole_number(code.strip()) for code in codes):
         raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
     return tuple(map(int, codes))
 
 
-def stations_of(args: argparse.Namespace) -> int | list[str]:
-    """What `--stations` asks for: how many of the scenario's, or their names; `FEWEST` without. BadInput."""
+def parse_stations(args: argparse.Namespace) -> int | list[str]:
+    """What `--stations` asks for: how many of the scenario's, or their names; `DEFAULT_STATION_COUNT` without. BadInput."""
     from harness.experiment.scenario import load_scenario
 
     if args.stations is None:
-        return min(FEWEST, len(load_scenario(args.scenario).wearing))
-    return int(args.stations) if whole(args.stations) else names_of(args.stations)
+        return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).wearing))
+    return int(args.stations) if is_whole_number(args.stations) else parse_names(args.stations)
 
 
-def names_of(text: str) -> list[str]:
+def parse_names(text: str) -> list[str]:
     """Stations by name, as `--stations` has them; BadInput for an empty one."""
     names = [name.strip() for name in text.split(",")]
     if not all(names):
@@ -100,19 +102,19 @@ def names_of(text: str) -> list[str]:
     return names
 
 
-def talk(line: str) -> None:
-    """To whoever sits there, over what `progress` left; stdout is data."""
+def print_status(line: str) -> None:
+    """To whoever sits there, over what `show_progress` left; stdout is data."""
     print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
 
 
-def progress(line: str) -> None:
+def show_progress(line: str) -> None:
     """One line that changes, for whoever watches a terminal."""
     if sys.stderr.isatty():
         print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager
-def ended_by_sigterm() -> Iterator[None]:
+def sigterm_as_interrupt() -> Iterator[None]:
     """Whoever stops the program by SIGTERM means what Ctrl-C says."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
@@ -125,7 +127,9 @@ def ended_by_sigterm() -> Iterator[None]:
         signal.signal(signal.SIGTERM, before)
 
 
-def say(args: argparse.Namespace, content: Mapping[str, Any], *lines: str, outcome: Outcome = Outcome.PASS) -> Outcome:
+def print_result(
+    args: argparse.Namespace, content: Mapping[str, Any], *lines: str, outcome: Outcome = Outcome.PASS
+) -> Outcome:
     """Print the lines, or with --json the content and the outcome's word; returns the outcome."""
     print(json.dumps({**content, "outcome": outcome.word}) if args.json else "\n".join(lines))
     return outcome

@@ -3,33 +3,33 @@
 import argparse
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, say
+from harness.commands.common import Verbs, add_verb, print_result
 from harness.errors import BadInput, Outcome
 
-_SIDE = "folder of a run or sweep, or of a baseline, or a baseline's name"
+_SIDE_HELP = "folder of a run or sweep, or of a baseline, or a baseline's name"
 _EVERYTHING = "everything"
 
 
 def add_baseline(verbs: Verbs) -> None:
     text = "keep what a finished run measured, to compare with later"
-    verb = add_verb(verbs, "baseline", text, save_baseline)
+    verb = add_verb(verbs, "baseline", text, run_baseline)
     verb.add_argument("what", choices=["save"], help="the one thing there is to do")
     verb.add_argument("name", metavar="NAME", help="of the baseline; it becomes results/baselines/NAME")
     verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
     verb.add_argument("--force", action="store_true", help="replace a baseline of that name")
 
 
-def save_baseline(args: argparse.Namespace) -> Outcome:
-    from harness.compare.baseline import save
+def run_baseline(args: argparse.Namespace) -> Outcome:
+    from harness.compare.baseline import write_baseline
 
-    folder = save(args.run, args.name, force=args.force)
-    return say(args, {"baseline": str(folder)}, f"baseline: {folder}")
+    folder = write_baseline(args.run, args.name, force=args.force)
+    return print_result(args, {"baseline": str(folder)}, f"baseline: {folder}")
 
 
 def add_compare(verbs: Verbs) -> None:
     text = "tell whether B is worse than A, or one method than another"
-    verb = add_verb(verbs, "compare", text, compare_sides)
-    verb.add_argument("a", metavar="A", help=f"the reference: {_SIDE}")
+    verb = add_verb(verbs, "compare", text, run_compare)
+    verb.add_argument("a", metavar="A", help=f"the reference: {_SIDE_HELP}")
     verb.add_argument("b", metavar="B", nargs="?", help="what is compared with it (default: A, with --methods)")
     verb.add_argument("--methods", metavar="A,B", help="compare method A of A with method B of B, or one of both")
     verb.add_argument("--metrics", metavar="M,N", help="what the outcome rests on (see `harness list`)")
@@ -38,30 +38,30 @@ def add_compare(verbs: Verbs) -> None:
     verb.add_argument("--html", metavar="FILE", type=Path, help="also write a page that shows it clip by clip")
 
 
-def compare_sides(args: argparse.Namespace) -> Outcome:
+def run_compare(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.compare.comparison import compare
-    from harness.compare.margins import GATED
-    from harness.core.files import plain
-    from harness.core.options import split
-    from harness.report.comparison.writer import text, write_page
-    from harness.results.reader import read_judged
+    from harness.compare.comparison import compare_results
+    from harness.compare.margins import GATED_METRICS
+    from harness.core.files import to_json_types
+    from harness.core.options import split_outside_brackets
+    from harness.report.comparison.writer import text, write_comparison_page
+    from harness.results.reader import load_results
 
     if args.b is None and not args.methods:
         raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
-    methods = split(args.methods, ",") if args.methods else []
+    methods = split_outside_brackets(args.methods, ",") if args.methods else []
     if len(methods) > 2:
         raise BadInput(f"--methods {args.methods} names {len(methods)} methods.", "Name one or two.")
-    a = read_judged(args.a)
-    comparison = compare(
+    a = load_results(args.a)
+    comparison = compare_results(
         a,
-        a if args.b is None else read_judged(args.b),
+        a if args.b is None else load_results(args.b),
         methods=(methods[0], methods[-1]) if methods else None,
-        metrics=args.metrics.split(",") if args.metrics else GATED,
+        metrics=args.metrics.split(",") if args.metrics else GATED_METRICS,
         allow=args.allow.split(",") if args.allow else None,
     )
-    page = write_page(comparison, args.html) if args.html else None
-    content = {**plain(asdict(comparison)), "page": page and str(page)}
+    page = write_comparison_page(comparison, args.html) if args.html else None
+    content = {**to_json_types(asdict(comparison)), "page": page and str(page)}
     lines = [text(comparison), *([f"page: {page}"] if page else [])]
-    return say(args, content, *lines, outcome=comparison.outcome)
+    return print_result(args, content, *lines, outcome=comparison.outcome)

@@ -11,15 +11,15 @@ from typing import TYPE_CHECKING, Any
 
 from harness.commands.common import (
     Verbs,
-    add_line,
+    add_line_flags,
     add_verb,
-    ended_by_sigterm,
-    line_wanted,
-    positive_number,
-    progress,
-    say,
-    stations_of,
-    talk,
+    line_options,
+    parse_stations,
+    positive_float,
+    print_result,
+    print_status,
+    show_progress,
+    sigterm_as_interrupt,
 )
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
@@ -27,19 +27,19 @@ if TYPE_CHECKING:
     from harness.calibrate.calibration_file import CalibrationFile
     from harness.calibrate.guided_calibration import Calibrator
     from harness.core.calibration import Calibration
-    from harness.experiment.playback import Rehearsal
+    from harness.experiment.playback import Playback
     from harness.live.pose import Output
     from harness.stream.driver import Is900, LineEvent
 
-_KINDS = ("exact", "tpose", "poses")
+_CALIBRATION_KINDS = ("exact", "tpose", "poses")
 _WARM_UP_FRAMES = 200
-_RATE_SLACK = 0.02
+_RATE_TOLERANCE = 0.02
 """How far a device may be off the rate that a method learnt at, as a share [choice]."""
 
 
 def add_live(verbs: Verbs) -> None:
     text = "reconstruct from a tracker in real time: a view, VMC, LSL, BVH; Ctrl-C ends it"
-    verb = add_verb(verbs, "live", text, live, "seed", "mocap", "endless")
+    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap", "endless")
     verb.add_argument(
         "--port", required=True, help="/dev/ttyUSB0, COM3, the link of an emulator's pty, tcp://HOST:PORT"
     )
@@ -50,8 +50,8 @@ def add_live(verbs: Verbs) -> None:
     text = "how many of the scenario's stations, or their names (default: the first 4)"
     verb.add_argument("--stations", metavar="N|A,B", help=text)
     text = "frames per second of the tracker, and of what is learnt (default: the scenario's)"
-    verb.add_argument("--rate", type=positive_number, metavar="HZ", help=text)
-    add_line(verb)
+    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
+    add_line_flags(verb)
     text = (
         "exact: worn as the scenario says, by whom it says; tpose: as a T-pose in the first seconds tells; poses: as "
         "eight poses tell, held first; or a file that `harness calibrate` wrote (default exact)"
@@ -66,52 +66,60 @@ def add_live(verbs: Verbs) -> None:
     verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion")
     verb.add_argument("--poses", type=Path, metavar="FILE", help="write a table: poses, and the times of each frame")
     verb.add_argument("--force", action="store_true", help="write over files that exist")
-    verb.add_argument("--seconds", type=positive_number, metavar="S", help="end after so long")
+    verb.add_argument("--seconds", type=positive_float, metavar="S", help="end after so long")
     text = "from the last byte to the pose (default: a period of the tracker)"
-    verb.add_argument("--deadline", type=positive_number, metavar="MS", help=text)
+    verb.add_argument("--deadline", type=positive_float, metavar="MS", help=text)
 
 
-def live(args: argparse.Namespace) -> Outcome:
-    with ended_by_sigterm():
+def run_live(args: argparse.Namespace) -> Outcome:
+    with sigterm_as_interrupt():
         try:
-            return _live(args)
+            return _reconstruct_live(args)
         except (KeyboardInterrupt, Exception) as error:
             if not was_interrupted(error):
                 raise
-            return say(args, {"poses": 0}, "stopped before it began")
+            return print_result(args, {"poses": 0}, "stopped before it began")
 
 
-def _live(args: argparse.Namespace) -> Outcome:
+def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
-    from harness.experiment.playback import rehearse
+    from harness.experiment.playback import prepare_playback
     from harness.live import summary
-    from harness.live.scheduling_jitter import Floor
-    from harness.live.session import Plan, perform, warm_up
+    from harness.live.scheduling_jitter import JitterProbe
+    from harness.live.session import LiveOptions, run_session, warm_up
     from harness.reconstruct import registry
 
     told = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
-    rehearsal = rehearse(args.scenario, stations=stations_of(args), **told)
-    if args.calibration not in _KINDS:
+    rehearsal = prepare_playback(args.scenario, stations=parse_stations(args), **told)
+    if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
-            raise UnknownName("file or kind of calibration", args.calibration, _KINDS)
+            raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
         rehearsal = rehearsal.going_by(read_calibration(args.calibration))
     method = registry.resolve(args.method)
     events: list[LineEvent] = []
     if args.calibration == "poses":
-        rehearsal = rehearsal.going_by(_posed(args, rehearsal, events))
+        rehearsal = rehearsal.going_by(_calibrate_by_poses(args, rehearsal, events))
     with ExitStack() as opened:
-        outputs = _outputs(args, rehearsal, opened)
-        device = opened.enter_context(_device(args, rehearsal, events))
+        outputs = _open_outputs(args, rehearsal, opened)
+        device = opened.enter_context(_open_device(args, rehearsal, events))
         rate_hz = rehearsal.tracker.rate_hz
-        talk(f"learning {args.method} from {len(rehearsal.setting.example_names)} clips of {rehearsal.scenario.name}")
+        print_status(
+            f"learning {args.method} from {len(rehearsal.setting.example_names)} clips of {rehearsal.scenario.name}"
+        )
         with redirect_stdout(sys.stderr):  # what a method prints is talk
             reconstructor = rehearsal.setting.fitted(method, args.method)
             warm_up(reconstructor, rehearsal.calibration, rehearsal.simulation.frames[:_WARM_UP_FRAMES])
-            floor = opened.enter_context(Floor())
-            talk("Ctrl-C ends it")
-            plan = Plan(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
-            done = perform(
-                device, rehearsal.calibrated.body, reconstructor, _worn(args, rehearsal), outputs, plan, say=talk
+            floor = opened.enter_context(JitterProbe())
+            print_status("Ctrl-C ends it")
+            plan = LiveOptions(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
+            done = run_session(
+                device,
+                rehearsal.calibrated.body,
+                reconstructor,
+                _initial_calibration(args, rehearsal),
+                outputs,
+                plan,
+                say=print_status,
             )
         beside = floor.finish()
         content = {
@@ -126,40 +134,40 @@ def _live(args: argparse.Namespace) -> Outcome:
     kinds = Counter(event.kind for event in events)
     line = [f"{name} {count}" for name, count in (device.counts | kinds).items()]
     outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
-    return say(args, content, *summary.lines(done, beside), f"line: {', '.join(line)}", outcome=outcome)
+    return print_result(args, content, *summary.lines(done, beside), f"line: {', '.join(line)}", outcome=outcome)
 
 
 @contextmanager
-def _device(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[LineEvent]") -> "Iterator[Is900]":
+def _open_device(args: argparse.Namespace, rehearsal: "Playback", events: "list[LineEvent]") -> "Iterator[Is900]":
     """The tracker, set up; BadInput when it is not the one that the scenario has."""
-    from harness.stream.driver import Is900, Wanted
+    from harness.stream.driver import DriverConfig, Is900
 
     def happened(event: "LineEvent") -> None:
         events.append(event)
-        talk(f"line: {event.text}")
+        print_status(f"line: {event.text}")
 
     tracker = rehearsal.tracker
     stations = tuple(rehearsal.scenario.stations)
-    wanted = Wanted(**{"items": tracker.items, **line_wanted(args)}, stations=stations, rate_hz=args.rate)
+    wanted = DriverConfig(**{"items": tracker.items, **line_options(args)}, stations=stations, rate_hz=args.rate)
     with Is900(args.port, wanted, on_event=happened) as device:
         runs_hz = device.wire.rate_hz
-        if abs(runs_hz - tracker.rate_hz) > _RATE_SLACK * tracker.rate_hz:
+        if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:
             raise BadInput(
                 f"The device sends {runs_hz:.1f} frames per second, {rehearsal.scenario.name} has {tracker.rate_hz:g}.",
                 f"Say --rate {runs_hz:.0f}: a method learns at the tracker's rate.",
             )
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
-        talk(f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz; stations {worn}")
+        print_status(f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz; stations {worn}")
         yield device
 
 
-def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack) -> "list[Output]":
+def _open_outputs(args: argparse.Namespace, rehearsal: "Playback", opened: ExitStack) -> "list[Output]":
     """What is asked for; closed again when something after it is refused."""
-    from harness.live.bvh import Bvh
-    from harness.live.lsl import Lsl
-    from harness.live.pose_table import Table
-    from harness.live.viewer import View
-    from harness.live.vmc import Vmc
+    from harness.live.bvh import BvhOutput
+    from harness.live.lsl import LslOutput
+    from harness.live.pose_table import PoseTableOutput
+    from harness.live.viewer import ViewerOutput
+    from harness.live.vmc import VmcOutput
 
     if args.out is not None and args.view != "frames":
         raise BadInput("--out without --view frames.", "Say both, or neither.")
@@ -168,37 +176,39 @@ def _outputs(args: argparse.Namespace, rehearsal: "Rehearsal", opened: ExitStack
     own, rate_hz = rehearsal.calibrated.body.skeleton, rehearsal.tracker.rate_hz
     stations = tuple(rehearsal.scenario.stations)
     wanted: dict[str, Any] = {
-        "vmc": lambda: Vmc(args.vmc, own),
-        "lsl": lambda: Lsl(args.lsl, own, rate_hz, network=args.lsl_network),
-        "bvh": lambda: Bvh(args.bvh, own, rate_hz, force=args.force),
-        "poses": lambda: Table(args.poses, own, stations, force=args.force),
-        "view": lambda: View(args.view, own, args.out, force=args.force),
+        "vmc": lambda: VmcOutput(args.vmc, own),
+        "lsl": lambda: LslOutput(args.lsl, own, rate_hz, network=args.lsl_network),
+        "bvh": lambda: BvhOutput(args.bvh, own, rate_hz, force=args.force),
+        "poses": lambda: PoseTableOutput(args.poses, own, stations, force=args.force),
+        "view": lambda: ViewerOutput(args.view, own, args.out, force=args.force),
     }
     outputs: list[Output] = []
     for name, make in wanted.items():
         if getattr(args, name) is not None:
             outputs.append(make())
             opened.callback(outputs[-1].close)
-            talk(outputs[-1].told)
+            print_status(outputs[-1].told)
     return outputs
 
 
-def _posed(args: argparse.Namespace, rehearsal: "Rehearsal", events: "list[LineEvent]") -> "CalibrationFile":
+def _calibrate_by_poses(
+    args: argparse.Namespace, rehearsal: "Playback", events: "list[LineEvent]"
+) -> "CalibrationFile":
     """What eight poses tell, held before anything is learnt: methods learn on the bones that are found."""
-    from harness.experiment.calibration_session import Posing
+    from harness.experiment.calibration_session import CalibrationSession
 
-    posing = Posing(args.scenario, tuple(rehearsal.scenario.stations), folder=args.mocap)
-    with _device(args, rehearsal, events) as device:
-        held = posing.held(device, talk, watch=progress).held
+    posing = CalibrationSession(args.scenario, tuple(rehearsal.scenario.stations), folder=args.mocap)
+    with _open_device(args, rehearsal, events) as device:
+        held = posing.held(device, print_status, watch=show_progress).held
     found = posing.found(held, args.port)
     for line in found.lines:
-        talk(line)
+        print_status(line)
     return found.kept
 
 
-def _worn(args: argparse.Namespace, rehearsal: "Rehearsal") -> "Calibration | Calibrator":
-    from harness.calibrate.guided_calibration import StandInTPose
+def _initial_calibration(args: argparse.Namespace, rehearsal: "Playback") -> "Calibration | Calibrator":
+    from harness.calibrate.guided_calibration import TPoseCalibrator
 
     if args.calibration == "tpose":
-        return StandInTPose(rehearsal.body, rehearsal.mounts)
+        return TPoseCalibrator(rehearsal.body, rehearsal.mounts)
     return rehearsal.calibration

@@ -5,7 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive, say
+from harness.commands.common import Verbs, add_verb, positive_int, print_result
 from harness.commands.run import this_command
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -13,26 +13,26 @@ from harness.errors import Outcome
 
 def add_paper(verbs: Verbs) -> None:
     text = "rerun every experiment of a paper beside its published figures; resumes what was interrupted"
-    verb = add_verb(verbs, "paper", text, rerun_paper, "out")
+    verb = add_verb(verbs, "paper", text, run_paper, "out")
     verb.add_argument("paper", choices=["liu2011", "kim2012"], help="Liu et al. 2011, or Kim, Seol and Lee 2012")
     text = "on the real motion in this library (default: on the built-in performer)"
     verb.add_argument("--mocap", type=Path, metavar="DIR", help=text)
     verb.add_argument("--seed", type=int, default=1, help="of all runs (default 1)")
-    verb.add_argument("--jobs", type=positive, default=2, metavar="N", help="clips at the same time (default 2)")
+    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
 
 
-def rerun_paper(args: argparse.Namespace) -> Outcome:
+def run_paper(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.core.files import plain
+    from harness.core.files import to_json_types
     from harness.report.paper.text import text_tables
-    from harness.report.paper.writer import write_paper
-    from harness.study.papers.paper import paper, rerun
+    from harness.report.paper.writer import write_paper_page
+    from harness.study.papers.paper import load_paper, reproduce
 
     out = args.out or Path("results") / (args.paper + ("_cmu" if args.mocap else ""))
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
-        findings, outcome = rerun(
-            paper(args.paper),
+        findings, outcome = reproduce(
+            load_paper(args.paper),
             out,
             library=args.mocap,
             seed=args.seed,
@@ -40,7 +40,7 @@ def rerun_paper(args: argparse.Namespace) -> Outcome:
             command=this_command(),
             progress=bar,
         )
-    page = write_paper(out)
-    content = {**plain(asdict(findings)), "out": str(out), "report": str(page)}
+    page = write_paper_page(out)
+    content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     lines = (text_tables(findings), "", f"findings: {out / 'findings.json'}", f"report: {page}")
-    return say(args, content, *lines, outcome=outcome)
+    return print_result(args, content, *lines, outcome=outcome)

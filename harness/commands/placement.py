@@ -5,7 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive, say
+from harness.commands.common import Verbs, add_verb, positive_int, print_result
 from harness.commands.run import this_command
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -13,27 +13,27 @@ from harness.errors import Outcome
 
 def add_placement(verbs: Verbs) -> None:
     text = "find out which trackers to wear and where: sets of candidates, ranked; resumes what was interrupted"
-    verb = add_verb(verbs, "placement", text, place_trackers, "out", "mocap")
+    verb = add_verb(verbs, "placement", text, run_placement, "out", "mocap")
     verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as placement_walking")
-    verb.add_argument("--jobs", type=positive, default=2, metavar="N", help="clips at the same time (default 2)")
+    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
 
 
-def place_trackers(args: argparse.Namespace) -> Outcome:
+def run_placement(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.core.files import plain
-    from harness.experiment.executors import processes
+    from harness.core.files import to_json_types
+    from harness.experiment.executors import process_executor
     from harness.report.placement.text import text
     from harness.report.placement.writer import write_placement_page
-    from harness.study.placement.placement_study import FINDINGS, placement
+    from harness.study.placement.placement_study import FINDINGS, run_placement
 
     out = args.out or Path("results") / Path(args.study).stem
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
-        each = processes(args.jobs)
-        findings, outcome = placement(
+        each = process_executor(args.jobs)
+        findings, outcome = run_placement(
             args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
         )
     page = write_placement_page(out)
-    content = {**plain(asdict(findings)), "out": str(out), "report": str(page)}
+    content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
     lines = (text(findings), "", f"findings: {out / FINDINGS}", f"report: {page}")
-    return say(args, content, *lines, outcome=outcome)
+    return print_result(args, content, *lines, outcome=outcome)

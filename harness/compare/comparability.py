@@ -3,50 +3,53 @@
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 
-from harness.compare.differences import Group
-from harness.compare.matching import LOOSENED, Matched, named
-from harness.core.files import plain
+from harness.compare.differences import PairGroup
+from harness.compare.matching import RELAXABLE_KEYS, CellPairing, format_cell_name
+from harness.core.files import to_json_types
 from harness.errors import UnknownName
-from harness.results.manifest import flat
-from harness.results.reader import Judged
+from harness.results.manifest import flatten
+from harness.results.reader import ResultSet
 
 EVERYTHING = "everything"
 """Allows any input to differ, any coverage and cells without a partner; cells pair as ever."""
-FAULTS = ("coverage", "cells")
+FAULT_KINDS = ("coverage", "cells")
 COVERAGE_FLOOR = 0.95
 """Of the frames on either side (choice): a method may lose the hardest, and score the better for it."""
-_MOST_OF_ONE = 4
+_MAX_NAMED = 4
 """So many differing inputs inside one are named each."""
 
 
-def check(allowance: Sequence[str], a: Judged, b: Judged, differing: Iterable[str]) -> None:
+def check_allowance(allowance: Sequence[str], a: ResultSet, b: ResultSet, differing: Iterable[str]) -> None:
     """UnknownName for an allowance that is no input and no fault."""
-    names = {*differing, *(name for side in (a, b) for cell in side.cells[:1] for name in flat(plain(cell.defined_by)))}
+    names = {
+        *differing,
+        *(name for side in (a, b) for cell in side.cells[:1] for name in flatten(to_json_types(cell.defined_by))),
+    }
     whole = {".".join(name.split(".")[:depth]) for name in names for depth in range(1, name.count(".") + 2)}
     for name in allowance:
-        if name not in whole | {*LOOSENED, *FAULTS, EVERYTHING}:
+        if name not in whole | {*RELAXABLE_KEYS, *FAULT_KINDS, EVERYTHING}:
             tops = sorted({name.partition(".")[0] for name in names})
-            raise UnknownName("input to allow", name, (EVERYTHING, *FAULTS, *LOOSENED, *tops))
+            raise UnknownName("input to allow", name, (EVERYTHING, *FAULT_KINDS, *RELAXABLE_KEYS, *tops))
 
 
-def allows(allowance: Sequence[str], name: str) -> bool:
+def is_allowed(allowance: Sequence[str], name: str) -> bool:
     """Whether this input, or what it is inside of, may differ."""
     return any(allowed in (EVERYTHING, name) or name.startswith(f"{allowed}.") for allowed in allowance)
 
 
-def together(differing: Mapping[str, str]) -> tuple[str, ...]:
+def summarise_differences(differing: Mapping[str, str]) -> tuple[str, ...]:
     """The texts; of more than a few inside one input, such as digests of examples, the first."""
     texts = []
     for top, names in groupby(differing, key=lambda name: name.partition(".")[0]):
         inside = list(names)
-        if len(inside) > _MOST_OF_ONE:
+        if len(inside) > _MAX_NAMED:
             texts.append(f"{differing[inside[0]]} (and {len(inside) - 1} more of {top})")
         else:
             texts += [differing[name] for name in inside]
     return tuple(texts)
 
 
-def coverage(found: Iterable[Group], metrics: Sequence[str]) -> list[str]:
+def find_coverage_faults(found: Iterable[PairGroup], metrics: Sequence[str]) -> list[str]:
     """Where the sides did not measure the same share, or too little of it."""
     texts = []
     for group in found:
@@ -67,26 +70,30 @@ def coverage(found: Iterable[Group], metrics: Sequence[str]) -> list[str]:
     return texts
 
 
-def alone(matched: Matched) -> list[str]:
+def find_unpaired_cells(matched: CellPairing) -> list[str]:
     """Cells without a partner, a line for each side."""
     sides = (("A", matched.only_a), ("B", matched.only_b))
-    return [f"{_cells(len(cells))} only in {side}: {some([*map(named, cells)])}" for side, cells in sides if cells]
+    return [
+        f"{_count_text(len(cells))} only in {side}: {join_first([*map(format_cell_name, cells)])}"
+        for side, cells in sides
+        if cells
+    ]
 
 
-def failed(side: str, judged: Judged, method: str | None) -> tuple[str, ...]:
+def list_failed_cells(side: str, judged: ResultSet, method: str | None) -> tuple[str, ...]:
     """Of one method, where only that is compared."""
     names = [name for name in judged.failed if method is None or f": {method} on " in f": {name}"]
     unfinished = judged.planned - len(judged.cells) - len(judged.failed)
     return (
         *(f"{side}: {name}" for name in names),
-        *([f"{side}: {_cells(unfinished)} not finished"] if unfinished > 0 else []),
+        *([f"{side}: {_count_text(unfinished)} not finished"] if unfinished > 0 else []),
     )
 
 
-def _cells(count: int) -> str:
+def _count_text(count: int) -> str:
     return "1 cell is" if count == 1 else f"{count} cells are"
 
 
-def some(texts: Sequence[str]) -> str:
+def join_first(texts: Sequence[str]) -> str:
     """The first three, and how many more."""
     return "; ".join(texts[:3]) + (f"; and {len(texts) - 3} more" if len(texts) > 3 else "")

@@ -4,17 +4,33 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import get_args
 
-from harness.compare.comparability import EVERYTHING, allows, alone, check, coverage, failed, some, together
-from harness.compare.differences import Difference, groups, lines
-from harness.compare.margins import GATED, INFORMED, TIMES, margin_of
-from harness.compare.matching import LOOSENED, Matched, inputs_that_differ, match, named, told
+from harness.compare.comparability import (
+    EVERYTHING,
+    check_allowance,
+    find_coverage_faults,
+    find_unpaired_cells,
+    is_allowed,
+    join_first,
+    list_failed_cells,
+    summarise_differences,
+)
+from harness.compare.differences import Difference, compare_groups, group_pairs
+from harness.compare.margins import GATED_METRICS, INFORMATIVE_METRICS, TIME_METRICS, margin_of
+from harness.compare.matching import (
+    RELAXABLE_KEYS,
+    CellPairing,
+    format_cell_name,
+    format_value,
+    inputs_that_differ,
+    pair_cells,
+)
 from harness.compare.significance import Verdict
-from harness.core.files import plain
+from harness.core.files import to_json_types
 from harness.errors import Outcome
-from harness.results.manifest import Manifest, flat
-from harness.results.reader import Judged
+from harness.results.manifest import Manifest, flatten
+from harness.results.reader import ResultSet
 
-__all__ = ["EVERYTHING", "Comparison", "Difference", "Verdict", "compare"]
+__all__ = ["EVERYTHING", "Comparison", "Difference", "Verdict", "compare_results"]
 
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
@@ -48,18 +64,18 @@ class Comparison:
     """Planned cells that failed on either side, such as "A: ik on walking_p1_01"."""
 
 
-def compare(
-    a: Judged,
-    b: Judged,
+def compare_results(
+    a: ResultSet,
+    b: ResultSet,
     *,
     methods: tuple[str, str] | None = None,
-    metrics: Sequence[str] = GATED,
+    metrics: Sequence[str] = GATED_METRICS,
     allow: Sequence[str] | None = None,
 ) -> Comparison:
     """Pair the cells, refuse what is not comparable, judge every gated metric of every group.
 
     `methods` compares the one of A with the other of B. `allow` names inputs that may differ (those inside them too),
-    names of `LOOSENED` that cells need not agree in, "coverage", "cells" (without a partner), or `EVERYTHING`.
+    names of `RELAXABLE_KEYS` that cells need not agree in, "coverage", "cells" (without a partner), or `EVERYTHING`.
     The outcome: NOT_COMPARABLE when nothing matched or inputs differ; REGRESSED when a gated line is worse; INCOMPLETE
     when planned cells failed; NOT_COMPARABLE when sides cover different things or a gated line cannot be told; PASS.
     Times are gated where both sides were measured on the same processor, else they are for information.
@@ -69,26 +85,26 @@ def compare(
     for metric in metrics:
         margin_of(metric)
     allowance = tuple(allow or ())
-    matched = match(a, b, methods, [name for name in allowance if name in LOOSENED])
+    matched = pair_cells(a, b, methods, [name for name in allowance if name in RELAXABLE_KEYS])
     differing = inputs_that_differ(matched.pairs, metrics)
-    check(allowance, a, b, differing)
-    refused = together({name: text for name, text in differing.items() if not allows(allowance, name)})
-    allowed = together({name: text for name, text in differing.items() if allows(allowance, name)})
-    found = [] if refused else groups(matched.pairs)
-    gated = _gated(metrics, a.manifest, b.manifest)
-    informed = [metric for metric in (*metrics, *INFORMED) if metric not in gated]
-    differences = lines(found, gated, dict.fromkeys(informed))
-    faults = {"coverage": coverage(found, metrics), "cells": alone(matched)}
-    kept = [text for name, texts in faults.items() for text in texts if not allows(allowance, name)]
-    missing = failed("A", a, methods and methods[0]) + failed("B", b, methods and methods[1])
+    check_allowance(allowance, a, b, differing)
+    refused = summarise_differences({name: text for name, text in differing.items() if not is_allowed(allowance, name)})
+    allowed = summarise_differences({name: text for name, text in differing.items() if is_allowed(allowance, name)})
+    found = [] if refused else group_pairs(matched.pairs)
+    gated = _gated_metrics(metrics, a.manifest, b.manifest)
+    informed = [metric for metric in (*metrics, *INFORMATIVE_METRICS) if metric not in gated]
+    differences = compare_groups(found, gated, dict.fromkeys(informed))
+    faults = {"coverage": find_coverage_faults(found, metrics), "cells": find_unpaired_cells(matched)}
+    kept = [text for name, texts in faults.items() for text in texts if not is_allowed(allowance, name)]
+    missing = list_failed_cells("A", a, methods and methods[0]) + list_failed_cells("B", b, methods and methods[1])
     outcome, why = _outcome(matched, refused, differences, missing, kept)
     return Comparison(
         a=a.title,
         b=b.title,
         differences=differences,
         matched=len(matched.pairs),
-        only_a=tuple(map(named, matched.only_a)),
-        only_b=tuple(map(named, matched.only_b)),
+        only_a=tuple(map(format_cell_name, matched.only_a)),
+        only_b=tuple(map(format_cell_name, matched.only_b)),
         inputs_that_differ=refused,
         allowed=(*allowed, *(text for texts in faults.values() for text in texts if text not in kept)),
         circumstances=_circumstances(a.manifest, b.manifest),
@@ -99,14 +115,14 @@ def compare(
     )
 
 
-def _gated(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:
+def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:
     """All of them on one processor; on two those that are no times, for what a step costs beside other work differs."""
     same = a.circumstances.get("processor") == b.circumstances.get("processor")
-    return tuple(metric for metric in metrics if same or metric not in TIMES)
+    return tuple(metric for metric in metrics if same or metric not in TIME_METRICS)
 
 
 def _outcome(
-    matched: Matched,
+    matched: CellPairing,
     refused: Sequence[str],
     differences: Sequence[Difference],
     failed: Sequence[str],
@@ -117,16 +133,16 @@ def _outcome(
     if not matched.pairs and not failed:
         return Outcome.NOT_COMPARABLE, f"no cell of A has a partner in B ({matched.why_none})"
     if refused:
-        return Outcome.NOT_COMPARABLE, f"inputs differ: {some(refused)}"
+        return Outcome.NOT_COMPARABLE, f"inputs differ: {join_first(refused)}"
     if by["worse"]:
         names = [f"{line.method} {line.metric}" for line in by["worse"]]
-        return Outcome.REGRESSED, f"{len(names)} of {len(gated)} gated lines are worse: {some(names)}"
+        return Outcome.REGRESSED, f"{len(names)} of {len(gated)} gated lines are worse: {join_first(names)}"
     if failed:
-        return Outcome.INCOMPLETE, f"planned cells are missing: {some(failed)}"
+        return Outcome.INCOMPLETE, f"planned cells are missing: {join_first(failed)}"
     if not gated:
         return Outcome.NOT_COMPARABLE, "nothing was measured on both sides that could be gated"
     if faults:
-        return Outcome.NOT_COMPARABLE, some(faults)
+        return Outcome.NOT_COMPARABLE, join_first(faults)
     if by["cannot tell"]:
         line, lines_ = by["cannot tell"][0], len(by["cannot tell"])
         text = f"{lines_} of {len(gated)} gated lines cannot be told, such as {line.method} {line.metric}: {line.why}"
@@ -135,6 +151,8 @@ def _outcome(
 
 
 def _circumstances(a: Manifest, b: Manifest) -> tuple[tuple[str, str, str], ...]:
-    mine, theirs = (flat(plain(side.circumstances)) for side in (a, b))
+    mine, theirs = (flatten(to_json_types(side.circumstances)) for side in (a, b))
     names = {**mine, **theirs}
-    return tuple((n, told(mine.get(n)), told(theirs.get(n))) for n in names if mine.get(n) != theirs.get(n))
+    return tuple(
+        (n, format_value(mine.get(n)), format_value(theirs.get(n))) for n in names if mine.get(n) != theirs.get(n)
+    )

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.compare.margins import margin_of
-from harness.compare.matching import Pair
-from harness.compare.significance import Judgement, Verdict, judge
+from harness.compare.matching import CellPair
+from harness.compare.significance import SignificanceResult, Verdict, decide_verdicts
 from harness.core.arrays import Floats
 from harness.score.metrics import DEFINITIONS
 
@@ -49,45 +49,47 @@ class Difference:
 
 
 @dataclass(frozen=True)
-class Group:
+class PairGroup:
     """Pairs of cells that are pooled."""
 
     method: str
     text: str
     """What they share besides: inputs, protocol, performer."""
-    pairs: tuple[Pair, ...]
+    pairs: tuple[CellPair, ...]
 
     @property
     def title(self) -> str:
         return f"{self.method} ({self.text})"
 
 
-def groups(pairs: Iterable[Pair]) -> list[Group]:
+def group_pairs(pairs: Iterable[CellPair]) -> list[PairGroup]:
     """By method, inputs, protocol and performer, in the order of the pairs."""
-    found: dict[tuple[str, str], list[Pair]] = {}
+    found: dict[tuple[str, str], list[CellPair]] = {}
     for a, b in pairs:
         method = a.method if a.method == b.method else f"{a.method} vs {b.method}"
         protocol = b.protocol if a.protocol == "none" else a.protocol
         text = ", ".join(filter(None, (a.inputs, protocol, a.performer)))
         found.setdefault((method, text), []).append((a, b))
-    return [Group(*name, tuple(of_it)) for name, of_it in found.items()]
+    return [PairGroup(*name, tuple(of_it)) for name, of_it in found.items()]
 
 
-def lines(found: Sequence[Group], gated: Sequence[str], informed: Iterable[str] = ()) -> tuple[Difference, ...]:
+def compare_groups(
+    found: Sequence[PairGroup], gated: Sequence[str], informed: Iterable[str] = ()
+) -> tuple[Difference, ...]:
     """Every metric of every group that was measured on some clip on both sides: gated lines first, judged together."""
-    first = [sides for group in found for metric in gated if (sides := _sides(group, metric)).clips]
-    others = [sides for group in found for metric in informed if (sides := _sides(group, metric)).clips]
-    judged = judge([sides.worsening for sides in first], [sides.margin for sides in first])
-    alone = [judge([sides.worsening], [sides.margin])[0] for sides in others]
+    first = [sides for group in found for metric in gated if (sides := _clip_means(group, metric)).clips]
+    others = [sides for group in found for metric in informed if (sides := _clip_means(group, metric)).clips]
+    judged = decide_verdicts([sides.worsening for sides in first], [sides.margin for sides in first])
+    alone = [decide_verdicts([sides.worsening], [sides.margin])[0] for sides in others]
     both = zip((*first, *others), (*judged, *alone), strict=True)
-    return tuple(_line(sides, told, at < len(first)) for at, (sides, told) in enumerate(both))
+    return tuple(_difference(sides, told, at < len(first)) for at, (sides, told) in enumerate(both))
 
 
 @dataclass(frozen=True, eq=False)
-class _Sides:
+class _ClipMeans:
     """What a group measured of one metric, as clip means."""
 
-    group: Group
+    group: PairGroup
     metric: str
     clips: tuple[str, ...]
     a: Floats
@@ -103,7 +105,7 @@ class _Sides:
         return margin_of(self.metric).of(float(self.a.mean()))
 
 
-def _sides(group: Group, metric: str) -> _Sides:
+def _clip_means(group: PairGroup, metric: str) -> _ClipMeans:
     """Cells that either side did not measure do not count; those of a clip are averaged."""
     by_clip: dict[str, list[tuple[float, float]]] = {}
     for a, b in group.pairs:
@@ -112,10 +114,10 @@ def _sides(group: Group, metric: str) -> _Sides:
             by_clip.setdefault(a.clip, []).append((mine, theirs))
     clips = tuple(sorted(by_clip))
     means = np.array([np.mean(by_clip[clip], axis=0) for clip in clips]).reshape(-1, 2)
-    return _Sides(group, metric, clips, means[:, 0], means[:, 1])
+    return _ClipMeans(group, metric, clips, means[:, 0], means[:, 1])
 
 
-def _line(sides: _Sides, told: Judgement, gated: bool) -> Difference:
+def _difference(sides: _ClipMeans, told: SignificanceResult, gated: bool) -> Difference:
     low, high = told.low, told.high
     if not margin_of(sides.metric).rise_is_worse and low is not None and high is not None:
         low, high = -high, -low

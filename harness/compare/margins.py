@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from harness.errors import UnknownName
 
-GATED = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3", "step_relative")
+GATED_METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3", "step_relative")
 """What a comparison's outcome rests on unless it is told otherwise."""
-TIMES = ("step_relative", "step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps")
+TIME_METRICS = ("step_relative", "step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps")
 """How long steps take: figures of one processor, the relative one included, which differs by a fifth between kinds."""
-INFORMED = ("mpjre_deg", "mpjpe_root_mm", "foot_skate_mm_s")
+INFORMATIVE_METRICS = ("mpjre_deg", "mpjpe_root_mm", "foot_skate_mm_s")
 """What it shows besides."""
 
 
@@ -42,7 +42,7 @@ MARGINS = {
     **dict.fromkeys(("upper_position_mm", "lower_position_mm", "hands_position_mm", "feet_position_mm"), _PLACE),
     **dict.fromkeys(("mpjve_mm_s", "jitter_m_s3"), _SMOOTH),
     **dict.fromkeys(("foot_skate_mm_s", "penetration_mm", "float_mm"), _GROUND),
-    **dict.fromkeys(TIMES, _TIME),
+    **dict.fromkeys(TIME_METRICS, _TIME),
     "fps": Margin(1.0 / 3.0, 1.0, rise_is_worse=False),
 }
 """Of every metric that has a better and a worse; the truth's own values, counts and lag have none."""

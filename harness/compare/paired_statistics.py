@@ -16,27 +16,27 @@ from scipy import special
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.results.findings import Verdict
+from harness.results.findings import ClaimVerdict
 
-FEWEST_CLIPS = 6
+MIN_CLIPS = 6
 """With fewer there is no interval."""
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 _RESAMPLES = 9999
 
 
 @dataclass(frozen=True)
-class Paired:
+class PairedDifference:
     """a - b over the clips on which both were measured."""
 
     clips: tuple[str, ...]
     mean: float | None
     """None without clips."""
     low: float | None = None
-    """End of the 95 % interval; None with fewer than `FEWEST_CLIPS`."""
+    """End of the 95 % interval; None with fewer than `MIN_CLIPS`."""
     high: float | None = None
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ClaimVerdict:
         """Of the claim that a is greater than b."""
         if not self.clips:
             return "not run"
@@ -50,11 +50,11 @@ class Paired:
         if not self.clips:
             return "no clip on which both were measured"
         if self.low is None:
-            return f"too few clips: {len(self.clips)}, of at least {FEWEST_CLIPS}"
+            return f"too few clips: {len(self.clips)}, of at least {MIN_CLIPS}"
         return {"cannot tell": "the interval holds zero", "not reproduced": "the other way round"}.get(self.verdict, "")
 
 
-def paired(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> Paired:
+def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> PairedDifference:
     """Compare errors by clip; a clip that either side lacks (or has None for) does not count.
 
     Clips must be of one kind: known and new performers, or two protocols, are never put into one mapping. BadInput for
@@ -66,14 +66,14 @@ def paired(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> Pair
         wrong = clips[int(np.flatnonzero(~np.isfinite(difference))[0])]
         raise BadInput(f"The errors on {wrong} are no finite numbers.", "What was not measured is None.")
     if not clips:
-        return Paired((), None)
+        return PairedDifference((), None)
     mean = float(difference.mean())
-    if len(clips) < FEWEST_CLIPS:
-        return Paired(clips, mean)
-    return Paired(clips, mean, *interval(difference))
+    if len(clips) < MIN_CLIPS:
+        return PairedDifference(clips, mean)
+    return PairedDifference(clips, mean, *bootstrap_interval(difference))
 
 
-def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
+def bootstrap_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple[float, float]:
     """Of the mean of (n,) values that were drawn independently, n >= 2; the same values give the same ends."""
     spread = float(np.ptp(values))
     if spread <= 1e-9 * float(np.abs(values).max()):  # all equal: nothing to resample, and BCa is undefined
@@ -81,17 +81,17 @@ def interval(values: Floats, level: float = LEVEL) -> tuple[float, float]:
     from scipy import stats  # takes a second to load, and each worker loads this file
 
     found = stats.bootstrap(
-        (grained(values),),
+        (round_to_grid(values),),
         np.mean,
         method="BCa",
-        confidence_level=expanded(level, len(values)),
+        confidence_level=expand_level(level, len(values)),
         n_resamples=_RESAMPLES,
         rng=generator(0, "paired"),
     ).confidence_interval
     return float(found.low), float(found.high)
 
 
-def grained(values: Floats) -> Floats:
+def round_to_grid(values: Floats) -> Floats:
     """(n,) values, not all zero, rounded at 2^-40 of the largest: their sums are exact in any order, so that what ties
     on paper ties here."""
     grain = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
@@ -99,7 +99,7 @@ def grained(values: Floats) -> Floats:
     return rounded
 
 
-def expanded(level: float, count: int) -> float:
+def expand_level(level: float, count: int) -> float:
     """The bootstrap's level whose interval is as wide as the t interval of `level` on `count` even values."""
     t = special.stdtrit(count - 1, 0.5 + 0.5 * level)
     return float(1.0 - 2.0 * special.ndtr(-np.sqrt(count / (count - 1)) * t))

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import FEWEST_CLIPS, grained, interval
+from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, round_to_grid
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
@@ -23,38 +23,38 @@ _EXACT_CLIPS, _DRAWS = 16, 20_000
 
 
 @dataclass(frozen=True)
-class Judgement:
+class SignificanceResult:
     """What paired differences come to."""
 
     verdict: Verdict
     why: str
     low: float | None = None
-    """End of the 95 % interval of the mean; None with fewer clips than `FEWEST_CLIPS`, as all that follows."""
+    """End of the 95 % interval of the mean; None with fewer clips than `MIN_CLIPS`, as all that follows."""
     high: float | None = None
     p: float | None = None
     p_holm: float | None = None
     """As it counts among all lines."""
 
 
-def judge(lines: Sequence[Floats], margins: Sequence[float]) -> list[Judgement]:
+def decide_verdicts(lines: Sequence[Floats], margins: Sequence[float]) -> list[SignificanceResult]:
     """Of lines that are judged together, each (clips,) differences and the margin in their unit; a rise is worse.
 
     *Worse* and *better*: p after Holm at most 0.05, the interval excludes zero, and the mean is beyond the margin.
     *Same*: the whole interval lies within the margin. Anything else cannot be told.
     """
-    tested = [at for at, line in enumerate(lines) if len(line) >= FEWEST_CLIPS]
+    tested = [at for at, line in enumerate(lines) if len(line) >= MIN_CLIPS]
     p = {at: sign_flip_p(lines[at]) for at in tested}
     counting = [at for at in tested if np.any(lines[at])]
     corrected = dict(zip(counting, holm([p[at] for at in counting]), strict=True))
     found = []
     for at, (line, margin) in enumerate(zip(lines, margins, strict=True)):
         if at not in p:
-            found.append(Judgement("cannot tell", f"too few clips: {len(line)}, of at least {FEWEST_CLIPS}"))
+            found.append(SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}"))
             continue
-        low, high = interval(line)
+        low, high = bootstrap_interval(line)
         p_holm = corrected.get(at, 1.0)
         told = _verdict(line, low, high, p_holm, margin, len(counting))
-        found.append(Judgement(*told, low, high, p[at], p_holm))
+        found.append(SignificanceResult(*told, low, high, p[at], p_holm))
     return found
 
 
@@ -64,7 +64,7 @@ def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lin
         return ("worse" if mean > 0.0 else "better"), "more than chance, and more than the margin"
     if -margin <= low and high <= margin:
         return "same", "the whole interval lies within the margin"
-    if lines * least_p(line) > SIGNIFICANCE:
+    if lines * smallest_possible_p(line) > SIGNIFICANCE:
         return "cannot tell", f"too few clips: {len(line)} can show nothing among {lines} lines"
     if p > SIGNIFICANCE and apart:
         return "cannot tell", f"among {lines} lines it may be chance"
@@ -77,20 +77,20 @@ def sign_flip_p(difference: Floats) -> float:
     """Two-sided p of the mean of (n,) differences; 1 if all are zero."""
     if not np.any(difference):
         return 1.0
-    values = grained(difference)
-    extreme = int(np.count_nonzero(np.abs(_signs(len(values)) @ values) >= abs(values.sum())))
+    values = round_to_grid(difference)
+    extreme = int(np.count_nonzero(np.abs(_sign_flips(len(values)) @ values) >= abs(values.sum())))
     if len(values) <= _EXACT_CLIPS:
         return extreme / float(2 ** (len(values) - 1))
     return (1 + extreme) / (1 + _DRAWS)  # what was found is one of the flips
 
 
-def least_p(difference: Floats) -> float:
+def smallest_possible_p(difference: Floats) -> float:
     """The smallest p that differences of these sizes could have had: that of all on one side."""
     return sign_flip_p(np.abs(difference))
 
 
 @lru_cache(maxsize=32)
-def _signs(count: int) -> Floats:
+def _sign_flips(count: int) -> Floats:
     """(F, count) of -1 and 1; where all are asked for the last is never flipped, for the other half mirrors this."""
     if count <= _EXACT_CLIPS:
         flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1

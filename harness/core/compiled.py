@@ -24,7 +24,7 @@ def compiled(function: F) -> F:
         return cast(F, numba.njit(error_model="numpy", nogil=True)(function))
 
 
-def bound(function: F, *arguments: Any) -> F:
+def specialise(function: F, *arguments: Any) -> F:
     """A compiled function for arguments of the very types of these, for loops that give it the same arrays.
 
     Finding out what it is given takes a compiled function longer than many a small task does. This one does not look:

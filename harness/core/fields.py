@@ -36,7 +36,7 @@ def build(kind: type[T], content: Any, where: str) -> T:
     return kind(**{key: convert(hints[key], value, f"{where}.{key}") for key, value in content.items()})
 
 
-def changed(instance: T, content: Mapping[str, Any], where: str, infinite: bool = False) -> T:
+def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite: bool = False) -> T:
     """A copy of a dataclass with the given fields replaced, checked as `build` does; `infinite` allows such numbers."""
     hints = get_type_hints(type(instance))
     fields = [f.name for f in dataclasses.fields(instance) if f.init]
@@ -47,9 +47,9 @@ def changed(instance: T, content: Mapping[str, Any], where: str, infinite: bool 
     for key, value in content.items():
         now = getattr(instance, key)
         if dataclasses.is_dataclass(now) and not isinstance(now, type) and isinstance(value, Mapping):
-            values[key] = changed(now, value, f"{where}.{key}", infinite)
+            values[key] = replace_fields(now, value, f"{where}.{key}", infinite)
         elif isinstance(now, Mapping) and isinstance(value, Mapping):
-            values[key] = {**now, **dict(_entries(now, value, hints[key], f"{where}.{key}", infinite))}
+            values[key] = {**now, **dict(_replace_entries(now, value, hints[key], f"{where}.{key}", infinite))}
         elif infinite and hints[key] is float and isinstance(value, float) and math.isinf(value):
             values[key] = value
         else:
@@ -57,7 +57,7 @@ def changed(instance: T, content: Mapping[str, Any], where: str, infinite: bool 
     return dataclasses.replace(instance, **values)
 
 
-def _entries(
+def _replace_entries(
     now: Mapping[str, Any], content: Mapping[str, Any], hint: Any, where: str, infinite: bool
 ) -> Iterator[tuple[str, Any]]:
     """Those of a table that `content` changes or adds: records and tables inside it keep what is not named."""
@@ -65,9 +65,9 @@ def _entries(
     for key, value in content.items():
         old = now.get(key)
         if isinstance(value, Mapping) and dataclasses.is_dataclass(old) and not isinstance(old, type):
-            yield key, changed(old, value, f"{where}.{key}", infinite)
+            yield key, replace_fields(old, value, f"{where}.{key}", infinite)
         elif isinstance(value, Mapping) and isinstance(old, Mapping):
-            yield key, {**old, **dict(_entries(old, value, Any, f"{where}.{key}", infinite))}
+            yield key, {**old, **dict(_replace_entries(old, value, Any, f"{where}.{key}", infinite))}
         else:
             yield key, convert(kind, value, f"{where}.{key}")
 
@@ -78,7 +78,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
     if hint is Any:
         return value
     if origin in (Union, types.UnionType):
-        return _first_that_fits(args, value, where)
+        return _convert_union(args, value, where)
     if origin is Literal:
         if value not in args:
             raise UnknownName(where, str(value), [str(a) for a in args])
@@ -106,7 +106,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
     return value
 
 
-def _first_that_fits(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
+def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
     if type(None) in kinds and value in (None, NONE):
         return None
     complaints: list[Exception] = []

@@ -18,17 +18,17 @@ TEMPORARY = ".unfinished-"
 """What names of things begin with that are still being written; a killed run leaves them behind."""
 
 
-def plain(value: Any) -> Any:
+def to_json_types(value: Any) -> Any:
     """The same value in JSON's own types; NaN and infinity become null."""
     match value:
         case Mapping():
-            return {str(key): plain(item) for key, item in value.items()}
+            return {str(key): to_json_types(item) for key, item in value.items()}
         case np.ndarray() | np.generic():
-            return plain(value.tolist())
+            return to_json_types(value.tolist())
         case list() | tuple():
-            return [plain(item) for item in value]
+            return [to_json_types(item) for item in value]
         case Enum():
-            return plain(value.value)
+            return to_json_types(value.value)
         case Path():
             return value.as_posix()
         case float():
@@ -39,7 +39,7 @@ def plain(value: Any) -> Any:
 
 def content_key(content: Any) -> str:
     """32 hex digits that stand for the content, whatever the order of its keys."""
-    text = json.dumps(plain(content), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(to_json_types(content), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
@@ -54,10 +54,10 @@ def digest(*arrays: NDArray[Any]) -> str:
 
 def write_text(path: Path, text: str) -> None:
     """Write beside, flush to the disk, rename: readers see the old file or the new one."""
-    write_whole(path, [text])
+    write_parts(path, [text])
 
 
-def write_whole(path: Path, texts: Iterable[str]) -> None:
+def write_parts(path: Path, texts: Iterable[str]) -> None:
     """The same with a text that comes in parts."""
     beside = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
     with open(beside, "w", encoding="utf-8", newline="") as file:
@@ -68,11 +68,11 @@ def write_whole(path: Path, texts: Iterable[str]) -> None:
 
 
 def write_json(path: Path, content: Any) -> None:
-    write_text(path, as_json(content))
+    write_text(path, to_json(content))
 
 
-def as_json(content: Any) -> str:
-    return json.dumps(plain(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+def to_json(content: Any) -> str:
+    return json.dumps(to_json_types(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def read_json(path: Path, expected: str) -> dict[str, Any]:

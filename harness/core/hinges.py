@@ -1,6 +1,6 @@
 """Rotations as the angles of a bone's one, two or three orthogonal hinges, innermost first, and back.
 
-Three orthogonal hinges reach any rotation (closed-form Euler angles), by two names each: `twin` gives the other. For
+Three orthogonal hinges reach any rotation (closed-form Euler angles), by two names each: `equivalent_euler_angles` gives the other. For
 one or two, with q the wanted quaternion, the nearest rotation maximises its product with the hinges' quaternion, which
 is bilinear in the half-angle vectors (cos, sin): the best angles are the leading singular vectors of a matrix of at
 most 2 x 2.
@@ -51,7 +51,7 @@ def are_gimbal(axes: Floats) -> bool:
     return len(axes) == 3 and bool(np.allclose(axes @ axes.T, np.eye(3), atol=1e-9))
 
 
-def twin(angles_rad: Floats) -> Floats:
+def equivalent_euler_angles(angles_rad: Floats) -> Floats:
     """The other angles (..., 3) of three orthogonal hinges that give the same rotation."""
     out: Floats = angles_rad * [1.0, -1.0, 1.0] + np.pi
     return out

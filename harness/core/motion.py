@@ -1,4 +1,4 @@
-"""Recorded or generated motion: on its own skeleton (`Clip`), and on the body (`Take`)."""
+"""Recorded or generated motion: on its own skeleton (`Clip`), and on the body (`BodyMotion`)."""
 
 from dataclasses import dataclass, field
 
@@ -41,7 +41,7 @@ class Clip:
 
 
 @dataclass(frozen=True, eq=False)
-class Take:
+class BodyMotion:
     """Motion on the body: T MuJoCo configurations at an even rate. What methods learn from."""
 
     name: str

@@ -12,10 +12,10 @@ from harness.errors import BadInput
 _ADVICE = "Write it as NAME[OPTION=VALUE,OPTION=VALUE]."
 
 
-def split(text: str, at: str) -> list[str]:
+def split_outside_brackets(text: str, at: str) -> list[str]:
     """The pieces of a text between the signs `at` that stand outside brackets and quotes; BadInput if those are odd."""
     pieces = [""]
-    for sign, level in zip(text, _levels(text), strict=True):
+    for sign, level in zip(text, _bracket_depths(text), strict=True):
         if sign == at and level == 0:
             pieces.append("")
         else:
@@ -23,25 +23,25 @@ def split(text: str, at: str) -> list[str]:
     return [piece.strip() for piece in pieces]
 
 
-def alternatives(text: str) -> list[str]:
+def expand_alternatives(text: str) -> list[str]:
     """Every name that a text with `|` between values stands for, the last option changing fastest."""
     names = [""]
-    for part in _parts(text):
+    for part in _split_brackets(text):
         ways = [part]
         if part.startswith("["):
-            options = [_each(option) for option in split(part[1:-1], ",")]
+            options = [_expand_option(option) for option in split_outside_brackets(part[1:-1], ",")]
             ways = [f"[{','.join(chosen)}]" for chosen in itertools.product(*options)]
         names = [name + way for name in names for way in ways]
     return names
 
 
-def named(text: str) -> tuple[str, dict[str, Any]]:
+def parse_name(text: str) -> tuple[str, dict[str, Any]]:
     """`name[a=1,b.c=2]` as the name and {"a": 1, "b": {"c": 2}}; BadInput when it is not written so."""
-    name, *brackets = _parts(text)
+    name, *brackets = _split_brackets(text)
     if len(brackets) > 1 or name.startswith("["):
         raise BadInput(f"{text!r} is no name with options.", _ADVICE)
     found: dict[str, Any] = {}
-    for option in split(brackets[0][1:-1], ",") if brackets else ():
+    for option in split_outside_brackets(brackets[0][1:-1], ",") if brackets else ():
         _add(found, option, text)
     return name, found
 
@@ -68,20 +68,20 @@ def _value(text: str) -> Any:
     return found["value"] if set(found) == {"value"} else text
 
 
-def _each(option: str) -> list[str]:
+def _expand_option(option: str) -> list[str]:
     """`a=1|2` as `a=1` and `a=2`."""
     key, equals, value = option.partition("=")
-    return [key + equals + one for one in split(value, "|")]
+    return [key + equals + one for one in split_outside_brackets(value, "|")]
 
 
-def _parts(text: str) -> list[str]:
+def _split_brackets(text: str) -> list[str]:
     """A text cut before and after its outermost brackets; never empty."""
-    pairs = zip(text, _levels(text), strict=True)
+    pairs = zip(text, _bracket_depths(text), strict=True)
     groups = ["".join(sign for sign, _ in group) for _, group in itertools.groupby(pairs, key=lambda p: p[1] > 0)]
     return groups or [""]
 
 
-def _levels(text: str) -> list[int]:
+def _bracket_depths(text: str) -> list[int]:
     """How deep in brackets or quotes each sign stands, those themselves included; BadInput if they do not match."""
     levels, depth, quote = [], 0, ""
     for sign in text:

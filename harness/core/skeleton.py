@@ -13,7 +13,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints, freeze
-from harness.core.hinges import are_gimbal, twin
+from harness.core.hinges import are_gimbal, equivalent_euler_angles
 from harness.errors import UnknownName
 
 
@@ -93,22 +93,22 @@ class Pose:
     """(T, B, 3, 3) rotation matrices."""
 
 
-def forward(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, angles_rad: Floats) -> Pose:
+def forward_kinematics(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, angles_rad: Floats) -> Pose:
     """Forward kinematics of T frames: root position (T, 3), root quaternion (T, 4), hinge angles (T, D)."""
-    return placed(skeleton, root_m, turned(skeleton, world_from_root, angles_rad))
+    return pose_from_rotations(skeleton, root_m, world_rotations(skeleton, world_from_root, angles_rad))
 
 
-def turned(skeleton: Skeleton, world_from_root: Floats, angles_rad: Floats) -> Floats:
+def world_rotations(skeleton: Skeleton, world_from_root: Floats, angles_rad: Floats) -> Floats:
     """(T, B, 3, 3) `world_from_bone`: the greater part of the work, and the same wherever the root is."""
     root = rotations.to_matrix(world_from_root)
     out = np.empty((len(angles_rad), skeleton.bone_count, 3, 3))
     for b, parent in enumerate(skeleton.parents):
         above = root if parent < 0 else out[:, parent]
-        out[:, b] = above @ bone_rotation(skeleton, b, angles_rad)
+        out[:, b] = above @ local_rotation(skeleton, b, angles_rad)
     return out
 
 
-def placed(skeleton: Skeleton, root_m: Floats, world_from_bone: Floats) -> Pose:
+def pose_from_rotations(skeleton: Skeleton, root_m: Floats, world_from_bone: Floats) -> Pose:
     """Bones turned so (T, B, 3, 3), hung on the root's path (T, 3)."""
     start = np.empty(world_from_bone.shape[:3])
     end = np.empty_like(start)
@@ -118,7 +118,7 @@ def placed(skeleton: Skeleton, root_m: Floats, world_from_bone: Floats) -> Pose:
     return Pose(start, end, world_from_bone)
 
 
-def bone_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
+def local_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
     """(T, 3, 3) rotation of one bone relative to its parent."""
     turn = np.broadcast_to(np.eye(3), (len(angles_rad), 3, 3))
     where = skeleton.dof_of_bone[bone]
@@ -127,7 +127,7 @@ def bone_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
     return turn
 
 
-def unwrapped(skeleton: Skeleton, angles_rad: Floats) -> Floats:
+def unwrap_angles(skeleton: Skeleton, angles_rad: Floats) -> Floats:
     """The same rotations (T, D) with each bone's angles as near as possible to the frame before.
 
     Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi) (docs/methods.md F9). What that
@@ -142,25 +142,25 @@ def unwrapped(skeleton: Skeleton, angles_rad: Floats) -> Floats:
         if are_gimbal(skeleton.axes[where]):
             # The distance between two frames is the same for both twins, so whether to change over does not depend
             # on which of them the frame before took.
-            kept = _turn_squared(column[1:] - column[:-1])
-            changed = _turn_squared(twin(column[1:]) - column[:-1])
+            kept = _wrapped_squared(column[1:] - column[:-1])
+            changed = _wrapped_squared(equivalent_euler_angles(column[1:]) - column[:-1])
             over = np.concatenate([[False], np.cumsum(changed < kept) % 2 == 1])
-            column = np.where(over[:, None], twin(column), column)
-            courses = [_near_zero(np.unwrap(c, axis=0)) for c in (column, twin(column))]
+            column = np.where(over[:, None], equivalent_euler_angles(column), column)
+            courses = [_centre_on_zero(np.unwrap(c, axis=0)) for c in (column, equivalent_euler_angles(column))]
             column = min(courses, key=lambda c: float(np.sum(np.median(c, axis=0) ** 2)))
         else:
-            column = _near_zero(np.unwrap(column, axis=0))
+            column = _centre_on_zero(np.unwrap(column, axis=0))
         out[:, where] = column
     return out
 
 
-def _turn_squared(difference_rad: Floats) -> Floats:
+def _wrapped_squared(difference_rad: Floats) -> Floats:
     """Squared size (...,) of differences (..., 3) of angles, each taken the short way round."""
     out: Floats = np.sum((difference_rad - 2 * np.pi * np.round(difference_rad / (2 * np.pi))) ** 2, axis=-1)
     return out
 
 
-def _near_zero(angles_rad: Floats) -> Floats:
+def _centre_on_zero(angles_rad: Floats) -> Floats:
     """Columns (T, N) shifted by whole turns so that each median lies in (-pi, pi]."""
     out: Floats = angles_rad - 2 * np.pi * np.ceil(np.median(angles_rad, axis=0) / (2 * np.pi) - 0.5)
     return out

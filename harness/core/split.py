@@ -9,14 +9,14 @@ import numpy as np
 
 from harness.errors import BadInput
 
-Protocol = Literal["block", "sequence", "subject"]
+Split = Literal["block", "sequence", "subject"]
 
 GUARD_S = 1.0
 """No example frame lies within this time of a tested block [s]."""
 
 
 @dataclass(frozen=True)
-class Part:
+class ClipPart:
     """A clip, or the share of it from `start` to `end`."""
 
     clip: str
@@ -24,7 +24,7 @@ class Part:
     end: float = 1.0
 
     @classmethod
-    def parse(cls, text: str) -> "Part":
+    def parse(cls, text: str) -> "ClipPart":
         """From "13_17" or "13_17@0.20-0.40"."""
         clip, at, share = text.partition("@")
         if not at:
@@ -54,7 +54,7 @@ def _text(share: float) -> str:
     return short if float(short) == share else np.format_float_positional(share)
 
 
-def examples_of(test: Part, candidates: Iterable[str], protocol: Protocol, subjects: dict[str, str]) -> list[str]:
+def select_examples(test: ClipPart, candidates: Iterable[str], protocol: Split, subjects: dict[str, str]) -> list[str]:
     """The candidate clips that the protocol lets a method see; for `block` the test clip itself is among them."""
     match protocol:
         case "block":
@@ -65,7 +65,7 @@ def examples_of(test: Part, candidates: Iterable[str], protocol: Protocol, subje
             return sorted({name for name in candidates if subjects[name] != subjects[test.clip]})
 
 
-def allowed_frames(closed: Iterable[Part], example: str, count: int, rate_hz: float) -> list[range]:
+def allowed_frames(closed: Iterable[ClipPart], example: str, count: int, rate_hz: float) -> list[range]:
     """The runs of frames of an example that may be learnt from: all, but for the closed parts and their guard time.
 
     A clip that is closed whole gives nothing, whatever the protocol.
@@ -77,7 +77,7 @@ def allowed_frames(closed: Iterable[Part], example: str, count: int, rate_hz: fl
     return [run for run in (*runs, range(first, count)) if len(run) > 1]
 
 
-def refuse_leak(closed: Iterable[Part], example: str, runs: Iterable[range], count: int, rate_hz: float) -> None:
+def refuse_leak(closed: Iterable[ClipPart], example: str, runs: Iterable[range], count: int, rate_hz: float) -> None:
     """BadInput when any frame that is learnt from lies in a closed part of the example or in the guard time of it."""
     guard, used = GUARD_S * rate_hz, list(runs)
     for part in closed:

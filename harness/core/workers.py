@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 R = TypeVar("R")
 
 
-def call_each(
+def run_in_workers(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], workers: int
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """`function(*task)` of every task, in fresh processes: which, and what came of it, as each ends; see `Pool`."""
@@ -30,7 +30,7 @@ class Pool:
     """So many worker processes, which are started when first needed and then stay for the next call.
 
     They end with this pool, or with this process. A worker that dies takes nothing with it but its task, see
-    `keep_busy`. What workers print goes to stderr.
+    `schedule_tasks`. What workers print goes to stderr.
     """
 
     def __init__(self, workers: int) -> None:
@@ -40,14 +40,14 @@ class Pool:
     def __call__(
         self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]]
     ) -> Generator[tuple[int, Future[R]], None, None]:
-        """As `call_each`. A caller that stops early, as Ctrl-C makes it, stops what runs at once."""
+        """As `run_in_workers`. A caller that stops early, as Ctrl-C makes it, stops what runs at once."""
 
         def submit(which: int) -> Future[R]:
             return next(process for process in self._processes if process.idle).submit(function, *tasks[which])
 
         whole = False
         try:
-            yield from keep_busy(submit, len(tasks), lambda: self._workers)
+            yield from schedule_tasks(submit, len(tasks), lambda: self._workers)
             whole = True
         finally:
             if not whole:
@@ -63,7 +63,7 @@ class Pool:
 
     def _begin(self) -> None:
         self._theirs, self._ours = get_context("spawn").Pipe(duplex=False)
-        self._processes = [_Process(self._theirs) for _ in range(self._workers)]
+        self._processes = [_WorkerProcess(self._theirs) for _ in range(self._workers)]
 
     def _stop(self) -> None:
         self._ours.close()
@@ -72,7 +72,7 @@ class Pool:
         self._theirs.close()
 
 
-def keep_busy(
+def schedule_tasks(
     submit: Callable[[int], Future[R]], count: int, room: Callable[[], int], *, look_s: float | None = None
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """Tasks 0 to `count` - 1, as many under way as there is room for: which, and what came of it, as each ends.
@@ -103,7 +103,7 @@ def keep_busy(
                 ended.append((which, future))
 
 
-class _Process:
+class _WorkerProcess:
     """A worker process, started when it is needed and anew when it died; a pool of one, which breaks alone."""
 
     def __init__(self, alive: Connection) -> None:
@@ -128,25 +128,25 @@ class _Process:
     def _submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         if self._last is not None:
             return self.pool.submit(function, *task)
-        with ctrl_c_ignored():  # which the process inherits, so that it never sees it, not even while it imports
+        with ignore_sigint():  # which the process inherits, so that it never sees it, not even while it imports
             return self.pool.submit(function, *task)
 
     def _fresh(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, get_context("spawn"), _start, (self._alive,))
+        return ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, (self._alive,))
 
 
-def _start(alive: Connection) -> None:
+def _initialise_worker(alive: Connection) -> None:
     sys.stdout = sys.stderr
-    Thread(target=_end_with, args=(alive,), daemon=True).start()
+    Thread(target=_exit_with_parent, args=(alive,), daemon=True).start()
 
 
-def _end_with(alive: Connection) -> None:
+def _exit_with_parent(alive: Connection) -> None:
     alive.poll(None)  # nothing is ever sent: this returns when the other end closes
     os._exit(1)
 
 
 @contextmanager
-def ctrl_c_ignored() -> Iterator[None]:
+def ignore_sigint() -> Iterator[None]:
     """Processes that are started meanwhile never see Ctrl-C."""
     if current_thread() is not main_thread():  # Ctrl-C is the main thread's affair, and signals may be set there alone
         yield

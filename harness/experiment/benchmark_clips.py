@@ -13,29 +13,29 @@ from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
-from harness.reconstruct.contract import LearnsFromDatabase, Method, Reconstructor
+from harness.reconstruct.contract import DatabaseMethod, Method, Reconstructor
 from harness.reconstruct.database import MotionDatabase
-from harness.score.angles import wrapped
-from harness.simulate.simulation import Simulation, simulate
+from harness.score.angles import wrap_angle
+from harness.simulate.simulation import Simulation, simulate_tracker
 
 RATE_HZ, TAKE_S = 40.0, 20.0
-FRAMES_EACH = round(TAKE_S * RATE_HZ) + 1
-HELD_OUT = 1_000_000
+FRAMES_PER_TAKE = round(TAKE_S * RATE_HZ) + 1
+HELD_OUT_SEED_OFFSET = 1_000_000
 """Seeds of held-out takes start so much higher."""
-WARM_UP = round(1.0 * RATE_HZ)
+WARM_UP_FRAMES = round(1.0 * RATE_HZ)
 """Frames at the start of every take that count neither for time nor for error, as in the tables."""
-SETTING = "walking"
+DEFAULT_SCENARIO = "walking"
 """The scenario whose stations and tracker are taken, where no other is named."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class BenchmarkClip:
     """A held-out take as the trackers read it, and its truth."""
 
     take: str
@@ -44,77 +44,87 @@ class Trial:
     """(F, 55) at each frame."""
 
 
-def body() -> Body:
+def build_common_body() -> Body:
     """The common body."""
-    return humanoid.build()
+    return humanoid.build_body()
 
 
-def scenario(name: str = SETTING) -> Scenario:
+def load_clean_scenario(name: str = DEFAULT_SCENARIO) -> Scenario:
     """One of the project's own, as good as it can be: level `clean`."""
     return replace(load_scenario(name), noise="clean", components={})
 
 
-def built_in(
-    which: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS, frames: int = FRAMES_EACH
-) -> Take:
+def generate_take(
+    which: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS, frames: int = FRAMES_PER_TAKE
+) -> BodyMotion:
     """One of endlessly many takes: behaviours and performers in turn, then a new seed; the angles as they are."""
-    people = synthetic.performers()
+    people = synthetic.performer_names()
     again, which = divmod(which, len(behaviours) * len(people))
     behaviour, who = behaviours[which % len(behaviours)], people[which // len(behaviours)]
     clip = synthetic.generate(behaviour, who, 1, seed=seed + again, duration_s=TAKE_S, rate_hz=RATE_HZ)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)[:frames]
-    return Take(f"{clip.name}_{seed + again}", clip.subject, clip.source, clip.behaviour, RATE_HZ, qpos)
+    return BodyMotion(f"{clip.name}_{seed + again}", clip.subject, clip.source, clip.behaviour, RATE_HZ, qpos)
 
 
-def makers(frames: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS) -> list[Callable[[], Take]]:
+def make_take_factories(
+    frames: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS
+) -> list[Callable[[], BodyMotion]]:
     """Functions that make takes of exactly so many frames together, all with names of their own; the last is cut."""
-    whole, rest = divmod(frames, FRAMES_EACH)
-    counts = [FRAMES_EACH] * whole + [rest] * (rest > 0)
-    return [partial(built_in, which, seed, behaviours, count) for which, count in enumerate(counts)]
+    whole, rest = divmod(frames, FRAMES_PER_TAKE)
+    counts = [FRAMES_PER_TAKE] * whole + [rest] * (rest > 0)
+    return [partial(generate_take, which, seed, behaviours, count) for which, count in enumerate(counts)]
 
 
-def held_out(count: int, seed: int, seconds: float, behaviours: Sequence[str] = synthetic.BEHAVIOURS) -> list[Take]:
+def generate_held_out_takes(
+    count: int, seed: int, seconds: float, behaviours: Sequence[str] = synthetic.BEHAVIOURS
+) -> list[BodyMotion]:
     """The first seconds of takes that are in no database of this seed."""
-    return [built_in(w, seed + HELD_OUT, behaviours, round(seconds * RATE_HZ) + 1) for w in range(count)]
+    return [
+        generate_take(w, seed + HELD_OUT_SEED_OFFSET, behaviours, round(seconds * RATE_HZ) + 1) for w in range(count)
+    ]
 
 
-def trials(seed: int, seconds: float) -> list[Trial]:
+def generate_held_out_clips(seed: int, seconds: float) -> list[BenchmarkClip]:
     """The first seconds of one held-out take of each behaviour."""
-    return trials_of(held_out(len(synthetic.BEHAVIOURS), seed, seconds), seed, scenario())
+    return simulate_clips(
+        generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, seconds), seed, load_clean_scenario()
+    )
 
 
-def trials_of(takes: Sequence[Take], seed: int, worn: Scenario) -> list[Trial]:
+def simulate_clips(takes: Sequence[BodyMotion], seed: int, worn: Scenario) -> list[BenchmarkClip]:
     """Takes as the stations of a scenario read them."""
-    on, found = body(), []
+    on, found = build_common_body(), []
     for take in takes:
-        seen = simulate(on, take, mounts_of(worn), tracker_of(worn), noise_of(worn), seed=seed)
-        found.append(Trial(take.name, seen, seen.truth_qpos[seen.frame_index]))
+        seen = simulate_tracker(on, take, mounts_of(worn), tracker_of(worn), noise_of(worn), seed=seed)
+        found.append(BenchmarkClip(take.name, seen, seen.truth_qpos[seen.frame_index]))
     return found
 
 
-def learner(name: str, learnt: MotionDatabase, seed: int) -> Reconstructor:
+def fit_named_method(name: str, learnt: MotionDatabase, seed: int) -> Reconstructor:
     """The method of that name, which has learnt from a database."""
-    return fitted(registry.resolve(name), body(), learnt, generator(seed, "method", name))
+    return fit_method(registry.resolve(name), build_common_body(), learnt, generator(seed, "method", name))
 
 
-def fitted(method: Method, on: Body, learnt: MotionDatabase, rng: np.random.Generator) -> Reconstructor:
+def fit_method(method: Method, on: Body, learnt: MotionDatabase, rng: np.random.Generator) -> Reconstructor:
     """Trained on a database; a method that asks for takes is given them."""
-    if isinstance(method, LearnsFromDatabase):
+    if isinstance(method, DatabaseMethod):
         return method.fit_database(on, learnt, rng)
-    return method.fit(on, takes(learnt) if method.needs_examples else [], rng)
+    return method.fit(on, extract_takes(learnt) if method.needs_examples else [], rng)
 
 
-def takes(learnt: MotionDatabase) -> list[Take]:
+def extract_takes(learnt: MotionDatabase) -> list[BodyMotion]:
     """The runs of a database as takes that start at the origin."""
     found = []
     for run in learnt.runs:
         rows = slice(run.start, run.stop)
-        ground = courses(np.asarray(learnt.step[rows], float))
-        found.append(Take(run.take, run.subject, run.source, run.behaviour, learnt.rate_hz, learnt.qpos(rows, ground)))
+        ground = integrate_steps(np.asarray(learnt.step[rows], float))
+        found.append(
+            BodyMotion(run.take, run.subject, run.source, run.behaviour, learnt.rate_hz, learnt.qpos(rows, ground))
+        )
     return found
 
 
-def courses(step: Floats) -> Floats:
+def integrate_steps(step: Floats) -> Floats:
     """(T, 3) ground frames (x, y, yaw) that steps (T, 3) lead through, from the origin."""
     yaw = np.cumsum(step[:, 2])
     before = yaw - step[:, 2]
@@ -124,6 +134,6 @@ def courses(step: Floats) -> Floats:
     return np.stack([x, y, yaw], axis=-1)
 
 
-def error_deg(estimate: Floats, truth: Floats) -> float:
+def joint_angle_error_deg(estimate: Floats, truth: Floats) -> float:
     """Joint angle error (D1) of configurations (F, 55)."""
-    return float(np.rad2deg(np.abs(wrapped(estimate[:, 7:] - truth[:, 7:])).mean()))
+    return float(np.rad2deg(np.abs(wrap_angle(estimate[:, 7:] - truth[:, 7:])).mean()))

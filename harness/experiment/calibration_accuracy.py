@@ -8,37 +8,37 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.body.humanoid import build
-from harness.body.mounts import DEFAULTS, Mount
-from harness.calibrate.hold import NotStanding
-from harness.calibrate.pose_calibration import EightPoses, calibrate_poses
+from harness.body.humanoid import build_body
+from harness.body.mounts import DEFAULT_MOUNTS, Mount
+from harness.calibrate.hold import UnusableHold
+from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrate.skeleton_prior import BoneSpace, bone_space
+from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.experiment.simulated_calibration import TrackerSession
-from harness.mocap.skeletons import skeletons
-from harness.mocap.sources import PEOPLE
-from harness.mocap.synthetic import population
+from harness.mocap.skeletons import read_skeletons
+from harness.mocap.sources import POPULATION_SIZE
+from harness.mocap.synthetic import sample_skeletons
 from harness.simulate import noise as noises
-from harness.simulate.held_poses import hold_times_s, holding
-from harness.simulate.mounting import strapped
-from harness.simulate.simulation import TrackerConfig, simulate
+from harness.simulate.held_poses import hold_poses, hold_times_s
+from harness.simulate.mounting import perturb_mounts
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 """Of the first paper."""
-HOLD_S, MOVE_S, EDGE_S = 3.0, 1.5, 0.2
+HOLD_S, MOVE_S, HOLD_MARGIN_S = 3.0, 1.5, 0.2
 """A hold, the time to the next, and what is left out of a hold at either end [s]."""
-BESIDE_M = 0.01
+MOUNT_OFFSET_SD_M = 0.01
 """How far trackers sit from their nominal mounts on each axis, standard deviation; they are turned anyhow."""
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class CalibrationErrors:
     """What one performer's calibration was off; N bones, S stations."""
 
     length_m: Floats
@@ -65,7 +65,7 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Spread:
+class ErrorStatistics:
     """Of errors over performers and over bones or stations; mm or deg."""
 
     what: str
@@ -88,23 +88,23 @@ class Spread:
         return [f"{self.what} [{self.unit}]", *("" if np.isnan(x) else f"{x:.2f}" for x in numbers), str(self.count)]
 
 
-HEAD = ["error", "rms", "median", "worst", "bound", "mean skeleton", "values"]
+TABLE_HEADER = ["error", "rms", "median", "worst", "bound", "mean skeleton", "values"]
 
 
 @dataclass(frozen=True, eq=False)
-class Trials:
+class CalibrationAccuracy:
     """Performers one after another."""
 
     miss_rad: float
     noise: str
     source: str
-    done: tuple[Trial, ...]
+    done: tuple[CalibrationErrors, ...]
     refused: dict[str, str]
     """Performers who could not be calibrated, and why."""
     seconds: tuple[float, ...]
     """Processor time of each calibration."""
 
-    def spreads(self) -> list[Spread]:
+    def spreads(self) -> list[ErrorStatistics]:
         """Of lengths: all, those that the trackers determine, those from the prior; of mounts; of orientations.
 
         Empty when every performer was refused.
@@ -121,14 +121,16 @@ class Trials:
         whole = np.ones(off.shape, dtype=bool)
         kinds = ("bone lengths", whole), ("determined by trackers", ~prior), ("from the prior", prior)
         lengths = [
-            _spread(what, "mm", *(1e3 * x[kept] for x in (off, bound, mean))) for what, kept in kinds if kept.any()
+            _error_statistics(what, "mm", *(1e3 * x[kept] for x in (off, bound, mean)))
+            for what, kept in kinds
+            if kept.any()
         ]
         none = np.full(mount.shape, np.nan)
         return [
             *lengths,
-            _spread("mounts", "mm", 1e3 * mount, 1e3 * mount_sd, none),
-            _spread("mounts, wrists from the elbow", "mm", 1e3 * elbow, none, none),
-            _spread("mounts turned", "deg", np.rad2deg(turn), np.rad2deg(turn_sd), none),
+            _error_statistics("mounts", "mm", 1e3 * mount, 1e3 * mount_sd, none),
+            _error_statistics("mounts, wrists from the elbow", "mm", 1e3 * elbow, none, none),
+            _error_statistics("mounts turned", "deg", np.rad2deg(turn), np.rad2deg(turn_sd), none),
         ]
 
     def as_dict(self) -> dict[str, object]:
@@ -151,13 +153,13 @@ class Trials:
         if self.done:
             found = np.rad2deg([trial.miss_rad for trial in self.done])
             told[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
-        rows = [HEAD, *(spread.row() for spread in self.spreads())]
+        rows = [TABLE_HEADER, *(spread.row() for spread in self.spreads())]
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
         table = ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in rows]
         return [*told, *(table if self.done else []), *(f"{name}: {why}" for name, why in self.refused.items())]
 
 
-def trials(
+def measure_calibration_accuracy(
     count: int,
     *,
     miss_rad: float = float(np.deg2rad(2.5)),
@@ -165,9 +167,9 @@ def trials(
     seed: int = 1,
     folder: Path | None = None,
     own_directions: bool = True,
-    beside_m: float = BESIDE_M,
+    beside_m: float = MOUNT_OFFSET_SD_M,
     stations: Sequence[str] = STATIONS,
-) -> Trials:
+) -> CalibrationAccuracy:
     """So many performers of whom nothing is known beforehand: drawn from the built-in spread, or the subjects of the
     ASF files below `folder`, each with bones learnt from the others.
 
@@ -175,56 +177,61 @@ def trials(
     UnknownName.
     """
     done, refused, seconds = [], {}, []
-    for number, (name, skeleton, space) in enumerate(people := _people(count, folder), 1):
-        own = skeleton if own_directions else _straightened(skeleton)
-        mounts = [DEFAULTS[station] for station in stations]
+    for number, (name, skeleton, space) in enumerate(people := _performers(count, folder), 1):
+        own = skeleton if own_directions else _with_standard_directions(skeleton)
+        mounts = [DEFAULT_MOUNTS[station] for station in stations]
         session = _session(f"{number} {name}", own, mounts, noise, seed, beside_m)
-        frames, began_s = held(session, miss_rad), time.process_time()
+        frames, began_s = simulate_pose_holds(session, miss_rad), time.process_time()
         try:
-            done.append(_judged(calibrate_poses(frames, space, mounts), session))
-        except NotStanding as error:
+            done.append(_calibration_errors(calibrate_poses(frames, space, mounts), session))
+        except UnusableHold as error:
             refused[session.name] = str(error)
         seconds.append(time.process_time() - began_s)
-    return Trials(miss_rad, noise, people[0][2].source, tuple(done), refused, tuple(seconds))
+    return CalibrationAccuracy(miss_rad, noise, people[0][2].source, tuple(done), refused, tuple(seconds))
 
 
-def held(session: TrackerSession, miss_rad: float) -> list[list[TrackerFrame]]:
+def simulate_pose_holds(session: TrackerSession, miss_rad: float) -> list[list[TrackerFrame]]:
     """What the tracker reports while the performer holds each of the eight poses."""
     configurations = [configuration(pose, session.body.skeleton) for pose in POSES]
     rng = generator(session.seed, "calibration trial", session.name)
-    take = holding(session.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=HOLD_S, move_s=MOVE_S)
-    seen = simulate(session.body, take, session.strapped, session.tracker, session.noise, seed=session.seed)
+    take = hold_poses(session.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=HOLD_S, move_s=MOVE_S)
+    seen = simulate_tracker(session.body, take, session.strapped, session.tracker, session.noise, seed=session.seed)
     # By the host's clock, which hears of everything a little late.
     holds = hold_times_s(len(POSES), HOLD_S, MOVE_S)
-    return [[f for f in seen.frames if a + EDGE_S <= f.received_s <= b - EDGE_S + 0.1] for a, b in holds]
+    return [[f for f in seen.frames if a + HOLD_MARGIN_S <= f.received_s <= b - HOLD_MARGIN_S + 0.1] for a, b in holds]
 
 
-def _people(count: int, folder: Path | None) -> list[tuple[str, Skeleton, BoneSpace]]:
+def _performers(count: int, folder: Path | None) -> list[tuple[str, Skeleton, SkeletonPrior]]:
     """Name, skeleton and the bones of others, of so many performers."""
     if folder is None:
-        everyone = population(PEOPLE + count, seed=0)
-        space = bone_space(everyone[:PEOPLE], source=f"{PEOPLE} other people of the built-in spread")
-        return [(f"person {PEOPLE + n + 1}", skeleton, space) for n, skeleton in enumerate(everyone[PEOPLE:])]
-    known = skeletons(folder)
+        everyone = sample_skeletons(POPULATION_SIZE + count, seed=0)
+        space = fit_skeleton_prior(
+            everyone[:POPULATION_SIZE], source=f"{POPULATION_SIZE} other people of the built-in spread"
+        )
+        return [
+            (f"person {POPULATION_SIZE + n + 1}", skeleton, space)
+            for n, skeleton in enumerate(everyone[POPULATION_SIZE:])
+        ]
+    known = read_skeletons(folder)
     names = [list(known)[n % len(known)] for n in range(count)]
-    spaces = {name: _others(known, name) for name in set(names)}
+    spaces = {name: _bone_space_without(known, name) for name in set(names)}
     return [(name, known[name], spaces[name]) for name in names]
 
 
-def _others(known: Mapping[str, Skeleton], name: str) -> BoneSpace:
+def _bone_space_without(known: Mapping[str, Skeleton], name: str) -> SkeletonPrior:
     others = [skeleton for other, skeleton in known.items() if other != name]
-    return bone_space(others, source=f"the {len(others)} other people of the library")
+    return fit_skeleton_prior(others, source=f"the {len(others)} other people of the library")
 
 
 def _session(
     name: str, own: Skeleton, mounts: Sequence[Mount], noise: str, seed: int, beside_m: float
 ) -> TrackerSession:
-    worn = strapped(mounts, beside_m=beside_m, turned_rad=np.pi, seed=seed, session=name)
+    worn = perturb_mounts(mounts, beside_m=beside_m, turned_rad=np.pi, seed=seed, session=name)
     tracker = TrackerConfig(slot_s=0.0) if noise == "clean" else TrackerConfig()
-    return TrackerSession(name, seed, build(own), tuple(mounts), worn, tracker, noises.level(noise))
+    return TrackerSession(name, seed, build_body(own), tuple(mounts), worn, tracker, noises.noise_preset(noise))
 
 
-def _judged(found: EightPoses, session: TrackerSession) -> Trial:
+def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> CalibrationErrors:
     true, own, known = session.exact, session.body.skeleton, found.calibration
     off_m = known.mount_m - true.mount_m
     elbow_m = np.array(off_m)
@@ -232,7 +239,7 @@ def _judged(found: EightPoses, session: TrackerSession) -> Trial:
         if bone in ("lwrist", "rwrist"):
             radius = own.index(f"{bone[0]}radius")
             elbow_m[row] += found.skeleton.bone_m[radius] - own.bone_m[radius]
-    return Trial(
+    return CalibrationErrors(
         length_m=found.skeleton.length_m - own.length_m,
         length_sd_m=found.length_sd_m,
         from_prior=found.from_prior,
@@ -246,15 +253,15 @@ def _judged(found: EightPoses, session: TrackerSession) -> Trial:
     )
 
 
-def _straightened(skeleton: Skeleton) -> Skeleton:
+def _with_standard_directions(skeleton: Skeleton) -> Skeleton:
     """Bones as long, pointing as the standard skeleton's."""
     standard = standard_skeleton()
     return skeleton.with_bones(standard.bone_m * (skeleton.length_m / standard.length_m)[:, None])
 
 
-def _spread(what: str, unit: str, off: Floats, bound: Floats, mean: Floats) -> Spread:
+def _error_statistics(what: str, unit: str, off: Floats, bound: Floats, mean: Floats) -> ErrorStatistics:
     size = np.abs(off)
-    return Spread(
+    return ErrorStatistics(
         what, unit, _rms(off), float(np.median(size)), float(size.max()), _rms(bound), _rms(mean), int(size.size)
     )
 

@@ -8,30 +8,30 @@ from pathlib import Path
 from typing import Literal
 
 from harness import __version__
-from harness.body.humanoid import Body, build
+from harness.body.humanoid import Body, build_body
 from harness.body.mounts import Mount
 from harness.calibrate import calibration_report
 from harness.calibrate.calibration_file import CalibrationFile
-from harness.calibrate.guided_calibration import HoldPoses, Say, Show
+from harness.calibrate.guided_calibration import Notifier, PoseDisplay, PoseGuide
 from harness.calibrate.pose_calibration import calibrate_poses
-from harness.calibrate.pose_classifier import Likeness
+from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
 from harness.calibrate.poses import POSES, CalibrationPose, configuration
-from harness.calibrate.skeleton_prior import BoneSpace, bone_space
+from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core.arrays import Floats
-from harness.core.split import Part
-from harness.experiment.cells import source_of
+from harness.core.split import ClipPart
+from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import mounts_of
-from harness.experiment.playback import chosen, rehearse
+from harness.experiment.playback import prepare_playback, select_stations
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.stream.frame import TrackerFrame
 
-Kind = Literal["poses", "tpose"]
+CalibrationKind = Literal["poses", "tpose"]
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class CalibrationOutcome:
     """A calibration, and what there is to say of it."""
 
     kept: CalibrationFile
@@ -39,13 +39,13 @@ class Found:
 
 
 @dataclass(frozen=True, eq=False)
-class Posing:
+class CalibrationSession:
     """A performer with these stations of a scenario on; UnknownName and BadFile as for a run of it."""
 
     scenario: Path | str
     stations: tuple[str, ...]
     """In the order of the stream's rows."""
-    kind: Kind = "poses"
+    kind: CalibrationKind = "poses"
     """Bones, mounts and room of eight poses; or mounts and room of the first alone, on a body that is known."""
     clip: str | None = None
     """Whose body that is, and of whose bones nothing may be known beforehand; None: the scenario's first, nobody."""
@@ -56,7 +56,7 @@ class Posing:
     def asked(self) -> Scenario:
         """With no other stations, in this order."""
         scenario = load_scenario(self.scenario)
-        worn = chosen(scenario, self.stations)
+        worn = select_stations(scenario, self.stations)
         return replace(scenario, stations={name: scenario.stations[name] for name in worn}, worn=())
 
     @property
@@ -72,8 +72,8 @@ class Posing:
     def body(self) -> Body:
         """The performer's where it is known, otherwise the standard one."""
         if self.kind == "poses":
-            return build()
-        return rehearse(self.scenario, clip=self.clip, folder=self.folder).body
+            return build_body()
+        return prepare_playback(self.scenario, clip=self.clip, folder=self.folder).body
 
     @cached_property
     def shown(self) -> list[Floats]:
@@ -81,43 +81,43 @@ class Posing:
         return [configuration(pose, self.body.skeleton) for pose in self.poses]
 
     @cached_property
-    def space(self) -> BoneSpace:
+    def space(self) -> SkeletonPrior:
         """What people's bones are like: the scenario's source knows some."""
         motion = self.asked.motion
-        source = source_of(motion, self.folder, self.asked.seed)
-        people = source.people(without=source.subject(Part.parse(self.clip).clip) if self.clip else "")
-        return bone_space(list(people.values()), source=f"{len(people)} people ({source.title})")
+        source = open_scenario_motion(motion, self.folder, self.asked.seed)
+        people = source.people(without=source.subject(ClipPart.parse(self.clip).clip) if self.clip else "")
+        return fit_skeleton_prior(list(people.values()), source=f"{len(people)} people ({source.title})")
 
     def held(
         self,
         frames: Iterable[TrackerFrame],
-        say: Say,
-        show: Show | None = None,
-        watch: Say = lambda text: None,
+        say: Notifier,
+        show: PoseDisplay | None = None,
+        watch: Notifier = lambda text: None,
     ) -> PoseCollector:
         """Lead the performer through the poses; NotStanding when the stream ends before the last."""
-        likeness = Likeness(self.body, self.mounts, self.shown)
+        likeness = PoseClassifier(self.body, self.mounts, self.shown)
         collector = PoseCollector(self.stations, len(self.poses), likeness)
-        HoldPoses(collector, self.poses, self.shown, show).lead(frames, say, watch)
+        PoseGuide(collector, self.poses, self.shown, show).lead(frames, say, watch)
         return collector
 
-    def found(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> Found:
+    def found(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:
         """Solve for what the poses tell; `source` is where the frames come from, in words. NotStanding, BadInput."""
         if self.kind == "poses":
             eight = calibrate_poses(held, self.space, self.mounts)
             calibration, skeleton, (words, lines) = (
                 eight.calibration,
                 eight.skeleton,
-                calibration_report.of_poses(eight),
+                calibration_report.report_pose_calibration(eight),
             )
         else:
             tpose = calibrate_tpose(held[0], self.body, self.mounts)
             calibration, skeleton, (words, lines) = (
                 tpose.calibration,
                 self.body.skeleton,
-                calibration_report.of_tpose(tpose),
+                calibration_report.report_tpose_calibration(tpose),
             )
         made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {__version__}"}
         made |= {"source": source, "scenario": self.asked.name}
         made |= {"others": self.space.source} if self.kind == "poses" else {}
-        return Found(CalibrationFile(calibration, skeleton, {**made, **words}), lines)
+        return CalibrationOutcome(CalibrationFile(calibration, skeleton, {**made, **words}), lines)

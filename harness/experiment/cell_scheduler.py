@@ -16,11 +16,11 @@ from platform import node
 from typing import Any, TypeVar
 
 from harness.core.files import TEMPORARY, content_key
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError
-from harness.experiment.cells import Ended, Job, Planned, Progress, forget_motion, run_job
-from harness.experiment.executors import Each
-from harness.experiment.interruption import stoppable
+from harness.experiment.cells import CellOutcome, ClipTask, PlannedCell, ProgressCallback, clear_caches, run_clip_task
+from harness.experiment.executors import TaskExecutor
+from harness.experiment.interruption import graceful_stop
 from harness.experiment.scenario import Scenario, variants
 from harness.reconstruct import registry
 from harness.results.index import CellIndex
@@ -28,14 +28,14 @@ from harness.results.manifest import source_hash
 
 T = TypeVar("T")
 
-MOST = 200
+MAX_CELLS_PER_TASK = 200
 """Cells in one task: what is lost of the index when the coordinator is killed, and how often a bar moves."""
-_TASKS = 4
+_TASKS_PER_WORKER = 4
 """For each worker in the end, if there are cells enough: the last one to end does not keep the others waiting long."""
 
 
 @dataclass(frozen=True)
-class Cells:
+class CellResults:
     """What came of the cells that were asked for."""
 
     rows: tuple[Mapping[str, Any], ...]
@@ -46,12 +46,12 @@ class Cells:
 
 
 @dataclass(frozen=True)
-class Task:
+class CellTask:
     """What a worker is given at once: some variants of a scenario on one clip, with some of its methods."""
 
     called: str
     """Goes before the names of its cells."""
-    job: Job
+    job: ClipTask
 
     def cells(self) -> list[str]:
         return [f"{self.called}: {cell}" for cell in self.job.cells()]
@@ -62,11 +62,11 @@ def run_cells(
     out: Path,
     *,
     folder: Path | None,
-    each: Each,
+    each: TaskExecutor,
     command: str,
-    progress: Progress = lambda cell, done, planned: None,
+    progress: ProgressCallback = lambda cell, done, planned: None,
     workers: int | None = None,
-) -> Cells:
+) -> CellResults:
     """Make every cell of the scenarios that the folder `out` does not have yet; BadInput when two would have one name.
 
     Tasks are cut for so many `workers`, by default as many as there are cores.
@@ -75,24 +75,24 @@ def run_cells(
     afterwards, the second one stops at once.
     """
     with CellIndex(out) as index:
-        names = [name for scenario in scenarios for name in planned_cells(scenario)]
-        tasks = tasks_of(scenarios, folder, command, workers or os.cpu_count() or 1)
-        ended = work(index, names, tasks, out, each, progress)
+        names = [name for scenario in scenarios for name in cell_names(scenario)]
+        tasks = plan_tasks(scenarios, folder, command, workers or os.cpu_count() or 1)
+        ended = run_tasks(index, names, tasks, out, each, progress)
         keys = [ended[name].key for name in names if name in ended and not ended[name].failure]
         failures = {name: ended[name].failure for name in names if name in ended and ended[name].failure}
-        return Cells(tuple(index.rows_of(keys)), failures, len(names))
+        return CellResults(tuple(index.rows_of(keys)), failures, len(names))
 
 
-def called(scenario: Scenario) -> str:
+def scenario_label(scenario: Scenario) -> str:
     """What goes before the names of a scenario's cells."""
     return f"{scenario.name} seed {scenario.seed}"
 
 
-def planned_cells(scenario: Scenario) -> list[str]:
+def cell_names(scenario: Scenario) -> list[str]:
     """Names of all its cells as tables list them: varied values change slowest, then clips, inputs and methods."""
-    parts = [Part.parse(text) for text in scenario.motion.test]
+    parts = [ClipPart.parse(text) for text in scenario.motion.test]
     return [
-        f"{called(scenario)}: {Planned(made, varied, part, method, inputs)}"
+        f"{scenario_label(scenario)}: {PlannedCell(made, varied, part, method, inputs)}"
         for varied, made in variants(scenario)
         for part in parts
         for inputs in made.inputs
@@ -100,60 +100,70 @@ def planned_cells(scenario: Scenario) -> list[str]:
     ]
 
 
-def tasks_of(scenarios: Iterable[Scenario], folder: Path | None, command: str, workers: int) -> list[Task]:
+def plan_tasks(scenarios: Iterable[Scenario], folder: Path | None, command: str, workers: int) -> list[CellTask]:
     """Whole clips, whose cells share motion and learning; parts of the last ones, so that all workers end together."""
-    whole = [(called(s), job, len(variants(s))) for s in scenarios for job in _jobs(s, folder, command)]
+    whole = [(scenario_label(s), job, len(variants(s))) for s in scenarios for job in _clip_jobs(s, folder, command)]
     shared = max(min(len(whole), workers), 1)
     tasks = []
     for place, (name, job, count) in enumerate(whole):
-        pieces = -(-_TASKS * workers // shared) if place >= len(whole) - shared else 1
-        pieces = max(pieces, -(-count * _width(job.scenario) // MOST))
-        parts = (tuple(some) if len(some) < count else () for some in _shared(range(count), pieces))
-        tasks += [Task(name, replace(job, chosen=chosen)) for chosen in parts]
+        pieces = -(-_TASKS_PER_WORKER * workers // shared) if place >= len(whole) - shared else 1
+        pieces = max(pieces, -(-count * _cells_per_variant(job.scenario) // MAX_CELLS_PER_TASK))
+        parts = (tuple(some) if len(some) < count else () for some in _split_evenly(range(count), pieces))
+        tasks += [CellTask(name, replace(job, chosen=chosen)) for chosen in parts]
     pieces = -(-workers // max(len(tasks), 1))
     return [
         replace(task, job=replace(task.job, scenario=replace(task.job.scenario, methods=tuple(some))))
         for task in tasks
-        for some in _shared(task.job.scenario.methods, pieces)
+        for some in _split_evenly(task.job.scenario.methods, pieces)
     ]
 
 
-def work(
-    index: CellIndex, names: Sequence[str], tasks: Sequence[Task], out: Path, each: Each, progress: Progress
-) -> dict[str, Ended]:
+def run_tasks(
+    index: CellIndex,
+    names: Sequence[str],
+    tasks: Sequence[CellTask],
+    out: Path,
+    each: TaskExecutor,
+    progress: ProgressCallback,
+) -> dict[str, CellOutcome]:
     """What became of each cell; see `run_cells`."""
     if len(set(names)) < len(names):
         twice = next(name for place, name in enumerate(names) if name in names[:place])
         raise BadInput(f"Two cells are called {twice!r}.", "Scenarios of other content need other names.")
     (out / "cells").mkdir(exist_ok=True)
     index.expect(names)
-    sources, facts, failed = _sources(tasks), index.facts(), index.failures()
+    sources, facts, failed = _source_hash(tasks), index.facts(), index.failures()
     index.reset(names if facts.get("sources") != sources else [name for name in names if name in failed])
     index.note(sources=sources, started_s=time.time(), made=0)
-    stop, ended = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, Ended]()
-    with stoppable(stop):
+    stop, ended = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, CellOutcome]()
+    with graceful_stop(stop):
         broken = []
-        for task, cells in _done(tasks, out, stop, each):
+        for task, cells in _completed_tasks(tasks, out, stop, each):
             if isinstance(cells, BrokenExecutor):
                 broken.append(task)
                 continue
-            _keep(index, task, cells, ended, progress, len(names))
-        alone = [one for task in broken for one in one_by_one(task)]  # but one of them may be to blame
-        for task, cells in _done(alone, out, stop, each):
+            _record_results(index, task, cells, ended, progress, len(names))
+        alone = [one for task in broken for one in split_task(task)]  # but one of them may be to blame
+        for task, cells in _completed_tasks(alone, out, stop, each):
             if isinstance(cells, BrokenExecutor):
-                cells = [Ended(str(cell), failure="a worker process died") for cell in task.job.cells()]
-            _keep(index, task, cells, ended, progress, len(names))
+                cells = [CellOutcome(str(cell), failure="a worker process died") for cell in task.job.cells()]
+            _record_results(index, task, cells, ended, progress, len(names))
     return ended
 
 
-def _sources(tasks: Sequence[Task]) -> str:
+def _source_hash(tasks: Sequence[CellTask]) -> str:
     """Of all code at work: while it is as it was, what was finished counts as finished before it is looked at again."""
     names = sorted({name for task in tasks for name in task.job.scenario.methods})
     return content_key([source_hash(), [registry.source_hash(registry.resolve(name)) for name in names]])
 
 
-def _keep(
-    index: CellIndex, task: Task, cells: Sequence[Ended], ended: dict[str, Ended], progress: Progress, planned: int
+def _record_results(
+    index: CellIndex,
+    task: CellTask,
+    cells: Sequence[CellOutcome],
+    ended: dict[str, CellOutcome],
+    progress: ProgressCallback,
+    planned: int,
 ) -> None:
     found = {f"{task.called}: {cell.cell}": cell for cell in cells}
     index.add((c.row for c in cells if c.row is not None), (c.seconds or None for c in cells if c.row is not None))
@@ -165,12 +175,12 @@ def _keep(
     index.note(made=index.facts()["made"] + made, seen_s=time.time())
 
 
-def _done(
-    tasks: Sequence[Task], out: Path, stop: Path, each: Each
-) -> Iterator[tuple[Task, Sequence[Ended] | BrokenExecutor]]:
+def _completed_tasks(
+    tasks: Sequence[CellTask], out: Path, stop: Path, each: TaskExecutor
+) -> Iterator[tuple[CellTask, Sequence[CellOutcome] | BrokenExecutor]]:
     if not tasks or stop.exists():
         return
-    for which, future in each(run_task, [(_session(), task.job, out.absolute(), stop.absolute()) for task in tasks]):
+    for which, future in each(run_task, [(_session_id(), task.job, out.absolute(), stop.absolute()) for task in tasks]):
         try:
             yield tasks[which], future.result()
         except BrokenExecutor as error:
@@ -180,30 +190,30 @@ def _done(
             raise
         except Exception:  # a task that could not even be sent or answered: its cells fail, the others go on
             failure = traceback.format_exc()
-            yield tasks[which], [Ended(str(cell), failure=failure) for cell in tasks[which].job.cells()]
+            yield tasks[which], [CellOutcome(str(cell), failure=failure) for cell in tasks[which].job.cells()]
 
 
-def run_task(session: str, job: Job, out: Path, stop: Path) -> list[Ended]:
+def run_task(session: str, job: ClipTask, out: Path, stop: Path) -> list[CellOutcome]:
     """In a worker; BadInput when it is on a computer that does not have the folder."""
     if not (out / "cells").is_dir():
         raise BadInput(f"A worker on {node()} does not see {out}.", "Name a folder with --out that all workers share.")
-    _begin(session)
-    return list(run_job(job, out, stop))
+    _start_session(session)
+    return list(run_clip_task(job, out, stop))
 
 
 @cache
-def _begin(session: str) -> None:
+def _start_session(session: str) -> None:
     """Workers that live on from another session have read files that may have changed."""
-    forget_motion()
+    clear_caches()
 
 
 @cache
-def _session() -> str:
+def _session_id() -> str:
     """One for each coordinator."""
     return f"{os.getpid()} {time.time_ns()}"
 
 
-def one_by_one(task: Task) -> list[Task]:
+def split_task(task: CellTask) -> list[CellTask]:
     """A task for each of its cells."""
     job = task.job
     chosen = job.chosen or range(len(variants(job.scenario)))
@@ -215,18 +225,18 @@ def one_by_one(task: Task) -> list[Task]:
     ]
 
 
-def _jobs(scenario: Scenario, folder: Path | None, command: str) -> list[Job]:
-    parts = [Part.parse(text) for text in scenario.motion.test]
+def _clip_jobs(scenario: Scenario, folder: Path | None, command: str) -> list[ClipTask]:
+    parts = [ClipPart.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
     where = folder and folder.absolute()  # workers may be anywhere
-    return [Job(scenario, part, b, where, command) for part, b in zip(parts, behaviours, strict=True)]
+    return [ClipTask(scenario, part, b, where, command) for part, b in zip(parts, behaviours, strict=True)]
 
 
-def _width(scenario: Scenario) -> int:
+def _cells_per_variant(scenario: Scenario) -> int:
     return len(scenario.inputs) * len(scenario.methods)
 
 
-def _shared(what: Sequence[T], pieces: int) -> list[Sequence[T]]:
+def _split_evenly(what: Sequence[T], pieces: int) -> list[Sequence[T]]:
     """Pieces of nearly one size, no more than there is to share."""
     count = max(min(pieces, len(what)), 1)
     ends = [len(what) * n // count for n in range(count + 1)]

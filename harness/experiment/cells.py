@@ -15,40 +15,40 @@ from typing import Any
 
 import numpy as np
 
-from harness.body.mounts import place
+from harness.body.mounts import locate_mount
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import HarnessError, was_interrupted
-from harness.experiment.clip_evaluation import Setting, mounts_of, noise_of
-from harness.experiment.reference_workload import EVERY, Reference
-from harness.experiment.scenario import Motion, Scenario, variants
-from harness.mocap.sources import MotionSource, open_source
+from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
+from harness.experiment.reference_workload import FRAMES_PER_TIMING, ReferenceWorkload
+from harness.experiment.scenario import Scenario, ScenarioMotion, variants
+from harness.mocap.sources import MotionSource, open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.results import manifest, storage
 from harness.results.cell import as_row, cell_folder, read_row, varied_text
-from harness.score.score import score
+from harness.score.score import score_estimate
 from harness.simulate.simulation import Simulation
 from harness.stream.codec.reader import WireFormat
-from harness.stream.inputs import Inputs, combination
+from harness.stream.inputs import Inputs, make_inputs
 
-Progress = Callable[[str, int, int], None]
+ProgressCallback = Callable[[str, int, int], None]
 """Called with what was done last, how many cells are finished and how many were planned."""
 
 
-Varied = Mapping[str, Any]
+VariedValues = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedCell:
     """One cell to come."""
 
     scenario: Scenario
     """With the varied values put in."""
-    varied: Varied
-    part: Part
+    varied: VariedValues
+    part: ClipPart
     method: str
     inputs: str
 
@@ -59,11 +59,11 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Job:
+class ClipTask:
     """One test clip of a scenario; everything a worker process needs to know."""
 
     scenario: Scenario
-    part: Part
+    part: ClipPart
     behaviour: str
     folder: Path | None
     """The library of real motion."""
@@ -72,10 +72,10 @@ class Job:
     chosen: tuple[int, ...] = ()
     """Which of the scenario's variants, () for all: several workers may share the variants of one clip."""
 
-    def cells(self) -> list[Planned]:
+    def cells(self) -> list[PlannedCell]:
         """One for each combination of varied values, inputs and methods."""
         return [
-            Planned(scenario, varied, self.part, method, inputs)
+            PlannedCell(scenario, varied, self.part, method, inputs)
             for varied, scenario in variants(self.scenario, self.chosen)
             for inputs in scenario.inputs
             for method in scenario.methods
@@ -83,7 +83,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Ended:
+class CellOutcome:
     """What became of one cell."""
 
     cell: str
@@ -98,56 +98,58 @@ class Ended:
     """It took here, with what it made for the cells after it [s]; 0 for one that was finished before."""
 
 
-def run_job(job: Job, out: Path, stop: Path | None = None) -> Iterator[Ended]:
+def run_clip_task(job: ClipTask, out: Path, stop: Path | None = None) -> Iterator[CellOutcome]:
     """Every cell of one clip, in order; a failure is reported in its place. It ends early once the file `stop` is."""
     for cell in job.cells():
         if stop is not None and stop.exists():
             return
         start = time.perf_counter()
         try:
-            setting, method = _setting(job, cell.scenario), _method(cell.method)
+            setting, method = _clip_evaluation(job, cell.scenario), _resolve_method(cell.method)
             key = setting.key(method, cell.method, cell.inputs, cell.varied)
             if storage.has_cell(out, key):
-                yield Ended(str(cell), key, row=read_row(cell_folder(out, key)))
+                yield CellOutcome(str(cell), key, row=read_row(cell_folder(out, key)))
                 continue
-            made = judge(setting, method, cell, key, job.command)
+            made = evaluate_cell(setting, method, cell, key, job.command)
             storage.write_cell(out, made)
-            yield Ended(str(cell), key, row=as_row(made), seconds=time.perf_counter() - start)
+            yield CellOutcome(str(cell), key, row=as_row(made), seconds=time.perf_counter() - start)
         except HarnessError as error:
-            yield Ended(str(cell), failure=str(error), refused=True)
+            yield CellOutcome(str(cell), failure=str(error), refused=True)
         except (Exception, SystemExit) as error:  # a method may raise anything: its cell fails, the run goes on
             if was_interrupted(error):
                 raise KeyboardInterrupt from error
-            yield Ended(str(cell), failure=traceback.format_exc())
+            yield CellOutcome(str(cell), failure=traceback.format_exc())
 
 
-_last: list[Setting] = []
+_recent_evaluations: list[ClipEvaluation] = []
 """What this process worked at, for the next job may be of the same clip."""
 
 
-def _setting(job: Job, scenario: Scenario) -> Setting:
+def _clip_evaluation(job: ClipTask, scenario: Scenario) -> ClipEvaluation:
     """Shares with the one before what may be shared."""
-    source, now = source_of(scenario.motion, job.folder, scenario.seed), None
-    for last in _last:
+    source, now = open_scenario_motion(scenario.motion, job.folder, scenario.seed), None
+    for last in _recent_evaluations:
         if last.source is source and (last.part, last.behaviour) == (job.part, job.behaviour):
             now = last if last.scenario == scenario else last.under(scenario)
-    _last[:] = [now or Setting(scenario, source, job.part, job.behaviour)]
-    return _last[0]
+    _recent_evaluations[:] = [now or ClipEvaluation(scenario, source, job.part, job.behaviour)]
+    return _recent_evaluations[0]
 
 
 @cache
-def _method(name: str) -> Method:
+def _resolve_method(name: str) -> Method:
     """Whatever package it is of: to look through all that are installed takes longer than to write a cell."""
     return registry.resolve(name)
 
 
-def judge(setting: Setting, method: Method, planned: Planned, key: str, command: str) -> storage.Cell:
+def evaluate_cell(
+    setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
+) -> storage.Cell:
     """Fit, run causally over the stream, score."""
     scenario, simulation = setting.scenario, setting.simulation
-    seen = combination(planned.inputs, simulation.stations)
+    seen = make_inputs(planned.inputs, simulation.stations)
     known, fitted = setting.calibrated, setting.fitted(method, planned.method)
-    qpos, status, step_ms, cpu_ms = reconstruct(fitted, known.calibration, simulation, seen)
-    scores = score(
+    qpos, status, step_ms, cpu_ms = run_method(fitted, known.calibration, simulation, seen)
+    scores = score_estimate(
         setting.body.skeleton,
         scenario.tracker.rate_hz,
         simulation.truth_qpos,
@@ -200,7 +202,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
     )
 
 
-def reconstruct(
+def run_method(
     reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
 ) -> tuple[Floats, Ints, Floats, tuple[Floats, Floats]]:
     """Estimates (F, 55), status (F,), wall time of each step (F,), CPU time of each and of the reference (F,) [ms].
@@ -208,7 +210,7 @@ def reconstruct(
     Reference work follows every so many steps. The step after it finds the method's data gone from the caches and is
     not timed, NaN: times are of steps that follow a step. The truth stays on this side.
     """
-    session, work = reconstructor.begin(calibration), Reference()
+    session, work = reconstructor.begin(calibration), ReferenceWorkload()
     qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
     for index, frame in enumerate(simulation.frames):
         shown = inputs.masked(frame)
@@ -218,40 +220,40 @@ def reconstruct(
         cpu_ms.append(1e3 * (time.process_time() - start_cpu))
         qpos.append(estimate.qpos)
         status.append(estimate.status)
-        reference_ms.append(work.cpu_ms() if index % EVERY == EVERY - 1 else np.nan)
+        reference_ms.append(work.cpu_ms() if index % FRAMES_PER_TIMING == FRAMES_PER_TIMING - 1 else np.nan)
     times_ms = np.array([step_ms, cpu_ms, reference_ms])
-    times_ms[:2, EVERY::EVERY] = np.nan
+    times_ms[:2, FRAMES_PER_TIMING::FRAMES_PER_TIMING] = np.nan
     return np.array(qpos), np.array(status), times_ms[0], (times_ms[1], times_ms[2])
 
 
-def source_of(motion: Motion, folder: Path | None, seed: int) -> MotionSource:
+def open_scenario_motion(motion: ScenarioMotion, folder: Path | None, seed: int) -> MotionSource:
     """The motion that a scenario names; BadInput when it needs a library and none is named."""
-    return _opened(motion.source, folder, seed, motion.rate_hz or None)
+    return _cached_source(motion.source, folder, seed, motion.rate_hz or None)
 
 
-def forget_motion() -> None:
+def clear_caches() -> None:
     """Whoever begins a run calls this: files may have changed since the last one."""
-    _opened.cache_clear()
-    _method.cache_clear()
-    _last.clear()
+    _cached_source.cache_clear()
+    _resolve_method.cache_clear()
+    _recent_evaluations.clear()
 
 
 @lru_cache(maxsize=2)
-def _opened(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
+def _cached_source(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
     """One for all the clips of a run: they share examples."""
-    return open_source(kind, folder, seed=seed, rate_hz=rate_hz)
+    return open_motion_source(kind, folder, seed=seed, rate_hz=rate_hz)
 
 
-def check_names(scenario: Scenario, source: MotionSource, parts: list[Part]) -> None:
+def check_names(scenario: Scenario, source: MotionSource, parts: list[ClipPart]) -> None:
     """Everything that a scenario names exists: clips, methods, inputs, bones, components. UnknownName, BadInput."""
-    withheld = {Part.parse(text).clip for text in scenario.motion.withheld}
+    withheld = {ClipPart.parse(text).clip for text in scenario.motion.withheld}
     for name in {part.clip for part in parts} | set(scenario.motion.examples) | withheld:
         source.check(name)
     for name in scenario.methods:
-        _method(name)
+        _resolve_method(name)
     for name in scenario.inputs:
-        combination(name, tuple(scenario.wearing))
+        make_inputs(name, tuple(scenario.wearing))
     WireFormat(tuple(scenario.wearing), scenario.tracker.rate_hz, scenario.tracker.items)
     for mount in mounts_of(scenario):
-        place(standard_skeleton(), mount)
+        locate_mount(standard_skeleton(), mount)
     scenario.disturbance.added(noise_of(scenario), tuple(scenario.wearing))

@@ -8,17 +8,23 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from harness.body import humanoid, retargeting
-from harness.body.mounts import Mount, place
-from harness.calibrate.skeleton_prior import bone_space
-from harness.core.fields import changed
+from harness.body.mounts import Mount, locate_mount
+from harness.calibrate.skeleton_prior import fit_skeleton_prior
+from harness.core.fields import replace_fields
 from harness.core.humanoid24 import BONES, standard_skeleton
-from harness.core.motion import Clip, Take
+from harness.core.motion import BodyMotion, Clip
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.core.split import Part, allowed_frames, examples_of, refuse_leak
+from harness.core.split import ClipPart, allowed_frames, refuse_leak, select_examples
 from harness.errors import BadInput
 from harness.experiment.scenario import Scenario
-from harness.experiment.simulated_calibration import Calibrated, TrackerSession, by_poses, by_tpose, exactly
+from harness.experiment.simulated_calibration import (
+    PerformerCalibration,
+    TrackerSession,
+    simulate_poses_calibration,
+    simulate_tpose_calibration,
+    use_exact_calibration,
+)
 from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
@@ -26,9 +32,9 @@ from harness.results import manifest, storage
 from harness.score.metrics import VERSIONS
 from harness.score.score import WARM_UP_S
 from harness.simulate import noise as noises
-from harness.simulate.mounting import strapped
+from harness.simulate.mounting import perturb_mounts
 from harness.simulate.noise import Noise
-from harness.simulate.simulation import Simulation, TrackerConfig, simulate
+from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from harness.simulate.trajectory import Trajectory
 
 
@@ -50,15 +56,15 @@ def tracker_of(scenario: Scenario) -> TrackerConfig:
 def noise_of(scenario: Scenario) -> Noise:
     """The level, with the scenario's changes to single components; UnknownName, BadInput."""
     try:
-        return changed(noises.level(scenario.noise), scenario.components, "components")
+        return replace_fields(noises.noise_preset(scenario.noise), scenario.components, "components")
     except TypeError as error:
         raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
 
-class Setting:
+class ClipEvaluation:
     """One test clip of a scenario; each part is made when it is first asked for."""
 
-    def __init__(self, scenario: Scenario, source: MotionSource, part: Part, behaviour: str) -> None:
+    def __init__(self, scenario: Scenario, source: MotionSource, part: ClipPart, behaviour: str) -> None:
         self.scenario, self.source, self.part, self.behaviour = scenario, source, part, behaviour
         self.clip = source.load(part.clip)
         self._retargeted: dict[str, retargeting.RetargetReport] = {}
@@ -66,7 +72,7 @@ class Setting:
         self._fitted: dict[str, Reconstructor] = {}
         self._sources: dict[str, str] = {}
 
-    def under(self, scenario: Scenario) -> "Setting | None":
+    def under(self, scenario: Scenario) -> "ClipEvaluation | None":
         """The same under other errors of the tracker, with other stations, calibrated otherwise or for other methods,
         sharing motion and, on the same body, what was learnt, which knows of none of these; None if more differs."""
         world = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
@@ -83,7 +89,7 @@ class Setting:
             other.__dict__.pop(own, None)
         return other
 
-    def going_by(self, calibrated: Calibrated) -> "Setting":
+    def going_by(self, calibrated: PerformerCalibration) -> "ClipEvaluation":
         """The same with methods told this of trackers, room and body; what was learnt on another body is not shared."""
         other = copy.copy(self)
         other.__dict__.pop("examples", None)
@@ -104,23 +110,25 @@ class Setting:
         """What is true while the trackers are worn."""
         scenario, how, nominal = self.scenario, self.scenario.calibrating, mounts_of(self.scenario)
         turned_rad, name = float(np.deg2rad(how.turned_deg)), str(self.part)
-        worn = strapped(nominal, beside_m=how.beside_m, turned_rad=turned_rad, seed=scenario.seed, session=name)
+        worn = perturb_mounts(nominal, beside_m=how.beside_m, turned_rad=turned_rad, seed=scenario.seed, session=name)
         tracker, noise = tracker_of(scenario), noise_of(scenario)
         return TrackerSession(name, scenario.seed, self.body, nominal, worn, tracker, noise)
 
     @cached_property
-    def calibrated(self) -> Calibrated:
+    def calibrated(self) -> PerformerCalibration:
         """What methods go by; NotStanding when the performer's model cannot be calibrated from."""
         how = self.scenario.calibrating
         model = {"miss_rad": float(np.deg2rad(how.miss_deg)), "hold_s": how.hold_s}
         match self.scenario.calibration:
             case "exact":
-                return exactly(self.session)
+                return use_exact_calibration(self.session)
             case "tpose":
-                return by_tpose(self.session, **model)
+                return simulate_tpose_calibration(self.session, **model)
             case "poses":
                 known = f"{len(self.people)} others ({self.source.title})"
-                return by_poses(self.session, bone_space(list(self.people.values()), source=known), **model)
+                return simulate_poses_calibration(
+                    self.session, fit_skeleton_prior(list(self.people.values()), source=known), **model
+                )
 
     @cached_property
     def people(self) -> dict[str, Skeleton]:
@@ -131,47 +139,47 @@ class Setting:
     def body(self) -> humanoid.Body:
         """The performer's, in truth."""
         if self.scenario.motion.body == "own":
-            return humanoid.build(self.clip.skeleton.subset(BONES)[0])
-        return humanoid.build(standard_skeleton())
+            return humanoid.build_body(self.clip.skeleton.subset(BONES)[0])
+        return humanoid.build_body(standard_skeleton())
 
     @cached_property
-    def whole(self) -> Take:
+    def whole(self) -> BodyMotion:
         """The test clip on the performer's body."""
         return self._on_body(self.clip, self.body)
 
     @cached_property
-    def take(self) -> Take:
+    def take(self) -> BodyMotion:
         """The part of it that is judged, and before a part the second of warm-up, which is nobody's example either."""
         frames, rate_hz = self.part.frames(len(self.whole)), self.whole.rate_hz
         start = max(frames.start - round(WARM_UP_S * rate_hz), 0)
         longest_s = self.scenario.motion.longest_s
         stop = min(frames.stop, start + round(longest_s * rate_hz) + 1) if longest_s else frames.stop
-        return _cut(self.whole, range(start, stop), str(self.part))
+        return _cut_take(self.whole, range(start, stop), str(self.part))
 
     @cached_property
     def simulation(self) -> Simulation:
         scenario, tracker = self.scenario, self.session.tracker
         noise = scenario.disturbance.added(self.session.noise, tuple(scenario.wearing))
-        seen = simulate(self.body, self.take, self.session.strapped, tracker, noise, seed=scenario.seed)
+        seen = simulate_tracker(self.body, self.take, self.session.strapped, tracker, noise, seed=scenario.seed)
         if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
             found = f"{self.part} is judged for {len(seen.truth_s) / tracker.rate_hz:.2f} s"
             raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
         return seen
 
     @cached_property
-    def closed(self) -> tuple[Part, ...]:
+    def closed(self) -> tuple[ClipPart, ...]:
         """What nothing is learnt from: the part that is judged, and what the scenario withholds."""
-        return (self.part, *map(Part.parse, self.scenario.motion.withheld))
+        return (self.part, *map(ClipPart.parse, self.scenario.motion.withheld))
 
     @cached_property
     def example_names(self) -> list[str]:
         """The clips that the protocol and the scenario let a method learn from, wholly or in part."""
         motion, test = self.scenario.motion, self.part
         subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
-        names = examples_of(test, motion.examples, motion.protocol, subjects)
+        names = select_examples(test, motion.examples, motion.protocol, subjects)
         if motion.database == "behaviour":
             names = [name for name in names if self.source.behaviour(name) == self.behaviour]
-        return [name for name in names if Part(name) not in self.closed]
+        return [name for name in names if ClipPart(name) not in self.closed]
 
     @cached_property
     def performer(self) -> str:
@@ -191,15 +199,15 @@ class Setting:
         return clips
 
     @cached_property
-    def examples(self) -> list[Take]:
+    def examples(self) -> list[BodyMotion]:
         """What the protocol lets a method learn from, on the body that it goes by and at the tracker's rate."""
         takes, body = [], self.calibrated.body
         for clip in self.example_clips:
             runs = allowed_frames(self.closed, clip.name, len(clip), clip.rate_hz)
             refuse_leak(self.closed, clip.name, runs, len(clip), clip.rate_hz)
             whole = self._on_body(clip, body)
-            takes += [_at_rate(body, _cut(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
-        return thinned(takes, self.scenario.motion.thin_to)
+            takes += [_resample(body, _cut_take(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
+        return thin_takes(takes, self.scenario.motion.thin_to)
 
     def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
         """Everything that defines a cell; two results with other inputs are not comparable.
@@ -243,7 +251,7 @@ class Setting:
     def _worn(self) -> dict[str, str]:
         """Digests of the body and of where the stations really sit on it."""
         skeleton = self.body.skeleton
-        worn = [array for mount in self.session.strapped for array in place(skeleton, mount)]
+        worn = [array for mount in self.session.strapped for array in locate_mount(skeleton, mount)]
         body = storage.digest(skeleton.bone_m, skeleton.axes, self.body.limits_rad)
         return {"body_digest": body, "mounts_digest": storage.digest(*worn)}
 
@@ -278,26 +286,26 @@ class Setting:
         content = {**self.inputs_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
         return storage.cell_key(content, described, manifest.source_hash())
 
-    def _on_body(self, clip: Clip, body: humanoid.Body) -> Take:
+    def _on_body(self, clip: Clip, body: humanoid.Body) -> BodyMotion:
         kind = self.scenario.motion.body
         if clip.name == self.clip.name and kind == "own" and body is self.body:
-            return retargeting.to_own_body(clip)[1]
+            return retargeting.retarget_to_own_body(clip)[1]
         if kind == "own" or body is not self.body:
-            take, report = _onto(clip, kind, body.skeleton)
+            take, report = _retarget(clip, kind, body.skeleton)
         else:
-            take, report = _onto_standard(clip, kind)
+            take, report = _retarget_to_standard(clip, kind)
         self._retargeted[clip.name] = report
         return take
 
 
 @lru_cache(maxsize=256)
-def _onto_standard(clip: Clip, kind: str) -> tuple[Take, retargeting.RetargetReport]:
+def _retarget_to_standard(clip: Clip, kind: str) -> tuple[BodyMotion, retargeting.RetargetReport]:
     """The same for every test clip: once in a process."""
-    return _onto(clip, kind, standard_skeleton())
+    return _retarget(clip, kind, standard_skeleton())
 
 
-def _onto(clip: Clip, kind: str, skeleton: Skeleton) -> tuple[Take, retargeting.RetargetReport]:
-    onto = retargeting.with_angles_kept if kind == "common" else retargeting.to_common_body
+def _retarget(clip: Clip, kind: str, skeleton: Skeleton) -> tuple[BodyMotion, retargeting.RetargetReport]:
+    onto = retargeting.retarget_with_same_angles if kind == "common" else retargeting.retarget_to_common_body
     return onto(clip, skeleton)
 
 
@@ -308,11 +316,13 @@ def _motion_digest(clip: Clip) -> str:
     return storage.digest(*where, clip.root_m, clip.world_from_root, clip.angles_rad)
 
 
-def _cut(take: Take, frames: range, name: str) -> Take:
-    return Take(name, take.subject, take.source, take.behaviour, take.rate_hz, take.qpos[frames.start : frames.stop])
+def _cut_take(take: BodyMotion, frames: range, name: str) -> BodyMotion:
+    return BodyMotion(
+        name, take.subject, take.source, take.behaviour, take.rate_hz, take.qpos[frames.start : frames.stop]
+    )
 
 
-def thinned(takes: Sequence[Take], count: int) -> list[Take]:
+def thin_takes(takes: Sequence[BodyMotion], count: int) -> list[BodyMotion]:
     """So many frames of takes at one rate, evenly spaced over all of them, at the lower rate that they then have.
 
     0 keeps all; BadInput when there are not as many.
@@ -329,12 +339,12 @@ def thinned(takes: Sequence[Take], count: int) -> list[Take]:
         passed += len(take)
         if len(rows):
             rate_hz = take.rate_hz / every
-            out.append(Take(take.name, take.subject, take.source, take.behaviour, rate_hz, take.qpos[rows]))
+            out.append(BodyMotion(take.name, take.subject, take.source, take.behaviour, rate_hz, take.qpos[rows]))
     return out
 
 
-def _at_rate(body: humanoid.Body, take: Take, rate_hz: float) -> Take:
+def _resample(body: humanoid.Body, take: BodyMotion, rate_hz: float) -> BodyMotion:
     """The take at the tracker's rate, on the same smooth trajectory that the simulation samples."""
     trajectory = Trajectory(body, take)
     time_s = np.arange(0.0, trajectory.duration_s, 1.0 / rate_hz)
-    return Take(take.name, take.subject, take.source, take.behaviour, rate_hz, trajectory.qpos(time_s))
+    return BodyMotion(take.name, take.subject, take.source, take.behaviour, rate_hz, trajectory.qpos(time_s))

@@ -19,18 +19,18 @@ from importlib.util import find_spec
 from threading import Lock
 from typing import Any, Protocol, TypeVar
 
-from harness.core.workers import Pool, ctrl_c_ignored, keep_busy
+from harness.core.workers import Pool, ignore_sigint, schedule_tasks
 from harness.errors import BadInput, MissingExtra
 from harness.results.manifest import source_hash
 
 R = TypeVar("R")
 
-ANSWER_S = 5.0
+SCHEDULER_TIMEOUT_S = 5.0
 """How long a scheduler may take to answer before it counts as none."""
-LOOK_S = 1.0
+POLL_INTERVAL_S = 1.0
 """How often it is asked whether it is there and how many workers it has."""
-LOCAL = {
-    "distributed.scheduler.allowed-failures": 1,  # of workers that die with a task; then `keep_busy` has it tried alone
+LOCAL_CLUSTER_CONFIG = {
+    "distributed.scheduler.allowed-failures": 1,  # of workers that die with a task; then `schedule_tasks` has it tried alone
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
     "distributed.worker.profile.enabled": False,  # it would slow the steps that are timed
@@ -42,7 +42,7 @@ LOCAL = {
 """Dask's settings for a cluster of our own."""
 
 
-class Each(Protocol):
+class TaskExecutor(Protocol):
     """Calls a function with each of several tasks, somewhere."""
 
     def __call__(
@@ -50,18 +50,18 @@ class Each(Protocol):
     ) -> Generator[tuple[int, Future[R]], None, None]: ...
 
 
-def processes(jobs: int) -> Each:
+def process_executor(jobs: int) -> TaskExecutor:
     """So many worker processes, which stay for the next call; a single job needs none and is done in this one."""
-    return here if jobs == 1 else partial(_pooled, Pool(jobs))
+    return run_in_process if jobs == 1 else partial(_run_on_pool, Pool(jobs))
 
 
-def _pooled(
+def _run_on_pool(
     pool: Pool, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    return pool(_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks])
+    return pool(_run_on_worker, [(source_hash(), os.getcwd(), function, *task) for task in tasks])
 
 
-def here(
+def run_in_process(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """One after another, in this process."""
@@ -75,7 +75,7 @@ def here(
 
 
 @contextmanager
-def dask(address: str, workers: int | None = None) -> Iterator[Each]:
+def dask_executor(address: str, workers: int | None = None) -> Iterator[TaskExecutor]:
     """The workers of the scheduler at an address such as tcp://host:8786; `local` starts one on this machine, with so
     many workers (by default one for each core), all of which end with this process.
 
@@ -90,24 +90,24 @@ def dask(address: str, workers: int | None = None) -> Iterator[Each]:
 
     with (
         silence_logging_cmgr(logging.CRITICAL),
-        _scheduler(address, workers) as found,
+        _connect_scheduler(address, workers) as found,
         Client(found, set_as_default=False) as client,
     ):
-        yield partial(_each, client, address)
+        yield partial(_run_on_dask, client, address)
 
 
 @contextmanager
-def _scheduler(address: str, workers: int | None) -> Iterator[Any]:
+def _connect_scheduler(address: str, workers: int | None) -> Iterator[Any]:
     """What a client connects to: the address, or a cluster of our own."""
     if address != "local":
-        asyncio.run(_answers(address))
+        asyncio.run(_require_scheduler(address))
         yield address
         return
     from dask import config
     from distributed import LocalCluster
 
-    with config.set(LOCAL):
-        with ctrl_c_ignored():
+    with config.set(LOCAL_CLUSTER_CONFIG):
+        with ignore_sigint():
             cluster = LocalCluster(
                 n_workers=workers or os.cpu_count() or 1,
                 threads_per_worker=1,
@@ -127,33 +127,33 @@ def _scheduler(address: str, workers: int | None) -> Iterator[Any]:
                 raise
 
 
-async def _answers(address: str) -> None:
+async def _require_scheduler(address: str) -> None:
     """BadInput unless a scheduler does: a client of Dask's would wait for one that is mute."""
     from distributed import Security, rpc
 
     advice = "Start one with `dask scheduler`, which prints its address, or take --dask local."
     try:
         keys = Security().get_connection_args("client")  # of Dask's own configuration, where there are any
-        async with asyncio.timeout(ANSWER_S), rpc(address, connection_args=keys) as asked:
+        async with asyncio.timeout(SCHEDULER_TIMEOUT_S), rpc(address, connection_args=keys) as asked:
             kind = (await asked.identity())["type"]
     except Exception as error:  # whatever a stranger may answer
-        said = str(error).rstrip(".") or f"no answer in {ANSWER_S:g} s"
+        said = str(error).rstrip(".") or f"no answer in {SCHEDULER_TIMEOUT_S:g} s"
         raise BadInput(f"No Dask scheduler at {address}: {said}.", advice) from error
     if kind != "Scheduler":
         raise BadInput(f"No Dask scheduler at {address}, but a {kind.lower()}.", advice)
 
 
-def _each(
+def _run_on_dask(
     client: Any, address: str, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
     source, folder = source_hash(), os.getcwd()
-    room = _Room(client)
+    room = _DaskCapacity(client)
 
     def submit(which: int) -> Future[R]:
-        return _followed(client.submit(_on_worker, source, folder, function, *tasks[which], pure=False))
+        return _to_future(client.submit(_run_on_worker, source, folder, function, *tasks[which], pure=False))
 
     try:
-        for which, future in keep_busy(submit, len(tasks), room.places, look_s=LOOK_S):
+        for which, future in schedule_tasks(submit, len(tasks), room.places, look_s=POLL_INTERVAL_S):
             if isinstance(future.exception(), CancelledError):  # by no one here: the connection was lost
                 raise OSError("lost")
             yield which, future
@@ -162,24 +162,24 @@ def _each(
         raise BadInput(f"The Dask scheduler at {address} is gone.", advice) from error
 
 
-class _Room:
+class _DaskCapacity:
     """How many tasks a scheduler is given at a time: one for each worker, for those that wait in one that dies are
     suspected too."""
 
     def __init__(self, client: Any) -> None:
-        self._client, self._asked_s, self._places = client, -LOOK_S, 1
+        self._client, self._asked_s, self._places = client, -POLL_INTERVAL_S, 1
 
     def places(self) -> int:
         """OSError when the scheduler is gone."""
         if self._client.status != "running":
             raise OSError(self._client.status)
-        if time.monotonic() - self._asked_s >= LOOK_S:
+        if time.monotonic() - self._asked_s >= POLL_INTERVAL_S:
             self._places = max(1, len(self._client.nthreads()))
             self._asked_s = time.monotonic()
         return self._places
 
 
-def _followed(submitted: Any) -> Future[Any]:
+def _to_future(submitted: Any) -> Future[Any]:
     """A future of Dask's as everyone's."""
     from distributed.scheduler import KilledWorker
 
@@ -197,16 +197,16 @@ def _followed(submitted: Any) -> Future[Any]:
     return future
 
 
-_one_at_a_time = Lock()
+_worker_lock = Lock()
 """Of a worker, whose threads would spoil each other's times and output."""
 
 
-def _on_worker(source: str, folder: str, function: Callable[..., R], *task: Any) -> R:
+def _run_on_worker(source: str, folder: str, function: Callable[..., R], *task: Any) -> R:
     """What a worker does, wherever it is; BadInput when it has other code, as after an edit, than whoever asks."""
     if source_hash() != source:
         advice = "Start both anew with the same one; what was finished is kept."
         raise BadInput("A worker has another version of the harness than the program that it works for.", advice)
-    with _one_at_a_time, redirect_stdout(sys.stderr):
+    with _worker_lock, redirect_stdout(sys.stderr):
         if folder not in sys.path:
             sys.path.append(folder)  # a user's own method may lie where they work
         return function(*task)

@@ -8,11 +8,11 @@ from pathlib import Path
 from threading import current_thread, main_thread
 from types import FrameType
 
-_SAID = b"\nharness: finishing what runs; again stops it at once\n"
+_STOP_MESSAGE = b"\nharness: finishing what runs; again stops it at once\n"
 
 
 @contextmanager
-def stoppable(stop: Path) -> Iterator[None]:
+def graceful_stop(stop: Path) -> Iterator[None]:
     """The first Ctrl-C or SIGTERM makes the file `stop`, which whoever works looks for; any further one is
     KeyboardInterrupt. Leaving raises it too when there was one, and removes the file."""
     stop.unlink(missing_ok=True)
@@ -21,7 +21,7 @@ def stoppable(stop: Path) -> Iterator[None]:
         if stop.exists():
             raise KeyboardInterrupt
         stop.touch()
-        os.write(2, _SAID)  # a signal may strike while something is printed
+        os.write(2, _STOP_MESSAGE)  # a signal may strike while something is printed
 
     with ExitStack() as after:
         after.callback(stop.unlink, missing_ok=True)

@@ -14,23 +14,23 @@ from harness.body.mounts import Mount
 from harness.calibrate.calibration_file import CalibrationFile
 from harness.calibrate.poses import POSES, configuration
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
-from harness.core.split import Part
+from harness.core.motion import BodyMotion
+from harness.core.split import ClipPart
 from harness.errors import BadInput, UnknownName
-from harness.experiment.cells import check_names, source_of
-from harness.experiment.clip_evaluation import Setting, mounts_of, noise_of, tracker_of
+from harness.experiment.cells import check_names, open_scenario_motion
+from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.experiment.simulated_calibration import Calibrated
-from harness.simulate.loop import lap
+from harness.experiment.simulated_calibration import PerformerCalibration
+from harness.simulate.loop import simulate_loop
 from harness.simulate.simulation import Simulation, TrackerConfig
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 
 
-class Rehearsal:
+class Playback:
     """One clip of a scenario with some of its stations, or with `posing` the poses of a calibration, held before it in
     the same session of the tracker; each part is made when it is first asked for."""
 
-    def __init__(self, setting: Setting, *, posing: bool = False) -> None:
+    def __init__(self, setting: ClipEvaluation, *, posing: bool = False) -> None:
         self.setting, self.posing = setting, posing
 
     @property
@@ -53,7 +53,7 @@ class Rehearsal:
         return mounts_of(self.scenario)
 
     @property
-    def calibrated(self) -> Calibrated:
+    def calibrated(self) -> PerformerCalibration:
         """What methods are told of trackers, room and body: the truth, until somebody calibrates."""
         return self.setting.calibrated
 
@@ -62,18 +62,18 @@ class Rehearsal:
         """Of the trackers and the room, as methods are told."""
         return self.calibrated.calibration
 
-    def going_by(self, kept: CalibrationFile) -> "Rehearsal":
+    def going_by(self, kept: CalibrationFile) -> "Playback":
         """The same with methods told what a calibration found, for these stations; BadInput when it lacks one.
 
         Where it has no skeleton the body is the scenario's.
         """
         chosen = kept.of(tuple(self.scenario.stations))
-        body = self.body if chosen.skeleton is None else humanoid.build(chosen.skeleton)
-        calibrated = Calibrated(chosen.calibration, body, {})
-        return Rehearsal(self.setting.going_by(calibrated), posing=self.posing)
+        body = self.body if chosen.skeleton is None else humanoid.build_body(chosen.skeleton)
+        calibrated = PerformerCalibration(chosen.calibration, body, {})
+        return Playback(self.setting.going_by(calibrated), posing=self.posing)
 
     @cached_property
-    def take(self) -> Take:
+    def take(self) -> BodyMotion:
         """What the performer does."""
         if not self.posing:
             return self.setting.take
@@ -87,15 +87,17 @@ class Rehearsal:
         return self.setting.session.seen(self.take) if self.posing else self.setting.simulation
 
     @cached_property
-    def samples(self) -> Samples:
+    def samples(self) -> DeviceSamples:
         """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
         session, scenario = self.setting.session, self.scenario
         noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
         noise, name = (session.lasting, session.name) if self.posing else (noise, "")
-        return lap(self.body, self.take, session.strapped, self.tracker, noise, seed=scenario.seed, session=name)
+        return simulate_loop(
+            self.body, self.take, session.strapped, self.tracker, noise, seed=scenario.seed, session=name
+        )
 
 
-def rehearse(
+def prepare_playback(
     scenario: Path | str,
     *,
     clip: str | None = None,
@@ -105,7 +107,7 @@ def rehearse(
     seed: int | None = None,
     folder: Path | None = None,
     posing: bool = False,
-) -> Rehearsal:
+) -> Playback:
     """A clip of a scenario (its first by default), with the first so many of its stations or those that are named.
 
     What is not given is as the scenario has it, but for the calibration: `exact`, until somebody calibrates.
@@ -114,7 +116,7 @@ def rehearse(
     asked = load_scenario(scenario)
     asked = replace(asked, stations=asked.wearing, worn=())
     if stations is not None:
-        asked = replace(asked, stations={name: asked.stations[name] for name in chosen(asked, stations)})
+        asked = replace(asked, stations={name: asked.stations[name] for name in select_stations(asked, stations)})
     if rate_hz is not None:
         asked = replace(asked, tracker=replace(asked.tracker, rate_hz=rate_hz))
     if noise is not None:
@@ -122,15 +124,15 @@ def rehearse(
     if seed is not None:
         asked = replace(asked, seed=seed)
     asked = replace(asked, vary={}, inputs=("pos+ori",), calibration="exact")
-    part = Part.parse(clip or asked.motion.test[0])
-    source = source_of(asked.motion, folder, asked.seed)
+    part = ClipPart.parse(clip or asked.motion.test[0])
+    source = open_scenario_motion(asked.motion, folder, asked.seed)
     check_names(asked, source, [part])
-    return Rehearsal(
-        Setting(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
+    return Playback(
+        ClipEvaluation(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
     )
 
 
-def chosen(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
+def select_stations(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
     """Names of the first so many stations of a scenario, or of those named; BadInput, UnknownName."""
     names = list(scenario.wearing)
     if isinstance(stations, int):
@@ -143,7 +145,7 @@ def chosen(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
     return stations
 
 
-def _behaviour(scenario: Scenario, part: Part) -> str:
+def _behaviour(scenario: Scenario, part: ClipPart) -> str:
     """What a test clip shows; "" for a clip that the scenario does not judge."""
     tested, behaviours = scenario.motion.test, scenario.motion.behaviours
     if str(part) not in tested:

@@ -7,22 +7,22 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.experiment.benchmark_clips import WARM_UP, Trial, error_deg
+from harness.experiment.benchmark_clips import WARM_UP_FRAMES, BenchmarkClip, joint_angle_error_deg
 from harness.reconstruct.contract import Reconstructor
 from harness.stream.frame import TrackerFrame
 
-TURN = 40
+FRAMES_PER_TURN = 40
 """Frames of one contender in a row."""
 
-Progress = Callable[[str, int, int], None]
-Follower = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
+ProgressCallback = Callable[[str, int, int], None]
+TimedStep = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
 """Takes a frame and the true pose of the one before to a configuration (55,) and the seconds that it took."""
-Contender = Callable[[Trial], Follower]
+TimedMethod = Callable[[BenchmarkClip], TimedStep]
 """Makes itself ready for a take."""
 
 
 @dataclass
-class Tally:
+class MethodTimings:
     """One contender's turns."""
 
     turn_s: list[float] = field(default_factory=list)
@@ -34,37 +34,42 @@ class Tally:
     @property
     def fps(self) -> float:
         """The median turn's."""
-        return TURN / float(np.median(self.turn_s))
+        return FRAMES_PER_TURN / float(np.median(self.turn_s))
 
 
-def contest(contenders: Mapping[str, Contender], shown: Sequence[Trial], progress: Progress) -> dict[str, Tally]:
+def time_round_robin(
+    contenders: Mapping[str, TimedMethod], shown: Sequence[BenchmarkClip], progress: ProgressCallback
+) -> dict[str, MethodTimings]:
     """All contenders on all takes, in turns; the first second of a take is not counted."""
-    tallies = {name: Tally() for name in contenders}
-    planned = sum(len(trial.simulation.frames) // TURN for trial in shown)
+    tallies = {name: MethodTimings() for name in contenders}
+    planned = sum(len(trial.simulation.frames) // FRAMES_PER_TURN for trial in shown)
     done = 0
     for trial in shown:
         followers = {name: begin(trial) for name, begin in contenders.items()}
-        for start in range(0, len(trial.simulation.frames) - TURN + 1, TURN):
+        for start in range(0, len(trial.simulation.frames) - FRAMES_PER_TURN + 1, FRAMES_PER_TURN):
             progress(trial.take, done, planned)
             done += 1
             for name, follow in followers.items():
                 turn = [
-                    follow(trial.simulation.frames[t], trial.truth[max(t - 1, 0)]) for t in range(start, start + TURN)
+                    follow(trial.simulation.frames[t], trial.truth[max(t - 1, 0)])
+                    for t in range(start, start + FRAMES_PER_TURN)
                 ]
                 found, seconds = np.array([qpos for qpos, _ in turn]), [spent for _, spent in turn]
                 if start == 0:
                     tallies[name].first_ms.append(1e3 * seconds[0])
-                if start >= WARM_UP:
+                if start >= WARM_UP_FRAMES:
                     tallies[name].turn_s.append(sum(seconds))
                     tallies[name].step_ms += [1e3 * spent for spent in seconds]
-                    tallies[name].error_deg.append(error_deg(found, trial.truth[start : start + TURN]))
+                    tallies[name].error_deg.append(
+                        joint_angle_error_deg(found, trial.truth[start : start + FRAMES_PER_TURN])
+                    )
     return tallies
 
 
-def following(learnt: Reconstructor) -> Contender:
+def time_method(learnt: Reconstructor) -> TimedMethod:
     """A method that has learnt; only its steps are timed."""
 
-    def begin(trial: Trial) -> Follower:
+    def begin(trial: BenchmarkClip) -> TimedStep:
         step = learnt.begin(trial.simulation.calibration).step
 
         def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:

@@ -7,23 +7,23 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.fields import build, changed
-from harness.core.options import alternatives
-from harness.core.package_data import share_folder
+from harness.core.fields import build, replace_fields
+from harness.core.options import expand_alternatives
+from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.results.cell import varied_text
-from harness.results.expected_orders import Order
+from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
-from harness.simulate.parameter_ranges import require
+from harness.simulate.parameter_ranges import require_ranges
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
-_FIXED = ("schema", "name", "methods", "inputs", "vary", "order", "left_out", "fault")
+_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "order", "left_out", "fault")
 
 
 @dataclass(frozen=True)
-class Motion:
+class ScenarioMotion:
     """Which clips are judged, and which may be learnt from."""
 
     source: Literal["builtin", "cmu"]
@@ -65,7 +65,7 @@ class Station:
 
 
 @dataclass(frozen=True)
-class Calibrating:
+class CalibrationSettings:
     """How a performer stands model for a calibration, and how the trackers then really sit."""
 
     miss_deg: float = 2.5
@@ -79,7 +79,7 @@ class Calibrating:
     """How far they are turned there, standard deviation about each of their axes [deg]; 180 is practically anyhow."""
 
     def __post_init__(self) -> None:
-        require(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
+        require_ranges(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Scenario:
     """One experiment: every test clip, with every method and every choice of inputs."""
 
     name: str
-    motion: Motion
+    motion: ScenarioMotion
     stations: dict[str, Station]
     methods: tuple[str, ...]
     """By name, with options and alternatives in brackets (see `harness.core.options`)."""
@@ -100,7 +100,7 @@ class Scenario:
     calibration: Literal["exact", "tpose", "poses"] = "exact"
     """What methods are told of trackers, room and body: the truth; what a T-pose tells of trackers and room (bone
     lengths are known); or what eight poses tell of all three. Vary it to see what calibrating costs."""
-    calibrating: Calibrating = field(default_factory=Calibrating)
+    calibrating: CalibrationSettings = field(default_factory=CalibrationSettings)
     """How that is done."""
     mount: str = "tibia"
     """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
@@ -116,7 +116,7 @@ class Scenario:
     vary: dict[str, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
     or with each combination of them when there are several keys."""
-    order: tuple[Order, ...] = ()
+    order: tuple[ExpectedOrder, ...] = ()
     """What a paper expects of the errors (see `harness.results.expected_orders`)."""
     left_out: dict[str, str] = field(default_factory=dict)
     """Clips, behaviours or experiments that are not here though one would expect them, and why: for the record."""
@@ -141,11 +141,11 @@ def load_scenario(path: Path | str) -> Scenario:
     content.setdefault("name", path.stem)
     try:
         scenario = build(Scenario, content, "scenario")
-        scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in alternatives(text)))
+        scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in expand_alternatives(text)))
     except (TypeError, ValueError) as error:
         raise BadFile(path, str(error), "a scenario", "See the shipped ones in scenarios/.") from error
     check_scenario(path, scenario)
-    check_orders(path, scenario)
+    check_expected_orders(path, scenario)
     return scenario
 
 
@@ -155,9 +155,9 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
 
     UnknownName for a key that does not exist, BadInput for one that cannot be varied or a value that does not fit.
     """
-    choices = dict(leaves(scenario.vary))
+    choices = dict(dotted_keys(scenario.vary))
     for key, values in choices.items():
-        if key.split(".")[0] in _FIXED or key in ("motion.test", "motion.behaviours"):
+        if key.split(".")[0] in _NOT_VARIABLE or key in ("motion.test", "motion.behaviours"):
             raise BadInput(f"vary: {key} cannot be varied.", "Lists of methods, inputs and clips say it themselves.")
         if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
             raise BadInput(f"vary: {key} = {values!r} is no list of different values.", "For example: [0.0, 0.05].")
@@ -172,18 +172,18 @@ def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dic
                 content: Any = value
                 for name in reversed(key.split(".")):
                     content = {name: content}
-                made = changed(made, content, "scenario")
+                made = replace_fields(made, content, "scenario")
         except (TypeError, ValueError) as error:
             raise BadInput(f"vary: {error}.", "Values are those that the scenario's own key may have.") from error
         found.append((varied, made))
     return found
 
 
-def leaves(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys, whether TOML read them as one text or as tables inside tables."""
     for key, value in table.items():
         if isinstance(value, Mapping):
-            yield from leaves(value, f"{before}{key}.")
+            yield from dotted_keys(value, f"{before}{key}.")
         else:
             yield f"{before}{key}", value
 
@@ -203,12 +203,12 @@ def find_scenario(path: Path | str) -> Path:
 
 def shipped_scenarios() -> list[Path]:
     studies = shipped_placements()
-    return sorted(path for path in share_folder("scenarios").glob("*.toml") if path not in studies)
+    return sorted(path for path in data_folder("scenarios").glob("*.toml") if path not in studies)
 
 
 def shipped_placements() -> list[Path]:
     """Studies of where trackers go, which lie among the scenarios."""
-    return sorted(share_folder("scenarios").glob("placement_*.toml"))
+    return sorted(data_folder("scenarios").glob("placement_*.toml"))
 
 
 def check_scenario(path: Path, scenario: Scenario) -> None:
@@ -263,7 +263,7 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
             refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Trackers sit on the skin.")
 
 
-def check_orders(path: Path, scenario: Scenario) -> None:
+def check_expected_orders(path: Path, scenario: Scenario) -> None:
     """That the orders a file states are of what it runs; BadFile. Whoever replaces its methods need not mind them."""
     for order in scenario.order:
         where, what, known = f"the order of {order.source!r}", "methods", scenario.methods

@@ -16,29 +16,29 @@ import numpy as np
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Estimate
 from harness.errors import BadInput
-from harness.experiment.playback import Rehearsal, chosen, rehearse
+from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
 from harness.report.run.text import COLUMNS
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
-from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pooled, score
+from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pool_frames, score_estimate
 from harness.score.timing import step_times_ms
 from harness.stream.codec.items import STATION_CHARACTERS
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.replay import RecordingStream
 
-SAME_M = 0.01
+POSITION_TOLERANCE_M = 0.01
 """Half of a frame's readings lie this near to those that were played; the wire's rounding is a hundredth of it [m]."""
-SAME_RATE = 0.02
+RATE_TOLERANCE = 0.02
 """A rate that the driver had to measure is the scenario's when it is within this share of it."""
-FEWEST = 0.5
+MIN_MATCHED_SHARE = 0.5
 """With a smaller share of frames that belong to the motion, it is another motion (choice)."""
 
 
 @dataclass(frozen=True)
-class Judged:
+class RecordingScore:
     """What one method made of a recording."""
 
     method: str
@@ -47,13 +47,13 @@ class Judged:
     frames_expected: int
     """True frames between the first and the last of each lap that was recorded, after the warm-up."""
     metrics: dict[str, float | None]
-    """By the names of `score.metrics`, over all laps together; None is "not measured"."""
+    """By the names of `score_estimate.metrics`, over all laps together; None is "not measured"."""
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
 
 
-def rehearsal_of(
+def find_playback(
     stream: RecordingStream,
     *,
     scenario: str | None = None,
@@ -62,7 +62,7 @@ def rehearsal_of(
     noise: str | None = None,
     seed: int | None = None,
     folder: Path | None = None,
-) -> Rehearsal:
+) -> Playback:
     """What a recording was played from: as told here, else as its note says, else as it was read.
 
     BadInput when nothing names the scenario; UnknownName and BadFile as for a run of it.
@@ -81,8 +81,8 @@ def rehearsal_of(
     ):
         stations = len(stream.stations)  # the driver was told no names: the first so many were played
     read_hz = stream.wire.rate_hz
-    measured = abs(read_hz / its_own.tracker.rate_hz - 1.0) < SAME_RATE
-    return rehearse(
+    measured = abs(read_hz / its_own.tracker.rate_hz - 1.0) < RATE_TOLERANCE
+    return prepare_playback(
         played,
         clip=clip or note.get("clip"),
         stations=stations,
@@ -94,7 +94,9 @@ def rehearsal_of(
     )
 
 
-def stations_in(stream: RecordingStream, scenario: Path | str, names: Sequence[str] | None = None) -> tuple[str, ...]:
+def name_recorded_stations(
+    stream: RecordingStream, scenario: Path | str, names: Sequence[str] | None = None
+) -> tuple[str, ...]:
     """What a scenario calls the stations of a recording: as told, else as recorded; where the driver was told no names,
     they are the first so many. BadInput for another number, UnknownName for others than the scenario's."""
     known, count = load_scenario(scenario), len(stream.stations)
@@ -104,15 +106,15 @@ def stations_in(stream: RecordingStream, scenario: Path | str, names: Sequence[s
                 f"{len(names)} names for {count} recorded stations: {', '.join(stream.stations)}.",
                 "Name each of them, in this order.",
             )
-        return tuple(chosen(known, names))
+        return tuple(select_stations(known, names))
     unnamed = set("".join(stream.stations).encode()) <= set(STATION_CHARACTERS)
     if unnamed and not set(stream.stations) & set(known.wearing):
-        return tuple(chosen(known, count))
-    return tuple(chosen(known, stream.stations))
+        return tuple(select_stations(known, count))
+    return tuple(select_stations(known, stream.stations))
 
 
 @dataclass(frozen=True, eq=False)
-class _Lap:
+class _LoopFrames:
     """Frames of one lap of the motion, in one session of the line."""
 
     rows: Ints
@@ -122,7 +124,7 @@ class _Lap:
 
 
 @dataclass(frozen=True, eq=False)
-class _Made:
+class _MethodOutput:
     """What one method made of all F frames."""
 
     qpos: Floats
@@ -133,19 +135,19 @@ class _Made:
         return self.qpos[rows], self.status[rows], self.step_ms[rows]
 
 
-def judge(stream: RecordingStream, rehearsal: Rehearsal, methods: Sequence[str]) -> list[Judged]:
+def score_methods(stream: RecordingStream, rehearsal: Playback, methods: Sequence[str]) -> list[RecordingScore]:
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     sessions = {
         name: rehearsal.setting.fitted(registry.resolve(name), name).begin(rehearsal.calibration) for name in methods
     }
-    frames, zero_s, made = _reconstructed(stream, sessions)
-    laps = _laps(frames, zero_s, rehearsal.samples)
-    return [_judged(name, made[name], laps, rehearsal) for name in methods]
+    frames, zero_s, made = _run_methods(stream, sessions)
+    laps = _split_into_loops(frames, zero_s, rehearsal.samples)
+    return [_score_method(name, made[name], laps, rehearsal) for name in methods]
 
 
-def _reconstructed(
+def _run_methods(
     stream: RecordingStream, sessions: Mapping[str, Session]
-) -> tuple[list[TrackerFrame], Floats, dict[str, _Made]]:
+) -> tuple[list[TrackerFrame], Floats, dict[str, _MethodOutput]]:
     """The frames, device time of the zero of the device's own clock at each (F,), and the estimates of each method."""
     frames, zero_s = [], []
     steps: dict[str, list[tuple[Estimate, float]]] = {name: [] for name in sessions}
@@ -157,7 +159,7 @@ def _reconstructed(
             estimate = session.step(frame)
             steps[name].append((estimate, 1e3 * (time.perf_counter() - start)))
     made = {
-        name: _Made(
+        name: _MethodOutput(
             np.array([estimate.qpos for estimate, _ in pairs]),
             np.array([estimate.status for estimate, _ in pairs], dtype=np.int64),
             np.array([step_ms for _, step_ms in pairs]),
@@ -167,37 +169,40 @@ def _reconstructed(
     return frames, np.array(zero_s), made
 
 
-def _laps(frames: Sequence[TrackerFrame], zero_s: Floats, samples: Samples) -> list[_Lap]:
+def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: DeviceSamples) -> list[_LoopFrames]:
     """The frames that have a truth, lap by lap; BadInput when they are of another motion."""
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
     stamp_s = np.array([f.measured_s for f in frames]).reshape(shape) - zero_s[:, None]
     since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_lap_s)
-    number = np.round(_medians(np.where(sound, since, np.nan)))
+    number = np.round(_row_medians(np.where(sound, since, np.nan)))
     timed = number >= 0.0
     lap, index = np.divmod(np.where(timed, number, 0.0).astype(np.int64), len(samples))
     judged = timed & (index < samples.first_lap)
     position_m = np.array([f.position_m for f in frames]).reshape(*shape, 3)
-    off_m = _medians(np.where(sound, np.linalg.norm(position_m - samples.position_m[index], axis=2), np.nan))
-    played = judged & ~(off_m > SAME_M)  # NaN: the list has no positions, or all stations are lost
-    if not played.any() or played.sum() < FEWEST * judged.sum():
+    off_m = _row_medians(np.where(sound, np.linalg.norm(position_m - samples.position_m[index], axis=2), np.nan))
+    played = judged & ~(off_m > POSITION_TOLERANCE_M)  # NaN: the list has no positions, or all stations are lost
+    if not played.any() or played.sum() < MIN_MATCHED_SHARE * judged.sum():
         raise BadInput(
             f"The recording is of another motion: {played.sum()} of {len(frames)} frames belong to this one.",
             "Name the scenario, clip, seed, noise and rate that it was played with.",
         )
     rows = np.flatnonzero(played)
     turns = np.flatnonzero((np.diff(lap[rows]) != 0) | (np.diff(zero_s[rows]) != 0.0)) + 1
-    return [_Lap(own, index[own]) for own in (_rising(part, index) for part in np.split(rows, turns))]
+    return [
+        _LoopFrames(own, index[own])
+        for own in (_strictly_increasing_rows(part, index) for part in np.split(rows, turns))
+    ]
 
 
-def _rising(rows: Ints, index: Ints) -> Ints:
+def _strictly_increasing_rows(rows: Ints, index: Ints) -> Ints:
     """The rows whose index goes on rising: the rest of a frame that came in two is left out."""
     highest = np.maximum.accumulate(np.append(-1, index[rows]))[:-1]
     out: Ints = rows[index[rows] > highest]
     return out
 
 
-def _medians(values: Floats) -> Floats:
+def _row_medians(values: Floats) -> Floats:
     """(F,) of each row (F, S), NaN left out; NaN where nothing is left."""
     some = np.isfinite(values).any(axis=1)
     out = np.full(len(values), np.nan)
@@ -205,7 +210,7 @@ def _medians(values: Floats) -> Floats:
     return out
 
 
-def _judged(name: str, made: _Made, laps: Sequence[_Lap], rehearsal: Rehearsal) -> Judged:
+def _score_method(name: str, made: _MethodOutput, laps: Sequence[_LoopFrames], rehearsal: Playback) -> RecordingScore:
     rate_hz, truth_qpos = rehearsal.tracker.rate_hz, rehearsal.simulation.truth_qpos
     skeleton, scores, expected = rehearsal.body.skeleton, [], 0
     for number, lap in enumerate(laps):
@@ -213,7 +218,7 @@ def _judged(name: str, made: _Made, laps: Sequence[_Lap], rehearsal: Rehearsal) 
         warm_s = first / rate_hz + WARM_UP_S if number == 0 else 0.0
         qpos, status, step_ms = made.at(lap.rows)
         scores.append(
-            score(
+            score_estimate(
                 skeleton,
                 rate_hz,
                 truth_qpos,
@@ -228,28 +233,30 @@ def _judged(name: str, made: _Made, laps: Sequence[_Lap], rehearsal: Rehearsal) 
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
     matched = sum(int(one.scored.sum()) for one in scores)
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected
-    return Judged(name, matched, expected, _metrics(scores, made.step_ms[1:]) if enough else _nothing())
+    return RecordingScore(
+        name, matched, expected, _pool_metrics(scores, made.step_ms[1:]) if enough else _not_measured()
+    )
 
 
-def _metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float | None]:
+def _pool_metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float | None]:
     """Of all laps together, from the errors of single frames."""
     measured = {
-        name: pooled(np.concatenate([one.per_frame[name][one.scored] for one in scores]), DEFINITIONS[name].pool)
+        name: pool_frames(np.concatenate([one.per_frame[name][one.scored] for one in scores]), DEFINITIONS[name].pool)
         for name in FRAME_METRICS
     }
     measured |= step_times_ms(step_ms)
     return {name: value if np.isfinite(value) else None for name, value in measured.items()}
 
 
-def _nothing() -> dict[str, float | None]:
+def _not_measured() -> dict[str, float | None]:
     return dict.fromkeys([*FRAME_METRICS, *step_times_ms(np.zeros(0))])
 
 
-def table(judged: Sequence[Judged]) -> str:
+def format_score_table(judged: Sequence[RecordingScore]) -> str:
     """A row for each method."""
     lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
     for one in judged:
-        figures = [_figure(one.metrics[name], decimals) for _, name, decimals in COLUMNS]
+        figures = [_format_number(one.metrics[name], decimals) for _, name, decimals in COLUMNS]
         lines.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
@@ -260,5 +267,5 @@ def table(judged: Sequence[Judged]) -> str:
     )
 
 
-def _figure(value: float | None, decimals: int) -> str:
+def _format_number(value: float | None, decimals: int) -> str:
     return "not measured" if value is None else f"{value:.{decimals}f}"

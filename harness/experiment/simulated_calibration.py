@@ -6,24 +6,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from harness.body.humanoid import Body, build, tpose
+from harness.body.humanoid import Body, build_body, tpose
 from harness.body.mounts import Mount
-from harness.calibrate.guided_calibration import HoldPoses
+from harness.calibrate.guided_calibration import PoseGuide
 from harness.calibrate.pose_calibration import calibrate_poses
-from harness.calibrate.pose_classifier import Likeness
+from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrate.skeleton_prior import BoneSpace
+from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.simulate.held_poses import holding
+from harness.simulate.held_poses import hold_poses
 from harness.simulate.noise import Noise
-from harness.simulate.simulation import Simulation, TrackerConfig, exact_calibration, simulate
+from harness.simulate.simulation import Simulation, TrackerConfig, exact_calibration, simulate_tracker
 from harness.stream.frame import TrackerFrame
 
 
@@ -54,18 +54,20 @@ class TrackerSession:
         """What goes wrong while calibrating too."""
         return replace(self.noise, slip=(), displaced=(), turned=(), lost=())
 
-    def model(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> Take:
+    def model(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> BodyMotion:
         """The performer holding configurations (55,), at the world's origin and facing x to begin with.
 
         How the n-th is missed does not depend on those after it.
         """
         rng = generator(self.seed, "standing model", self.name)
-        take = holding(self.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=hold_s)
+        take = hold_poses(self.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=hold_s)
         return replace(take, name=f"{self.name} calibration")
 
-    def seen(self, take: Take) -> Simulation:
+    def seen(self, take: BodyMotion) -> Simulation:
         """A take for calibration as the tracker sees it."""
-        return simulate(self.body, take, self.strapped, self.tracker, self.lasting, seed=self.seed, session=self.name)
+        return simulate_tracker(
+            self.body, take, self.strapped, self.tracker, self.lasting, seed=self.seed, session=self.name
+        )
 
     def standing_model(
         self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float
@@ -75,48 +77,52 @@ class TrackerSession:
 
 
 @dataclass(frozen=True, eq=False)
-class Calibrated:
+class PerformerCalibration:
     """What a method goes by."""
 
     calibration: Calibration
     body: Body
     """With the bone lengths that are known or were found."""
     errors: Mapping[str, float]
-    """How far that is from the truth, see `errors_of`; empty where it is the truth."""
+    """How far that is from the truth, see `measure_calibration_errors`; empty where it is the truth."""
     notes: tuple[str, ...] = ()
 
 
-def exactly(session: TrackerSession) -> Calibrated:
+def use_exact_calibration(session: TrackerSession) -> PerformerCalibration:
     """Nothing had to be found."""
-    return Calibrated(session.exact, session.body, {})
+    return PerformerCalibration(session.exact, session.body, {})
 
 
-def by_tpose(session: TrackerSession, *, miss_rad: float, hold_s: float) -> Calibrated:
+def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
     """Mounts and room from a T-pose; bone lengths are known from elsewhere. NotStanding says what was wrong with it."""
     pose = tpose(session.body.skeleton)
     frames = session.standing_model([pose], miss_rad=miss_rad, hold_s=hold_s)
     found = calibrate_tpose(frames, session.body, session.nominal)
-    errors = errors_of(found.calibration, session.body.skeleton, session)
-    return Calibrated(found.calibration, session.body, errors, (_note("T-pose, bone lengths known", errors),))
+    errors = measure_calibration_errors(found.calibration, session.body.skeleton, session)
+    return PerformerCalibration(
+        found.calibration, session.body, errors, (_error_note("T-pose, bone lengths known", errors),)
+    )
 
 
-def by_poses(session: TrackerSession, space: BoneSpace, *, miss_rad: float, hold_s: float) -> Calibrated:
+def simulate_poses_calibration(
+    session: TrackerSession, space: SkeletonPrior, *, miss_rad: float, hold_s: float
+) -> PerformerCalibration:
     """Bone lengths, mounts and room from eight poses and from what other people's bones are like: of the performer,
     nothing is known but the stream. NotStanding when the poses cannot be found in it, or not be calibrated from."""
     poses = [configuration(pose, session.body.skeleton) for pose in POSES]
     frames = session.standing_model(poses, miss_rad=miss_rad, hold_s=hold_s)
-    nobody = build()
+    nobody = build_body()
     shown = [configuration(pose, nobody.skeleton) for pose in POSES]
     stations = [mount.station for mount in session.nominal]
-    collector = PoseCollector(stations, len(POSES), Likeness(nobody, session.nominal, shown))
-    HoldPoses(collector, POSES).lead(frames, say=lambda text: None)
+    collector = PoseCollector(stations, len(POSES), PoseClassifier(nobody, session.nominal, shown))
+    PoseGuide(collector, POSES).lead(frames, say=lambda text: None)
     found = calibrate_poses(collector.held, space, session.nominal)
-    errors = errors_of(found.calibration, found.skeleton, session)
-    notes = (_note(f"eight poses, other bones learnt from {space.source}", errors),)
-    return Calibrated(found.calibration, build(found.skeleton), errors, notes)
+    errors = measure_calibration_errors(found.calibration, found.skeleton, session)
+    notes = (_error_note(f"eight poses, other bones learnt from {space.source}", errors),)
+    return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
 
 
-def errors_of(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:
+def measure_calibration_errors(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:
     """Of mounts, root mean square over stations [mm] and [deg]; of bone lengths, root mean square [mm]; of the room's
     frame, its turn about the vertical [deg] and its origin [mm]."""
     true = session.exact
@@ -132,7 +138,7 @@ def errors_of(found: Calibration, skeleton: Skeleton, session: TrackerSession) -
     }
 
 
-def _note(how: str, errors: Mapping[str, float]) -> str:
+def _error_note(how: str, errors: Mapping[str, float]) -> str:
     return (
         f"calibrated by {how}: mounts {errors['mount_mm']:.0f} mm and {errors['mount_deg']:.1f} deg off, bone lengths "
         f"{errors['length_mm']:.0f} mm (root mean square), room {errors['room_heading_deg']:.1f} deg about the vertical"

@@ -7,12 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.fields import build
-from harness.core.options import alternatives
-from harness.core.package_data import share_folder
-from harness.core.split import Part
+from harness.core.options import expand_alternatives
+from harness.core.package_data import data_folder
+from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.cells import check_names, source_of
-from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, find_scenario, leaves, load_scenario, variants
+from harness.experiment.cells import check_names, open_scenario_motion
+from harness.experiment.scenario import (
+    SCHEMA,
+    Scenario,
+    check_scenario,
+    dotted_keys,
+    find_scenario,
+    load_scenario,
+    variants,
+)
 
 _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/studies/."
 
@@ -76,10 +84,10 @@ def find_sweep(path: Path | str) -> Path:
 
 
 def shipped_sweeps() -> list[Path]:
-    return sorted(share_folder("scenarios").glob("studies/*.toml"))
+    return sorted(data_folder("scenarios").glob("studies/*.toml"))
 
 
-def expand(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
+def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
     """A scenario for each one named and each seed, whose variants, clips, inputs and methods are the sweep's cells.
 
     `seed` replaces all seeds. BadFile, BadInput and UnknownName say what does not fit.
@@ -93,7 +101,7 @@ def expand(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
     for scenario in found:
         seeds = sweep.seeds or (scenario.seed,)
         for one in seeds if seed is None else (seed,):
-            made = replace(_changed(scenario, sweep), seed=one)
+            made = replace(_apply_sweep(scenario, sweep), seed=one)
             check_scenario(path, made)
             out.append(made)
     names = [scenario.name for scenario in found]
@@ -102,37 +110,37 @@ def expand(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
     return out
 
 
-def check(scenarios: Sequence[Scenario], folder: Path | None) -> None:
+def check_scenario_names(scenarios: Sequence[Scenario], folder: Path | None) -> None:
     """That everything exists which any variant names; BadInput, UnknownName. Hours of work are not begun in vain."""
     for scenario in scenarios:
-        parts = [Part.parse(text) for text in scenario.motion.test]
+        parts = [ClipPart.parse(text) for text in scenario.motion.test]
         for _, made in variants(scenario):
-            check_names(made, source_of(made.motion, folder, made.seed), parts)
+            check_names(made, open_scenario_motion(made.motion, folder, made.seed), parts)
 
 
-def _changed(scenario: Scenario, sweep: Sweep) -> Scenario:
+def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:
     motion = scenario.motion
     behaviours = motion.behaviours * (1 if len(motion.behaviours) > 1 else len(motion.test))
     kept = {c: b for c, b in zip(motion.test, behaviours, strict=True) if not sweep.clips or c in sweep.clips}
     if not kept:
         advice = f"Its test clips are: {', '.join(motion.test)}."
         raise BadInput(f"The sweep has none of the clips of {scenario.name}.", advice)
-    methods = tuple(name for text in sweep.methods for name in alternatives(text))
+    methods = tuple(name for text in sweep.methods for name in expand_alternatives(text))
     return replace(
         scenario,
         motion=replace(motion, test=tuple(kept), behaviours=tuple(kept.values())),
         methods=methods or scenario.methods,
         inputs=sweep.inputs or scenario.inputs,
-        vary=_varied(scenario.vary, sweep.vary),
+        vary=_merge_vary(scenario.vary, sweep.vary),
         order=(),
         left_out={},
         fault=(),
     )
 
 
-def _varied(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, Any]:
+def _merge_vary(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, Any]:
     """Both, by dotted keys; what the sweep says of a key counts."""
-    return {**dict(leaves(theirs)), **dict(leaves(ours))}
+    return {**dict(dotted_keys(theirs)), **dict(dotted_keys(ours))}
 
 
 def _scenario_file(name: str, beside: Path) -> Path:

@@ -7,16 +7,16 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.live.incremental_file import Written
+from harness.live.incremental_file import IncrementalFile
 from harness.live.pose import LivePose
-from harness.mocap.write.bvh import channels, hierarchy, row
+from harness.mocap.write.bvh import channel_values, format_row, hierarchy_lines
 
-_COUNT = "Frames: {:>10}"
+_FRAME_COUNT_LINE = "Frames: {:>10}"
 """As wide for any number, since it stands before the frames and grows with them."""
-_LONGEST_GAP_S = 10.0
+_MAX_GAP_S = 10.0
 
 
-class Bvh:
+class BvhOutput:
     """An `Output`: joints, axes and numbers of `harness export --format bvh`.
 
     BVH has an even rate and no times, so where frames were dropped the one before is repeated; a break of more than
@@ -27,10 +27,10 @@ class Bvh:
         """BadFile when there is one and it is not to be written over, or when it cannot be written."""
         self.name, self.told = f"--bvh {path}", f"BVH: {path}"
         self._skeleton, self._rate_hz = own, rate_hz
-        head = "\n".join([*hierarchy(own), "MOTION", ""])
+        head = "\n".join([*hierarchy_lines(own), "MOTION", ""])
         self._count_at = len(head)
-        head += f"{_COUNT.format(0)}\nFrame Time: {1.0 / rate_hz:.9f}\n"
-        self._file = Written(path, head.encode(), force=force)
+        head += f"{_FRAME_COUNT_LINE.format(0)}\nFrame Time: {1.0 / rate_hz:.9f}\n"
+        self._file = IncrementalFile(path, head.encode(), force=force)
         self._frames = 0
         self._device_s = -np.inf
         self._numbers: Floats = np.zeros(0)
@@ -38,12 +38,12 @@ class Bvh:
 
     def send(self, pose: LivePose) -> None:
         passed_s = pose.device_s - self._device_s
-        missing = max(round(passed_s * self._rate_hz) - 1, 0) if passed_s < _LONGEST_GAP_S else 0
+        missing = max(round(passed_s * self._rate_hz) - 1, 0) if passed_s < _MAX_GAP_S else 0
         numbers = self._channels(pose)
         if self._frames:
             turned = numbers[3:] - self._numbers[3:]
             numbers[3:] -= 360.0 * np.round(turned / 360.0)
-        before, self._row = self._row, (row(numbers) + "\n").encode()
+        before, self._row = self._row, (format_row(numbers) + "\n").encode()
         self._numbers, self._device_s = numbers, pose.device_s
         self._frames += missing + 1
         if self._file.write(before * missing + self._row, pose.ready_s):
@@ -59,8 +59,8 @@ class Bvh:
     def _channels(self, pose: LivePose) -> Floats:
         _, world_from_bone = pose.bones
         root, bones = rotations.to_matrix(pose.world_from_root), rotations.to_matrix(world_from_bone)
-        out: Floats = channels(self._skeleton, pose.root_m[None], root[None], bones[None])[0]
+        out: Floats = channel_values(self._skeleton, pose.root_m[None], root[None], bones[None])[0]
         return out
 
     def _save(self) -> None:
-        self._file.save(_COUNT.format(self._frames).encode(), self._count_at)
+        self._file.save(_FRAME_COUNT_LINE.format(self._frames).encode(), self._count_at)

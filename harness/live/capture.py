@@ -10,7 +10,7 @@ from harness.stream.frame import TrackerFrame, TrackerStream
 
 
 @dataclass(frozen=True, slots=True)
-class Captured:
+class CapturedFrame:
     """A frame as it came out of the stream."""
 
     frame: TrackerFrame
@@ -18,11 +18,11 @@ class Captured:
     """Host monotonic clock then [s]."""
 
 
-class Capture:
+class CaptureThread:
     """Iterates a stream into a queue; the queue ends with the stream."""
 
     def __init__(
-        self, stream: TrackerStream, queue: DroppingQueue[Captured], clock: Callable[[], float] = time.monotonic
+        self, stream: TrackerStream, queue: DroppingQueue[CapturedFrame], clock: Callable[[], float] = time.monotonic
     ) -> None:
         self._stream, self._queue, self._clock = stream, queue, clock
         self._thread = Thread(target=self._run, name="capture")
@@ -43,7 +43,7 @@ class Capture:
         try:
             for frame in self._stream:
                 self.frames += 1
-                self._queue.put(Captured(frame, self._clock()))
+                self._queue.put(CapturedFrame(frame, self._clock()))
         except Exception as error:  # whoever waits for frames raises it again
             self.error = error
         finally:

@@ -4,12 +4,12 @@ import numpy as np
 
 from harness.stream.frame import TrackerFrame
 
-_DRIFT = 1e-4
+_MAX_DRIFT = 1e-4
 """How much one clock may gain on the other, as a share: crystals do a tenth of it."""
-_SET_ANEW_S = 1.0
+_CLOCK_RESET_S = 1.0
 
 
-class HostTime:
+class HostClockEstimator:
     """Maps the device's stamps to the host's clock by the quickest frames so far.
 
     A frame can be held up but never comes early, so the least difference of the two clocks is the truest; it is let go
@@ -27,8 +27,8 @@ class HostTime:
         if len(known) == 0:
             return frame.received_s
         difference_s = frame.received_s - float(known[-1])
-        drifted_s = self._least_s + _DRIFT * max(frame.received_s - self._before_s, 0.0)
-        set_anew = abs(difference_s - drifted_s) > _SET_ANEW_S
+        drifted_s = self._least_s + _MAX_DRIFT * max(frame.received_s - self._before_s, 0.0)
+        set_anew = abs(difference_s - drifted_s) > _CLOCK_RESET_S
         self._least_s = difference_s if set_anew else min(difference_s, drifted_s)
         self._before_s = frame.received_s
         return float(known.mean()) + self._least_s

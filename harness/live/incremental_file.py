@@ -9,10 +9,10 @@ from typing import BinaryIO
 
 from harness.errors import BadFile
 
-_SAVE_S = 1.0
+_SAVE_PERIOD_S = 1.0
 
 
-class Written:
+class IncrementalFile:
     """A file that grows by runs of bytes after a head."""
 
     def __init__(self, path: Path, head: bytes, *, force: bool) -> None:
@@ -34,7 +34,7 @@ class Written:
     def write(self, data: bytes, now_s: float) -> bool:
         """Append; True when it is time to `save`, which is once a second."""
         self._file.write(data)
-        due = self._saved_s is None or now_s - self._saved_s > _SAVE_S
+        due = self._saved_s is None or now_s - self._saved_s > _SAVE_PERIOD_S
         self._saved_s = now_s if due else self._saved_s
         return due
 

@@ -8,10 +8,10 @@ from harness.core.arrays import Ints
 
 _BIN_S, _BINS = 1e-5, 200_000
 """Hundredths of a millisecond up to two seconds: as much memory for a day as for a minute."""
-_LIKE_S = 0.5 * _BIN_S
+_HALF_BIN_S = 0.5 * _BIN_S
 
 
-class Durations:
+class DurationHistogram:
     """Many times, of which quantiles are asked."""
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class Durations:
         if self.count == 0:
             return float("nan")
         place = int(np.searchsorted(np.cumsum(self._bins), max(share * self.count, 1.0)))
-        return self.longest_s if place >= _BINS else min(place * _BIN_S + _LIKE_S, self.longest_s)
+        return self.longest_s if place >= _BINS else min(place * _BIN_S + _HALF_BIN_S, self.longest_s)
 
     def as_dict(self) -> dict[str, float | None]:
         """Milliseconds; None where there is nothing to tell."""
@@ -40,20 +40,20 @@ class Durations:
 
 
 @dataclass
-class Stages:
+class StageLatencies:
     """Of every frame: when its last byte was there, it was taken up, its pose was ready, the outputs had it."""
 
     deadline_s: float
     """From the last byte to the pose."""
     missed: int = 0
     """Poses that were ready after it."""
-    waiting: Durations = field(default_factory=Durations)
+    waiting: DurationHistogram = field(default_factory=DurationHistogram)
     """Last byte to taken from the queue."""
-    solving: Durations = field(default_factory=Durations)
+    solving: DurationHistogram = field(default_factory=DurationHistogram)
     """Taken to pose ready."""
-    sending: Durations = field(default_factory=Durations)
+    sending: DurationHistogram = field(default_factory=DurationHistogram)
     """Pose ready to outputs sent."""
-    to_pose: Durations = field(default_factory=Durations)
+    to_pose: DurationHistogram = field(default_factory=DurationHistogram)
     """Last byte to pose ready: what the deadline is for."""
 
     def add(self, received_s: float, taken_s: float, ready_s: float, sent_s: float) -> None:
@@ -64,7 +64,7 @@ class Stages:
         self.to_pose.add(ready_s - received_s)
         self.missed += ready_s - received_s > self.deadline_s
 
-    def named(self) -> dict[str, Durations]:
+    def named(self) -> dict[str, DurationHistogram]:
         """In the order of the way."""
         return {
             "last byte to taken": self.waiting,

@@ -15,7 +15,7 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra
 from harness.live.pose import LivePose
 
-_HERE = """
+_LOOPBACK_CONFIG = """
 [multicast]
 ResolveScope = machine
 ListenAddress = 127.0.0.1
@@ -25,25 +25,27 @@ IPv6 = disable
 level = -2
 """
 """Announced on the loopback interface only; only errors are logged."""
-_CHOSEN = "LSLAPICFG"
+_CONFIG_VARIABLE = "LSLAPICFG"
 """The variable with which users name a configuration of their own."""
 
 
-class Lsl:
+class LslOutput:
     """An `Output`."""
 
     def __init__(self, name: str, own: Skeleton, rate_hz: float, *, network: bool = False) -> None:
         """BadInput, MissingExtra. `network` leaves liblsl its own configuration."""
-        pylsl = library()
+        pylsl = import_pylsl()
         if not name.strip():
             raise BadInput("--lsl without a name.", "Receivers find the streams by it.")
         self.name = f"--lsl {name}"
-        where = f"as {_CHOSEN} says"
+        where = f"as {_CONFIG_VARIABLE} says"
         if network:
             where = "announced to the network"
-        elif not os.environ.get(_CHOSEN):
+        elif not os.environ.get(_CONFIG_VARIABLE):
             where = "found on this computer alone, though liblsl's ports are open to the network"
-            pylsl.set_config_content(_HERE)  # counts until the first stream is made, and for the whole program
+            pylsl.set_config_content(
+                _LOOPBACK_CONFIG
+            )  # counts until the first stream is made, and for the whole program
         self.told = f"LSL: {name}-qpos and {name}-joints, {where}"
         self._late_s = pylsl.local_clock() - time.monotonic()
         root = [(f"root.{axis}", "metres") for axis in "xyz"] + [
@@ -53,8 +55,8 @@ class Lsl:
             (own.dof_names[d], "radians") for run in own.dof_of_bone for d in reversed(range(run.start, run.stop))
         ]
         joints = [(f"{bone}.{axis}", "metres") for bone in ("root", *own.names) for axis in "xyz"]
-        self._qpos = _outlet(pylsl, f"{name}-qpos", [*root, *hinges], rate_hz)
-        self._joints = _outlet(pylsl, f"{name}-joints", joints, rate_hz)
+        self._qpos = _make_outlet(pylsl, f"{name}-qpos", [*root, *hinges], rate_hz)
+        self._joints = _make_outlet(pylsl, f"{name}-joints", joints, rate_hz)
 
     def send(self, pose: LivePose) -> None:
         stamp_s = pose.measured_s + self._late_s
@@ -65,7 +67,7 @@ class Lsl:
         self._qpos = self._joints = None  # liblsl closes what nobody holds
 
 
-def library() -> Any:
+def import_pylsl() -> Any:
     """The module pylsl; MissingExtra when it or its C library is not there."""
     try:
         import pylsl
@@ -74,7 +76,7 @@ def library() -> Any:
     return pylsl
 
 
-def _outlet(pylsl: Any, name: str, channels: list[tuple[str, str]], rate_hz: float) -> Any:
+def _make_outlet(pylsl: Any, name: str, channels: list[tuple[str, str]], rate_hz: float) -> Any:
     info = pylsl.StreamInfo(name, "MoCap", len(channels), rate_hz, "double64", f"tracker-harness-{name}")
     listed = info.desc().append_child("channels")
     for label, unit in channels:

@@ -9,23 +9,23 @@ from PIL import Image, ImageDraw, ImageFont
 from harness.calibrate.poses import CalibrationPose, configuration
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
-from harness.live.viewer import View
+from harness.live.viewer import ViewerOutput
 
-SHEET = "poses.png"
-_ACROSS, _PIXELS, _MARGIN, _TEXT = 4, 320, 34, 15
+SHEET_NAME = "poses.png"
+_COLUMNS, _PIXELS, _MARGIN, _TEXT = 4, 320, 34, 15
 _PAPER, _INK = "#f3f5f7", "#2b3138"
-_DRAWN_S = 60.0
+_DRAW_TIMEOUT_S = 60.0
 
 
 def draw_poses(poses: Sequence[CalibrationPose], own: Skeleton, folder: Path, *, force: bool) -> list[Path]:
     """`pose_1.png` and so on, and the sheet; the paths. As for `--view frames`: BadFile for a folder with other
     pictures of a view in it, BadInput where nothing can be drawn."""
-    view = View("frames", own, folder, force=force)
+    view = ViewerOutput("frames", own, folder, force=force)
     try:
         drawn = []
         for number, pose in enumerate(poses, 1):
             view.show(number, configuration(pose, own))
-            picture, until_s = folder / f"{number:08d}.png", time.monotonic() + _DRAWN_S
+            picture, until_s = folder / f"{number:08d}.png", time.monotonic() + _DRAW_TIMEOUT_S
             while not picture.exists():
                 if time.monotonic() > until_s:
                     raise BadInput(f"Nothing was drawn of pose {number}.", "Does this computer have OpenGL?")
@@ -33,18 +33,20 @@ def draw_poses(poses: Sequence[CalibrationPose], own: Skeleton, folder: Path, *,
             drawn.append(picture.replace(folder / f"pose_{number}.png"))
     finally:
         view.close()
-    sheet = folder / SHEET
-    _sheet([(path, f"{n}  {pose.name}") for n, (path, pose) in enumerate(zip(drawn, poses, strict=True), 1)], sheet)
+    sheet = folder / SHEET_NAME
+    _save_sheet(
+        [(path, f"{n}  {pose.name}") for n, (path, pose) in enumerate(zip(drawn, poses, strict=True), 1)], sheet
+    )
     return [*drawn, sheet]
 
 
-def _sheet(pictures: Sequence[tuple[Path, str]], path: Path) -> None:
+def _save_sheet(pictures: Sequence[tuple[Path, str]], path: Path) -> None:
     """Rows of pictures with what they are called."""
-    rows = -(-len(pictures) // _ACROSS)
-    sheet = Image.new("RGB", (_ACROSS * _PIXELS, rows * (_PIXELS + _MARGIN)), _PAPER)
+    rows = -(-len(pictures) // _COLUMNS)
+    sheet = Image.new("RGB", (_COLUMNS * _PIXELS, rows * (_PIXELS + _MARGIN)), _PAPER)
     pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(_TEXT)
     for place, (picture, name) in enumerate(pictures):
-        x, y = _PIXELS * (place % _ACROSS), (_PIXELS + _MARGIN) * (place // _ACROSS)
+        x, y = _PIXELS * (place % _COLUMNS), (_PIXELS + _MARGIN) * (place // _COLUMNS)
         with Image.open(picture) as image:
             sheet.paste(image.convert("RGB").resize((_PIXELS, _PIXELS)), (x, y))
         pen.text((x + _PIXELS // 2, y + _PIXELS + _MARGIN // 2 - 4), name, fill=_INK, font=font, anchor="mm")

@@ -3,11 +3,11 @@
 from pathlib import Path
 
 from harness.core.skeleton import Skeleton
-from harness.live.incremental_file import Written
+from harness.live.incremental_file import IncrementalFile
 from harness.live.pose import LivePose
 
 
-class Table:
+class PoseTableOutput:
     """An `Output`: one row of comma-separated values for each frame, numbers such that they are read back exactly.
 
     Times are of this computer's monotonic clock, which all programs on it share under Linux; those that begin with
@@ -18,10 +18,10 @@ class Table:
         """BadFile when there is one and it is not to be written over, or when it cannot be written."""
         self.name, self.told = f"--poses {path}", f"table of poses: {path}"
         root = [f"root.{axis}_m" for axis in "xyz"] + [f"root.q{axis}" for axis in "wxyz"]
-        hinges = [f"{own.dof_names[d]}_rad" for d in _as_in_qpos(own)]
+        hinges = [f"{own.dof_names[d]}_rad" for d in _hinges_in_qpos_order(own)]
         times = ["received_s", "taken_s", "ready_s", *(f"device_s.{name}" for name in stations)]
         head = ",".join(["frame", "status", *times, *root, *hinges]) + "\n"
-        self._file = Written(path, head.encode(), force=force)
+        self._file = IncrementalFile(path, head.encode(), force=force)
 
     def send(self, pose: LivePose) -> None:
         frame = pose.frame
@@ -35,6 +35,6 @@ class Table:
         self._file.close()
 
 
-def _as_in_qpos(own: Skeleton) -> list[int]:
+def _hinges_in_qpos_order(own: Skeleton) -> list[int]:
     """The skeleton's hinges in the order of a configuration, each bone's from the outermost (`core.humanoid24`)."""
     return [d for where in own.dof_of_bone for d in reversed(range(where.start, where.stop))]

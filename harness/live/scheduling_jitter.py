@@ -18,9 +18,9 @@ _SLEEP_S = 0.02
 
 def main() -> None:
     """Until the standard input ends."""
-    from harness.live.latency import Durations
+    from harness.live.latency import DurationHistogram
 
-    late, handed = Durations(), Durations()
+    late, handed = DurationHistogram(), DurationHistogram()
     words: SimpleQueue[float | None] = SimpleQueue()
     ends: list[bool] = []
 
@@ -42,7 +42,7 @@ def main() -> None:
     print(json.dumps({"timer": late.as_dict(), "handover": handed.as_dict(), "sleeps": late.count}))
 
 
-class Floor:
+class JitterProbe:
     """Measures from now until `finish`; leaves nothing running behind when its block ends."""
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class Floor:
             start_new_session=True,  # Ctrl-C is not for this one
         )
 
-    def __enter__(self) -> "Floor":
+    def __enter__(self) -> "JitterProbe":
         return self
 
     def __exit__(self, *raised: object) -> None:

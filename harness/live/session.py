@@ -12,14 +12,14 @@ from threading import Event, Thread
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
-from harness.calibrate.guided_calibration import Calibrator, Say
+from harness.calibrate.guided_calibration import Calibrator, Notifier
 from harness.core.calibration import Calibration
 from harness.core.estimate import Status
-from harness.live.capture import Capture, Captured
-from harness.live.clock import HostTime
+from harness.live.capture import CapturedFrame, CaptureThread
+from harness.live.clock import HostClockEstimator
 from harness.live.dropping_queue import DroppingQueue
-from harness.live.latency import Stages
-from harness.live.low_latency import tidy, undisturbed
+from harness.live.latency import StageLatencies
+from harness.live.low_latency import collect_garbage, low_latency_mode
 from harness.live.pose import LivePose, Output
 from harness.reconstruct.contract import Reconstructor, Session
 from harness.stream.frame import TrackerFrame, TrackerStream
@@ -27,12 +27,12 @@ from harness.stream.frame import TrackerFrame, TrackerStream
 QUEUE_FRAMES = 32
 """What waits for a pose that takes long: a quarter of a second at 120 Hz. Solving is several times faster than frames
 come, so that it has soon caught up, and methods do not like gaps [choice]."""
-_TIDY_S = 1.0
-_LOOK_S = 0.1
+_COLLECT_PERIOD_S = 1.0
+_POLL_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
-class Plan:
+class LiveOptions:
     """How a session goes."""
 
     rate_hz: float
@@ -48,7 +48,7 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False)
-class Performed:
+class LiveResult:
     """What became of a session."""
 
     captured: int
@@ -61,7 +61,7 @@ class Performed:
     """Poses by how far they rest on readings."""
     seconds: float
     """From the first pose to the last."""
-    stages: Stages
+    stages: StageLatencies
     failed: dict[str, str]
     """Outputs that could not go on, and why."""
 
@@ -77,32 +77,32 @@ def warm_up(reconstructor: Reconstructor, calibration: Calibration, frames: Sequ
         session.step(frame)
 
 
-def perform(
+def run_session(
     stream: TrackerStream,
     body: Body,
     reconstructor: Reconstructor,
     worn: Calibration | Calibrator,
     outputs: Sequence[Output],
-    plan: Plan,
+    plan: LiveOptions,
     *,
-    say: Say = lambda text: None,
+    say: Notifier = lambda text: None,
     clock: Callable[[], float] = time.monotonic,
-) -> Performed:
+) -> LiveResult:
     """Until the stream ends, the plan's time is over or Ctrl-C; stream and outputs are closed then.
 
     What ends a stream or a method unexpectedly is raised, after all is closed. An output that fails is left out, and
     said so; the others go on.
     """
-    queue: DroppingQueue[Captured] = DroppingQueue(plan.queue_frames)
-    capture = Capture(stream, queue, clock)
-    solver = _Solver(queue, body, reconstructor, worn, outputs, plan, say, clock)
+    queue: DroppingQueue[CapturedFrame] = DroppingQueue(plan.queue_frames)
+    capture = CaptureThread(stream, queue, clock)
+    solver = _SolverThread(queue, body, reconstructor, worn, outputs, plan, say, clock)
     thread = Thread(target=solver.run, name="reconstruct")
     try:
-        with undisturbed():
+        with low_latency_mode():
             solver.prepare()
             thread.start()
             capture.start()
-            while not solver.done.wait(_LOOK_S):
+            while not solver.done.wait(_POLL_PERIOD_S):
                 if plan.seconds is not None and clock() - solver.began_s >= plan.seconds:
                     break
     except KeyboardInterrupt:
@@ -118,25 +118,25 @@ def perform(
     return solver.performed(capture.frames)
 
 
-class _Solver:
+class _SolverThread:
     """What the second thread does, and what it has to tell afterwards."""
 
     def __init__(
         self,
-        queue: DroppingQueue[Captured],
+        queue: DroppingQueue[CapturedFrame],
         body: Body,
         reconstructor: Reconstructor,
         worn: Calibration | Calibrator,
         outputs: Sequence[Output],
-        plan: Plan,
-        say: Say,
+        plan: LiveOptions,
+        say: Notifier,
         clock: Callable[[], float],
     ) -> None:
         self._queue, self._reconstructor, self._worn = queue, reconstructor, worn
         self._outputs, self._plan, self._say, self._clock = list(outputs), plan, say, clock
         self._kinematics = Kinematics(body)
-        self._host_time = HostTime()
-        self._stages = Stages(1.0 / plan.rate_hz if plan.deadline_s is None else plan.deadline_s)
+        self._host_time = HostClockEstimator()
+        self._stages = StageLatencies(1.0 / plan.rate_hz if plan.deadline_s is None else plan.deadline_s)
         self._status: Counter[str] = Counter()
         self._failed: dict[str, str] = {}
         self._session: Session | None = None
@@ -175,10 +175,10 @@ class _Solver:
         try:
             output.close()
         except Exception as error:  # whatever it is, the others are closed too
-            self._failed.setdefault(output.name, _words(error))
+            self._failed.setdefault(output.name, _error_text(error))
 
-    def performed(self, captured: int) -> Performed:
-        return Performed(
+    def performed(self, captured: int) -> LiveResult:
+        return LiveResult(
             captured=captured,
             before=self._calibrating + self._let_go,
             dropped=self._queue.dropped - self._let_go,
@@ -219,21 +219,21 @@ class _Solver:
             self._status[estimate.status.name] += 1
             self._first_s, self._last_s = self._first_s or ready_s, ready_s
             number += 1
-            if len(self._queue) == 0 and sent_s - tidied_s > _TIDY_S:
+            if len(self._queue) == 0 and sent_s - tidied_s > _COLLECT_PERIOD_S:
                 tidied_s = sent_s
-                tidy()
+                collect_garbage()
 
     def _send(self, pose: LivePose) -> None:
         for output in list(self._outputs):
             try:
                 output.send(pose)
             except Exception as error:  # a library's own too: no output ends the session
-                self._failed[output.name] = _words(error)
+                self._failed[output.name] = _error_text(error)
                 self._outputs.remove(output)
-                self._say(f"{output.name}: {_words(error)}; the session goes on without it")
+                self._say(f"{output.name}: {_error_text(error)}; the session goes on without it")
                 self._close(output)
 
 
-def _words(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     """An OSError speaks for itself; of others the kind has to be said."""
     return str(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from harness.live.latency import Durations
-from harness.live.session import Performed
+from harness.live.latency import DurationHistogram
+from harness.live.session import LiveResult
 
 
-def as_dict(done: Performed, floor: Mapping[str, Any]) -> dict[str, Any]:
+def as_dict(done: LiveResult, floor: Mapping[str, Any]) -> dict[str, Any]:
     """Counts; times in milliseconds."""
     stages = done.stages
     return {
@@ -25,11 +25,11 @@ def as_dict(done: Performed, floor: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def lines(done: Performed, floor: Mapping[str, Any]) -> list[str]:
+def lines(done: LiveResult, floor: Mapping[str, Any]) -> list[str]:
     """A table of the times, with what the computer itself takes below, and the counts."""
     stages = done.stages
-    rows = [_row(name, durations) for name, durations in stages.named().items()]
-    rows += [_numbers(name, floor[key]) for name, key in _FLOOR.items() if floor.get(key)]
+    rows = [_stage_row(name, durations) for name, durations in stages.named().items()]
+    rows += [_time_row(name, floor[key]) for name, key in _JITTER_LABELS.items() if floor.get(key)]
     states = ", ".join(f"{count} {name}" for name, count in done.status.items())
     counts = f"{done.poses} poses in {done.seconds:.1f} s ({states}); {done.dropped} frames dropped"
     if done.before:
@@ -40,15 +40,15 @@ def lines(done: Performed, floor: Mapping[str, Any]) -> list[str]:
     return [f"{'milliseconds':<32}{'p50':>8}{'p99':>8}{'max':>8}", *rows, "", counts, late, *failed]
 
 
-_FLOOR = {
+_JITTER_LABELS = {
     "the computer: a timer is late": "timer",
     "the computer: thread to thread": "handover",
 }
 
 
-def _row(name: str, durations: Durations) -> str:
-    return _numbers(name, durations.as_dict())
+def _stage_row(name: str, durations: DurationHistogram) -> str:
+    return _time_row(name, durations.as_dict())
 
 
-def _numbers(name: str, times: Mapping[str, float | None]) -> str:
+def _time_row(name: str, times: Mapping[str, float | None]) -> str:
     return f"{name:<32}" + "".join(f"{'-' if ms is None else format(ms, '.2f'):>8}" for ms in times.values())

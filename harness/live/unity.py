@@ -53,7 +53,7 @@ class UnityPose:
 
     def __init__(self, own: Skeleton) -> None:
         self.names = (HIPS, *UNITY_BONES)
-        rest = skeleton.forward(own, *(part[None] for part in humanoid24.unpack(humanoid.tpose(own))))
+        rest = skeleton.forward_kinematics(own, *(part[None] for part in humanoid24.unpack(humanoid.tpose(own))))
         ours = [own.index(bone) for bone, _ in UNITY_BONES.values()]
         self._ours = np.array(ours, dtype=np.int64)
         self._parents: Ints = np.array([self.names.index(p) for _, p in UNITY_BONES.values()], dtype=np.int64)

@@ -17,26 +17,26 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton
-from harness.core.workers import ctrl_c_ignored
+from harness.core.workers import ignore_sigint
 from harness.errors import BadFile, BadInput, MissingExtra
 from harness.live.pose import LivePose
 
-Kind = Literal["window", "frames"]
-_PICTURES = "[0-9]" * 8 + ".png"
+ViewerKind = Literal["window", "frames"]
+_PICTURE_PATTERN = "[0-9]" * 8 + ".png"
 """As `screen` names them; whatever else a folder holds is not ours."""
 READY, CLOSED = "ready", "its window was closed"
 """What the other process says."""
-_START_S, _END_S = 60.0, 10.0
-_SIZE = 3 + 55
-_RATE_HZ: dict[Kind, float] = {"window": 30.0, "frames": 4.0}
+_START_TIMEOUT_S, _END_TIMEOUT_S = 60.0, 10.0
+_RECORD_SIZE = 3 + 55
+_RATE_HZ: dict[ViewerKind, float] = {"window": 30.0, "frames": 4.0}
 """Pictures per second at most."""
 
 
 @dataclass(frozen=True)
-class Screen:
+class ViewerConfig:
     """What the other process is to show, and where."""
 
-    kind: Kind
+    kind: ViewerKind
     bone_m: Floats
     """(B, 3) of the body [m]."""
     out: str
@@ -45,12 +45,12 @@ class Screen:
     """Pictures per second at most."""
 
 
-class Shared:
+class SharedPose:
     """The newest pose, in memory that two processes share: its number, time [s] and status, then `qpos`."""
 
     def __init__(self, context: Any) -> None:
         self._lock = context.Lock()
-        self._memory = context.RawArray("d", _SIZE)
+        self._memory = context.RawArray("d", _RECORD_SIZE)
         self._memory[0] = -1.0
 
     def put(self, pose: LivePose) -> None:
@@ -76,10 +76,10 @@ class Shared:
             return np.array(self._memory)
 
 
-class View:
+class ViewerOutput:
     """An `Output`: a window, or pictures in a folder."""
 
-    def __init__(self, kind: Kind, own: Skeleton, out: Path | None = None, *, force: bool) -> None:
+    def __init__(self, kind: ViewerKind, own: Skeleton, out: Path | None = None, *, force: bool) -> None:
         """Returns when a first picture, of the T-pose, was drawn; BadInput, BadFile, MissingExtra when it cannot be."""
         self.name, self.told = f"--view {kind}", f"view: {'a window' if kind == 'window' else f'pictures in {out}'}"
         if find_spec("pyvista") is None:
@@ -88,19 +88,21 @@ class View:
         if kind == "window" and screenless:
             raise BadInput("--view window: there is no screen (DISPLAY is not set).", "Take --view frames --out DIR.")
         if kind == "frames":
-            _made(out, force)
+            _prepare_folder(out, force)
         context = get_context("spawn")
-        self._shared = Shared(context)
+        self._shared = SharedPose(context)
         self._ours, theirs = context.Pipe()
-        screen = Screen(kind, own.bone_m, str(out or ""), _RATE_HZ[kind])
-        self._process = context.Process(target=_show, args=(screen, self._shared, theirs), name="view", daemon=True)
-        with ctrl_c_ignored():  # it ends with us, not beside us
+        screen = ViewerConfig(kind, own.bone_m, str(out or ""), _RATE_HZ[kind])
+        self._process = context.Process(
+            target=_run_viewer_process, args=(screen, self._shared, theirs), name="view", daemon=True
+        )
+        with ignore_sigint():  # it ends with us, not beside us
             self._process.start()
         theirs.close()
         try:
-            said = self._ours.recv() if self._ours.poll(_START_S) else "it does not answer"
+            said = self._ours.recv() if self._ours.poll(_START_TIMEOUT_S) else "it does not answer"
         except EOFError:
-            self._process.join(_END_S)
+            self._process.join(_END_TIMEOUT_S)
             said = f"its process ended with {self._process.exitcode}"
         if said != READY:
             self.close()
@@ -126,13 +128,13 @@ class View:
 
     def close(self) -> None:
         self._ours.close()
-        self._process.join(_END_S)
+        self._process.join(_END_TIMEOUT_S)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
 
 
-def _made(out: Path | None, force: bool) -> None:
+def _prepare_folder(out: Path | None, force: bool) -> None:
     """The folder is there, and has no pictures of another session."""
     if out is None:
         raise BadInput("--view frames needs a folder.", "Name one with --out DIR.")
@@ -140,21 +142,21 @@ def _made(out: Path | None, force: bool) -> None:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadFile(out, f"it cannot be made ({error.strerror})", "a folder", "Name another.") from error
-    old = sorted(out.glob(_PICTURES))
+    old = sorted(out.glob(_PICTURE_PATTERN))
     if old and not force:
         raise BadFile(out, f"there are {len(old)} pictures in it", "a folder without", "Name another, or say --force.")
     for picture in old:
         picture.unlink()
 
 
-def _show(screen: Screen, shared: Shared, told: Any) -> None:
+def _run_viewer_process(screen: ViewerConfig, shared: SharedPose, told: Any) -> None:
     """The other process; it takes what the computer has left over."""
     if hasattr(os, "nice"):
         os.nice(10)
     os.environ["LP_NUM_THREADS"] = "1"  # Mesa draws by as many threads as there are cores where there is no GPU
     try:
-        from harness.live.viewer_process import show
+        from harness.live.viewer_process import run_viewer
 
-        show(screen, shared, told)
+        run_viewer(screen, shared, told)
     except Exception as error:  # whoever started us tells the user
         told.send(f"{type(error).__name__}: {error}")

@@ -12,43 +12,43 @@ import numpy as np
 from PIL import Image
 
 from harness.body.humanoid import tpose
-from harness.body.rendering import Figure, Stage
+from harness.body.rendering import BodyMesh, RenderScene
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton
-from harness.live.viewer import CLOSED, READY, Screen, Shared
+from harness.live.viewer import CLOSED, READY, SharedPose, ViewerConfig
 
 _COLOURS = {Status.SOLVED: "#e8850c", Status.HELD: "#a98a63", Status.LOST: "#9aa3ab"}
 """Paler the less a pose rests on readings."""
 _SIZE = (640, 640)
-_VIEW_DEG = 33.0
+_VIEW_ANGLE_DEG = 33.0
 """Arms that are raised are in it too."""
 
 
-class Viewer:
+class BodyRenderer:
     """One body on a stage."""
 
     def __init__(self, own: Skeleton, *, off_screen: bool) -> None:
         self._own = own
-        self.stage = Stage(_SIZE, 0.0, off_screen=off_screen)
-        self.stage.plotter.camera.view_angle = _VIEW_DEG
-        self._figure = Figure(self.stage.plotter, own, _COLOURS[Status.SOLVED], girth=1.0, opacity=1.0)
+        self.stage = RenderScene(_SIZE, 0.0, off_screen=off_screen)
+        self.stage.plotter.camera.view_angle = _VIEW_ANGLE_DEG
+        self._figure = BodyMesh(self.stage.plotter, own, _COLOURS[Status.SOLVED], girth=1.0, opacity=1.0)
 
     def pose(self, qpos: Floats, status: Status) -> None:
         """Take up a configuration (55,)."""
         root_m, quaternion, angles_rad = humanoid24.unpack(qpos[None])
-        at = skeleton.forward(self._own, root_m, quaternion, angles_rad)
+        at = skeleton.forward_kinematics(self._own, root_m, quaternion, angles_rad)
         root = rotations.to_matrix(quaternion[0])
         self._figure.move(root_m[0], root, at.start_m[0], at.world_from_bone[0])
         self._figure.look.color = _COLOURS[status]
         self.stage.follow(root_m[0])
 
 
-def show(screen: Screen, shared: Shared, told: Any) -> None:
+def run_viewer(screen: ViewerConfig, shared: SharedPose, told: Any) -> None:
     """Tells READY after the first picture, and CLOSED when the user closes the window."""
     own = humanoid24.standard_skeleton().with_bones(screen.bone_m)
-    viewer = Viewer(own, off_screen=screen.kind == "frames")
+    viewer = BodyRenderer(own, off_screen=screen.kind == "frames")
     viewer.pose(tpose(own), Status.SOLVED)
     if screen.kind == "window":
         viewer.stage.plotter.show(interactive_update=True, auto_close=False, title="harness live")
@@ -61,7 +61,7 @@ def show(screen: Screen, shared: Shared, told: Any) -> None:
         if number != drawn:
             viewer.pose(newest[3:], status)
             if screen.kind == "frames":
-                _save(viewer.stage.picture(), Path(screen.out) / f"{number:08d}.png")
+                _save_picture(viewer.stage.picture(), Path(screen.out) / f"{number:08d}.png")
             drawn = number
         if screen.kind == "window":
             viewer.stage.plotter.update()
@@ -71,7 +71,7 @@ def show(screen: Screen, shared: Shared, told: Any) -> None:
     viewer.stage.close()
 
 
-def _save(picture: "np.ndarray[Any, Any]", path: Path) -> None:
+def _save_picture(picture: "np.ndarray[Any, Any]", path: Path) -> None:
     """There whole or not at all."""
     beside = path.with_name(f".unfinished-{path.name}")
     Image.fromarray(picture).save(beside, format="png", compress_level=1)

@@ -20,13 +20,13 @@ from harness.errors import BadInput, MissingExtra
 from harness.live.pose import LivePose
 from harness.live.unity import UnityPose
 
-_PER_BUNDLE = 12
+_BONES_PER_BUNDLE = 12
 """Bones in a datagram: below 1500 bytes, which the protocol advises and networks carry whole."""
-_NUMBERS = 28
+_POSE_BYTES = 28
 """Bytes of the seven floats at the end of a message."""
 
 
-class Vmc:
+class VmcOutput:
     """An `Output`. The avatar's root stays in the world's origin; the hips carry the way through the room."""
 
     def __init__(self, address: str, own: Skeleton) -> None:
@@ -36,7 +36,7 @@ class Vmc:
         host, port = parse_address(address)
         self.name, self.told = f"--vmc {host}:{port}", f"VMC protocol: to UDP port {port} of {host}"
         self._pose = UnityPose(own)
-        self._datagrams = _Datagrams(self._pose.names)
+        self._datagrams = _VmcDatagrams(self._pose.names)
         self._to: Any
         try:
             family, _, _, _, self._to = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
@@ -58,7 +58,7 @@ class Vmc:
         self._socket.close()
 
 
-class _Datagrams:
+class _VmcDatagrams:
     """Bundles that are built once; of a pose only the numbers change, which stay where the first build put them."""
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -79,11 +79,11 @@ class _Datagrams:
         bones = [message("/VMC/Ext/Bone/Pos", name, *nowhere) for name in names]
         self._bundles: list[NDArray[np.uint8]] = []
         self._numbers: list[NDArray[np.int64]] = []
-        for at in range(0, len(bones), _PER_BUNDLE):
+        for at in range(0, len(bones), _BONES_PER_BUNDLE):
             before = first if at == 0 else []
-            data, ends = _bundle([*before, *bones[at : at + _PER_BUNDLE]])
+            data, ends = _bundle([*before, *bones[at : at + _BONES_PER_BUNDLE]])
             self._bundles.append(data)
-            self._numbers.append(ends[len(before) :, None] + np.arange(-_NUMBERS, 0))
+            self._numbers.append(ends[len(before) :, None] + np.arange(-_POSE_BYTES, 0))
         self._tracked, self._time = (int(end) - 4 for end in _bundle(first)[1][:2])
 
     def filled(self, tracked: bool, time_s: float, bones: Floats) -> list[bytes]:

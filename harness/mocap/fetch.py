@@ -18,15 +18,15 @@ from urllib.parse import urlsplit
 
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
-from harness.mocap.library import INDEX, read_index
+from harness.mocap.library import INDEX_NAME, read_index
 from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
 
 CMU_URL = "http://mocap.cs.cmu.edu"
-LISTED_RATE_HZ = 120.0
+SHIPPED_RATE_HZ = 120.0
 """Of every clip on the shipped list; CMU's other clips have 120 or 60, which no file tells."""
 TIMEOUT_S = 30.0
 
-Progress = Callable[[str, int, int], None]
+FetchProgress = Callable[[str, int, int], None]
 """Called with a file's name, how many are done, and how many there will be."""
 
 
@@ -35,7 +35,7 @@ def fetch_cmu(
     folder: Path | str,
     *,
     base_url: str = CMU_URL,
-    progress: Progress = lambda name, done, planned: None,
+    progress: FetchProgress = lambda name, done, planned: None,
 ) -> list[Path]:
     """The skeleton and all motions of each subject below `folder`, with an index; those in place are kept.
 
@@ -47,13 +47,13 @@ def fetch_cmu(
     for subject in subjects:
         if not re.fullmatch(r"[0-9]{1,3}", subject):
             raise BadInput(f"{subject!r} is no subject of CMU.", "Subjects are numbers, such as 02 or 13.")
-        wanted += _files_of(subject.zfill(2), base_url)
+        wanted += _list_subject_files(subject.zfill(2), base_url)
     if not wanted:
         raise BadInput("No subjects are named.", "For example: --subjects 13,14.")
     fetched = []
     for done, name in enumerate(wanted):
         progress(name, done, len(wanted))
-        fetched.append(_fetch(name, top, base_url))
+        fetched.append(_fetch_file(name, top, base_url))
     progress("", len(wanted), len(wanted))
     _write_index(top, wanted)
     return fetched
@@ -73,14 +73,14 @@ def sha256_of(path: Path) -> str:
     return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
 
 
-def _files_of(subject: str, base_url: str) -> list[str]:
+def _list_subject_files(subject: str, base_url: str) -> list[str]:
     """A subject's files by the site's search page, or by the listing of its folder; the skeleton first."""
     pages = (f"{base_url}/search.php?subjectnumber={subject}", f"{base_url}/subjects/{subject}/")
     with tempfile.TemporaryDirectory() as folder:
         for page in pages:
             try:
                 text = _download(page, Path(folder) / "page").read_text(encoding="latin-1")
-            except _NotThere:
+            except _NotFound:
                 continue
             trials = sorted(set(re.findall(rf"\b{subject}_[0-9]{{2,3}}\.amc\b", text)))
             if trials:
@@ -88,7 +88,7 @@ def _files_of(subject: str, base_url: str) -> list[str]:
     raise BadInput(f"{urlsplit(base_url).netloc} lists no motions of subject {subject}.", f"Looked at {pages[0]}.")
 
 
-class _NotThere(Exception):
+class _NotFound(Exception):
     """The site answered, but has no such page or file."""
 
 
@@ -101,7 +101,7 @@ def _download(url: str, path: Path) -> Path:
         pooch.retrieve(url, None, fname=path.name, path=path.parent, downloader=pooch.HTTPDownloader(timeout=TIMEOUT_S))
     except OSError as error:
         if getattr(error, "response", None) is not None:
-            raise _NotThere(url) from error
+            raise _NotFound(url) from error
         where = urlsplit(url).netloc
         raise BadInput(
             f"{where} cannot be reached ({type(error).__name__}).", "Check the network, or name a mirror (--url)."
@@ -109,7 +109,7 @@ def _download(url: str, path: Path) -> Path:
     return path
 
 
-def _fetch(name: str, top: Path, base_url: str) -> Path:
+def _fetch_file(name: str, top: Path, base_url: str) -> Path:
     """One file, checked, then put in place in one step; a file that is in place already is kept if it is as listed."""
     place = top / name
     listed = shipped_sha256().get(name)
@@ -125,17 +125,17 @@ def _fetch(name: str, top: Path, base_url: str) -> Path:
         url = f"{base_url}/subjects/{name}"
         try:
             new = _download(url, Path(folder) / place.name)
-        except _NotThere:
+        except _NotFound:
             raise BadInput(f"There is no {url}.", "Is the site laid out like CMU's?") from None
-        _check(new, url, listed, place.parent)
+        _check_file(new, url, listed, place.parent)
         os.replace(new, place)
     return place
 
 
-def _check(new: Path, url: str, listed: str | None, beside: Path) -> None:
+def _check_file(new: Path, url: str, listed: str | None, beside: Path) -> None:
     """BadFile, naming the address, unless the file parses and is as listed."""
     try:
-        _parse(new, beside)
+        _parse_file(new, beside)
     except BadFile as error:
         raise BadFile(url, error.found, error.expected, "Nothing was kept of it; try again.", error.line) from error
     found = sha256_of(new)
@@ -144,25 +144,25 @@ def _check(new: Path, url: str, listed: str | None, beside: Path) -> None:
         raise BadFile(url, f"a file with SHA-256 {found[:12]}...", f"{listed[:12]}... as shipped", advice)
 
 
-def _parse(path: Path, beside: Path) -> AsfFile | Clip:
+def _parse_file(path: Path, beside: Path) -> AsfFile | Clip:
     if path.suffix == ".asf":
         return read_asf_file(path)
     asf = read_asf_file(beside / f"{path.stem.split('_')[0]}.asf")
-    return read_amc(path, asf.skeleton, rate_hz=LISTED_RATE_HZ)
+    return read_amc(path, asf.skeleton, rate_hz=SHIPPED_RATE_HZ)
 
 
 def _write_index(top: Path, names: list[str]) -> None:
     """Add the motions to the folder's index, with the rate of those whose rate is known; replaced in one step."""
-    rows = read_index(top / INDEX)
+    rows = read_index(top / INDEX_NAME)
     known = shipped_sha256()
     for name in names:
         if name.endswith(".amc"):
             subject, trial = Path(name).stem.split("_")
-            fps = f"{LISTED_RATE_HZ:g}" if name in known else ""
+            fps = f"{SHIPPED_RATE_HZ:g}" if name in known else ""
             rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
     columns = list(dict.fromkeys(column for row in rows.values() for column in row))
     with tempfile.NamedTemporaryFile("w", dir=top, delete=False, newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, columns)
         table.writeheader()
         table.writerows(rows.values())
-    os.replace(file.name, top / INDEX)
+    os.replace(file.name, top / INDEX_NAME)

@@ -13,13 +13,13 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import BONES
 from harness.core.motion import Clip
-from harness.core.skeleton import Skeleton, forward
+from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap import motion_checks
 from harness.mocap.inspection import Inspection
-from harness.mocap.library import INDEX, MotionLibrary, read_index, skeleton_file
+from harness.mocap.library import INDEX_NAME, MotionLibrary, find_skeleton_file, read_index
 from harness.mocap.read.file_checks import check_size
-from harness.mocap.read.joint_clip import LEG
+from harness.mocap.read.joint_clip import LEG_BONES
 
 if TYPE_CHECKING:
     from harness.mocap.read.c3d import MarkerClip
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 FORMATS = ("amc", "bvh", "npz", "c3d")
 LEG_M = (0.55, 1.15)
 """Thigh and shin of people, together [m]; 20 skeletons of CMU have 0.74 to 0.90."""
-ROOT_IN_LEGS = (0.05, 5.0)
+ROOT_HEIGHT_IN_LEGS = (0.05, 5.0)
 """Median height of the root over z = 0 in leg lengths; CMU's clips have 0.82 to 1.50."""
 UPRIGHT_SHARE = 0.4
 """Share of frames with the head over the feet; the cartwheels of 49_08 have 0.59."""
-IN_FILE = "recorded in the file"
-FOOT_REACH = 0.12
+RATE_IN_FILE = "recorded in the file"
+FOOT_HEIGHT_SHARE = 0.12
 """Joints no higher in the rest pose than this share of its height belong to the feet."""
 
 
@@ -62,14 +62,14 @@ def inspect_file(
         return _inspect_c3d(path, unit, library)
     if unit is not None:
         raise BadInput(f"{path.name} is in metres, as all AMASS files are.", "Leave out --unit.")
-    from harness.mocap.read.amass import read_clip
+    from harness.mocap.read.amass import read_amass_clip
 
-    found = inspect_clip(read_clip(path))
+    found = inspect_clip(read_amass_clip(path))
     return replace(
         found,
         format="npz",
         height_m=None,
-        rate_evidence=IN_FILE,
+        rate_evidence=RATE_IN_FILE,
         unit_evidence="AMASS is in metres",
         up=f"z ({found.up})",
     )
@@ -81,30 +81,32 @@ def inspect_clip(clip: Clip) -> Inspection:
     One that has the 24 bones is judged by these, toes, thumbs and fingers left out, and held to the joint limits.
     """
     skeleton = clip.skeleton
-    pose = forward(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
+    pose = forward_kinematics(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
     whole = set(BONES) <= set(skeleton.names)
     kept = [skeleton.index(bone) for bone in (BONES if whole else skeleton.names)]
-    rest_m = _rest_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in kept)]]
-    points = Points(
+    rest_m = _rest_positions_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in kept)]]
+    points = PointTrajectories(
         names=("root", *(skeleton.names[b] for b in kept)),
         position_m=np.concatenate([clip.root_m[:, None], pose.end_m[:, kept]], axis=1),
         rest_m=rest_m,
     )
-    facts = replace(_look(clip.name, points, clip.rate_hz), height_m=float(np.ptp(rest_m[:, 2])), notes=clip.notes)
+    facts = replace(
+        _inspect_points(clip.name, points, clip.rate_hz), height_m=float(np.ptp(rest_m[:, 2])), notes=clip.notes
+    )
     if not whole:
         return facts
-    leg = 0.5 * sum(float(skeleton.length_m[skeleton.index(bone)]) for bone in LEG)
+    leg = 0.5 * sum(float(skeleton.length_m[skeleton.index(bone)]) for bone in LEG_BONES)
     above = float(np.median(clip.root_m[:, 2])) / leg
     doubts = list(facts.doubts)
     if not LEG_M[0] <= leg <= LEG_M[1]:
         doubts.append(f"legs of {leg:.3g} m: is the unit right?")
-    if not ROOT_IN_LEGS[0] <= above <= ROOT_IN_LEGS[1]:
+    if not ROOT_HEIGHT_IN_LEGS[0] <= above <= ROOT_HEIGHT_IN_LEGS[1]:
         doubts.append(f"the root is {above:.3g} leg lengths above z = 0: are root and bones in one unit?")
     evidence = f"legs of {leg:.2f} m"
-    facts = replace(facts, height_m=_standing_m(skeleton), unit_evidence=evidence, doubts=tuple(doubts))
-    if not motion_checks.has_the_hinges(skeleton):
+    facts = replace(facts, height_m=_standing_height_m(skeleton), unit_evidence=evidence, doubts=tuple(doubts))
+    if not motion_checks.has_standard_hinges(skeleton):
         return facts
-    share, most, hinge = motion_checks.outside_limits(skeleton, clip.angles_rad)
+    share, most, hinge = motion_checks.measure_limit_violations(skeleton, clip.angles_rad)
     worst = f"{hinge} by {np.rad2deg(most):.1f} deg" if share else ""
     return replace(facts, limits_share=share, limits_worst=worst)
 
@@ -113,9 +115,9 @@ def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, librar
     from harness.mocap.read.acclaim import read_amc, read_asf_file
 
     check_size(path, "an AMC motion")
-    rate, evidence = (rate_hz, "as given") if rate_hz is not None else _rate_of_index(path, library)
+    rate, evidence = (rate_hz, "as given") if rate_hz is not None else _rate_from_index(path, library)
     whole = path.resolve()
-    asf = read_asf_file(skeleton_file(whole, whole.parents[min(2, len(whole.parents) - 1)]), unit_m=unit_m)
+    asf = read_asf_file(find_skeleton_file(whole, whole.parents[min(2, len(whole.parents) - 1)]), unit_m=unit_m)
     found = inspect_clip(read_amc(path, asf.skeleton, rate_hz=rate, unit_m=asf.unit_m))
     why = "as given" if unit_m is not None else "length in the ASF's :units"
     return replace(
@@ -136,12 +138,14 @@ def _inspect_bvh(path: Path, unit_m: float | None) -> Inspection:
         found = inspect_clip(to_cmu_clip(joint_clip))
     else:
         position, _ = joint_clip.world()
-        found = _look(path.stem, Points(joint_clip.names, position, joint_clip.rest_m()), joint_clip.rate_hz)
+        found = _inspect_points(
+            path.stem, PointTrajectories(joint_clip.names, position, joint_clip.rest_m()), joint_clip.rate_hz
+        )
         found = replace(found, height_m=float(np.ptp(joint_clip.rest_m()[:, 2])))
     return replace(
         found,
         format="bvh",
-        rate_evidence=IN_FILE,
+        rate_evidence=RATE_IN_FILE,
         unit_m=joint_clip.unit_m,
         unit_evidence=joint_clip.unit_evidence,
         up=f"y ({found.up})",
@@ -155,33 +159,33 @@ def _inspect_c3d(path: Path, unit_m: float | None, library: Path | str | None) -
     seen: Bools = np.isfinite(markers.position_m[..., 0])
     if not seen.any():
         raise BadFile(path, "no marker in any frame", "positions of markers", "Export it again.")
-    found = _look(path.stem, Points(markers.labels, markers.position_m, None), markers.rate_hz)
+    found = _inspect_points(path.stem, PointTrajectories(markers.labels, markers.position_m, None), markers.rate_hz)
     return replace(
         found,
         format="c3d",
-        rate_evidence=IN_FILE,
+        rate_evidence=RATE_IN_FILE,
         unit_m=markers.unit_m,
         unit_evidence=markers.unit_evidence,
         up=markers.up_evidence,
         missing_share=float(1.0 - seen.mean()),
         missing_markers=tuple(label for m, label in enumerate(markers.labels) if not seen[:, m].all()),
-        notes=() if library is None else _spreads(markers, MotionLibrary(library)),
+        notes=() if library is None else _marker_spread_notes(markers, MotionLibrary(library)),
     )
 
 
-def _spreads(markers: "MarkerClip", library: MotionLibrary) -> tuple[str, ...]:
+def _marker_spread_notes(markers: "MarkerClip", library: MotionLibrary) -> tuple[str, ...]:
     """How firmly each marker sits on its bone, if the library has the motion of the same take."""
     if markers.name not in library.names():
         return ()
-    from harness.mocap.read.c3d import marker_spreads
+    from harness.mocap.read.c3d import measure_marker_spreads
 
-    spreads = marker_spreads(markers, library.load(markers.name))
+    spreads = measure_marker_spreads(markers, library.load(markers.name))
     told = ", ".join(f"{s.label} {s.bone} {1000.0 * s.spread_m:.0f}" for s in spreads)
     return (f"standard deviation of each marker about the bone that it follows in {markers.name} [mm]: {told}",)
 
 
 @dataclass(frozen=True, eq=False)
-class Points:
+class PointTrajectories:
     """Positions (T, P, 3) of joints or markers, and where the joints are in the rest pose, if that is known."""
 
     names: tuple[str, ...]
@@ -189,11 +193,11 @@ class Points:
     rest_m: Floats | None
 
 
-def _look(name: str, points: Points, rate_hz: float) -> Inspection:
+def _inspect_points(name: str, points: PointTrajectories, rate_hz: float) -> Inspection:
     """The checks that need nothing but positions."""
     feet, up, doubts = _feet_and_up(points)
-    floor_m, contact_share = motion_checks.floor(points.position_m, feet)
-    speed_m_s, joint, frame = motion_checks.fastest(points.names, points.position_m, rate_hz)
+    floor_m, contact_share = motion_checks.estimate_floor(points.position_m, feet)
+    speed_m_s, joint, frame = motion_checks.find_fastest_joint(points.names, points.position_m, rate_hz)
     return Inspection(
         name=name,
         format="clip",
@@ -209,8 +213,8 @@ def _look(name: str, points: Points, rate_hz: float) -> Inspection:
         fastest_m_s=speed_m_s,
         fastest_joint=joint,
         fastest_frame=frame,
-        spikes=motion_checks.spikes(points.names, points.position_m, rate_hz),
-        frozen=motion_checks.frozen(points.position_m),
+        spikes=motion_checks.find_spikes(points.names, points.position_m, rate_hz),
+        frozen=motion_checks.find_frozen_frames(points.position_m),
         missing_share=0.0,
         missing_markers=(),
         limits_share=None,
@@ -220,13 +224,13 @@ def _look(name: str, points: Points, rate_hz: float) -> Inspection:
     )
 
 
-def _feet_and_up(points: Points) -> tuple[Ints, str, tuple[str, ...]]:
+def _feet_and_up(points: PointTrajectories) -> tuple[Ints, str, tuple[str, ...]]:
     """Points of the feet, what says that z is up, and what says that it is not."""
     if points.rest_m is None:
         return np.arange(len(points.names)), "", ()
     height = points.rest_m[:, 2]
     tall = np.ptp(height)
-    feet = np.flatnonzero(height < height.min() + FOOT_REACH * tall)
+    feet = np.flatnonzero(height < height.min() + FOOT_HEIGHT_SHARE * tall)
     head = int(height.argmax())
     rise = points.position_m[:, head] - points.position_m[:, feet].mean(axis=1)
     above = float(np.mean(rise[:, 2] > 0.5 * np.sqrt(np.sum(rise**2, axis=1))))
@@ -241,7 +245,7 @@ def _feet_and_up(points: Points) -> tuple[Ints, str, tuple[str, ...]]:
     return feet, up, tuple(doubts)
 
 
-def _rest_m(parents: Sequence[int], bone_m: Floats) -> Floats:
+def _rest_positions_m(parents: Sequence[int], bone_m: Floats) -> Floats:
     """(B + 1, 3) root and far ends in the rest pose [m]."""
     rest = np.zeros((len(parents) + 1, 3))
     for b, parent in enumerate(parents):
@@ -249,25 +253,25 @@ def _rest_m(parents: Sequence[int], bone_m: Floats) -> Floats:
     return rest
 
 
-def _standing_m(skeleton: Skeleton) -> float:
+def _standing_height_m(skeleton: Skeleton) -> float:
     """Height of the body with its legs and back straight, from the end of the head to the end of a foot [m]."""
     back = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
-    length = {name: float(skeleton.length_m[skeleton.index(name)]) for name in (*back, *LEG)}
+    length = {name: float(skeleton.length_m[skeleton.index(name)]) for name in (*back, *LEG_BONES)}
     drop = sum(
         float(-skeleton.bone_m[skeleton.index(bone), 2]) for bone in ("lhipjoint", "rhipjoint", "lfoot", "rfoot")
     )
-    return sum(length[bone] for bone in back) + 0.5 * (sum(length[bone] for bone in LEG) + drop)
+    return sum(length[bone] for bone in back) + 0.5 * (sum(length[bone] for bone in LEG_BONES) + drop)
 
 
-def _rate_of_index(path: Path, library: Path | str | None) -> tuple[float, str]:
+def _rate_from_index(path: Path, library: Path | str | None) -> tuple[float, str]:
     """The rate [Hz] by the index of `library`, or of a folder above the file; BadInput if none names the file."""
-    above = [folder for folder in path.resolve().parents if (folder / INDEX).is_file()]
+    above = [folder for folder in path.resolve().parents if (folder / INDEX_NAME).is_file()]
     for folder in [Path(library).resolve()] if library is not None else above[:1]:
         if path.resolve().is_relative_to(folder):
-            row = read_index(folder / INDEX).get(path.resolve().relative_to(folder).as_posix(), {})
+            row = read_index(folder / INDEX_NAME).get(path.resolve().relative_to(folder).as_posix(), {})
             if row.get("fps"):
-                return float(row["fps"]), f"from {INDEX} of the library"
+                return float(row["fps"]), f"from {INDEX_NAME} of the library"
     raise BadInput(
-        f"{path.name} does not say how many frames a second it has, as no AMC does, and no {INDEX} names it.",
+        f"{path.name} does not say how many frames a second it has, as no AMC does, and no {INDEX_NAME} names it.",
         "Give the rate (--rate HZ; CMU's clips have 120, some 60).",
     )

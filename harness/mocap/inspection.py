@@ -5,7 +5,7 @@ from typing import Any
 
 from harness.mocap.motion_checks import Spike
 
-SHOWN = 8
+MAX_LISTED_SPIKES = 8
 """So many spikes are spelled out; the rest are counted."""
 
 
@@ -55,12 +55,12 @@ class Inspection:
     @property
     def findings(self) -> tuple[str, ...]:
         """What is wrong, in words; () is a clean bill."""
-        found = [f"frame {s.frame}: {s.joint} is off by {s.speed_m_s:.1f} m/s" for s in self.spikes[:SHOWN]]
-        if len(self.spikes) > SHOWN:
-            found.append(f"and {len(self.spikes) - SHOWN} more frames with spikes")
+        found = [f"frame {s.frame}: {s.joint} is off by {s.speed_m_s:.1f} m/s" for s in self.spikes[:MAX_LISTED_SPIKES]]
+        if len(self.spikes) > MAX_LISTED_SPIKES:
+            found.append(f"and {len(self.spikes) - MAX_LISTED_SPIKES} more frames with spikes")
         found += [f"frames {first} to {last} are all the same" for first, last in self.frozen]
         if self.missing_share > 0.0:
-            labels = ", ".join(self.missing_markers[:SHOWN])
+            labels = ", ".join(self.missing_markers[:MAX_LISTED_SPIKES])
             found.append(f"{100 * self.missing_share:.2g} % of the marker positions are missing ({labels})")
         if self.limits_share:
             found.append(f"{100 * self.limits_share:.1f} % of the frames break a joint limit ({self.limits_worst})")

@@ -13,11 +13,11 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from harness.core.motion import Clip
-from harness.core.skeleton import unwrapped
+from harness.core.skeleton import unwrap_angles
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.read.file_checks import check_size
 
-INDEX = "manifest.csv"
+INDEX_NAME = "manifest.csv"
 FORMATS = ("amc", "bvh", "npz", "c3d")
 """By preference when a clip comes in several; the last holds markers and cannot be loaded as a clip."""
 
@@ -26,7 +26,7 @@ _CMU_NAME = re.compile(r"(\d+_\d+)(_poses|_stageii)?")
 
 
 @dataclass(frozen=True)
-class Entry:
+class LibraryEntry:
     """One clip of a library: its preferred file, and what the index knows."""
 
     name: str
@@ -62,9 +62,9 @@ class MotionLibrary:
         if not self.folder.is_dir():
             raise BadInput(f"{folder} is no folder.", "Name the folder of a motion library.")
         self._rate_hz = rate_hz
-        self._entries = _find(self.folder.resolve())
+        self._entries = _find_entries(self.folder.resolve())
 
-    def entries(self) -> tuple[Entry, ...]:
+    def entries(self) -> tuple[LibraryEntry, ...]:
         """Every clip, sorted by name."""
         return tuple(self._entries.values())
 
@@ -72,7 +72,7 @@ class MotionLibrary:
         """Clips that `load` can load."""
         return tuple(entry.name for entry in self.entries() if entry.format != "c3d")
 
-    def entry(self, name: str) -> Entry:
+    def entry(self, name: str) -> LibraryEntry:
         """What is known about a clip; UnknownName if there is none."""
         if name not in self._entries:
             raise UnknownName("clip", name, self._entries)
@@ -92,31 +92,31 @@ class MotionLibrary:
             behaviour=entry.behaviour,
         )
         notes = (entry.note, *clip.notes) if entry.note else clip.notes
-        return replace(clip, notes=notes, angles_rad=unwrapped(clip.skeleton, clip.angles_rad))
+        return replace(clip, notes=notes, angles_rad=unwrap_angles(clip.skeleton, clip.angles_rad))
 
-    def _read(self, entry: Entry) -> Clip:
+    def _read(self, entry: LibraryEntry) -> Clip:
         if entry.format == "c3d":
             raise BadInput(f"{entry.name} is a C3D file, which holds markers.", "Give its AMC, BVH or npz.")
         if entry.format == "bvh":
-            from harness.mocap.read.bvh import read_clip as read_bvh_clip
+            from harness.mocap.read.bvh import read_bvh_clip
 
             return read_bvh_clip(entry.path)
         if entry.format == "npz":
-            from harness.mocap.read.amass import read_clip as read_npz_clip
+            from harness.mocap.read.amass import read_amass_clip as read_npz_clip
 
             return read_npz_clip(entry.path)
-        from harness.mocap.read.acclaim import read_clip
+        from harness.mocap.read.acclaim import read_amc_clip
 
         rate_hz = entry.rate_hz or self._rate_hz
         if rate_hz is None:
             raise BadInput(
-                f"The rate of {entry.name} is not known: AMC files record none, and no {INDEX} names it.",
+                f"The rate of {entry.name} is not known: AMC files record none, and no {INDEX_NAME} names it.",
                 "Give the rate (--rate); CMU's clips have 120, some 60.",
             )
-        return read_clip(skeleton_file(entry.path, self.folder.resolve()), entry.path, rate_hz=rate_hz)
+        return read_amc_clip(find_skeleton_file(entry.path, self.folder.resolve()), entry.path, rate_hz=rate_hz)
 
 
-def skeleton_file(amc: Path, top: Path) -> Path:
+def find_skeleton_file(amc: Path, top: Path) -> Path:
     """The ASF of an AMC: called like its subject, beside it or above as far as `top`; else the only one beside it."""
     subject = amc.stem.split("_", 1)[0]
     for folder in amc.parents:
@@ -139,19 +139,19 @@ def clip_name(path: Path) -> str:
     return match[1] if match else path.stem
 
 
-def _find(top: Path) -> dict[str, Entry]:
-    index = read_index(top / INDEX)
+def _find_entries(top: Path) -> dict[str, LibraryEntry]:
+    index = read_index(top / INDEX_NAME)
     files: dict[str, list[Path]] = {}
     for path in sorted(top.rglob("*")):
         if path.suffix.lower().lstrip(".") in FORMATS and path.is_file() and path.resolve().is_relative_to(top):
             files.setdefault(clip_name(path), []).append(path)
-    return {name: _entry(name, files[name], top, index) for name in sorted(files)}
+    return {name: _make_entry(name, files[name], top, index) for name in sorted(files)}
 
 
-def _entry(name: str, files: list[Path], top: Path, index: Mapping[str, Mapping[str, str]]) -> Entry:
+def _make_entry(name: str, files: list[Path], top: Path, index: Mapping[str, Mapping[str, str]]) -> LibraryEntry:
     best, *others = sorted(files, key=lambda path: (FORMATS.index(path.suffix.lower().lstrip(".")), path))
     row = index.get(best.relative_to(top).as_posix(), {})
-    return Entry(
+    return LibraryEntry(
         name=name,
         format=best.suffix.lower().lstrip("."),
         path=best,
@@ -179,11 +179,11 @@ def read_index(path: Path) -> dict[str, dict[str, str]]:
         if not row.get("path"):
             raise BadFile(path, "a row without a path", "columns path, subject, behaviour, ...", "Repair it.", line)
         for column, kind in (("frames", int), ("fps", float)):
-            _check(path, row.get(column) or "", column, kind, line)
+            _check_number(path, row.get(column) or "", column, kind, line)
     return {row["path"]: row for _, row in rows}
 
 
-def _check(path: Path, word: str, column: str, kind: type[int] | type[float], line: int) -> None:
+def _check_number(path: Path, word: str, column: str, kind: type[int] | type[float], line: int) -> None:
     try:
         good = not word or 0 < kind(word) < 1e9
     except ValueError:

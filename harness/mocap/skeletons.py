@@ -10,7 +10,7 @@ from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.read.asf import read_asf
 
 
-def skeletons(folder: Path | str) -> dict[str, Skeleton]:
+def read_skeletons(folder: Path | str) -> dict[str, Skeleton]:
     """Subject -> skeleton [m], sorted by subject; a file is called like its subject, and copies of it count once.
 
     BadInput when there is none; BadFile for one that cannot be read, lacks a bone, or differs from its copy.
@@ -20,7 +20,7 @@ def skeletons(folder: Path | str) -> dict[str, Skeleton]:
     for path in sorted(top.rglob("*")):
         if path.suffix.lower() != ".asf" or not path.is_file() or not path.resolve().is_relative_to(top):
             continue
-        subject, read = path.stem.split("_", 1)[0], _read(path)
+        subject, read = path.stem.split("_", 1)[0], _read_skeleton(path)
         known = found.setdefault(subject, read)
         if not np.array_equal(known.bone_m, read.bone_m):
             raise BadFile(path, f"another skeleton of subject {subject}", "the same as its copy", "Remove one of them.")
@@ -29,7 +29,7 @@ def skeletons(folder: Path | str) -> dict[str, Skeleton]:
     return dict(sorted(found.items()))
 
 
-def _read(path: Path) -> Skeleton:
+def _read_skeleton(path: Path) -> Skeleton:
     whole = read_asf(path)
     try:
         return whole.subset(BONES)[0]

@@ -10,10 +10,10 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
 from harness.mocap import synthetic
 from harness.mocap.library import MotionLibrary
-from harness.mocap.skeletons import skeletons
+from harness.mocap.skeletons import read_skeletons
 
-VARIABLE = "HARNESS_MOCAP"
-PEOPLE = 100
+MOCAP_VARIABLE = "HARNESS_MOCAP"
+POPULATION_SIZE = 100
 """So many others there are beside the built-in performers: modes and spreads are then known to a tenth [choice]."""
 
 
@@ -44,16 +44,16 @@ class MotionSource(Protocol):
         ...
 
 
-def open_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | None) -> MotionSource:
+def open_motion_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | None) -> MotionSource:
     """`builtin`, or `cmu` from `folder` or else from HARNESS_MOCAP; BadInput when neither names one."""
     if kind == "builtin":
-        return BuiltIn(seed)
+        return SyntheticSource(seed)
     if kind != "cmu":
         raise UnknownName("motion source", kind, ("builtin", "cmu"))
-    return MotionFiles(MotionLibrary(library_folder(folder), rate_hz=rate_hz))
+    return LibrarySource(MotionLibrary(find_library_folder(folder), rate_hz=rate_hz))
 
 
-class BuiltIn:
+class SyntheticSource:
     """The built-in performer's takes; the seed is the scenario's."""
 
     title = synthetic.SOURCE
@@ -70,34 +70,37 @@ class BuiltIn:
             raise UnknownName("built-in take", name, self.names())
 
     def subject(self, name: str) -> str:
-        return _parts(name)[1]
+        return _parse_take_name(name)[1]
 
     def behaviour(self, name: str) -> str:
-        return _parts(name)[0]
+        return _parse_take_name(name)[0]
 
     def load(self, name: str) -> Clip:
         if name not in self._made:
-            behaviour, who, take = _parts(name)
+            behaviour, who, take = _parse_take_name(name)
             self._made[name] = synthetic.generate(behaviour, who, take, seed=self._seed)
         return self._made[name]
 
     def people(self, without: str) -> dict[str, Skeleton]:
         """Drawn from the performers' spread, whatever the seed; no performer is among them."""
-        return _others()
+        return _synthetic_population()
 
 
 @cache
-def _others() -> dict[str, Skeleton]:
-    return {f"other {number}": skeleton for number, skeleton in enumerate(synthetic.population(PEOPLE, seed=0), 1)}
+def _synthetic_population() -> dict[str, Skeleton]:
+    return {
+        f"other {number}": skeleton
+        for number, skeleton in enumerate(synthetic.sample_skeletons(POPULATION_SIZE, seed=0), 1)
+    }
 
 
-def _parts(name: str) -> tuple[str, str, int]:
+def _parse_take_name(name: str) -> tuple[str, str, int]:
     """Behaviour, performer and number of a built-in take such as "table_tennis_p1_03"."""
     behaviour, who, take = name.rsplit("_", 2)
     return behaviour, who, int(take)
 
 
-class MotionFiles:
+class LibrarySource:
     """Clips of a library."""
 
     title = "cmu"
@@ -127,19 +130,19 @@ class MotionFiles:
     def people(self, without: str) -> dict[str, Skeleton]:
         """The library's ASF skeletons; BadInput when there is none."""
         if self._people is None:
-            self._people = skeletons(self._library.folder)
+            self._people = read_skeletons(self._library.folder)
         return {subject: skeleton for subject, skeleton in self._people.items() if subject != without}
 
 
-def library_folder(folder: Path | None) -> Path:
+def find_library_folder(folder: Path | None) -> Path:
     """The folder of real motion that --mocap or HARNESS_MOCAP names; BadInput when there is none."""
-    named = folder or (Path(os.environ[VARIABLE]) if os.environ.get(VARIABLE) else None)
+    named = folder or (Path(os.environ[MOCAP_VARIABLE]) if os.environ.get(MOCAP_VARIABLE) else None)
     if named is None:
         raise BadInput(
             "This needs real motion, and no library was named.",
-            f"Give --mocap DIR or set {VARIABLE}; `harness mocap fetch cmu --subjects 13,14` downloads some; "
+            f"Give --mocap DIR or set {MOCAP_VARIABLE}; `harness mocap fetch cmu --subjects 13,14` downloads some; "
             "`harness demo` needs none.",
         )
     if not named.is_dir():
-        raise BadInput(f"{named} is no folder.", f"--mocap or {VARIABLE} names the folder of the motion library.")
+        raise BadInput(f"{named} is no folder.", f"--mocap or {MOCAP_VARIABLE} names the folder of the motion library.")
     return named

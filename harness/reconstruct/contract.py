@@ -8,7 +8,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.stream.frame import TrackerFrame
 
 if TYPE_CHECKING:
@@ -48,13 +48,13 @@ class Method(Protocol):
         """Whether `fit` learns from other takes; without it the result's protocol is "none"."""
         ...
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Reconstructor:
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Reconstructor:
         """Learn from takes at the tracker's rate, retargeted to `body`; never from the take under test."""
         ...
 
 
 @runtime_checkable
-class LearnsFromDatabase(Method, Protocol):
+class DatabaseMethod(Method, Protocol):
     """A method that can also learn from a database on disk, for which takes would not fit into memory.
 
     `fit(body, examples, rng)` of such a method is `fit_database(body, MotionDatabase.build(body, examples), rng)`.

@@ -19,10 +19,10 @@ from harness.core.compiled import compiled
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
-Pull = tuple[float, float, float, float, float, float]
+Wrench = tuple[float, float, float, float, float, float]
 
 
-class Chain(NamedTuple):
+class KinematicTree(NamedTuple):
     """B bodies, parents first and the root first of all; their V = 6 + hinges directions; S stations on them."""
 
     parent: Ints
@@ -47,7 +47,7 @@ class Chain(NamedTuple):
     """(S, 3)"""
 
 
-class Readings(NamedTuple):
+class StationTargets(NamedTuple):
     """What one frame asks for: rows are S positions, then S orientations."""
 
     target_m: Floats
@@ -60,7 +60,7 @@ class Readings(NamedTuple):
     """(2S,) of the Lorentzian; inf for plain squares."""
 
 
-class Tracker(NamedTuple):
+class MeasurementModel(NamedTuple):
     """How readings become targets."""
 
     turn: Floats
@@ -79,7 +79,7 @@ class Tracker(NamedTuple):
     """What a suspect reading counts beside that."""
 
 
-class Placed(NamedTuple):
+class KinematicState(NamedTuple):
     """Where a configuration puts the body."""
 
     at_m: Floats
@@ -100,7 +100,7 @@ class Placed(NamedTuple):
     """(6, D) of the station at hand by directions of each depth: how it moves, then how it turns."""
 
 
-def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
+def build_tree(body: Body, bones: Sequence[int], mount_m: Floats) -> KinematicTree:
     """Of a body, with stations on these bones (S,) at `mount_m` (S, 3)."""
     model, stations = body.model, body.bone_body_ids[np.asarray(bones)]
     hinges = np.array(model.body_dofnum[1:])
@@ -117,7 +117,7 @@ def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
         while model.body_dofnum[station] == 0:
             station = model.body_parentid[station]
         last.append(model.body_dofadr[station] + model.body_dofnum[station] - 1)
-    return Chain(
+    return KinematicTree(
         parent=np.array(model.body_parentid[1:] - 1, dtype=np.int64),
         start_m=np.array(model.body_pos[1:]),
         first_hinge=np.concatenate([[6], np.cumsum(hinges)]),
@@ -131,10 +131,10 @@ def chain(body: Body, bones: Sequence[int], mount_m: Floats) -> Chain:
     )
 
 
-def unplaced(chain: Chain) -> Placed:
+def new_state(chain: KinematicTree) -> KinematicState:
     """Arrays for one session."""
     bodies, directions, stations = len(chain.parent), len(chain.depth), len(chain.station_body)
-    return Placed(
+    return KinematicState(
         at_m=np.zeros((bodies, 3)),
         turned=np.zeros((bodies, 4)),
         axis=np.zeros((directions, 3)),
@@ -147,9 +147,9 @@ def unplaced(chain: Chain) -> Placed:
 
 
 @compiled
-def read(
-    tracker: Tracker,
-    readings: Readings,
+def update_targets(
+    tracker: MeasurementModel,
+    readings: StationTargets,
     position_m: Floats,
     turned: Floats,
     position_valid: Bools,
@@ -189,7 +189,7 @@ def read(
 
 
 @compiled
-def stand(chain: Chain, placed: Placed, qpos: Floats) -> None:
+def forward_kinematics(chain: KinematicTree, placed: KinematicState, qpos: Floats) -> None:
     """Forward kinematics of a configuration (V + 1,)."""
     at_m, turned, axis = placed.at_m, placed.turned, placed.axis
     length = np.sqrt(qpos[3] ** 2 + qpos[4] ** 2 + qpos[5] ** 2 + qpos[6] ** 2)
@@ -197,45 +197,47 @@ def stand(chain: Chain, placed: Placed, qpos: Floats) -> None:
         at_m[0, i] = qpos[i]
     for i in range(4):
         turned[0, i] = qpos[3 + i] / length
-    q = _four(turned[0])
-    axis[3], axis[4], axis[5] = _rotated(q, 1.0, 0.0, 0.0), _rotated(q, 0.0, 1.0, 0.0), _rotated(q, 0.0, 0.0, 1.0)
+    q = as_tuple(turned[0])
+    axis[3], axis[4], axis[5] = rotate(q, 1.0, 0.0, 0.0), rotate(q, 0.0, 1.0, 0.0), rotate(q, 0.0, 0.0, 1.0)
     for body in range(1, len(chain.parent)):
         parent, start = chain.parent[body], chain.start_m[body]
-        q = _four(turned[parent])
-        x, y, z = _rotated(q, start[0], start[1], start[2])
+        q = as_tuple(turned[parent])
+        x, y, z = rotate(q, start[0], start[1], start[2])
         at_m[body, 0], at_m[body, 1], at_m[body, 2] = at_m[parent, 0] + x, at_m[parent, 1] + y, at_m[parent, 2] + z
         for hinge in range(chain.first_hinge[body], chain.first_hinge[body + 1]):
             own, half = chain.axis[hinge], 0.5 * qpos[hinge + 1]
-            axis[hinge, 0], axis[hinge, 1], axis[hinge, 2] = _rotated(q, own[0], own[1], own[2])
+            axis[hinge, 0], axis[hinge, 1], axis[hinge, 2] = rotate(q, own[0], own[1], own[2])
             sine = np.sin(half)
-            q = _times(q, np.cos(half), sine * own[0], sine * own[1], sine * own[2])
+            q = quaternion_product(q, np.cos(half), sine * own[0], sine * own[1], sine * own[2])
         turned[body, 0], turned[body, 1], turned[body, 2], turned[body, 3] = q
     for s in range(len(chain.station_body)):
         body, mount = chain.station_body[s], chain.mount_m[s]
-        x, y, z = _rotated(_four(turned[body]), mount[0], mount[1], mount[2])
+        x, y, z = rotate(as_tuple(turned[body]), mount[0], mount[1], mount[2])
         placed.station_m[s] = at_m[body, 0] + x, at_m[body, 1] + y, at_m[body, 2] + z
 
 
 @compiled
-def stand_each(chain: Chain, placed: Placed, qpos: Floats, station_m: Floats, turned: Floats) -> None:
+def forward_kinematics_batch(
+    chain: KinematicTree, placed: KinematicState, qpos: Floats, station_m: Floats, turned: Floats
+) -> None:
     """The same of many (T, V + 1): their stations (T, S, 3) and the orientations of the bones under them (T, S, 4)."""
     for t in range(len(qpos)):
-        stand(chain, placed, qpos[t])
+        forward_kinematics(chain, placed, qpos[t])
         station_m[t] = placed.station_m
         for s in range(len(chain.station_body)):
             turned[t, s] = placed.turned[chain.station_body[s]]
 
 
 @compiled
-def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> float:
+def evaluate(chain: KinematicTree, readings: StationTargets, placed: KinematicState, qpos: Floats) -> float:
     """Stands the body, then errors and weights; the data cost."""
-    stand(chain, placed, qpos)
+    forward_kinematics(chain, placed, qpos)
     count, cost = len(chain.station_body), 0.0
     for s in range(count):
         placed.error[s] = readings.target_m[s] - placed.station_m[s]
         q = placed.turned[chain.station_body[s]]
-        placed.error[count + s] = _rotation_vector(
-            *_times(_four(readings.world_from_target[s]), q[0], -q[1], -q[2], -q[3])
+        placed.error[count + s] = rotation_vector(
+            *quaternion_product(as_tuple(readings.world_from_target[s]), q[0], -q[1], -q[2], -q[3])
         )
     for row in range(2 * count):
         error, precision, scale = placed.error[row], readings.precision[row], readings.twice_scale_squared[row]
@@ -250,7 +252,9 @@ def place(chain: Chain, readings: Readings, placed: Placed, qpos: Floats) -> flo
 
 
 @compiled
-def normal_equations(chain: Chain, placed: Placed, hessian: Floats, descent: Floats, bent: bool = False) -> None:
+def normal_equations(
+    chain: KinematicTree, placed: KinematicState, hessian: Floats, descent: Floats, bent: bool = False
+) -> None:
     """Gauss and Newton's matrix (V, V), lower triangle, zero elsewhere, the curvature added if asked; the descent."""
     rows = np.empty(chain.inwards.shape)
     normal_rows(chain, placed, rows, descent)
@@ -263,16 +267,16 @@ def normal_equations(chain: Chain, placed: Placed, hessian: Floats, descent: Flo
 
 
 @compiled
-def normal_rows(chain: Chain, placed: Placed, rows: Floats, descent: Floats) -> None:
+def normal_rows(chain: KinematicTree, placed: KinematicState, rows: Floats, descent: Floats) -> None:
     """The same as rows (V, D)."""
     rows[:], descent[:] = 0.0, 0.0
     count = len(chain.station_body)
-    m0, m1, m2, t0, t1, t2 = _each(placed.slope)
+    m0, m1, m2, t0, t1, t2 = _jacobian_rows(placed.slope)
     for s in range(count):
         moving, turning = placed.weight[s], placed.weight[count + s]
         if moving == 0.0 and turning == 0.0:
             continue
-        _slopes(chain, placed, s)
+        _station_jacobian(chain, placed, s)
         off, twist = placed.error[s], placed.error[count + s]
         for d in range(chain.depth[chain.last[s]] + 1):
             i = chain.inwards[chain.last[s], d]
@@ -286,7 +290,7 @@ def normal_rows(chain: Chain, placed: Placed, rows: Floats, descent: Floats) -> 
 
 
 @compiled
-def add_curvature(chain: Chain, placed: Placed, rows: Floats) -> None:
+def add_curvature(chain: KinematicTree, placed: KinematicState, rows: Floats) -> None:
     """Adds to rows (V, D) what Gauss and Newton leave out.
 
     A hinge j turns the slope J_i of everything beyond it: the derivative of J_i by q_j is a_j x J_i where i lies
@@ -294,37 +298,37 @@ def add_curvature(chain: Chain, placed: Placed, rows: Floats) -> None:
     this term outweighs the prior as soon as residuals reach 1 mm.
     """
     count, slope = len(chain.station_body), placed.slope
-    _, _, _, t0, t1, t2 = _each(slope)
+    _, _, _, t0, t1, t2 = _jacobian_rows(slope)
     for s in range(count):
         moving, turning = placed.weight[s], 0.5 * placed.weight[count + s]
         if moving == 0.0 and turning == 0.0:
             continue
-        _slopes(chain, placed, s)
+        _station_jacobian(chain, placed, s)
         off, twist = placed.error[s], placed.error[count + s]
         pull = (
             *(moving * off[0], moving * off[1], moving * off[2]),
             *(turning * twist[0], turning * twist[1], turning * twist[2]),
         )
         for d in range(3, chain.depth[chain.last[s]] + 1):
-            x, y, z = _across(pull, slope, d)
+            x, y, z = _wrench_cross(pull, slope, d)
             row = rows[chain.inwards[chain.last[s], d]]
             if d >= 6:
                 for e in range(3, d + 1):
                     row[e] += x * t0[e] + y * t1[e] + z * t2[e]
                 continue
             for e in range(3, d + 1):  # the root turns all three ways at once: the mean of both orders
-                x1, y1, z1 = _across(pull, slope, e)
+                x1, y1, z1 = _wrench_cross(pull, slope, e)
                 here = x * t0[e] + y * t1[e] + z * t2[e]
                 row[e] += 0.5 * (here + x1 * t0[d] + y1 * t1[d] + z1 * t2[d])
 
 
 @compiled
-def _each(slope: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+def _jacobian_rows(slope: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
     return slope[0], slope[1], slope[2], slope[3], slope[4], slope[5]
 
 
 @compiled
-def _across(pull: Pull, slope: Floats, d: int) -> Vector:
+def _wrench_cross(pull: Wrench, slope: Floats, d: int) -> Vector:
     """What moves times how a station moves by the direction of a depth, plus what turns times how it turns."""
     p0, p1, p2, u0, u1, u2 = pull
     m0, m1, m2, t0, t1, t2 = slope[0, d], slope[1, d], slope[2, d], slope[3, d], slope[4, d], slope[5, d]
@@ -336,7 +340,7 @@ def _across(pull: Pull, slope: Floats, d: int) -> Vector:
 
 
 @compiled
-def _slopes(chain: Chain, placed: Placed, station: int) -> None:
+def _station_jacobian(chain: KinematicTree, placed: KinematicState, station: int) -> None:
     """How the station moves and turns by every direction that moves it."""
     slope, at, last = placed.slope, placed.station_m[station], chain.last[station]
     slope[:, :3] = 0.0
@@ -349,7 +353,7 @@ def _slopes(chain: Chain, placed: Placed, station: int) -> None:
         slope[3, d], slope[4, d], slope[5, d] = a[0], a[1], a[2]
 
 
-class Model(NamedTuple):
+class QuadraticModel(NamedTuple):
     """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, and what finding its minimum takes."""
 
     hessian: Floats
@@ -376,12 +380,12 @@ class Model(NamedTuple):
     bend: Floats
 
 
-def unsolved(chain: Chain) -> Model:
+def new_quadratic_model(chain: KinematicTree) -> QuadraticModel:
     """Arrays for one solver."""
     directions = len(chain.depth)
     gradient, step, away, slope, toward, there, gone, bend = np.zeros((8, directions))
     hessian, bent, factor = np.zeros((3, *chain.inwards.shape))
-    return Model(
+    return QuadraticModel(
         hessian,
         bent,
         gradient,
@@ -400,7 +404,7 @@ def unsolved(chain: Chain) -> Model:
     )
 
 
-class Trust(NamedTuple):
+class PriorAndLimits(NamedTuple):
     """A Gaussian prior, the hinges' limits, and when to stop."""
 
     mean: Floats
@@ -415,21 +419,26 @@ class Trust(NamedTuple):
     most_steps: int
 
 
-_DAMPING, _RAISE, _LOWER = 0.3, 10.0, 3.0
-_MODEST = 30.0
+_INITIAL_DAMPING, DAMPING_INCREASE, DAMPING_DECREASE = 0.3, 10.0, 3.0
+_MAX_CONVERGED_DAMPING = 30.0
 """Damping that still lets a step go where it wants: as a prior, 10 deg about the present pose [1/rad^2]."""
-_GOOD, _FAIR = 0.9, 0.5
+_GOOD_GAIN_RATIO, _FAIR_GAIN_RATIO = 0.9, 0.5
 """Shares of a step's promise kept: the plain model will do from the one, damping may fall from the other."""
-_LONGEST_TURN_RAD = 1.0
-_SMALL = 1e-2
+_MAX_STEP_RAD = 1.0
+_MAX_FINAL_STEP = 1e-2
 """A step that promises next to nothing is still taken when it is no larger [m, rad]."""
-_NOTHING = 1e-12
+_MIN_DECREASE = 1e-12
 """A promise, as a log likelihood, that rounding makes."""
 
 
 @compiled
-def descend(
-    chain: Chain, readings: Readings, placed: Placed, model: Model, trust: Trust, qpos: Floats
+def minimise(
+    chain: KinematicTree,
+    readings: StationTargets,
+    placed: KinematicState,
+    model: QuadraticModel,
+    trust: PriorAndLimits,
+    qpos: Floats,
 ) -> tuple[float, int, bool]:
     """Takes a configuration (V + 1,) downhill, in place: the cost before the last step, the steps, if it converged.
 
@@ -438,8 +447,8 @@ def descend(
     for i in range(7, len(qpos)):
         qpos[i] = min(max(qpos[i], trust.low_rad[i - 7]), trust.high_rad[i - 7])
     hessian, gradient, step, moved = model.hessian, model.gradient, model.step, model.moved
-    cost = place(chain, readings, placed, qpos) + _prior_cost(trust, qpos, model.away)
-    damping, kept, fresh = _DAMPING, 1.0, False
+    cost = evaluate(chain, readings, placed, qpos) + _prior_cost(trust, qpos, model.away)
+    damping, kept, fresh = _INITIAL_DAMPING, 1.0, False
     for steps in range(1, trust.most_steps + 1):
         if not fresh:
             normal_rows(chain, placed, hessian, gradient)
@@ -451,31 +460,31 @@ def descend(
                 model.high[i] = max(trust.high_rad[i - 6] - qpos[i + 1], 0.0)
             fresh = True
         solved = False
-        if kept < _GOOD:
+        if kept < _GOOD_GAIN_RATIO:
             model.bent[:] = hessian
             add_curvature(chain, placed, model.bent)
-            solved = lowest(chain, model, model.bent)
-        if not solved and not lowest(chain, model, hessian):
+            solved = solve_box_qp(chain, model, model.bent)
+        if not solved and not solve_box_qp(chain, model, hessian):
             return cost, -1, False
-        promised, longest = -0.5 * _dot(gradient, step), np.abs(step).max()
-        if longest > _LONGEST_TURN_RAD:
-            step[3:] *= min(1.0, _LONGEST_TURN_RAD / np.abs(step[3:]).max())
-        _move(qpos, step, moved)
-        if damping <= _MODEST and (longest < trust.step or promised < trust.decrease):
-            if longest < _SMALL:
+        promised, longest = -0.5 * dot(gradient, step), np.abs(step).max()
+        if longest > _MAX_STEP_RAD:
+            step[3:] *= min(1.0, _MAX_STEP_RAD / np.abs(step[3:]).max())
+        _integrate(qpos, step, moved)
+        if damping <= _MAX_CONVERGED_DAMPING and (longest < trust.step or promised < trust.decrease):
+            if longest < _MAX_FINAL_STEP:
                 qpos[:] = moved
             return cost, steps, True
-        new_cost = place(chain, readings, placed, moved) + _prior_cost(trust, moved, model.away)
+        new_cost = evaluate(chain, readings, placed, moved) + _prior_cost(trust, moved, model.away)
         kept = (cost - new_cost) / promised
         if new_cost < cost:
             qpos[:] = moved
             cost, fresh = new_cost, False
-            damping = max(_DAMPING, damping / _LOWER) if kept > _FAIR else damping
+            damping = max(_INITIAL_DAMPING, damping / DAMPING_DECREASE) if kept > _FAIR_GAIN_RATIO else damping
             if cost < trust.decrease:
                 return cost, steps, True
         else:
-            place(chain, readings, placed, qpos)
-            more = max(_RAISE, damping * _RAISE)
+            evaluate(chain, readings, placed, qpos)
+            more = max(DAMPING_INCREASE, damping * DAMPING_INCREASE)
             for i in range(len(step)):
                 hessian[i, chain.depth[i]] += more - damping
             damping = more
@@ -483,12 +492,12 @@ def descend(
 
 
 @compiled
-def _prior_cost(trust: Trust, qpos: Floats, away: Floats) -> float:
+def _prior_cost(trust: PriorAndLimits, qpos: Floats, away: Floats) -> float:
     """Fills in the tangent step from a configuration to the prior's mean."""
     mean, q, cost = trust.mean, qpos[3:7], 0.0
     away[:3] = mean[:3] - qpos[:3]
     w, x, y, z = mean[3], mean[4], mean[5], mean[6]
-    away[3], away[4], away[5] = _rotation_vector(*_times((q[0], -q[1], -q[2], -q[3]), w, x, y, z))
+    away[3], away[4], away[5] = rotation_vector(*quaternion_product((q[0], -q[1], -q[2], -q[3]), w, x, y, z))
     away[6:] = mean[7:] - qpos[7:]
     for i in range(len(away)):
         cost += 0.5 * trust.precision[i] * away[i] ** 2
@@ -496,19 +505,21 @@ def _prior_cost(trust: Trust, qpos: Floats, away: Floats) -> float:
 
 
 @compiled
-def _move(qpos: Floats, step: Floats, moved: Floats) -> None:
+def _integrate(qpos: Floats, step: Floats, moved: Floats) -> None:
     """The configuration one tangent step on: root translation in world axes, root turn in its own, hinges."""
     moved[:3] = qpos[:3] + step[:3]
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
     sine = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
-    turned = _times(_four(qpos[3:7]), np.cos(0.5 * angle), sine * step[3], sine * step[4], sine * step[5])
+    turned = quaternion_product(
+        as_tuple(qpos[3:7]), np.cos(0.5 * angle), sine * step[3], sine * step[4], sine * step[5]
+    )
     moved[3], moved[4], moved[5], moved[6] = turned
-    moved[3:7] /= np.sqrt(_dot(moved[3:7], moved[3:7]))
+    moved[3:7] /= np.sqrt(dot(moved[3:7], moved[3:7]))
     moved[7:] = qpos[7:] + step[6:]
 
 
 @compiled
-def lowest(chain: Chain, model: Model, hessian: Floats) -> bool:
+def solve_box_qp(chain: KinematicTree, model: QuadraticModel, hessian: Floats) -> bool:
     """Fills in `model.step` by projected Newton steps (Tassa et al. 2014); 0 must lie within the bounds.
 
     False unless H is positive definite on the directions that the bounds leave free.
@@ -529,10 +540,10 @@ def lowest(chain: Chain, model: Model, hessian: Floats) -> bool:
             toward[i] = 0.0 if clamped else -slope[i]
         if whole and not changed:
             return True
-        if changed and not _factored(chain, hessian, model.clamped, model.factor):
+        if changed and not _factorise(chain, hessian, model.clamped, model.factor):
             return False
-        _solve(chain, model.factor, toward)
-        if not _dot(slope, toward) < -_NOTHING:
+        _solve_factorised(chain, model.factor, toward)
+        if not dot(slope, toward) < -_MIN_DECREASE:
             return True
         share, bound = 1.0, 0
         while True:
@@ -547,8 +558,8 @@ def lowest(chain: Chain, model: Model, hessian: Floats) -> bool:
             if whole and bound == 0:
                 x[:] = there
                 return True
-            _product(chain, hessian, gone, bend)
-            if whole or promised + 0.5 * _dot(gone, bend) <= 0.1 * promised or share < 1e-9:
+            _multiply_symmetric(chain, hessian, gone, bend)
+            if whole or promised + 0.5 * dot(gone, bend) <= 0.1 * promised or share < 1e-9:
                 break
             share *= 0.5
         for i in range(len(x)):
@@ -558,7 +569,7 @@ def lowest(chain: Chain, model: Model, hessian: Floats) -> bool:
 
 
 @compiled
-def _factored(chain: Chain, hessian: Floats, clamped: Bools, factor: Floats) -> bool:
+def _factorise(chain: KinematicTree, hessian: Floats, clamped: Bools, factor: Floats) -> bool:
     """L^T D L of the free directions, D last in each row; False unless positive definite (Featherstone 2008, 6.5)."""
     for k in range(len(factor)):
         for d in range(chain.depth[k] + 1):
@@ -580,7 +591,7 @@ def _factored(chain: Chain, hessian: Floats, clamped: Bools, factor: Floats) -> 
 
 
 @compiled
-def _solve(chain: Chain, factor: Floats, x: Floats) -> None:
+def _solve_factorised(chain: KinematicTree, factor: Floats, x: Floats) -> None:
     """x := (L^T D L)^-1 x"""
     for k in range(len(x) - 1, -1, -1):
         for d in range(chain.depth[k]):
@@ -592,7 +603,7 @@ def _solve(chain: Chain, factor: Floats, x: Floats) -> None:
 
 
 @compiled
-def _product(chain: Chain, hessian: Floats, x: Floats, out: Floats) -> None:
+def _multiply_symmetric(chain: KinematicTree, hessian: Floats, x: Floats, out: Floats) -> None:
     """H x."""
     for k in range(len(x)):
         out[k] = hessian[k, chain.depth[k]] * x[k]
@@ -603,7 +614,7 @@ def _product(chain: Chain, hessian: Floats, x: Floats, out: Floats) -> None:
 
 
 @compiled
-def _dot(a: Floats, b: Floats) -> float:
+def dot(a: Floats, b: Floats) -> float:
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -611,12 +622,12 @@ def _dot(a: Floats, b: Floats) -> float:
 
 
 @compiled
-def _four(q: Floats) -> Quaternion:
+def as_tuple(q: Floats) -> Quaternion:
     return q[0], q[1], q[2], q[3]
 
 
 @compiled
-def _times(q: Quaternion, w: float, x: float, y: float, z: float) -> Quaternion:
+def quaternion_product(q: Quaternion, w: float, x: float, y: float, z: float) -> Quaternion:
     """The product of two quaternions."""
     return (
         q[0] * w - q[1] * x - q[2] * y - q[3] * z,
@@ -627,7 +638,7 @@ def _times(q: Quaternion, w: float, x: float, y: float, z: float) -> Quaternion:
 
 
 @compiled
-def _rotated(q: Quaternion, x: float, y: float, z: float) -> Vector:
+def rotate(q: Quaternion, x: float, y: float, z: float) -> Vector:
     """A vector turned by a unit quaternion."""
     u, v, w = q[2] * z - q[3] * y, q[3] * x - q[1] * z, q[1] * y - q[2] * x
     return (
@@ -638,14 +649,14 @@ def _rotated(q: Quaternion, x: float, y: float, z: float) -> Vector:
 
 
 @compiled
-def _rotation_vector(w: float, x: float, y: float, z: float) -> Vector:
+def rotation_vector(w: float, x: float, y: float, z: float) -> Vector:
     """`rotations.log` of one quaternion, the short way round."""
     sine = np.sqrt(x * x + y * y + z * z) + 1e-12
     factor = np.arctan2(sine, abs(w)) / sine * (2.0 if w >= 0.0 else -2.0)
     return factor * x, factor * y, factor * z
 
 
-class Space(NamedTuple):
+class Subspace(NamedTuple):
     """Postures near p, P numbers each, that leave it by nothing along N, at a cost of 1/2 a^T A a - b^T a for leaving
     it by a. `subspace.spanned` makes it: touch that file when fields change here, for compiled code is kept by file."""
 
@@ -661,64 +672,69 @@ class Space(NamedTuple):
     """(P,) what of the diagonal of A is the spring's."""
 
 
-_WITHIN_DAMPING, _LEAST = 1e-3, 1e-6
+_INITIAL_DAMPING, _MIN_DIAGONAL = 1e-3, 1e-6
 """Of the first step among the postures of a space; what keeps a step of 0 where nothing was read about the ground."""
 
 
 @compiled
-def descend_within(
-    chain: Chain, readings: Readings, placed: Placed, space: Space, stop: tuple[float, float, int], z: Floats
+def minimise_in_subspace(
+    chain: KinematicTree,
+    readings: StationTargets,
+    placed: KinematicState,
+    space: Subspace,
+    stop: tuple[float, float, int],
+    z: Floats,
 ) -> tuple[Floats, float, int, bool]:
     """Levenberg and Marquardt's method among the postures of a space, from a ground frame and a posture z (3 + P,).
 
     `stop` is step, decrease, and most steps (`solver.Stopping`). The configuration (V + 1,), its cost, the steps,
-    whether it converged; -1 steps as for `descend`.
+    whether it converged; -1 steps as for `minimise`.
     """
     directions = len(chain.depth)
     hessian, descent = np.zeros((directions, directions)), np.empty(directions)
     normal, gradient = np.empty((len(z), len(z))), np.empty(len(z))
-    z[3:] = nearest(space, z[3:])
-    qpos = stood(z[3:], z[:3])
-    cost = place(chain, readings, placed, qpos) + cost_within(space, z[3:])
-    damping = _WITHIN_DAMPING
+    z[3:] = project_posture(space, z[3:])
+    qpos = qpos_from_posture(z[3:], z[:3])
+    cost = evaluate(chain, readings, placed, qpos) + subspace_cost(space, z[3:])
+    damping = _INITIAL_DAMPING
     for steps in range(1, stop[2] + 1):
         normal_equations(chain, placed, hessian, descent)
-        refer(space, z, hessian, descent, normal, gradient)
+        to_subspace(space, z, hessian, descent, normal, gradient)
         while True:
-            step = damped(space, normal, gradient, damping)
+            step = solve_damped(space, normal, gradient, damping)
             longest = np.abs(step).max()
             if not np.isfinite(longest):
                 return qpos, cost, -1, False
             there = z + step
-            moved = stood(there[3:], there[:3])
-            new_cost = place(chain, readings, placed, moved) + cost_within(space, there[3:])
+            moved = qpos_from_posture(there[3:], there[:3])
+            new_cost = evaluate(chain, readings, placed, moved) + subspace_cost(space, there[3:])
             if new_cost <= cost or longest < stop[0]:
                 break
-            damping *= _RAISE
+            damping *= DAMPING_INCREASE
         converged = longest < stop[0] or cost - new_cost < stop[1]
         if new_cost <= cost:
-            z, qpos, cost, damping = there, moved, new_cost, damping / _LOWER
+            z, qpos, cost, damping = there, moved, new_cost, damping / DAMPING_DECREASE
         if converged:
             return qpos, cost, steps, True
     return qpos, cost, stop[2], False
 
 
 @compiled
-def nearest(space: Space, posture: Floats) -> Floats:
+def project_posture(space: Subspace, posture: Floats) -> Floats:
     """The posture (P,) of the space that is nearest to one."""
     out: Floats = posture - np.dot(np.dot(space.across, posture - space.mean), space.across)
     return out
 
 
 @compiled
-def cost_within(space: Space, posture: Floats) -> float:
+def subspace_cost(space: Subspace, posture: Floats) -> float:
     """Of a posture (P,)."""
     away = posture - space.mean
-    return _dot(away, 0.5 * np.dot(space.curvature, away) - space.pull)
+    return dot(away, 0.5 * np.dot(space.curvature, away) - space.pull)
 
 
 @compiled
-def stood(posture: Floats, ground: Floats) -> Floats:
+def qpos_from_posture(posture: Floats, ground: Floats) -> Floats:
     """The configuration (P + 3,) of a posture (P,), height, tilt and hinges, on a ground frame (3,)."""
     out = np.empty(len(posture) + 3)
     out[0], out[1], out[2] = ground[0], ground[1], posture[0]
@@ -732,7 +748,7 @@ def stood(posture: Floats, ground: Floats) -> Floats:
 
 
 @compiled
-def _root_slope(z: Floats) -> Floats:
+def _root_jacobian(z: Floats) -> Floats:
     """(4, 3) how the root turns, in its own axes, as yaw and tilt (3) do.
 
     Its turn is about_z(yaw) exp(tilt): yaw turns it about exp(-tilt) z, and tilt by its right Jacobian.
@@ -754,12 +770,12 @@ def _root_slope(z: Floats) -> Floats:
 
 
 @compiled
-def refer(space: Space, z: Floats, hessian: Floats, descent: Floats, normal: Floats, gradient: Floats) -> None:
+def to_subspace(space: Subspace, z: Floats, hessian: Floats, descent: Floats, normal: Floats, gradient: Floats) -> None:
     """Makes normal equations (3 + P, 3 + P), lower triangle, and descent of z from those of the solver's directions.
 
     Hinges are the same in both; so are the root's moves, with the height after the yaw. The space's cost is added.
     """
-    slope, root, turn, curvature = np.zeros((7, 6)), np.empty((6, 6)), _root_slope(z), space.curvature
+    slope, root, turn, curvature = np.zeros((7, 6)), np.empty((6, 6)), _root_jacobian(z), space.curvature
     slope[0, 0] = slope[1, 1] = slope[3, 2] = 1.0
     slope[2, 3:], slope[4:, 3:] = turn[0], turn[1:]
     for k in range(6):
@@ -781,15 +797,15 @@ def refer(space: Space, z: Floats, hessian: Floats, descent: Floats, normal: Flo
 
 
 @compiled
-def damped(space: Space, normal: Floats, gradient: Floats, damping: float) -> Floats:
+def solve_damped(space: Subspace, normal: Floats, gradient: Floats, damping: float) -> Floats:
     """Levenberg and Marquardt's step (3 + P,) within the space; NaN when the matrix is not positive definite."""
     factor, step = normal.copy(), gradient.copy()
     count = len(step)
     for k in range(count):
         if k >= 3:
             factor[k, k] -= space.spring[k - 3] * (damping / (1.0 + damping))  # the spring is not damped
-        factor[k, k] = factor[k, k] * (1.0 + damping) + _LEAST
-    for k in range(count - 1, -1, -1):  # L^T D L, as `_factored`
+        factor[k, k] = factor[k, k] * (1.0 + damping) + _MIN_DIAGONAL
+    for k in range(count - 1, -1, -1):  # L^T D L, as `_factorise`
         pivot = factor[k]
         if not pivot[k] > 0.0:
             step[:] = np.nan

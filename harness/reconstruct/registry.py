@@ -17,8 +17,8 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, cast
 
-from harness.core.fields import changed
-from harness.core.options import named, split
+from harness.core.fields import replace_fields
+from harness.core.options import parse_name, split_outside_brackets
 from harness.errors import BadInput, HarnessError, UnknownName
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods import dynamic_map, ik
@@ -31,7 +31,7 @@ from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.reconstruct.methods.weighted_blend import WeightedBlend
 
 GROUP = "harness.methods"
-_SAYS = ("name", "summary", "needs_examples", "fit")
+_REQUIRED_ATTRIBUTES = ("name", "summary", "needs_examples", "fit")
 """What everything that is a method has; none of it is an option."""
 
 
@@ -73,35 +73,35 @@ def origin(name: str) -> str:
 
 def resolve(name: str) -> Method:
     """The method of that name, with options as in `best_match[matching=tree]+ik`; UnknownName, BadInput."""
-    base, *suffixes = split(name, "+")
-    plain, options = named(base)
-    method = configured(_plain(plain), options, base)
+    base, *suffixes = split_outside_brackets(name, "+")
+    plain, options = parse_name(base)
+    method = with_options(_base_method(plain), options, base)
     for suffix in suffixes:
-        plain, options = named(suffix)
+        plain, options = parse_name(suffix)
         if f"+{plain}" != SUFFIX:
             raise UnknownName("method", name, methods())
-        method = configured(CleanUp(method), options, method.name + SUFFIX)
+        method = with_options(CleanUp(method), options, method.name + SUFFIX)
     return method
 
 
 def without_options(name: str) -> str:
     """`best_match[matching=tree]+ik` as `best_match+ik`."""
-    return "+".join(named(part)[0] for part in split(name, "+"))
+    return "+".join(parse_name(part)[0] for part in split_outside_brackets(name, "+"))
 
 
-def configured(method: Method, options: Mapping[str, Any], name: str) -> Method:
+def with_options(method: Method, options: Mapping[str, Any], name: str) -> Method:
     """A copy of that name with other options, the fields of its dataclass; UnknownName, BadInput."""
     if not options:
         return method
     if not dataclasses.is_dataclass(method) or isinstance(method, type):
         raise BadInput(f"{method.name} takes no options.", "Those of a method are the fields of its dataclass.")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
-    known = [field for field in fields if field not in _SAYS]
+    known = [field for field in fields if field not in _REQUIRED_ATTRIBUTES]
     for option in options:
         if option not in known:
             raise UnknownName(f"option of {method.name}", option, known)
     try:
-        copy = changed(method, options, method.name, infinite=True)
+        copy = replace_fields(method, options, method.name, infinite=True)
         return cast(Method, dataclasses.replace(copy, name=name) if "name" in fields else copy)
     except HarnessError:
         raise
@@ -109,17 +109,17 @@ def configured(method: Method, options: Mapping[str, Any], name: str) -> Method:
         raise BadInput(f"{error}.", f"Options of {method.name}: {', '.join(known)}.") from error
 
 
-def _plain(name: str) -> Method:
+def _base_method(name: str) -> Method:
     known = methods()
     if name in known:
         return known[name]()
     module, colon, attribute = name.partition(":")
-    if not colon or not attribute or module in known or not _exists(module):
+    if not colon or not attribute or module in known or not _module_exists(module):
         raise UnknownName("method", name, known)
     try:
         found = getattr(importlib.import_module(module), attribute, None)
         if found is None:
-            raise UnknownName(f"method in {module}", attribute, _public(module))
+            raise UnknownName(f"method in {module}", attribute, _public_classes(module))
         method: Method = found()
     except HarnessError:
         raise
@@ -127,7 +127,7 @@ def _plain(name: str) -> Method:
         raise BadInput(
             f"{name} cannot be made: {type(error).__name__}: {error}.", "Does it import, and need no arguments?"
         ) from error
-    missing = [m for m in _SAYS if not hasattr(method, m)]
+    missing = [m for m in _REQUIRED_ATTRIBUTES if not hasattr(method, m)]
     if missing:
         raise BadInput(
             f"{name} is not a method: it has no {' and no '.join(missing)}.",
@@ -152,7 +152,7 @@ def source_hash(method: Method) -> str:
         top = sys.modules.get(type(inner).__module__.partition(".")[0])
         package = tuple(top.__path__) if top is not None and hasattr(top, "__path__") else ()
         digest.update(
-            Path(file).name.encode() + b"\0" + (_package_hash(package) if package else _lone_hash(Path(file)))
+            Path(file).name.encode() + b"\0" + (_package_hash(package) if package else _file_hash(Path(file)))
         )
         inner = getattr(inner, "method", None)
     return digest.hexdigest()
@@ -164,7 +164,7 @@ def _package_hash(folders: tuple[str, ...]) -> bytes:
     return _hash_of(part for folder in folders for part in Path(folder).rglob("*.py"))
 
 
-def _lone_hash(file: Path) -> bytes:
+def _file_hash(file: Path) -> bytes:
     """Of a method's file and what it imports from its folder."""
     found, waiting = set(), [file]
     while waiting:
@@ -185,12 +185,12 @@ def _hash_of(files: Iterable[Path]) -> bytes:
     return digest.digest()
 
 
-def _exists(module: str) -> bool:
+def _module_exists(module: str) -> bool:
     try:
         return importlib.util.find_spec(module) is not None
     except (ImportError, ValueError):
         return False
 
 
-def _public(module: str) -> list[str]:
+def _public_classes(module: str) -> list[str]:
     return sorted(name for name, what in vars(importlib.import_module(module)).items() if inspect.isclass(what))

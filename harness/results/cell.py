@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.files import TEMPORARY, as_json, plain, read_json
+from harness.core.files import TEMPORARY, read_json, to_json, to_json_types
 from harness.errors import BadFile, ShapeError
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
@@ -37,18 +37,18 @@ IDENTITY = (
     "seed",
 )
 """What a row of the summary says about its cell first, in this order."""
-FURTHER = ("scenario", "performer", "varied")
+EXTRA_IDENTITY = ("scenario", "performer", "varied")
 """What it says besides."""
-CARRIED = (*FURTHER, "key", "source_hash", "health", "calibration_errors")
+TRAILING_COLUMNS = (*EXTRA_IDENTITY, "key", "source_hash", "health", "calibration_errors")
 """What a row has after the metrics."""
 _TEXTS = (
-    *(*IDENTITY, *FURTHER, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
+    *(*IDENTITY, *EXTRA_IDENTITY, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
 )
 _FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "step_cpu_ms", "reference_cpu_ms", "quality")
 _INTS = ("frame_index", "status")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
-_ERROR = "error."
+_ERROR_PREFIX = "error."
 _ADVICE = "Delete the cell's folder and run again; finished cells are kept."
 
 
@@ -166,9 +166,9 @@ def write_cell(out: Path, cell: Cell) -> Path:
     content = {name: getattr(cell, name) for name in _TEXTS}
     content |= {"metrics": cell.scores.metrics, "per_joint": cell.scores.per_joint, "metric_versions": VERSIONS}
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
-    columns |= {_ERROR + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
+    columns |= {_ERROR_PREFIX + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
     columns["scored"] = cell.scores.scored
-    whole = {"cell.json": as_json(content).encode(), "frames.npz": _packed(columns)}
+    whole = {"cell.json": to_json(content).encode(), "frames.npz": _npz_bytes(columns)}
     for name, data in whole.items():
         (beside / name).write_bytes(data)
     for name in whole:  # when both are written: the disk is asked once for most of it
@@ -183,7 +183,7 @@ def write_cell(out: Path, cell: Cell) -> Path:
     return folder
 
 
-def _packed(columns: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
+def _npz_bytes(columns: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
     """As `np.savez` has it. Only what is no measured number is compressed: of those deflate saves a tenth, in ten times
     the time of all the rest of writing a cell."""
     packed = io.BytesIO()
@@ -206,7 +206,7 @@ def read_cell(folder: Path) -> Cell:
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise BadFile(frames, f"cannot be read ({error})", "the frames of a cell", _ADVICE) from error
     try:
-        per_frame = {name: arrays[_ERROR + name].astype(float) for name in FRAME_METRICS}
+        per_frame = {name: arrays[_ERROR_PREFIX + name].astype(float) for name in FRAME_METRICS}
         scores = Scores(content["metrics"], per_frame, content["per_joint"], arrays["scored"])
         return Cell(
             scores=scores,
@@ -225,7 +225,7 @@ def read_row(folder: Path) -> dict[str, Any]:
     text = folder / "cell.json"
     content = read_json(text, "a cell of a run")
     try:
-        first, rest = ({name: content[name] for name in names} for names in (IDENTITY, CARRIED))
+        first, rest = ({name: content[name] for name in names} for names in (IDENTITY, TRAILING_COLUMNS))
         return {**first, **content["metrics"], **rest}
     except (KeyError, TypeError) as error:
         raise BadFile(text, f"no {error}", "a cell of this version of the harness", _ADVICE) from error
@@ -233,7 +233,9 @@ def read_row(folder: Path) -> dict[str, Any]:
 
 def as_row(cell: Cell) -> dict[str, Any]:
     """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
-    first, rest = ({name: plain(getattr(cell, name)) for name in names} for names in (IDENTITY, CARRIED))
+    first, rest = (
+        {name: to_json_types(getattr(cell, name)) for name in names} for names in (IDENTITY, TRAILING_COLUMNS)
+    )
     return {**first, **cell.metrics, **rest}
 
 
@@ -247,4 +249,4 @@ def _short(value: Any) -> str:
         return f"{value:g}"
     if isinstance(value, list | tuple) and value and all(isinstance(name, str) for name in value):
         return "+".join(value)
-    return value if isinstance(value, str) else json.dumps(plain(value), separators=(",", ":"))
+    return value if isinstance(value, str) else json.dumps(to_json_types(value), separators=(",", ":"))

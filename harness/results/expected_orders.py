@@ -30,7 +30,7 @@ METRIC, DECIMALS = "joint_angle_mean_deg", 2
 
 
 @dataclass(frozen=True)
-class Order:
+class ExpectedOrder:
     """Of methods, or of one method's inputs."""
 
     source: str
@@ -57,17 +57,17 @@ class Order:
         return [f"{less} > {more}" for less, more in pairwise(self.names)]
 
 
-def judged(orders: Sequence[Order], rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def evaluate_orders(orders: Sequence[ExpectedOrder], rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """For `summary.json`: of its `cells`, one for each order and setting.
 
     Each says `source`, `method` (whose inputs are compared, or ""), `names`, the setting (`behaviour`, `inputs`,
     `performer`, `varied`), on how many `clips` all were measured and on how many any, their `means_deg` or None,
     whether it `holds` (None: not judged), and `why` it does not, step by step, or was not judged.
     """
-    return [found for order in orders for found in _in_each_setting(order, rows)]
+    return [found for order in orders for found in _evaluate_by_group(order, rows)]
 
 
-def _in_each_setting(order: Order, rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
+def _evaluate_by_group(order: ExpectedOrder, rows: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, Any]]:
     settings: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
         if row[order.by] in order.names and order.method in ("", row["method"]):
@@ -88,7 +88,7 @@ def _in_each_setting(order: Order, rows: Sequence[Mapping[str, Any]]) -> Iterato
         }
 
 
-def _outcome(order: Order, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _outcome(order: ExpectedOrder, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     errors: dict[str, dict[str, float]] = {name: {} for name in order.names}
     for row in rows:
         if row[METRIC] is not None:

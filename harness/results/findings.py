@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.fields import build
-from harness.core.files import plain, read_json, write_json
+from harness.core.files import read_json, to_json_types, write_json
 from harness.errors import BadFile, UnknownName
 
 SCHEMA = 1
-Verdict = Literal["reproduced", "not reproduced", "cannot tell", "not comparable", "not run"]
+ClaimVerdict = Literal["reproduced", "not reproduced", "cannot tell", "not comparable", "not run"]
 """*Reproduced*: the paired 95 % interval lies on the published side; *not reproduced*: on the other; *cannot tell*: it
 holds zero, or there are fewer than 6 clips; *not comparable*: absolute figures of other motion."""
 
@@ -28,7 +28,7 @@ class Claim:
     published: str
     """The figure as printed, such as "1.25 deg", or "order" where only bars are."""
     ours: str
-    verdict: Verdict
+    verdict: ClaimVerdict
     why: str = ""
     """Of a verdict that is not *reproduced*: what differs, or what is missing."""
     clips: int = 0
@@ -42,7 +42,7 @@ class Claim:
 
 
 @dataclass(frozen=True)
-class Table:
+class FindingsTable:
     """Texts in rows; TypeError if one has not a text for each column."""
 
     title: str
@@ -56,7 +56,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Bars:
+class BarChart:
     """A bar for each group and series; intervals where they are known."""
 
     title: str
@@ -77,7 +77,7 @@ class Bars:
 
 
 @dataclass(frozen=True)
-class Lines:
+class LineChart:
     """Curves over a common axis."""
 
     title: str
@@ -90,7 +90,7 @@ class Lines:
 
 
 @dataclass(frozen=True)
-class Experiment:
+class PaperExperiment:
     """One experiment of a paper, rerun."""
 
     name: str
@@ -101,8 +101,8 @@ class Experiment:
     differences: tuple[str, ...]
     """In which this is another experiment than the paper's."""
     claims: tuple[Claim, ...] = ()
-    tables: tuple[Table, ...] = ()
-    figures: tuple[Bars | Lines, ...] = ()
+    tables: tuple[FindingsTable, ...] = ()
+    figures: tuple[BarChart | LineChart, ...] = ()
     runs: tuple[str, ...] = ()
     """Folders of the runs that it rests on, relative to the study's."""
     notes: tuple[str, ...] = ()
@@ -110,7 +110,7 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class Findings:
+class PaperFindings:
     """A paper rerun; findings.json in the folder of the study."""
 
     paper: str
@@ -121,23 +121,23 @@ class Findings:
     """Such as "built-in performer" or "cmu"."""
     command: str
     seed: int
-    experiments: tuple[Experiment, ...]
+    experiments: tuple[PaperExperiment, ...]
     circumstances: dict[str, Any]
     """See `manifest.here`."""
-    tables: tuple[Table, ...] = ()
+    tables: tuple[FindingsTable, ...] = ()
     """Of the whole study: databases, clips, what was left out and why, tuned constants and what they were chosen on."""
     schema: int = SCHEMA
 
 
-def write_findings(path: Path, findings: Findings) -> None:
-    write_json(path, plain(dataclasses.asdict(findings)))
+def write_findings(path: Path, findings: PaperFindings) -> None:
+    write_json(path, to_json_types(dataclasses.asdict(findings)))
 
 
-def read_findings(path: Path) -> Findings:
+def read_findings(path: Path) -> PaperFindings:
     """BadFile when it is none."""
     expected = "the findings of a paper's study"
     content = read_json(path, expected)
     try:
-        return build(Findings, content, "findings")
+        return build(PaperFindings, content, "findings")
     except (TypeError, UnknownName) as error:
         raise BadFile(path, str(error), expected, "Give the command of the study again.") from error

@@ -14,25 +14,25 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from harness.core.files import TEMPORARY, content_key, plain
+from harness.core.files import TEMPORARY, content_key, to_json_types
 from harness.errors import BadFile
-from harness.results.cell import CARRIED, IDENTITY, read_row
+from harness.results.cell import IDENTITY, TRAILING_COLUMNS, read_row
 from harness.score.metrics import DEFINITIONS
 
-INDEX = "index.sqlite"
+INDEX_FILE = "index.sqlite"
 TEXTS = ("scenario", "clip", "behaviour", "method", "inputs", "protocol", "performer", "calibration", "noise")
 """Columns to choose by, besides `seed`."""
 _COLUMNS = ("key", *TEXTS, "seed", "varied", "seconds", *DEFINITIONS, "rest")
-_ROW = (*IDENTITY, *DEFINITIONS, *CARRIED, "seconds")
+_ROW_KEYS = (*IDENTITY, *DEFINITIONS, *TRAILING_COLUMNS, "seconds")
 _VERSION = int(content_key(_COLUMNS)[:7], 16)
 """Goes into the file: an index with other columns is made anew."""
-_PLAN = "place INTEGER PRIMARY KEY, cell TEXT UNIQUE, key TEXT, failure TEXT"
-_AT_ONCE = 500
+_PLAN_COLUMNS = "place INTEGER PRIMARY KEY, cell TEXT UNIQUE, key TEXT, failure TEXT"
+_KEYS_PER_QUERY = 500
 """Keys in one question."""
 
 
 @dataclass(frozen=True)
-class Counts:
+class CellCounts:
     """What became of the plan."""
 
     planned: int
@@ -45,7 +45,7 @@ class CellIndex:
 
     def __init__(self, out: Path, *, read_only: bool = False) -> None:
         """BadFile when there is none to read."""
-        self.path, self._cells = out / INDEX, out / "cells"
+        self.path, self._cells = out / INDEX_FILE, out / "cells"
         if read_only:
             self._db = self._opened_to_read()
         else:
@@ -121,10 +121,10 @@ class CellIndex:
                 ((key, failure, cell) for cell, key, failure in what),
             )
 
-    def counts(self) -> Counts:
+    def counts(self) -> CellCounts:
         """Of the plan, as far as it was written down."""
         row = self._db.execute("SELECT count(*), count(key), count(failure) FROM plan").fetchone()
-        return Counts(*row)
+        return CellCounts(*row)
 
     def failures(self) -> dict[str, str]:
         """Cell -> why it has no result, in planned order."""
@@ -146,8 +146,8 @@ class CellIndex:
 
     def rows_of(self, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
         """These cells, in this order; KeyError for one that is not here."""
-        for start in range(0, len(keys), _AT_ONCE):
-            some = keys[start : start + _AT_ONCE]
+        for start in range(0, len(keys), _KEYS_PER_QUERY):
+            some = keys[start : start + _KEYS_PER_QUERY]
             question = f"SELECT * FROM cells WHERE key IN ({', '.join('?' * len(some))})"  # noqa: S608  # holes alone
             found = {columns[0]: columns for columns in self._db.execute(question, some)}
             yield from (_as_row(found[key]) for key in some)
@@ -165,7 +165,7 @@ class CellIndex:
         with self._db:
             self._db.executemany(
                 "INSERT OR REPLACE INTO facts VALUES (?, ?)",
-                ((name, json.dumps(plain(value))) for name, value in facts.items()),
+                ((name, json.dumps(to_json_types(value))) for name, value in facts.items()),
             )
 
     def facts(self) -> dict[str, Any]:
@@ -179,8 +179,8 @@ class CellIndex:
             db.execute("PRAGMA journal_mode = WAL")
             db.execute("PRAGMA synchronous = NORMAL")  # a crash of the machine may cost rows, which are in the folders
             with db:
-                db.execute(f"CREATE TABLE IF NOT EXISTS cells ({', '.join(map(_declared, _COLUMNS))})")
-                db.execute(f"CREATE TABLE IF NOT EXISTS plan ({_PLAN})")
+                db.execute(f"CREATE TABLE IF NOT EXISTS cells ({', '.join(map(_column_declaration, _COLUMNS))})")
+                db.execute(f"CREATE TABLE IF NOT EXISTS plan ({_PLAN_COLUMNS})")
                 db.execute("CREATE TABLE IF NOT EXISTS facts (name TEXT PRIMARY KEY, value TEXT)")
                 db.execute(f"PRAGMA user_version = {_VERSION}")
         except sqlite3.DatabaseError:
@@ -204,11 +204,11 @@ class CellIndex:
         return db
 
     def _remove(self) -> None:
-        for path in self.path.parent.glob(f"{INDEX}*"):
+        for path in self.path.parent.glob(f"{INDEX_FILE}*"):
             path.unlink()
 
 
-def _declared(column: str) -> str:
+def _column_declaration(column: str) -> str:
     if column in DEFINITIONS:
         return f"{column} {'INTEGER' if DEFINITIONS[column].unit == 'frames' else 'REAL'}"
     kinds = {"key": "TEXT PRIMARY KEY", "seed": "INTEGER", "seconds": "REAL"}
@@ -225,8 +225,8 @@ def _as_row(columns: Sequence[Any]) -> dict[str, Any]:
     """As it was added, and `seconds`."""
     held = dict(zip(_COLUMNS, columns, strict=True))
     held |= {**json.loads(held.pop("rest")), "varied": json.loads(held["varied"])}
-    return {name: held[name] for name in _ROW}
+    return {name: held[name] for name in _ROW_KEYS}
 
 
 def _json(value: Any) -> str:
-    return json.dumps(plain(value), separators=(",", ":"), ensure_ascii=False)
+    return json.dumps(to_json_types(value), separators=(",", ":"), ensure_ascii=False)

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from harness.errors import BadInput
 
-LOCK = ".lock"
+LOCK_FILE = ".lock"
 
 
 @contextmanager
-def at_work(out: Path, *, alone: bool = True) -> Iterator[None]:
+def folder_lock(out: Path, *, alone: bool = True) -> Iterator[None]:
     """While this process works there, beside others only if none of them is `alone`; BadInput."""
-    handle = os.open(out / LOCK, os.O_RDWR | os.O_CREAT, 0o666)
+    handle = os.open(out / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         try:
             fcntl.flock(handle, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
@@ -30,7 +30,7 @@ def at_work(out: Path, *, alone: bool = True) -> Iterator[None]:
 def is_running(out: Path) -> bool:
     """Whether any process works there, on this machine or on the same file system."""
     try:
-        handle = os.open(out / LOCK, os.O_RDWR)
+        handle = os.open(out / LOCK_FILE, os.O_RDWR)
     except FileNotFoundError:
         return False
     try:

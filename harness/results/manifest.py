@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import harness
-from harness.core.files import plain, read_json
+from harness.core.files import read_json, to_json_types
 from harness.errors import BadFile
 from harness.score.metrics import VERSIONS
 
@@ -35,7 +35,7 @@ class Manifest:
     """Methods, command, source hash, commit, versions, platform."""
 
     def as_dict(self) -> dict[str, Any]:
-        out: dict[str, Any] = plain(asdict(self))
+        out: dict[str, Any] = to_json_types(asdict(self))
         return out
 
     @classmethod
@@ -50,11 +50,11 @@ class Manifest:
 
     def differences(self, other: "Manifest") -> list[str]:
         """Names of the inputs in which two runs differ, such as "motion.test"; none for one and the same run."""
-        mine, theirs = flat(plain(self.inputs)), flat(plain(other.inputs))
+        mine, theirs = flatten(to_json_types(self.inputs)), flatten(to_json_types(other.inputs))
         return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
 
 
-def of_run(
+def describe_run(
     scenario: Mapping[str, Any], *, motion_source: str, command: str, constants: Mapping[str, str] | None = None
 ) -> Manifest:
     """The manifest of running a scenario here and now.
@@ -70,12 +70,12 @@ def of_run(
             "constants": constants or {},
             "left_out": scenario.get("left_out", {}),
             "command": command,
-            **here(),
+            **current_circumstances(),
         },
     )
 
 
-def here() -> dict[str, Any]:
+def current_circumstances() -> dict[str, Any]:
     """Source, commit, versions and machine."""
     return {
         "harness": harness.__version__,
@@ -132,9 +132,9 @@ def _version(package: str) -> str:
         return "absent"
 
 
-def flat(content: Any, prefix: str = "") -> dict[str, Any]:
+def flatten(content: Any, prefix: str = "") -> dict[str, Any]:
     """Nested mappings as one, with dotted names."""
     if not isinstance(content, dict) or not content:
         return {prefix: content}
-    parts = [flat(value, f"{prefix}.{name}" if prefix else name) for name, value in content.items()]
+    parts = [flatten(value, f"{prefix}.{name}" if prefix else name) for name, value in content.items()]
     return {name: value for part in parts for name, value in part.items()}

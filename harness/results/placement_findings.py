@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.fields import build
-from harness.core.files import plain, read_json, write_json
+from harness.core.files import read_json, to_json_types, write_json
 from harness.errors import BadFile, UnknownName
 from harness.results.findings import Claim
 
 SCHEMA = 1
-Mode = Literal["ablate", "add", "greedy", "exhaustive", "refine"]
-MODES: dict[Mode, str] = {
+PlacementMode = Literal["ablate", "add", "greedy", "exhaustive", "refine"]
+MODES: dict[PlacementMode, str] = {
     "ablate": "each left out of a base set",
     "add": "each added to a base set",
     "greedy": "one after another, the best next one each time",
@@ -25,12 +25,12 @@ MODES: dict[Mode, str] = {
     "refine": "places moved along and around the bone",
 }
 """What each mode tries."""
-Stations = tuple[str, ...]
+StationNames = tuple[str, ...]
 """Names of candidates, in the order of `PlacementFindings.candidates`: equal sets are equal tuples."""
 
 
 @dataclass(frozen=True)
-class Place:
+class StationPlacement:
     """A candidate: one tracker at one place (see `harness.body.mounts.Mount`); a moved one has its own name."""
 
     name: str
@@ -44,10 +44,10 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Tried:
+class StationSetResult:
     """One set under the study's own conditions."""
 
-    stations: Stations
+    stations: StationNames
     rate_hz: float
     """At which the line carries so many."""
     errors: dict[str, float | None]
@@ -60,10 +60,10 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Ranked:
+class RankedSet:
     """One set among others of its ranking."""
 
-    stations: Stations
+    stations: StationNames
     rank: int
     """By mean error, 1 the best."""
     rank_low: int
@@ -87,22 +87,22 @@ class Ranked:
 class Ranking:
     """Sets that compete for one job, best first."""
 
-    mode: Mode
+    mode: PlacementMode
     title: str
     """Such as "3 trackers of 12"."""
-    rows: tuple[Ranked, ...]
-    base: Stations = ()
+    rows: tuple[RankedSet, ...]
+    base: StationNames = ()
     """What `ablate` takes from and `add` adds to."""
 
 
 @dataclass(frozen=True)
-class Worth:
+class MarginalContribution:
     """What one candidate is worth beside others: the error without it less the error with it."""
 
     candidate: str
     mode: Literal["ablate", "add", "exhaustive"]
     """Left out of `base`, added to it, or, over every set tried, on average with it against without it."""
-    base: Stations
+    base: StationNames
     difference: float | None
     """Positive where wearing it helps, in the metric's unit."""
     low: float | None = None
@@ -111,10 +111,10 @@ class Worth:
 
 
 @dataclass(frozen=True)
-class Step:
+class SearchStep:
     """One step of a search: the set that it came to, against the one before."""
 
-    stations: Stations
+    stations: StationNames
     changed: str
     """Such as "+ left_ankle", or "left_ankle: along 0.90 to 0.80"; "" of where it began."""
     difference: float | None = None
@@ -126,12 +126,12 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Search:
+class PlacementSearch:
     """A search that goes step by step."""
 
     mode: Literal["greedy", "refine"]
     title: str
-    steps: tuple[Step, ...]
+    steps: tuple[SearchStep, ...]
     ended: str = ""
     """Why it ended."""
     held_out: float | None = None
@@ -142,11 +142,11 @@ class Search:
 
 
 @dataclass(frozen=True)
-class Best:
+class BestSet:
     """The set of so many stations with the least error."""
 
-    stations: Stations
-    ties: tuple[Stations, ...] = ()
+    stations: StationNames
+    ties: tuple[StationNames, ...] = ()
     """Others of as many that nothing shows to be worse."""
     on_front: bool = True
     """No set of fewer or as many stations errs less (Pareto)."""
@@ -165,14 +165,14 @@ class Best:
 
 
 @dataclass(frozen=True)
-class Condition:
+class PlacementCondition:
     """The same sets elsewhere: another behaviour, method or noise."""
 
     name: str
     """Such as "boxing" or "ik"; the first of a study is its own."""
     kind: str
     """Such as "behaviour", "method" or "noise"."""
-    best: dict[str, Stations]
+    best: dict[str, StationNames]
     """How many stations -> the best set there; JSON's keys are texts."""
     means: tuple[float | None, ...]
     """Of each set of `PlacementFindings.compared`."""
@@ -182,7 +182,7 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Agreement:
+class RankAgreement:
     """How alike two conditions rank the sets that both measured."""
 
     a: str
@@ -213,19 +213,19 @@ class PlacementFindings:
     """How many stations the line carries at which rate, in words; "" where the rate is the same for all."""
     seed: int
     command: str
-    candidates: tuple[Place, ...]
-    tried: tuple[Tried, ...]
-    best: tuple[Best, ...]
+    candidates: tuple[StationPlacement, ...]
+    tried: tuple[StationSetResult, ...]
+    best: tuple[BestSet, ...]
     """By number of stations, fewest first."""
     circumstances: dict[str, Any]
     """See `manifest.here`."""
     rankings: tuple[Ranking, ...] = ()
-    searches: tuple[Search, ...] = ()
-    worth: tuple[Worth, ...] = ()
-    compared: tuple[Stations, ...] = ()
+    searches: tuple[PlacementSearch, ...] = ()
+    worth: tuple[MarginalContribution, ...] = ()
+    compared: tuple[StationNames, ...] = ()
     """The sets that every condition ranks."""
-    conditions: tuple[Condition, ...] = ()
-    agreements: tuple[Agreement, ...] = ()
+    conditions: tuple[PlacementCondition, ...] = ()
+    agreements: tuple[RankAgreement, ...] = ()
     """Of each pair of conditions."""
     claims: tuple[Claim, ...] = ()
     """What papers say, and what came out."""
@@ -240,13 +240,13 @@ class PlacementFindings:
     kind: Literal["placement"] = "placement"
     schema: int = SCHEMA
 
-    def of(self, stations: Stations) -> Tried | None:
+    def of(self, stations: StationNames) -> StationSetResult | None:
         """What came of a set."""
         return next((tried for tried in self.tried if tried.stations == stations), None)
 
 
 def write_placement(path: Path, findings: PlacementFindings) -> None:
-    write_json(path, plain(dataclasses.asdict(findings)))
+    write_json(path, to_json_types(dataclasses.asdict(findings)))
 
 
 def read_placement(path: Path) -> PlacementFindings:
@@ -259,17 +259,17 @@ def read_placement(path: Path) -> PlacementFindings:
         findings = build(PlacementFindings, content, "findings")
     except (TypeError, UnknownName) as error:
         raise BadFile(path, str(error), expected, advice) from error
-    if strangers := _strangers(findings):
+    if strangers := _unknown_stations(findings):
         raise BadFile(path, f"names {strangers[0]!r}, which is no candidate of it", expected, advice)
     return findings
 
 
-def is_placement(path: Path) -> bool:
+def is_placement_findings(path: Path) -> bool:
     """Whether this file says that it holds a placement study's findings; BadFile when it is no JSON."""
     return read_json(path, "findings").get("kind") == "placement"
 
 
-def _strangers(findings: PlacementFindings) -> list[str]:
+def _unknown_stations(findings: PlacementFindings) -> list[str]:
     """Names of stations that are no candidates."""
     known = {place.name for place in findings.candidates}
     sets = [tried.stations for tried in findings.tried]

@@ -9,23 +9,23 @@ from typing import Any
 from harness.core.files import read_json
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder
-from harness.results.index import INDEX, CellIndex
+from harness.results.index import INDEX_FILE, CellIndex
 from harness.results.manifest import Manifest
 from harness.results.storage import read_summary
 from harness.score.metrics import DEFINITIONS
 
 BASELINES = Path("results/baselines")
-CELLS = "cells.json"
+CELLS_FILE = "cells.json"
 """Of a baseline (see `baseline.save`)."""
 SCHEMA = 1
 _TEXTS = ("scenario", "clip", "method", "inputs", "protocol", "noise", "behaviour", "performer")
 _KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
-COUNTED = ("frames_matched", "frames_expected")
-_AGAIN = "Run, or save, it again."
+COUNT_METRICS = ("frames_matched", "frames_expected")
+_ADVICE = "Run, or save, it again."
 
 
 @dataclass(frozen=True)
-class JudgedCell:
+class CellResult:
     """One method on one clip: what it is, what it rests on, what it scored."""
 
     scenario: str
@@ -47,62 +47,62 @@ class JudgedCell:
 
 
 @dataclass(frozen=True)
-class Judged:
+class ResultSet:
     """Everything that one side has."""
 
     title: str
     """As the reader named it, such as "results/demo" or "baseline gate"."""
     manifest: Manifest
-    cells: tuple[JudgedCell, ...]
+    cells: tuple[CellResult, ...]
     """Those that are finished, in the order of their tables."""
     planned: int
     failed: tuple[str, ...] = ()
     """Names of planned cells that failed."""
 
 
-def read_judged(where: Path | str) -> Judged:
+def load_results(where: Path | str) -> ResultSet:
     """A run's folder, a sweep's, a baseline's, or the name of a baseline below `BASELINES`; a folder goes first.
 
     BadFile for what is none of these, was written by another version or is damaged; UnknownName for a name.
     """
     folder = Path(where)
     if not folder.is_dir():
-        known = sorted(path.parent.name for path in BASELINES.glob(f"*/{CELLS}"))
+        known = sorted(path.parent.name for path in BASELINES.glob(f"*/{CELLS_FILE}"))
         if folder.name != str(where):
             raise BadFile(folder, "no such folder", "a run, a sweep or a baseline", "`harness run` writes one.")
         if str(where) not in known:
             raise UnknownName("folder or baseline", str(where), known)
         folder = BASELINES / folder
-    if (folder / CELLS).is_file():
-        return _of_baseline(folder)
-    return _of_sweep(folder, str(where)) if (folder / INDEX).is_file() else _of_run(folder, str(where))
+    if (folder / CELLS_FILE).is_file():
+        return _load_baseline(folder)
+    return _load_sweep(folder, str(where)) if (folder / INDEX_FILE).is_file() else _load_run(folder, str(where))
 
 
-def _of_run(folder: Path, title: str) -> Judged:
+def _load_run(folder: Path, title: str) -> ResultSet:
     manifest, summary = Manifest.read(folder / "manifest.json"), read_summary(folder)
-    cells = tuple(_of_row(folder, row) for row in summary["cells"])
-    return Judged(title, manifest, cells, int(summary["cells_planned"]), tuple(summary["failures"]))
+    cells = tuple(_cell_from_row(folder, row) for row in summary["cells"])
+    return ResultSet(title, manifest, cells, int(summary["cells_planned"]), tuple(summary["failures"]))
 
 
-def _of_sweep(folder: Path, title: str) -> Judged:
+def _load_sweep(folder: Path, title: str) -> ResultSet:
     manifest = Manifest.read(folder / "manifest.json")
     with CellIndex(folder, read_only=True) as index:
-        cells = tuple(_of_row(folder, row) for row in index.rows())
-        return Judged(title, manifest, cells, index.counts().planned, tuple(index.failures()))
+        cells = tuple(_cell_from_row(folder, row) for row in index.rows())
+        return ResultSet(title, manifest, cells, index.counts().planned, tuple(index.failures()))
 
 
-def _of_row(folder: Path, row: Mapping[str, Any]) -> JudgedCell:
+def _cell_from_row(folder: Path, row: Mapping[str, Any]) -> CellResult:
     if not row.get("scenario"):
         found, advice = "cells that name no scenario", "An older version wrote it: run again with another --out."
         raise BadFile(folder, found, "a run of this version of the harness", advice)
     path = cell_folder(folder, row["key"]) / "cell.json"
     defined_by = read_json(path, "a cell of a run").get("defined_by")
     metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
-    return _cell(path, {**row, "defined_by": defined_by, "metrics": metrics})
+    return _check_cell(path, {**row, "defined_by": defined_by, "metrics": metrics})
 
 
-def _of_baseline(folder: Path) -> Judged:
-    path, expected = folder / CELLS, "the cells of a baseline"
+def _load_baseline(folder: Path) -> ResultSet:
+    path, expected = folder / CELLS_FILE, "the cells of a baseline"
     content = read_json(path, expected)
     if content.get("schema") != SCHEMA:
         advice = "Another version of the harness saved it: use that one, or save the baseline again."
@@ -114,20 +114,22 @@ def _of_baseline(folder: Path) -> Judged:
             metrics = dict(zip(names, cell["metrics"], strict=True))
             whole.append({**cell, "metrics": metrics, "defined_by": {**shared, **parts[cell["part"]]}})
     except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise BadFile(path, f"damaged ({error!r})", expected, _AGAIN) from error
-    cells = tuple(_cell(path, cell) for cell in whole)
+        raise BadFile(path, f"damaged ({error!r})", expected, _ADVICE) from error
+    cells = tuple(_check_cell(path, cell) for cell in whole)
     if planned != len(cells):
-        raise BadFile(path, f"{len(cells)} cells of {planned}", expected, _AGAIN)
-    return Judged(f"baseline {folder.name}", Manifest.read(folder / "manifest.json"), cells, planned)
+        raise BadFile(path, f"{len(cells)} cells of {planned}", expected, _ADVICE)
+    return ResultSet(f"baseline {folder.name}", Manifest.read(folder / "manifest.json"), cells, planned)
 
 
-def _cell(path: Path, content: Mapping[str, Any]) -> JudgedCell:
+def _check_cell(path: Path, content: Mapping[str, Any]) -> CellResult:
     """BadFile for one that lacks something or has it as something else."""
     for name, kind in _KINDS.items():
         if not isinstance(content.get(name), kind):
-            raise BadFile(path, f"{name} is {content.get(name)!r}", f"a cell with a {kind.__name__} there", _AGAIN)
-    for name in (*COUNTED, *content["metrics"]):
+            raise BadFile(path, f"{name} is {content.get(name)!r}", f"a cell with a {kind.__name__} there", _ADVICE)
+    for name in (*COUNT_METRICS, *content["metrics"]):
         value = content["metrics"].get(name)
-        if not (isinstance(value, int | float) and math.isfinite(value)) and (value is not None or name in COUNTED):
-            raise BadFile(path, f"{name} is {value!r}", "a cell with a number there", _AGAIN)
-    return JudgedCell(**{name: content[name] for name in _KINDS})
+        if not (isinstance(value, int | float) and math.isfinite(value)) and (
+            value is not None or name in COUNT_METRICS
+        ):
+            raise BadFile(path, f"{name} is {value!r}", "a cell with a number there", _ADVICE)
+    return CellResult(**{name: content[name] for name in _KINDS})

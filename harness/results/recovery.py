@@ -22,17 +22,17 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.estimate import Status
-from harness.core.files import plain
+from harness.core.files import to_json_types
 from harness.results.cell import Cell
 
-AT_MOST = 1.5
+MAX_RECOVERED_RATIO = 1.5
 """Times the undisturbed error."""
-AFTER_S, OVER_S = 1.0, 1.0
+SETTLING_S, WINDOW_S = 1.0, 1.0
 """The error is taken from so long after the last bad frame, over so long [s]."""
 LOST_AFTER_S = 0.5
 """Under half of the stations for longer than this is LOST, before that HELD [s]."""
-_SMOOTHED_S = 0.25
-_CLOSE_S = 0.05
+_SMOOTHING_S = 0.25
+_STATUS_TOLERANCE_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -63,11 +63,11 @@ class Recovery:
 
     @property
     def ratio(self) -> float:
-        return times(self.disturbed_deg, self.undisturbed_deg)
+        return error_ratio(self.disturbed_deg, self.undisturbed_deg)
 
 
 @dataclass(frozen=True, eq=False)
-class _Course:
+class _CellErrors:
     """What is kept of a cell."""
 
     cell: Mapping[str, str]
@@ -80,11 +80,11 @@ class _Course:
     """(F,) at least half of the stations."""
 
 
-class Recoveries:
+class RecoveryCollector:
     """Add cells in any order, then ask for the pairs among them."""
 
     def __init__(self) -> None:
-        self._courses: dict[str, dict[str, _Course]] = {}
+        self._courses: dict[str, dict[str, _CellErrors]] = {}
 
     def add(self, cell: Cell) -> None:
         """Keep it if its scenario knows disturbances."""
@@ -95,9 +95,9 @@ class Recoveries:
         kind = disturbance["kind"]
         settings = {name: value for name, value in disturbance.items() if name not in ("kind", "begins_s", "ends_s")}
         names = ("method", "inputs", "protocol", "behaviour", "clip")
-        pair = json.dumps(plain({"method": cell.method, "same": same, "settings": settings}), sort_keys=True)
+        pair = json.dumps(to_json_types({"method": cell.method, "same": same, "settings": settings}), sort_keys=True)
         seen = (cell.position_valid | cell.orientation_valid).sum(axis=1)
-        self._courses.setdefault(pair, {})[kind] = _Course(
+        self._courses.setdefault(pair, {})[kind] = _CellErrors(
             {name: str(getattr(cell, name)) for name in names},
             disturbance,
             cell.time_s,
@@ -112,7 +112,7 @@ class Recoveries:
         found = []
         for courses in self._courses.values():
             if (plain_course := courses.get("none")) is not None:
-                found += [_compared(course, plain_course) for kind, course in courses.items() if kind != "none"]
+                found += [_recovery(course, plain_course) for kind, course in courses.items() if kind != "none"]
         return found
 
     def rows(self) -> list[dict[str, Any]]:
@@ -120,62 +120,65 @@ class Recoveries:
         return [{**asdict(recovery), "ratio": recovery.ratio} for recovery in self.pairs()]
 
 
-def _compared(course: _Course, undisturbed: _Course) -> Recovery:
+def _recovery(course: _CellErrors, undisturbed: _CellErrors) -> Recovery:
     begin_s, end_s = float(course.disturbance["begins_s"]), float(course.disturbance["ends_s"])
     common, here, there = np.intersect1d(course.time_s, undisturbed.time_s, return_indices=True)
     bad = common[common < end_s - 1e-9]
     since_s = common - (bad[-1] if len(bad) else np.inf)
-    long_enough = len(since_s) > 0 and since_s[-1] > AFTER_S + OVER_S - 1e-9
-    until = (since_s <= AFTER_S + OVER_S + 1e-9) & long_enough
-    judged, during = until & (since_s > AFTER_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
+    long_enough = len(since_s) > 0 and since_s[-1] > SETTLING_S + WINDOW_S - 1e-9
+    until = (since_s <= SETTLING_S + WINDOW_S + 1e-9) & long_enough
+    judged, during = until & (since_s > SETTLING_S + 1e-9), until & (common >= begin_s - 1e-9) & (since_s <= 0.0)
     disturbed_deg, undisturbed_deg = course.error_deg[here], undisturbed.error_deg[there]
-    right = _right(course.time_s, course.reporting, course.status)
+    right = _status_is_correct(course.time_s, course.reporting, course.status)
     return Recovery(
         **course.cell,
         disturbance=str(course.disturbance["kind"]),
         judged=int(np.count_nonzero(judged)),
-        disturbed_deg=_over(disturbed_deg, judged),
-        undisturbed_deg=_over(undisturbed_deg, judged),
-        during=times(_over(disturbed_deg, during), _over(undisturbed_deg, during)),
-        disturbed_mm=_over(course.error_mm[here], judged),
-        undisturbed_mm=_over(undisturbed.error_mm[there], judged),
+        disturbed_deg=_mean_over(disturbed_deg, judged),
+        undisturbed_deg=_mean_over(undisturbed_deg, judged),
+        during=error_ratio(_mean_over(disturbed_deg, during), _mean_over(undisturbed_deg, during)),
+        disturbed_mm=_mean_over(course.error_mm[here], judged),
+        undisturbed_mm=_mean_over(undisturbed.error_mm[there], judged),
         back_after_s=_back_after_s(since_s, until & (since_s > 0.0), disturbed_deg, undisturbed_deg),
-        status_right=_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
+        status_right=_mean_over(right[here].astype(float), until & (common >= begin_s - 1e-9)),
     )
 
 
-def times(error: float, undisturbed: float) -> float:
+def error_ratio(error: float, undisturbed: float) -> float:
     """How many times as large: 1 where both are zero, NaN where one is not finite."""
     if undisturbed == 0.0:
         return 1.0 if error == 0.0 else float("nan") if np.isnan(error) else float("inf")
     return error / undisturbed
 
 
-def _over(values: Floats, rows: Bools) -> float:
+def _mean_over(values: Floats, rows: Bools) -> float:
     return float(np.mean(values[rows])) if rows.any() else float("nan")
 
 
 def _back_after_s(since_s: Floats, after: Bools, disturbed_deg: Floats, undisturbed_deg: Floats) -> float | None:
     rows = np.flatnonzero(after)
-    width = max(round(_SMOOTHED_S / float(np.median(np.diff(since_s[rows])))), 1) if len(rows) > 1 else 1
+    width = max(round(_SMOOTHING_S / float(np.median(np.diff(since_s[rows])))), 1) if len(rows) > 1 else 1
     starts = rows[: max(len(rows) - width + 1, 0)]
-    good = [np.mean(disturbed_deg[i : i + width]) <= AT_MOST * np.mean(undisturbed_deg[i : i + width]) for i in starts]
+    good = [
+        np.mean(disturbed_deg[i : i + width]) <= MAX_RECOVERED_RATIO * np.mean(undisturbed_deg[i : i + width])
+        for i in starts
+    ]
     first = len(good) - next((n for n, fine in enumerate(reversed(good)) if not fine), len(good))
     return float(since_s[starts[first]]) if first < len(good) else None
 
 
-def _right(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
+def _status_is_correct(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
     """(F,) whether the status is what the readings call for; close to 0.5 s both HELD and LOST are."""
     enough_s = np.where(reporting, time_s, -np.inf)
     enough_s[0] = time_s[0]
     gone_s = time_s - np.maximum.accumulate(enough_s)
-    lost = (status == Status.LOST) & (gone_s > LOST_AFTER_S - _CLOSE_S)
-    held = (status == Status.HELD) & (gone_s < LOST_AFTER_S + _CLOSE_S)
+    lost = (status == Status.LOST) & (gone_s > LOST_AFTER_S - _STATUS_TOLERANCE_S)
+    held = (status == Status.HELD) & (gone_s < LOST_AFTER_S + _STATUS_TOLERANCE_S)
     out: Bools = np.where(reporting, status == Status.SOLVED, lost | held)
     return out
 
 
-def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Of `summary.json`'s rows: one for each method, inputs and protocol, clips pooled.
 
     Each has `clips`, `undisturbed_deg`, `status_right` (the least) and, under `after`, disturbance -> `ratio` of the
@@ -195,7 +198,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
             means = [_mean(those, name) for name in ("disturbed_deg", "undisturbed_deg")]
             slowest = [row["back_after_s"] for row in those]
             after[kind] = {
-                "ratio": times(*means),
+                "ratio": error_ratio(*means),
                 "during": _mean(those, "during"),
                 "worst": float(np.max([_number(row["ratio"]) for row in those])),
                 "back_after_s": None if None in slowest else max(slowest),

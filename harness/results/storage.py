@@ -14,10 +14,10 @@ from typing import Any
 from harness.core.files import TEMPORARY, content_key, digest, read_json, write_json, write_text
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
-from harness.results.expected_orders import Order, judged
+from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.manifest import Manifest
-from harness.results.recovery import Recoveries
-from harness.results.summary import GROUP, Tally, as_csv
+from harness.results.recovery import RecoveryCollector
+from harness.results.summary import GROUP_KEYS, SummaryStatistics, as_csv
 
 __all__ = [
     "Cell",
@@ -34,7 +34,7 @@ __all__ = [
 ]
 
 
-_SUMMARY = ("outcome", "cells_finished", "cells_planned", "failures", "methods", "behaviours", "cells")
+_SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "failures", "methods", "behaviours", "cells")
 
 
 def cell_key(inputs: Mapping[str, Any], method: Mapping[str, Any], source_hash: str) -> str:
@@ -61,7 +61,7 @@ def open_run(out: Path, manifest: Manifest) -> None:
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "manifest.json", manifest.as_dict())  # first: without it a folder is no run
         (out / "cells").mkdir(exist_ok=True)
-        _clear(out)
+        _remove_leftovers(out)
     except OSError as error:
         raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
 
@@ -71,7 +71,7 @@ def read_summary(out: Path) -> dict[str, Any]:
     path, expected = out / "summary.json", "the summary of a run"
     content = read_json(path, expected)
     advice = "Give the command of the run again."
-    if missing := [name for name in _SUMMARY if name not in content]:
+    if missing := [name for name in _SUMMARY_KEYS if name not in content]:
         raise BadFile(path, f"no {', '.join(missing)}", expected, advice)
     for row in content["cells"]:
         if not re.fullmatch(r"\w+", str(row.get("key"))):
@@ -103,17 +103,21 @@ def write_summary(
     keys: Iterable[str],
     planned: int,
     failures: Mapping[str, str] | None = None,
-    orders: Sequence[Order] = (),
+    orders: Sequence[ExpectedOrder] = (),
 ) -> dict[str, Any]:
     """Write summary.csv (a row for each cell) and summary.json, whose content is returned.
 
     `keys` are the finished cells in the order of the table, `failures` cell -> what went wrong. summary.json has
-    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `Tally.rows`), recovery
+    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `SummaryStatistics.rows`), recovery
     (see `recovery.Recoveries`), which is empty unless the scenario varies a disturbance, and orders (see
     `orders.judged`), empty unless it expects any.
     """
     failures = dict(failures or {})
-    methods, behaviours, recoveries = Tally(*GROUP), Tally(*GROUP, "behaviour"), Recoveries()
+    methods, behaviours, recoveries = (
+        SummaryStatistics(*GROUP_KEYS),
+        SummaryStatistics(*GROUP_KEYS, "behaviour"),
+        RecoveryCollector(),
+    )
     rows = []
     for key in keys:
         cell = read_cell(cell_folder(out, key))
@@ -130,7 +134,7 @@ def write_summary(
         "methods": methods.rows(),
         "behaviours": behaviours.rows(),
         "recovery": recoveries.rows(),
-        "orders": judged(orders, rows),
+        "orders": evaluate_orders(orders, rows),
         "cells": rows,
     }
     write_text(out / "summary.csv", as_csv(rows))
@@ -138,10 +142,10 @@ def write_summary(
     return content
 
 
-def _clear(out: Path) -> None:
+def _remove_leftovers(out: Path) -> None:
     for folder in (out, out / "cells"):
         for path in folder.glob(f"{TEMPORARY}*"):
-            if _still_written(path):
+            if _writer_is_alive(path):
                 continue
             if path.is_dir():
                 shutil.rmtree(path)
@@ -149,7 +153,7 @@ def _clear(out: Path) -> None:
                 path.unlink()
 
 
-def _still_written(path: Path) -> bool:
+def _writer_is_alive(path: Path) -> bool:
     """Whether the process whose number is in the name lives: another run of the same scenario into the same folder."""
     number = path.name.removeprefix(TEMPORARY).partition("-")[0]
     if not number.isdigit() or int(number) == os.getpid():

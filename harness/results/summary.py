@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.files import plain
-from harness.results.cell import FURTHER, IDENTITY, Cell, as_row, varied_text
+from harness.core.files import to_json_types
+from harness.results.cell import EXTRA_IDENTITY, IDENTITY, Cell, as_row, varied_text
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
-from harness.score.score import pooled
+from harness.score.score import pool_frames
 from harness.score.timing import step_relative, step_times_ms
 
 FIRST_METRICS = (
@@ -31,10 +31,16 @@ FIRST_METRICS = (
     "step_p99_ms",
     "fps",
 )
-COLUMNS = (*IDENTITY, *FIRST_METRICS, *(name for name in DEFINITIONS if name not in FIRST_METRICS), *FURTHER, "key")
+COLUMNS = (
+    *IDENTITY,
+    *FIRST_METRICS,
+    *(name for name in DEFINITIONS if name not in FIRST_METRICS),
+    *EXTRA_IDENTITY,
+    "key",
+)
 """Of summary.csv."""
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
-GROUP = ("method", "inputs", "protocol", "performer", "varied")
+GROUP_KEYS = ("method", "inputs", "protocol", "performer", "varied")
 """Cells that differ in these are never pooled."""
 
 
@@ -47,23 +53,23 @@ def as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
     return out.getvalue()
 
 
-class Tally:
+class SummaryStatistics:
     """Adds up cells one at a time, so that a run of any length fits in memory."""
 
     def __init__(self, *by: str) -> None:
         self.by = by
-        self._groups: dict[tuple[str, ...], _Group] = {}
+        self._groups: dict[tuple[str, ...], _GroupStatistics] = {}
 
     def add(self, cell: Cell) -> None:
-        name = tuple(_text(plain(getattr(cell, field))) for field in self.by)
-        self._groups.setdefault(name, _Group()).add(cell)
+        name = tuple(_text(to_json_types(getattr(cell, field))) for field in self.by)
+        self._groups.setdefault(name, _GroupStatistics()).add(cell)
 
     def rows(self) -> list[dict[str, Any]]:
         """One for each group: what it is, how many sequences, frames and the statistics of every metric."""
         return [{**group.named(self.by), **group.row()} for group in self._groups.values()]
 
 
-class _Group:
+class _GroupStatistics:
     def __init__(self) -> None:
         self.sequences: list[dict[str, Any]] = []
         self.frames: dict[str, list[Floats]] = {name: [] for name in FRAME_METRICS}
@@ -107,7 +113,7 @@ class _Group:
     def _over_frames(self, name: str) -> float | None:
         if name in self.frames:
             columns = [values.astype(float) for values in self.frames[name]]
-            value = pooled(np.concatenate(columns), DEFINITIONS[name].pool) if columns else np.nan
+            value = pool_frames(np.concatenate(columns), DEFINITIONS[name].pool) if columns else np.nan
         else:
             value = self._times().get(name, np.nan)
         return float(value) if np.isfinite(value) else None

@@ -13,7 +13,7 @@ SIP_BONES = ("lhumerus", "rhumerus", "lfemur", "rfemur")
 """Upper arms and thighs: von Marcard et al. 2017, Sparse Inertial Poser."""
 
 
-def wrapped(angle_rad: Floats) -> Floats:
+def wrap_angle(angle_rad: Floats) -> Floats:
     """The same angle within +-pi; exactly zero stays exactly zero."""
     out: Floats = angle_rad - 2.0 * np.pi * np.round(angle_rad / (2.0 * np.pi))
     return out
@@ -31,7 +31,7 @@ def geodesic_deg(p: Floats, q: Floats) -> Floats:
 
 def hinge_errors_deg(pair: Pair) -> Floats:
     """(F, D) wrapped difference of every hinge angle, without sign."""
-    out: Floats = np.rad2deg(np.abs(wrapped(pair.estimate.angles_rad - pair.truth.angles_rad)))
+    out: Floats = np.rad2deg(np.abs(wrap_angle(pair.estimate.angles_rad - pair.truth.angles_rad)))
     return out
 
 
@@ -65,7 +65,7 @@ def mpjre_axis_angle_deg(pair: Pair) -> Floats:
     truth, estimate = (
         rotations.log(rotations.from_matrix(p.parent_from_bone[:, bones])) for p in (pair.truth, pair.estimate)
     )
-    out: Floats = np.rad2deg(np.abs(wrapped(estimate - truth))).mean(axis=(1, 2))
+    out: Floats = np.rad2deg(np.abs(wrap_angle(estimate - truth))).mean(axis=(1, 2))
     return out
 
 
@@ -88,7 +88,7 @@ def root_angle_deg(pair: Pair) -> Floats:
 def root_heading_deg(pair: Pair) -> Floats:
     """(F,) wrapped difference of the root's yaw, without sign."""
     truth, estimate = (rotations.yaw_rad(p.world_from_root) for p in (pair.truth, pair.estimate))
-    out: Floats = np.rad2deg(np.abs(wrapped(estimate - truth)))
+    out: Floats = np.rad2deg(np.abs(wrap_angle(estimate - truth)))
     return out
 
 

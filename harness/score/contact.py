@@ -7,7 +7,7 @@ last frame of each difference, NaN elsewhere. Contact is decided by the truth al
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.score.pair import Pair, Posed, bones_named
+from harness.score.pair import Pair, PoseSequence, bones_named
 
 FOOT_POINTS = ("ltibia", "lfoot", "rtibia", "rfoot")
 """Their far ends: ankle and toe, left and right."""
@@ -16,14 +16,14 @@ CONTACT_SPEED_M_S = 0.15
 """In contact: lower over the ground and slower than this (choices)."""
 
 
-def sole_heights_m(motion: Posed) -> Floats:
+def sole_heights_m(motion: PoseSequence) -> Floats:
     """(T, 4) height of the toes, and of the ankles less their height over the toe in the rest pose."""
     toe_drop_m = motion.skeleton.bone_m[bones_named(motion.skeleton, ("lfoot", "lfoot", "rfoot", "rfoot")), 2]
     out: Floats = _foot_points_m(motion)[..., 2] + np.where([True, False, True, False], toe_drop_m, 0.0)
     return out
 
 
-def ground_m(truth: Posed) -> float:
+def ground_m(truth: PoseSequence) -> float:
     """Height at which the truth's feet stand [m]: the median over the take of its lowest sole point (choice).
 
     Joint centres lie inside the feet and the floor of a recording need not be at zero: on CMU's clips true toes stand
@@ -87,7 +87,7 @@ def in_contact(pair: Pair) -> Bools:
     return out
 
 
-def _skate(pair: Pair, motion: Posed) -> Floats:
+def _skate(pair: Pair, motion: PoseSequence) -> Floats:
     contact = in_contact(pair)
     speed_mm_s = np.zeros(contact.shape)
     speed_mm_s[1:] = 1e3 * pair.rate_hz * _length(np.diff(_foot_points_m(motion)[..., :2], axis=0))
@@ -96,17 +96,17 @@ def _skate(pair: Pair, motion: Posed) -> Floats:
     return out
 
 
-def _lowest_mm(pair: Pair, motion: Posed) -> Floats:
+def _lowest_mm(pair: Pair, motion: PoseSequence) -> Floats:
     lowest_mm = 1e3 * (sole_heights_m(motion).min(axis=1) - pair.ground_m)
     out: Floats = np.where(in_contact(pair).any(axis=1), lowest_mm, np.nan)
     return out
 
 
-def _jerk(pair: Pair, motion: Posed) -> Floats:
+def _jerk(pair: Pair, motion: PoseSequence) -> Floats:
     return pair.over_gaps(pair.rate_hz**3 * _length(np.diff(motion.joints_m, n=3, axis=0)).mean(axis=1), steps=3)
 
 
-def _foot_points_m(motion: Posed) -> Floats:
+def _foot_points_m(motion: PoseSequence) -> Floats:
     out: Floats = motion.joints_m[:, 1 + bones_named(motion.skeleton, FOOT_POINTS)]
     return out
 

@@ -11,7 +11,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.skeleton import Skeleton
-from harness.score.score import Scores, score
+from harness.score.score import Scores, score_estimate
 
 
 def oracle(truth_qpos: Floats) -> Floats:
@@ -36,16 +36,16 @@ def frozen_pose(truth_qpos: Floats) -> Floats:
     return np.repeat(truth_qpos[:1], len(truth_qpos), axis=0)
 
 
-NULLS: dict[str, Callable[[Floats], Floats]] = {
+NULL_METHODS: dict[str, Callable[[Floats], Floats]] = {
     function.__name__: function for function in (oracle, last_value, mean_pose, frozen_pose)
 }
 
 
-def bounds(skeleton: Skeleton, rate_hz: float, truth_qpos: Floats) -> dict[str, Scores]:
+def score_null_methods(skeleton: Skeleton, rate_hz: float, truth_qpos: Floats) -> dict[str, Scores]:
     """Scores of every null method on one true motion (T, 55)."""
     frames = len(truth_qpos)
     status, untimed = np.full(frames, Status.SOLVED), np.full(frames, np.nan)
     return {
-        name: score(skeleton, rate_hz, truth_qpos, null(truth_qpos), np.arange(frames), status, untimed)
-        for name, null in NULLS.items()
+        name: score_estimate(skeleton, rate_hz, truth_qpos, null(truth_qpos), np.arange(frames), status, untimed)
+        for name, null in NULL_METHODS.items()
     }

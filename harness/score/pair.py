@@ -12,11 +12,11 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import unpack
-from harness.core.skeleton import Skeleton, forward
+from harness.core.skeleton import Skeleton, forward_kinematics
 
 
 @dataclass(frozen=True, eq=False)
-class Posed:
+class PoseSequence:
     """T frames of one motion: hinge angles, root, joint centres and bone rotations."""
 
     skeleton: Skeleton
@@ -31,10 +31,10 @@ class Posed:
     world_from_bone: Floats
     """(T, B, 3, 3)."""
 
-    def at(self, rows: Bools | Ints) -> "Posed":
+    def at(self, rows: Bools | Ints) -> "PoseSequence":
         """Some of the frames."""
         columns = (self.angles_rad, self.root_m, self.world_from_root, self.joints_m, self.world_from_bone)
-        return Posed(self.skeleton, *(column[rows] for column in columns))
+        return PoseSequence(self.skeleton, *(column[rows] for column in columns))
 
     @cached_property
     def root_from_bone(self) -> Floats:
@@ -53,13 +53,13 @@ class Posed:
         return out
 
 
-def posed(skeleton: Skeleton, qpos: Floats) -> Posed:
+def compute_poses(skeleton: Skeleton, qpos: Floats) -> PoseSequence:
     """Configurations (T, 55) on a skeleton; the root quaternion need not be normed."""
     root_m, quaternion, angles_rad = unpack(np.asarray(qpos, dtype=float))
     world_from_root = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-    pose = forward(skeleton, root_m, world_from_root, angles_rad)
+    pose = forward_kinematics(skeleton, root_m, world_from_root, angles_rad)
     joints_m = np.concatenate([root_m[:, None], pose.end_m], axis=1)
-    return Posed(skeleton, angles_rad, root_m, world_from_root, joints_m, pose.world_from_bone)
+    return PoseSequence(skeleton, angles_rad, root_m, world_from_root, joints_m, pose.world_from_bone)
 
 
 def joint_names(skeleton: Skeleton) -> tuple[str, ...]:
@@ -82,8 +82,8 @@ class Pair:
     """F frames of which both truth and estimate are known, each posed on a skeleton of its own: they differ when bone
     lengths had to be found by calibration. Bones and hinges are the same ones."""
 
-    truth: Posed
-    estimate: Posed
+    truth: PoseSequence
+    estimate: PoseSequence
     frame_index: Ints
     """(F,) which of the true frames each row is, strictly increasing; a step of more than one is a gap."""
     rate_hz: float

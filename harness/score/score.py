@@ -11,7 +11,7 @@ from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS, Pool
-from harness.score.pair import Pair, hinged_bones, joint_names, posed
+from harness.score.pair import Pair, compute_poses, hinged_bones, joint_names
 
 WARM_UP_S = 1.0
 """Estimates before this time of a take are no part of any score [s] (choice)."""
@@ -33,7 +33,7 @@ class Scores:
     """(F,) the frames that count: after the warm-up and finite."""
 
 
-def score(
+def score_estimate(
     skeleton: Skeleton,
     rate_hz: float,
     truth_qpos: Floats,
@@ -54,7 +54,7 @@ def score(
     strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed, `cpu_ms` (F,) of
     the steps and (F,) of the reference (see `timing.step_relative`), NaN likewise. Raises ShapeError and BadInput.
     """
-    frame_index, status, step_ms = _checked(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
+    frame_index, status, step_ms = _check_shapes(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
     warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
     finite = np.isfinite(estimate_qpos).all(axis=1) & (np.linalg.norm(estimate_qpos[:, 3:7], axis=1) > 0.0)
     warm = frame_index >= warm_up
@@ -62,10 +62,10 @@ def score(
     expected = max(len(truth_qpos) - warm_up, 0)
     coverage = scored.sum() / expected if expected else 0.0
 
-    truth = posed(skeleton, truth_qpos)
+    truth = compute_poses(skeleton, truth_qpos)
     ground_m = contact.ground_m(truth) if len(truth_qpos) else 0.0
     known = frame_index[finite]
-    estimate = posed(estimate_skeleton or skeleton, estimate_qpos[finite])
+    estimate = compute_poses(estimate_skeleton or skeleton, estimate_qpos[finite])
     pair = Pair(truth.at(known), estimate, known, rate_hz, ground_m)
     per_frame = {name: np.full(len(frame_index), np.nan) for name in FRAME_METRICS}
     for name, function in FRAME_METRICS.items():
@@ -73,7 +73,7 @@ def score(
             per_frame[name][finite] = function(pair)
 
     measured: dict[str, float] = {
-        name: pooled(per_frame[name][scored], DEFINITIONS[name].pool) for name in FRAME_METRICS
+        name: pool_frames(per_frame[name][scored], DEFINITIONS[name].pool) for name in FRAME_METRICS
     }
     judged = pair.at(known >= warm_up)
     measured["root_drift_mm_s"] = positions.root_drift_mm_s(judged)
@@ -99,7 +99,7 @@ def score(
     return Scores(metrics, per_frame, _per_joint(judged) if enough else {}, scored)
 
 
-def pooled(values: Floats, pool: Pool) -> float:
+def pool_frames(values: Floats, pool: Pool) -> float:
     """One number from per-frame values, those that are undefined left out; NaN of none."""
     known = values[np.isfinite(values)]
     if not len(known) or pool == "none":
@@ -119,7 +119,7 @@ def _per_joint(pair: Pair) -> dict[str, dict[str, float]]:
     return {metric: dict(zip(names, map(float, row), strict=True)) for metric, (names, row) in columns.items()}
 
 
-def _checked(
+def _check_shapes(
     skeleton: Skeleton, truth_qpos: Floats, estimate_qpos: Floats, frame_index: Ints, status: Ints, step_ms: Floats
 ) -> tuple[Ints, Ints, Floats]:
     width, frames = 7 + len(skeleton.axes), len(estimate_qpos)

@@ -11,10 +11,10 @@ import numpy as np
 
 from harness.errors import UnknownName
 from harness.simulate.components.lost_station import LostStation
-from harness.simulate.components.orientation_offset import Turned
-from harness.simulate.components.position_offset import Displaced
+from harness.simulate.components.orientation_offset import OrientationOffset
+from harness.simulate.components.position_offset import PositionOffset
 from harness.simulate.noise import Noise
-from harness.simulate.parameter_ranges import require
+from harness.simulate.parameter_ranges import require_ranges
 
 Kind = Literal["none", "one_lost", "all_lost", "one_off", "all_turned", "start_off"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -39,7 +39,7 @@ class Disturbance:
     """How far from its place everything is at the start [m]."""
 
     def __post_init__(self) -> None:
-        require(self, from_s=(0.0, 1e6), lasts_s=(0.0, 1e6))
+        require_ranges(self, from_s=(0.0, 1e6), lasts_s=(0.0, 1e6))
 
     @property
     def begins_s(self) -> float:
@@ -68,16 +68,17 @@ class Disturbance:
                 return replace(noise, lost=(*noise.lost, *(LostStation(s, fade_s=0.0, **within) for s in gone)))
             case "one_off":
                 return replace(
-                    noise, displaced=(*noise.displaced, Displaced(one, offset_m=ahead(self.off_m), **within))
+                    noise,
+                    displaced=(*noise.displaced, PositionOffset(one, offset_m=forward_offset_m(self.off_m), **within)),
                 )
             case "start_off":
-                everything = Displaced((), offset_m=ahead(self.start_off_m), **within)
+                everything = PositionOffset((), offset_m=forward_offset_m(self.start_off_m), **within)
                 return replace(noise, displaced=(*noise.displaced, everything))
             case "all_turned":
-                turned = Turned((), angle_rad=float(np.deg2rad(self.turn_deg)), **within)
+                turned = OrientationOffset((), angle_rad=float(np.deg2rad(self.turn_deg)), **within)
                 return replace(noise, turned=(*noise.turned, turned))
 
 
-def ahead(by_m: float) -> tuple[float, float, float]:
+def forward_offset_m(by_m: float) -> tuple[float, float, float]:
     """Forward in the tracker's frame."""
     return by_m, 0.0, 0.0

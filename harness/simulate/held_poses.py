@@ -12,14 +12,14 @@ from harness.body import ground, kinematics
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 
 STEP_M, STEP_RAD = 0.03, float(np.deg2rad(3.0))
 """How far the performer stands and faces from where the pose before was held, standard deviations [choice]."""
 
 
-def holding(
+def hold_poses(
     body: Body,
     configurations: Sequence[Floats],
     *,
@@ -28,7 +28,7 @@ def holding(
     hold_s: float = 3.0,
     move_s: float = 1.5,
     rate_hz: float = 120.0,
-) -> Take:
+) -> BodyMotion:
     """A take in which each configuration (55,) is held for `hold_s`, with `move_s` from one to the next.
 
     Every hinge and the lean of the body miss each pose by N(0, `miss_rad`), drawn anew; the lower sole stands on z = 0.
@@ -40,14 +40,14 @@ def holding(
     for number, meant in enumerate(configurations):
         if number:
             beside_m, turned_rad = beside_m + rng.normal(0.0, STEP_M, 2), turned_rad + float(rng.normal(0.0, STEP_RAD))
-        held.append(_standing(body, _missed(meant, miss_rad, rng), beside_m, turned_rad))
+        held.append(_put_on_floor(body, _with_pose_error(meant, miss_rad, rng), beside_m, turned_rad))
     time_s = np.arange(round(rate_hz * (len(held) * (hold_s + move_s) - move_s)) + 1) / rate_hz
     cycle, since_s = np.divmod(time_s, hold_s + move_s)
     which = np.minimum(cycle.astype(int), len(held) - 1)
     share = np.clip((since_s - hold_s) / max(move_s, 1e-9), 0.0, 1.0)
     poses = np.array([*held, held[-1]])
-    qpos = between(poses[which], poses[which + 1], np.where(which == len(held) - 1, 0.0, share))
-    return Take("calibration", "", "built-in performer", "calibration", rate_hz, qpos)
+    qpos = minimum_jerk(poses[which], poses[which + 1], np.where(which == len(held) - 1, 0.0, share))
+    return BodyMotion("calibration", "", "built-in performer", "calibration", rate_hz, qpos)
 
 
 def hold_times_s(count: int, hold_s: float = 3.0, move_s: float = 1.5) -> list[tuple[float, float]]:
@@ -55,7 +55,7 @@ def hold_times_s(count: int, hold_s: float = 3.0, move_s: float = 1.5) -> list[t
     return [(n * (hold_s + move_s), n * (hold_s + move_s) + hold_s) for n in range(count)]
 
 
-def between(first: Floats, last: Floats, share: Floats) -> Floats:
+def minimum_jerk(first: Floats, last: Floats, share: Floats) -> Floats:
     """(N, 55) from one configuration to another, (55,) or (N, 55), at shares (N,) of the time that it takes.
 
     A minimum-jerk course, at rest at both ends (Flash & Hogan 1985).
@@ -69,7 +69,7 @@ def between(first: Floats, last: Floats, share: Floats) -> Floats:
     return qpos
 
 
-def _missed(meant: Floats, miss_rad: float, rng: np.random.Generator) -> Floats:
+def _with_pose_error(meant: Floats, miss_rad: float, rng: np.random.Generator) -> Floats:
     """The configuration with each hinge off by a little, and the body leaning."""
     qpos = np.array(meant)
     lean = np.array([*rng.normal(0.0, miss_rad, 2), 0.0])
@@ -78,11 +78,11 @@ def _missed(meant: Floats, miss_rad: float, rng: np.random.Generator) -> Floats:
     return qpos
 
 
-def _standing(body: Body, qpos: Floats, beside_m: Floats, turned_rad: float) -> Floats:
+def _put_on_floor(body: Body, qpos: Floats, beside_m: Floats, turned_rad: float) -> Floats:
     """The configuration turned about the vertical through its root, set beside, its lower sole on the floor."""
     out = np.array(qpos)
     out[:2] += beside_m
     out[3:7] = rotations.multiply(rotations.about_z(turned_rad), out[3:7])
-    soles_m = ground.sole_heights_m(body.skeleton, kinematics.pose(body.skeleton, out[None]))
+    soles_m = ground.sole_heights_m(body.skeleton, kinematics.pose_from_qpos(body.skeleton, out[None]))
     out[2] -= float(soles_m.min())
     return out

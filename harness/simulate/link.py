@@ -7,7 +7,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadInput
-from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, size
+from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class TrackerConfig:
     @property
     def record_s(self) -> float:
         """Time that one record takes on the line [s]."""
-        return size(self.items) * BITS_PER_BYTE / self.baud
+        return record_size(self.items) * BITS_PER_BYTE / self.baud
 
     def station_slot_s(self, stations: int) -> float:
         """Time between the samples of one station and the next [s]."""

@@ -12,28 +12,28 @@ from harness.body.humanoid import Body
 from harness.body.mounts import Mount
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.motion import Take
-from harness.simulate.held_poses import between
+from harness.core.motion import BodyMotion
+from harness.simulate.held_poses import minimum_jerk
 from harness.simulate.noise import Noise
-from harness.simulate.simulation import TrackerConfig, sampling_times_s, sense
+from harness.simulate.simulation import TrackerConfig, sampling_times_s, simulate_readings
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 
-SHORTEST_BACK_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
+SHORTEST_RETURN_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
 """The way back takes a second, or as long as walking there and turning round does at an easy pace."""
 _BLEND_HZ = 120.0
 
 
-def lap(
+def simulate_loop(
     body: Body,
-    take: Take,
+    take: BodyMotion,
     mounts: Sequence[Mount],
     tracker: TrackerConfig,
     noise: Noise,
     *,
     seed: int,
     session: str = "",
-) -> Samples:
+) -> DeviceSamples:
     """The readings of a take and of the way back; BadInput when the take is shorter than one period.
 
     `session` is as in `simulate`.
@@ -42,13 +42,13 @@ def lap(
     time_s = sampling_times_s(there.duration_s, tracker, len(mounts))
     first = len(time_s)
     ends = there.qpos(np.array([time_s[-1, 0], 0.0]))
-    periods = int(np.ceil(_way_back_s(ends[0], ends[1]) * tracker.rate_hz)) + 1
+    periods = int(np.ceil(_return_duration_s(ends[0], ends[1]) * tracker.rate_hz)) + 1
     turns_s = time_s[0]
-    back = _back(take, ends[0], ends[1], periods / tracker.rate_hz + float(turns_s[-1]))
+    back = _return_motion(take, ends[0], ends[1], periods / tracker.rate_hz + float(turns_s[-1]))
     back_s = np.arange(1, periods)[:, None] / tracker.rate_hz + turns_s
     seen = [
-        sense(there, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session),
-        sense(
+        simulate_readings(there, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session),
+        simulate_readings(
             Trajectory(body, back),
             mounts,
             tracker,
@@ -60,7 +60,7 @@ def lap(
             session=session,
         ),
     ]
-    return Samples(
+    return DeviceSamples(
         stations=seen[0].stations,
         rate_hz=tracker.rate_hz,
         first_lap=first,
@@ -73,16 +73,16 @@ def lap(
     )
 
 
-def _way_back_s(last: Floats, first: Floats) -> float:
+def _return_duration_s(last: Floats, first: Floats) -> float:
     """How long it takes from one configuration (55,) to the other [s]."""
     walk_s = float(np.linalg.norm(first[:2] - last[:2])) / WALK_M_S
     turn_s = float(rotations.angle_between_rad(first[3:7], last[3:7])) / TURN_RAD_S
-    return max(SHORTEST_BACK_S, walk_s, turn_s)
+    return max(SHORTEST_RETURN_S, walk_s, turn_s)
 
 
-def _back(take: Take, last: Floats, first: Floats, duration_s: float) -> Take:
+def _return_motion(take: BodyMotion, last: Floats, first: Floats, duration_s: float) -> BodyMotion:
     """From the last configuration to the first, where it stays for what is left of the time."""
     rate_hz = max(_BLEND_HZ, take.rate_hz)
     time_s = np.arange(int(np.ceil(duration_s * rate_hz)) + 1) / rate_hz
-    qpos = between(last, first, np.clip(time_s / duration_s, 0.0, 1.0))
-    return Take(f"{take.name} and back", take.subject, take.source, take.behaviour, rate_hz, qpos)
+    qpos = minimum_jerk(last, first, np.clip(time_s / duration_s, 0.0, 1.0))
+    return BodyMotion(f"{take.name} and back", take.subject, take.source, take.behaviour, rate_hz, qpos)

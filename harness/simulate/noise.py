@@ -4,45 +4,45 @@ from dataclasses import dataclass
 
 from harness.errors import UnknownName
 from harness.simulate.components.clock import Clock
-from harness.simulate.components.drift_noise import Slow
+from harness.simulate.components.drift_noise import DriftNoise
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.orientation_offset import Turned
-from harness.simulate.components.position_offset import Displaced
-from harness.simulate.components.session_bias import Session
-from harness.simulate.components.soft_tissue import Wobble
-from harness.simulate.components.speed_error import Speed
-from harness.simulate.components.strap_slip import Loose
-from harness.simulate.components.white_noise import White
-from harness.simulate.readings import Sensed
+from harness.simulate.components.orientation_offset import OrientationOffset
+from harness.simulate.components.position_offset import PositionOffset
+from harness.simulate.components.session_bias import SessionBias
+from harness.simulate.components.soft_tissue import SoftTissueArtefact
+from harness.simulate.components.speed_error import SpeedError
+from harness.simulate.components.strap_slip import StrapSlip
+from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.readings import SimulatedReadings
 
-LEVELS = ("clean", "noise", "default")
+NOISE_PRESETS = ("clean", "noise", "default")
 
 
 @dataclass(frozen=True)
 class Noise:
     """What goes wrong; None or () for what does not. Each component draws for itself, whatever else there is."""
 
-    wobble: Wobble | None = None
+    wobble: SoftTissueArtefact | None = None
     mount: MountOffset | None = None
-    loose: Loose | None = None
+    loose: StrapSlip | None = None
     slip: tuple[MountSlip, ...] = ()
-    speed: Speed | None = None
-    session: Session | None = None
-    slow: Slow | None = None
-    white: White | None = None
+    speed: SpeedError | None = None
+    session: SessionBias | None = None
+    slow: DriftNoise | None = None
+    white: WhiteNoise | None = None
     excursion: Excursion | None = None
     echo: Echo | None = None
-    displaced: tuple[Displaced, ...] = ()
-    turned: tuple[Turned, ...] = ()
+    displaced: tuple[PositionOffset, ...] = ()
+    turned: tuple[OrientationOffset, ...] = ()
     dropout: Dropout | None = None
     lost: tuple[LostStation, ...] = ()
     clock: Clock | None = None
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         """Let every component do its work, in the order of the fields: from the body outwards to the device."""
         for component in (
             self.wobble,
@@ -65,22 +65,22 @@ class Noise:
                 component.spoil(sensed)
 
 
-def level(name: str) -> Noise:
+def noise_preset(name: str) -> Noise:
     """`clean` (nothing), `noise` (white, slow, session, clock) or `default` (all of 13.5). UnknownName."""
     match name:
         case "clean":
             return Noise()
         case "noise":
-            return Noise(white=White(), slow=Slow(), session=Session(), clock=Clock())
+            return Noise(white=WhiteNoise(), slow=DriftNoise(), session=SessionBias(), clock=Clock())
         case "default":
             return Noise(
-                white=White(),
-                slow=Slow(),
-                session=Session(),
+                white=WhiteNoise(),
+                slow=DriftNoise(),
+                session=SessionBias(),
                 excursion=Excursion(),
                 echo=Echo(),
                 dropout=Dropout(),
-                speed=Speed(),
+                speed=SpeedError(),
                 clock=Clock(),
             )
-    raise UnknownName("noise level", name, LEVELS)
+    raise UnknownName("noise level", name, NOISE_PRESETS)

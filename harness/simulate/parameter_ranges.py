@@ -5,7 +5,7 @@ import math
 from harness.errors import BadInput
 
 
-def require(component: object, **ranges: tuple[float, float]) -> None:
+def require_ranges(component: object, **ranges: tuple[float, float]) -> None:
     """Each named field lies between these two, bounds included; of a pair both, in ascending order. Else BadInput."""
     for name, (low, high) in ranges.items():
         value = getattr(component, name)

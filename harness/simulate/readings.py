@@ -14,7 +14,7 @@ GRAVITY_M_S2 = 9.81
 
 
 @dataclass(eq=False)
-class Sensed:
+class SimulatedReadings:
     """N samples of S stations in the tracker's frame; components change the arrays in place."""
 
     seed: int

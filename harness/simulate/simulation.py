@@ -6,23 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.body.mounts import Mount, place
-from harness.body.soft_tissue import thickness_m
+from harness.body.mounts import Mount, locate_mount
+from harness.body.soft_tissue import tissue_thickness_m
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, freeze
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.simulate.link import TrackerConfig, transmit
 from harness.simulate.noise import Noise
-from harness.simulate.readings import GRAVITY_M_S2, Sensed
+from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 from harness.simulate.trajectory import StationMotion, Trajectory
-from harness.stream.codec.capture import Capture
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import FrameReader, WireFormat
-from harness.stream.codec.records import Said, encode
+from harness.stream.codec.records import RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 
-__all__ = ["Simulation", "TrackerConfig", "sense", "simulate"]
+__all__ = ["Simulation", "TrackerConfig", "simulate_readings", "simulate_tracker"]
 
 WORLD_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 """The tracker's axes are x forward, y right, z down (docs/is900.md 5.3): half a turn about x from the world's."""
@@ -33,7 +33,7 @@ class Simulation:
     """A take as the tracker saw it, and the truth beside it. Frames carry nothing of the truth."""
 
     wire_format: WireFormat
-    wire: Capture
+    wire: ByteCapture
     """What came over the line, record by record."""
     frames: tuple[TrackerFrame, ...]
     """(F,) decoded from `wire`."""
@@ -62,9 +62,9 @@ class Simulation:
         return len(self.truth_s)
 
 
-def simulate(
+def simulate_tracker(
     body: Body,
-    take: Take,
+    take: BodyMotion,
     mounts: Sequence[Mount],
     tracker: TrackerConfig,
     noise: Noise,
@@ -81,7 +81,7 @@ def simulate(
     trajectory = Trajectory(body, take)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     calibration = exact_calibration(body, mounts, tracker)
-    sensed = sense(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
+    sensed = simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
     sent, wire = _transmitted(sensed, wire_format, tracker)
     reader = FrameReader(wire_format)
     frames = (*reader.feed_all(wire), *reader.finish())
@@ -90,7 +90,7 @@ def simulate(
         wire_format=wire_format,
         wire=wire,
         frames=frames,
-        frame_index=_matched(frames, sensed.device_s),
+        frame_index=_match_frames(frames, sensed.device_s),
         truth_s=truth_s,
         truth_qpos=trajectory.qpos(truth_s),
         calibration=calibration,
@@ -109,7 +109,7 @@ def sampling_times_s(duration_s: float, tracker: TrackerConfig, stations: int) -
 
 def exact_calibration(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calibration:
     """The mounts as they are and the true frame of the tracker."""
-    places = [place(body.skeleton, mount) for mount in mounts]
+    places = [locate_mount(body.skeleton, mount) for mount in mounts]
     return Calibration(
         kind="exact",
         stations=tuple(mount.station for mount in mounts),
@@ -121,7 +121,7 @@ def exact_calibration(body: Body, mounts: Sequence[Mount], tracker: TrackerConfi
     )
 
 
-def sense(
+def simulate_readings(
     trajectory: Trajectory,
     mounts: Sequence[Mount],
     tracker: TrackerConfig,
@@ -132,7 +132,7 @@ def sense(
     take: str,
     begins_s: float = 0.0,
     session: str = "",
-) -> Sensed:
+) -> SimulatedReadings:
     """What the tracker believes at the moments `time_s` (E, S) of a trajectory, before it goes over the line.
 
     `begins_s` is the time of the trajectory's beginning, for the device's clock and for errors that have a moment.
@@ -142,7 +142,7 @@ def sense(
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     skeleton = trajectory.body.skeleton
     along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
-    sensed = Sensed(
+    sensed = SimulatedReadings(
         seed=seed,
         take=take,
         stations=calibration.stations,
@@ -150,7 +150,7 @@ def sense(
         rate_hz=tracker.rate_hz,
         velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
         radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
-        flesh_m=np.array([thickness_m(mount.bone, mount.along) for mount in mounts]),
+        flesh_m=np.array([tissue_thickness_m(mount.bone, mount.along) for mount in mounts]),
         force_m_s2=_force_m_s2(motion, calibration),
         position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
@@ -170,19 +170,21 @@ def _force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
     return out
 
 
-def _transmitted(sensed: Sensed, wire_format: WireFormat, tracker: TrackerConfig) -> tuple[Bools, Capture]:
+def _transmitted(
+    sensed: SimulatedReadings, wire_format: WireFormat, tracker: TrackerConfig
+) -> tuple[Bools, ByteCapture]:
     """Which records (E*S,) got through the line, in the order of sampling, and what came out at its end."""
     characters = np.tile(np.frombuffer(wire_format.characters, np.uint8), len(sensed.time_s))
-    said = Said(
+    said = RecordValues(
         sensed.device_s.ravel(), sensed.position_m.reshape(-1, 3), sensed.turn.reshape(-1, 4), sensed.quality.ravel()
     )
-    table = encode(wire_format.items, characters, said, wire_format.settings)
+    table = encode_records(wire_format.items, characters, said, wire_format.settings)
     sent, arrived_s = transmit(sensed.time_s.ravel() + tracker.latency_s, tracker)
     ends = table.itemsize * np.arange(1, int(sent.sum()) + 1)
-    return sent, Capture(table[sent].tobytes(), ends, arrived_s[sent])
+    return sent, ByteCapture(table[sent].tobytes(), ends, arrived_s[sent])
 
 
-def _matched(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
+def _match_frames(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
     """The sampled frame (F,) that each decoded frame is, by what the device's clock (E, S) said then."""
     began_s, pace_s = device_s[0], np.diff(device_s[:2, 0])
     stamps_s = np.array([frame.measured_s for frame in frames]).reshape(-1, device_s.shape[1])
@@ -192,7 +194,9 @@ def _matched(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
     return np.round(frames_since).astype(np.int64)
 
 
-def _health(sensed: Sensed, sent: Bools, wire: Capture, frames: Sequence[TrackerFrame]) -> dict[str, float]:
+def _health(
+    sensed: SimulatedReadings, sent: Bools, wire: ByteCapture, frames: Sequence[TrackerFrame]
+) -> dict[str, float]:
     delay_s = wire.received_s - sensed.time_s.ravel()[sent]
     counts = {f"{name}_share": float(np.mean(hit)) for name, hit in sensed.hits.items()}
     return {

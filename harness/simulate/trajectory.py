@@ -10,7 +10,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats, freeze
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import QPOS_OF_DOF, unpack
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput
 
@@ -45,7 +45,7 @@ class Trajectory:
     length afterwards, which keeps two continuous derivatives. Time runs from 0 to `duration_s`; BadInput outside.
     """
 
-    def __init__(self, body: Body, take: Take) -> None:
+    def __init__(self, body: Body, take: BodyMotion) -> None:
         if len(take) < 2:
             raise BadInput(f"{take.name} has {len(take)} frame(s).", "A trajectory needs two at least.")
         self.body = body
@@ -101,7 +101,7 @@ class Trajectory:
         q, v, a = self._derivatives(time_s, 2)
         at, turned, angle = unpack(q)
         rate, surge = v[:, 6:][:, QPOS_OF_DOF], a[:, 6:][:, QPOS_OF_DOF]
-        point = _Point(at, v[:, :3], a[:, :3])
+        point = _PointMotion(at, v[:, :3], a[:, :3])
         omega, alpha = rotations.rotate(turned, v[:, 3:6]), rotations.rotate(turned, a[:, 3:6])
         chain = _chain(skeleton, worn.bones[row])
         for bone in chain:
@@ -119,17 +119,17 @@ class Trajectory:
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
+class _PointMotion:
     """Of a point on a rigid bone: place, velocity and acceleration, (N, 3) each."""
 
     at_m: Floats
     velocity: Floats
     acceleration: Floats
 
-    def carried(self, reach_m: Floats, omega: Floats, alpha: Floats) -> "_Point":
+    def carried(self, reach_m: Floats, omega: Floats, alpha: Floats) -> "_PointMotion":
         """The same of the point `reach_m` (N, 3) away on the same bone, which turns by `omega` and `alpha`."""
         swing = _cross(omega, reach_m)
-        return _Point(
+        return _PointMotion(
             self.at_m + reach_m,
             self.velocity + swing,
             self.acceleration + _cross(alpha, reach_m) + _cross(omega, swing),

@@ -9,7 +9,7 @@ from harness.core.arrays import Bools, freeze
 from harness.errors import BadInput, UnknownName
 from harness.stream.frame import TrackerFrame
 
-COMBINATIONS = {
+INPUT_COMBINATIONS = {
     "pos+ori": "position and orientation of every station",
     "pos+torso_ori": "position of every station, orientation of the torso",
     "pos": "position of every station",
@@ -45,7 +45,7 @@ class Inputs:
         )
 
 
-def combination(name: str, stations: Sequence[str]) -> Inputs:
+def make_inputs(name: str, stations: Sequence[str]) -> Inputs:
     """The named combination for these stations; BadInput when a station that it is about is not worn."""
     every, none = np.ones(len(stations), bool), np.zeros(len(stations), bool)
     if name == "pos+ori":
@@ -55,19 +55,19 @@ def combination(name: str, stations: Sequence[str]) -> Inputs:
     if name == "ori":
         return Inputs(name, none, every)
     if name == "pos+torso_ori":
-        return Inputs(name, every, _named(name, stations, "torso"))
+        return Inputs(name, every, _station_mask(name, stations, "torso"))
     if name == "mixed":
-        legs_and_torso = _named(name, stations, "torso", "left_ankle", "right_ankle")
-        upper = _named(name, stations, "torso", "head", *_hands(stations))
+        legs_and_torso = _station_mask(name, stations, "torso", "left_ankle", "right_ankle")
+        upper = _station_mask(name, stations, "torso", "head", *_hand_stations(stations))
         return Inputs(name, legs_and_torso, upper)
-    raise UnknownName("input combination", name, COMBINATIONS)
+    raise UnknownName("input combination", name, INPUT_COMBINATIONS)
 
 
-def _hands(stations: Sequence[str]) -> tuple[str, str]:
+def _hand_stations(stations: Sequence[str]) -> tuple[str, str]:
     return ("left_wrist", "right_wrist") if "left_wrist" in stations else ("left_hand", "right_hand")
 
 
-def _named(combination_name: str, stations: Sequence[str], *wanted: str) -> Bools:
+def _station_mask(combination_name: str, stations: Sequence[str], *wanted: str) -> Bools:
     missing = [w for w in wanted if w not in stations]
     if missing:
         raise BadInput(

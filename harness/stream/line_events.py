@@ -5,7 +5,7 @@ from typing import Literal, Protocol
 
 from harness.stream.codec.reader import WireFormat
 
-Kind = Literal[
+LineEventKind = Literal[
     "connected",  # streaming, for the first time or again
     "unplugged",  # the port or the connection is gone
     "stalled",  # nothing came for a moment, or the device's clock stands still
@@ -22,7 +22,7 @@ Kind = Literal[
 class LineEvent:
     """Something a person at the device wants to know; each trouble is told once, however long it lasts."""
 
-    kind: Kind
+    kind: LineEventKind
     monotonic_s: float
     """Host's monotonic clock [s], that of `TrackerFrame.received_s`."""
     wall_s: float
@@ -30,7 +30,7 @@ class LineEvent:
     text: str
 
 
-class Witness(Protocol):
+class LineObserver(Protocol):
     """Sees all that goes over the line, in order; a recording is one."""
 
     def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
@@ -45,7 +45,7 @@ class Witness(Protocol):
     def happened(self, event: LineEvent) -> None: ...
 
 
-class NoWitness:
+class NullLineObserver:
     """Nobody looks on."""
 
     def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...

@@ -9,7 +9,7 @@ import numpy as np
 from harness.errors import HarnessError
 from harness.reconstruct import registry
 from harness.stream.frame import TrackerFrame
-from harness.testing.contract_case import make_trial, only_positions, told
+from harness.testing.contract_case import keep_positions, make_case, run_session
 
 _FRAMES = 8
 
@@ -19,10 +19,10 @@ def compile_all() -> None:
     for name in registry.methods():
         if ":" in name:  # a preset, of the same code
             continue
-        trial = make_trial(registry.resolve(name))
+        trial = make_case(registry.resolve(name))
         frames: list[TrackerFrame] = list(trial.frames[:_FRAMES])
-        for seen in (frames, [only_positions(frame) for frame in frames]):
-            answers = told(trial.reconstructor.begin(trial.calibration), seen)
+        for seen in (frames, [keep_positions(frame) for frame in frames]):
+            answers = run_session(trial.reconstructor.begin(trial.calibration), seen)
             if not all(np.isfinite(answer.qpos).all() for answer in answers):
                 raise HarnessError(f"{name} gave an answer that is not finite.")
 

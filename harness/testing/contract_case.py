@@ -17,21 +17,21 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.stream.frame import TrackerFrame
-from harness.testing.frames import exact_frames, swaying, without, worn
+from harness.testing.frames import drop_stations, exact_calibration, exact_frames, swaying_motion
 
 RATE_HZ, FRAMES = 40.0, 60
-SECOND = round(RATE_HZ)
-LONG, BAD = 7 * SECOND // 2, range(SECOND, 2 * SECOND)
+FRAMES_PER_SECOND = round(RATE_HZ)
+LONG_FRAMES, DISTURBED_FRAMES = 7 * FRAMES_PER_SECOND // 2, range(FRAMES_PER_SECOND, 2 * FRAMES_PER_SECOND)
 """Frames of a long take, and those of it that are disturbed."""
 Frames = Sequence[TrackerFrame]
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ContractCase:
     """A method, examples for it, and a take that is none of them; each `fitted` learns anew."""
 
     method: Method
@@ -40,11 +40,14 @@ class Trial:
     truth: Floats
     """(LONG, 55) configurations."""
 
-    def examples(self) -> list[Take]:
+    def examples(self) -> list[BodyMotion]:
         """New ones every time, for methods that learn."""
         if not self.method.needs_examples:
             return []
-        return [Take(f"sway_{n}", "nobody", "swaying", "", RATE_HZ, swaying(self.body, 160, n)) for n in (2, 3, 4)]
+        return [
+            BodyMotion(f"sway_{n}", "nobody", "swaying", "", RATE_HZ, swaying_motion(self.body, 160, n))
+            for n in (2, 3, 4)
+        ]
 
     def fitted(self) -> Reconstructor:
         """`generator(1, "fit")` is its chance."""
@@ -71,7 +74,7 @@ class Trial:
 
     def run(self, frames: Frames) -> list[Estimate]:
         """Answers of a new session."""
-        return told(self.reconstructor.begin(self.calibration), frames)
+        return run_session(self.reconstructor.begin(self.calibration), frames)
 
     def begun(self, count: int) -> list[Session]:
         """So many sessions of one new reconstructor."""
@@ -79,21 +82,21 @@ class Trial:
         return [reconstructor.begin(self.calibration) for _ in range(count)]
 
 
-def make_trial(method: Method) -> Trial:
-    body = humanoid.build()
-    return Trial(method, body, worn(body), swaying(body, LONG))
+def make_case(method: Method) -> ContractCase:
+    body = humanoid.build_body()
+    return ContractCase(method, body, exact_calibration(body), swaying_motion(body, LONG_FRAMES))
 
 
-def told(session: Session, frames: Frames) -> list[Estimate]:
+def run_session(session: Session, frames: Frames) -> list[Estimate]:
     return [session.step(frame) for frame in frames]
 
 
-def qpos_of(estimates: Sequence[Estimate]) -> Floats:
+def stack_qpos(estimates: Sequence[Estimate]) -> Floats:
     """(F, 55) as they are now."""
     return np.array([estimate.qpos for estimate in estimates])
 
 
-def digest(takes: Sequence[Take]) -> str:
+def hash_motions(takes: Sequence[BodyMotion]) -> str:
     whole = hashlib.blake2b()
     for take in takes:
         whole.update(repr((take.name, take.subject, take.source, take.behaviour, take.rate_hz)).encode())
@@ -101,7 +104,7 @@ def digest(takes: Sequence[Take]) -> str:
     return whole.hexdigest()
 
 
-def elsewhere(qpos: Floats, yaw_rad: float, by_m: Floats) -> Floats:
+def transform_motion(qpos: Floats, yaw_rad: float, by_m: Floats) -> Floats:
     """The same motion (T, 55) turned about the vertical through the origin, then shifted."""
     turn, out = rotations.about_z(yaw_rad), np.array(qpos)
     out[:, :3] = rotations.rotate(turn, qpos[:, :3]) + by_m
@@ -109,45 +112,45 @@ def elsewhere(qpos: Floats, yaw_rad: float, by_m: Floats) -> Floats:
     return out
 
 
-def only_positions(frame: TrackerFrame) -> TrackerFrame:
+def keep_positions(frame: TrackerFrame) -> TrackerFrame:
     nothing = np.full_like(frame.tracker_from_station, np.nan)
     return replace(frame, orientation_valid=np.zeros(len(nothing), bool), tracker_from_station=nothing)
 
 
-def only_orientations(frame: TrackerFrame) -> TrackerFrame:
+def keep_orientations(frame: TrackerFrame) -> TrackerFrame:
     nothing_m = np.full_like(frame.position_m, np.nan)
     return replace(frame, position_valid=np.zeros(len(nothing_m), bool), position_m=nothing_m)
 
 
-def moved(frame: TrackerFrame, offset_m: Floats) -> TrackerFrame:
+def offset_positions(frame: TrackerFrame, offset_m: Floats) -> TrackerFrame:
     """Positions off by (S, 3) or (3,) along the tracker's axes."""
     return replace(frame, position_m=frame.position_m + offset_m)
 
 
-def turned(frame: TrackerFrame, angle_rad: float) -> TrackerFrame:
+def rotate_orientations(frame: TrackerFrame, angle_rad: float) -> TrackerFrame:
     """Every orientation off by so much about the vertical, positions as they are."""
     turn = rotations.about_z(angle_rad)
     return replace(frame, tracker_from_station=rotations.multiply(turn, frame.tracker_from_station))
 
 
-def _one_off(frame: TrackerFrame) -> TrackerFrame:
+def _offset_first_station(frame: TrackerFrame) -> TrackerFrame:
     offset_m = np.zeros((len(frame.quality), 3))
     offset_m[0, 0] = 0.3
-    return moved(frame, offset_m)
+    return offset_positions(frame, offset_m)
 
 
 DISTURBANCES: dict[str, tuple[range, Callable[[TrackerFrame], TrackerFrame]]] = {
-    "one station lost": (BAD, lambda frame: without(frame, [0])),
-    "all lost": (BAD, lambda frame: without(frame, range(len(frame.quality)))),
-    "one 0.3 m off": (BAD, _one_off),
-    "all turned by 30 deg": (BAD, lambda frame: turned(frame, np.pi / 6.0)),
-    "a start 1 m off": (range(SECOND), lambda frame: moved(frame, np.array([1.0, 0.0, 0.0]))),
+    "one station lost": (DISTURBED_FRAMES, lambda frame: drop_stations(frame, [0])),
+    "all lost": (DISTURBED_FRAMES, lambda frame: drop_stations(frame, range(len(frame.quality)))),
+    "one 0.3 m off": (DISTURBED_FRAMES, _offset_first_station),
+    "all turned by 30 deg": (DISTURBED_FRAMES, lambda frame: rotate_orientations(frame, np.pi / 6.0)),
+    "a start 1 m off": (range(FRAMES_PER_SECOND), lambda frame: offset_positions(frame, np.array([1.0, 0.0, 0.0]))),
 }
 """What goes wrong in which frames, and how: what `simulate.disturbance` does, for 1 s each."""
 
 
-def disturbed(frames: Frames, what: str) -> tuple[list[TrackerFrame], slice]:
+def disturb_frames(frames: Frames, what: str) -> tuple[list[TrackerFrame], slice]:
     """Frames with something gone wrong, and which of them recovery is judged by: half a second from 1 s after it."""
     when, spoil = DISTURBANCES[what]
-    judged = slice(when.stop + SECOND, when.stop + 3 * SECOND // 2)
+    judged = slice(when.stop + FRAMES_PER_SECOND, when.stop + 3 * FRAMES_PER_SECOND // 2)
     return [spoil(frame) if index in when else frame for index, frame in enumerate(frames[: judged.stop])], judged

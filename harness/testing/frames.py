@@ -13,16 +13,16 @@ from harness.core.calibration import Calibration
 from harness.core.seeds import generator
 from harness.stream.frame import TrackerFrame
 
-SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
+SIX_STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
 
-def worn(body: Body, stations: Sequence[str] = SIX) -> Calibration:
+def exact_calibration(body: Body, stations: Sequence[str] = SIX_STATIONS) -> Calibration:
     """Default mounts of these stations, known exactly, in a room whose tracker frame is not the world's."""
-    placed = [mounts.place(body.skeleton, mounts.DEFAULTS[station]) for station in stations]
+    placed = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in stations]
     return Calibration(
         kind="exact",
         stations=tuple(stations),
-        bones=tuple(mounts.DEFAULTS[station].bone for station in stations),
+        bones=tuple(mounts.DEFAULT_MOUNTS[station].bone for station in stations),
         mount_m=np.array([mount_m for mount_m, _ in placed]),
         bone_from_station=np.array([turn for _, turn in placed]),
         world_from_tracker=rotations.exp(np.array([np.pi, 0.0, 0.3])),
@@ -54,7 +54,7 @@ def exact_frames(body: Body, calibration: Calibration, qpos: Floats, rate_hz: fl
     return frames
 
 
-def without(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
+def drop_stations(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
     """The frame as if these stations had not reported."""
     kept = np.ones(len(frame.quality), bool)
     kept[list(lost)] = False
@@ -70,7 +70,7 @@ def without(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
     )
 
 
-def swaying(body: Body, frames: int, seed: int = 1, rate_hz: float = 40.0) -> Floats:
+def swaying_motion(body: Body, frames: int, seed: int = 1, rate_hz: float = 40.0) -> Floats:
     """(T, 55) a performer who strolls along a curve while every hinge swings gently: no behaviour, but smooth."""
     rng = generator(seed, "swaying")
     t = np.arange(frames)[:, None] / rate_hz

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 _LEVELS = {"worse": "error", "cannot tell": "warning"}
 
 
-def annotations(properties: Mapping[str, str], file: str, line: int) -> Iterator[str]:
+def format_annotations(properties: Mapping[str, str], file: str, line: int) -> Iterator[str]:
     """A line for each metric that is worse or cannot be told; for what could not be compared at all, one that says why.
 
     `properties` as `gate.Checked.properties` names them; none of them, no line.
@@ -27,8 +27,8 @@ def annotations(properties: Mapping[str, str], file: str, line: int) -> Iterator
 
 
 def _annotation(level: str, file: str, line: int, title: str, message: str) -> str:
-    return f"::{level} file={_escaped(file, ':,')},line={line},title={_escaped(title, ':,')}::{_escaped(message)}"
+    return f"::{level} file={_escape(file, ':,')},line={line},title={_escape(title, ':,')}::{_escape(message)}"
 
 
-def _escaped(text: str, signs: str = "") -> str:
+def _escape(text: str, signs: str = "") -> str:
     return "".join(f"%{ord(sign):02X}" if sign in f"%\r\n{signs}" else sign for sign in text)

@@ -6,12 +6,12 @@ from typing import Any
 
 from harness.errors import HarnessError, was_interrupted
 from harness.reconstruct.contract import Method
-from harness.testing.contract_case import make_trial
+from harness.testing.contract_case import make_case
 from harness.testing.rules import RULES
-from harness.testing.rules.assertions import Broken
+from harness.testing.rules.assertions import RuleViolation
 
 
-class MethodBroken(HarnessError):
+class MethodContractError(HarnessError):
     """A rule of the contract that a method does not keep."""
 
     def __init__(self, method: str, rule: str, seen: str) -> None:
@@ -23,7 +23,7 @@ class MethodBroken(HarnessError):
 
 
 @dataclass(frozen=True)
-class Finding:
+class RuleResult:
     """One rule, whether the method keeps it, and what was seen."""
 
     rule: str
@@ -36,20 +36,20 @@ class Finding:
 
 def check_method(method: Method) -> None:
     """Every rule; MethodBroken at the first that does not hold."""
-    for finding in examine(method):
+    for finding in check_rules(method):
         if not finding.ok:
-            raise MethodBroken(method.name, finding.rule, finding.seen)
+            raise MethodContractError(method.name, finding.rule, finding.seen)
 
 
-def examine(method: Method) -> Iterator[Finding]:
+def check_rules(method: Method) -> Iterator[RuleResult]:
     """Every rule, one after another, whatever the method raises."""
-    trial = make_trial(method)
+    trial = make_case(method)
     for rule, check in RULES.items():
         try:
-            yield Finding(rule, True, check(trial))
-        except Broken as broken:
-            yield Finding(rule, False, str(broken))
+            yield RuleResult(rule, True, check(trial))
+        except RuleViolation as broken:
+            yield RuleResult(rule, False, str(broken))
         except (Exception, SystemExit) as error:  # a method may raise anything: that is the finding
             if was_interrupted(error):
                 raise
-            yield Finding(rule, False, f"raised {type(error).__name__}: {error}")
+            yield RuleResult(rule, False, f"raised {type(error).__name__}: {error}")

@@ -34,13 +34,13 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     `baseline_method`; `metrics` names what must not be worse. With --harness-save it becomes the baseline instead, on
     `scenario` (a shipped one or a file) where there is none yet.
     """
-    from harness.compare.margins import GATED
+    from harness.compare.margins import GATED_METRICS
     from harness.errors import HarnessError
-    from harness.testing.regression_gate import Gate
+    from harness.testing.regression_gate import RegressionGate
 
     root, options = request.config.rootpath, request.config.option
     out = root / options.harness_out if options.harness_out else tmp_path_factory.getbasetemp() / "harness"
-    gate = Gate(out, root / options.harness_baselines, command=f"pytest {request.node.nodeid}")
+    gate = RegressionGate(out, root / options.harness_baselines, command=f"pytest {request.node.nodeid}")
 
     def held(
         method: str,
@@ -48,7 +48,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
         *,
         baseline_method: str | None = None,
         scenario: str | None = None,
-        metrics: tuple[str, ...] = GATED,
+        metrics: tuple[str, ...] = GATED_METRICS,
     ) -> None:
         __tracebackhide__ = True
         if str(root) not in sys.path:
@@ -74,9 +74,9 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
     for report in (*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")):
         properties = {name: str(value) for name, value in report.user_properties if name.startswith("harness.")}
         if properties:
-            from harness.testing.github_annotations import annotations
+            from harness.testing.github_annotations import format_annotations
 
             path, line, _ = report.location
             file = os.path.relpath(config.rootpath / path, os.environ.get("GITHUB_WORKSPACE") or config.rootpath)
-            for text in annotations(properties, Path(file).as_posix(), (line or 0) + 1):
+            for text in format_annotations(properties, Path(file).as_posix(), (line or 0) + 1):
                 terminalreporter.write_line(text)

@@ -10,26 +10,26 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 from harness.compare import baseline
-from harness.compare.comparison import Comparison, compare
-from harness.compare.margins import GATED, margin_of
+from harness.compare.comparison import Comparison, compare_results
+from harness.compare.margins import GATED_METRICS, margin_of
 from harness.core.fields import build
 from harness.core.files import content_key
 from harness.errors import BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario
-from harness.report.comparison.wording import groups_vary, interval, signed
+from harness.report.comparison.wording import format_interval, format_signed, groups_vary
 from harness.report.comparison.writer import text
 from harness.results.manifest import Manifest
-from harness.results.reader import BASELINES, Judged, read_judged
+from harness.results.reader import BASELINES, ResultSet, load_results
 from harness.results.storage import read_summary
 
-SCENARIO = "gate"
+DEFAULT_SCENARIO = "gate"
 """What a method is measured on when its first baseline is made, unless told otherwise."""
-_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+_THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
-class Checked:
+class GateResult:
     """What a comparison with a baseline came to."""
 
     comparison: Comparison
@@ -51,13 +51,13 @@ class Checked:
         for line in self.comparison.differences:
             if line.gated:
                 of = f"[{line.group}]" if groups_vary(self.comparison) else ""
-                yield f"harness.{line.metric}{of}.difference", f"{signed(line, line.difference)} {line.unit}"
-                yield f"harness.{line.metric}{of}.interval", interval(line)
+                yield f"harness.{line.metric}{of}.difference", f"{format_signed(line, line.difference)} {line.unit}"
+                yield f"harness.{line.metric}{of}.interval", format_interval(line)
                 yield f"harness.{line.metric}{of}.verdict", line.verdict
 
 
 @dataclass(frozen=True)
-class Gate:
+class RegressionGate:
     """Where baselines are and runs go; what a caller runs twice into one folder is resumed."""
 
     out: Path
@@ -66,7 +66,9 @@ class Gate:
     command: str = ""
     """That reproduces the run."""
 
-    def check(self, method: str, name: str, *, against: str | None = None, metrics: Sequence[str] = GATED) -> Checked:
+    def check(
+        self, method: str, name: str, *, against: str | None = None, metrics: Sequence[str] = GATED_METRICS
+    ) -> GateResult:
         """Run `method` (such as "my_module:MyMethod") on the scenario of baseline `name`, and compare.
 
         `against` is the method of the baseline that it is held to: by default the one of the same name, or the only
@@ -85,15 +87,15 @@ class Gate:
             )
         if held_to not in known:
             raise UnknownName(f"method in baseline {name}", held_to, known)
-        run = self._run(replace(scenario_of(reference.manifest), methods=(method,)))
-        now = replace(read_judged(run), title=f"{method} now")
-        comparison = compare(reference, now, methods=(held_to, method), metrics=metrics)
-        return Checked(comparison, next(iter(read_summary(run)["failures"].values()), ""))
+        run = self._run(replace(scenario_from_manifest(reference.manifest), methods=(method,)))
+        now = replace(load_results(run), title=f"{method} now")
+        comparison = compare_results(reference, now, methods=(held_to, method), metrics=metrics)
+        return GateResult(comparison, next(iter(read_summary(run)["failures"].values()), ""))
 
     def keep(self, method: str, name: str, *, scenario: str | None = None) -> Path:
         """Run `method` and keep what it measures as baseline `name`; returns its folder.
 
-        On the `scenario`, a shipped one or a file; by default that of the baseline which is replaced, or `SCENARIO`.
+        On the `scenario`, a shipped one or a file; by default that of the baseline which is replaced, or `DEFAULT_SCENARIO`.
         BadInput when the baseline also has other methods, which would be lost.
         """
         exists = (self.baselines / name).is_dir()
@@ -104,12 +106,14 @@ class Gate:
                 "Choose another name, or keep a run of all of them with `harness baseline save --force`.",
             )
         if scenario is None and exists:
-            planned = scenario_of(self._read(name).manifest)
+            planned = scenario_from_manifest(self._read(name).manifest)
         else:
-            planned = load_scenario(scenario or SCENARIO)
-        return baseline.save(self._run(replace(planned, methods=(method,), order=())), name, self.baselines, force=True)
+            planned = load_scenario(scenario or DEFAULT_SCENARIO)
+        return baseline.write_baseline(
+            self._run(replace(planned, methods=(method,), order=())), name, self.baselines, force=True
+        )
 
-    def _read(self, name: str) -> Judged:
+    def _read(self, name: str) -> ResultSet:
         folder = self.baselines / name
         if not folder.is_dir():
             raise BadInput(
@@ -117,21 +121,21 @@ class Gate:
                 "The test with `--harness-save` makes it of what the method measures now; "
                 f"so does `harness baseline save {name} RUN` of a run.",
             )
-        return read_judged(folder)
+        return load_results(folder)
 
     def _run(self, scenario: Scenario) -> Path:
         out = self.out / f"{scenario.name}-{content_key(repr(scenario))[:12]}"
-        with _one_thread():
+        with _single_threaded():
             engine.run(scenario, out, jobs=2, command=self.command)
         return out
 
 
 @contextmanager
-def _one_thread() -> Iterator[None]:
+def _single_threaded() -> Iterator[None]:
     """Processes that are started meanwhile compute as the command line does, whatever this one has loaded: threads that
     wait for each other cost CPU time, and steps would seem many times as expensive."""
-    before = {name: os.environ.get(name) for name in _THREADS}
-    os.environ.update(dict.fromkeys(_THREADS, "1"))
+    before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
     try:
         yield
     finally:
@@ -141,7 +145,7 @@ def _one_thread() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def scenario_of(manifest: Manifest) -> Scenario:
+def scenario_from_manifest(manifest: Manifest) -> Scenario:
     """What a run was of, read off its manifest, but for its methods. BadInput when it was no single scenario's."""
     known = {field.name for field in fields(Scenario)}
     content = {name: value for name, value in manifest.inputs.items() if name in known}

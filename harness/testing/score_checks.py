@@ -15,26 +15,30 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.skeleton import Skeleton
 from harness.score.metrics import DEFINITIONS
-from harness.score.null_methods import bounds
-from harness.score.score import Scores, score
+from harness.score.null_methods import score_null_methods
+from harness.score.score import Scores, score_estimate
 
-BESIDE = {
+TRUTH_METRIC_OF = {
     "jitter_m_s3": "jitter_true_m_s3",
     "foot_skate_mm_s": "foot_skate_true_mm_s",
     "penetration_mm": "penetration_true_mm",
     "float_mm": "float_true_mm",
 }
 """Metrics of one motion alone, and the truth's own value: an oracle reaches that, not zero."""
-ERRORS = tuple(name for name, d in DEFINITIONS.items() if d.pool != "none" and name not in {*BESIDE, *BESIDE.values()})
+ERROR_METRICS = tuple(
+    name
+    for name, d in DEFINITIONS.items()
+    if d.pool != "none" and name not in {*TRUTH_METRIC_OF, *TRUTH_METRIC_OF.values()}
+)
 """Metrics that are zero for the truth."""
-_ZERO = 1e-9
+_ZERO_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
-class Check:
+class InstallationCheck:
     """One thing that was tried."""
 
     name: str
@@ -45,44 +49,48 @@ class Check:
         return asdict(self)
 
 
-def check_scores(takes: Sequence[Take], skeleton: Skeleton | None = None) -> list[Check]:
+def check_scores(takes: Sequence[BodyMotion], skeleton: Skeleton | None = None) -> list[InstallationCheck]:
     """Oracle, null methods, closed forms and evo on true motion of at least 3 s each, on the body `skeleton`."""
     body = skeleton or standard_skeleton()
-    found = [bounds(body, take.rate_hz, take.qpos) for take in takes]
+    found = [score_null_methods(body, take.rate_hz, take.qpos) for take in takes]
     return [
-        _oracle_is_zero([nulls["oracle"] for nulls in found]),
-        _nulls_are_ordered([{name: s.metrics for name, s in nulls.items()} for nulls in found]),
-        *_closed_forms(body, takes[0]),
-        _lag(body, takes[0]),
-        _evo_agrees(body, takes[0]),
+        _check_oracle([nulls["oracle"] for nulls in found]),
+        _check_null_methods([{name: s.metrics for name, s in nulls.items()} for nulls in found]),
+        *_check_closed_forms(body, takes[0]),
+        _check_lag(body, takes[0]),
+        _check_against_evo(body, takes[0]),
     ]
 
 
-def _oracle_is_zero(oracles: Sequence[Scores]) -> Check:
+def _check_oracle(oracles: Sequence[Scores]) -> InstallationCheck:
     wrong = [
         name
         for scores in oracles
-        for name in (*ERRORS, *BESIDE)
-        if not _is_zero(scores.metrics[name], scores.metrics.get(BESIDE.get(name, "")))
+        for name in (*ERROR_METRICS, *TRUTH_METRIC_OF)
+        if not _is_zero(scores.metrics[name], scores.metrics.get(TRUTH_METRIC_OF.get(name, "")))
     ]
-    detail = f"not so: {', '.join(dict.fromkeys(wrong))}" if wrong else f"{len(ERRORS)} metrics on {len(oracles)} takes"
-    return Check("the truth scores zero", not wrong, detail)
+    detail = (
+        f"not so: {', '.join(dict.fromkeys(wrong))}"
+        if wrong
+        else f"{len(ERROR_METRICS)} metrics on {len(oracles)} takes"
+    )
+    return InstallationCheck("the truth scores zero", not wrong, detail)
 
 
 def _is_zero(value: float | None, truth: float | None) -> bool:
-    return value == truth if value is None or truth is not None else abs(value) <= _ZERO
+    return value == truth if value is None or truth is not None else abs(value) <= _ZERO_TOLERANCE
 
 
-def _nulls_are_ordered(nulls: Sequence[Mapping[str, Mapping[str, float | None]]]) -> Check:
+def _check_null_methods(nulls: Sequence[Mapping[str, Mapping[str, float | None]]]) -> InstallationCheck:
     """Oracle < last value < mean pose and frozen pose, by the mean joint angle over all takes."""
     names = ("oracle", "last_value", "mean_pose", "frozen_pose")
     mean = {name: float(np.mean([take[name]["joint_angle_mean_deg"] or 0.0 for take in nulls])) for name in names}
     ok = mean["oracle"] < mean["last_value"] < min(mean["mean_pose"], mean["frozen_pose"])
     detail = ", ".join(f"{name.replace('_', ' ')} {value:.2f} deg" for name, value in mean.items())
-    return Check("null methods are in order", ok, detail)
+    return InstallationCheck("null methods are in order", ok, detail)
 
 
-def _closed_forms(body: Skeleton, take: Take) -> list[Check]:
+def _check_closed_forms(body: Skeleton, take: BodyMotion) -> list[InstallationCheck]:
     root_m, quaternion, angles_rad = unpack(take.qpos)
     bent = np.array(angles_rad)
     bent[:, 0] += np.deg2rad(4.8)
@@ -95,38 +103,40 @@ def _closed_forms(body: Skeleton, take: Take) -> list[Check]:
         ("one hinge off by 4.8 deg", pack(root_m, quaternion, bent), hinge),
         ("turned by 90 deg", turned, {"root_angle_deg": 90.0, "mpjre_deg": 0.0, "mpjpe_pa_mm": 0.0}),
     )
-    return [_close(name, _judged(body, take, estimate), expected) for name, estimate, expected in cases]
+    return [
+        _check_values(name, _score_all_frames(body, take, estimate), expected) for name, estimate, expected in cases
+    ]
 
 
-def _lag(body: Skeleton, take: Take) -> Check:
+def _check_lag(body: Skeleton, take: BodyMotion) -> InstallationCheck:
     late = np.concatenate([np.repeat(take.qpos[:1], 2, axis=0), take.qpos[:-2]])
-    return _close("two frames late", _judged(body, take, late), {"lag_ms": 2e3 / take.rate_hz})
+    return _check_values("two frames late", _score_all_frames(body, take, late), {"lag_ms": 2e3 / take.rate_hz})
 
 
-def _close(name: str, scores: Scores, expected: Mapping[str, float]) -> Check:
+def _check_values(name: str, scores: Scores, expected: Mapping[str, float]) -> InstallationCheck:
     found = {metric: scores.metrics[metric] for metric in expected}
     ok = all(value is not None and abs(value - expected[metric]) < 1e-6 for metric, value in found.items())
     text = ", ".join(f"{metric} {'not measured' if v is None else f'{v:.6g}'}" for metric, v in found.items())
-    return Check(f"closed form: {name}", ok, text)
+    return InstallationCheck(f"closed form: {name}", ok, text)
 
 
-def _judged(body: Skeleton, take: Take, estimate_qpos: Floats) -> Scores:
+def _score_all_frames(body: Skeleton, take: BodyMotion, estimate_qpos: Floats) -> Scores:
     frames = len(take)
-    return score(
+    return score_estimate(
         body, take.rate_hz, take.qpos, estimate_qpos, np.arange(frames), np.zeros(frames, int), np.full(frames, np.nan)
     )
 
 
-def _evo_agrees(body: Skeleton, take: Take) -> Check:
+def _check_against_evo(body: Skeleton, take: BodyMotion) -> InstallationCheck:
     """Root position error against evo's absolute pose error (translation, no alignment), where evo is installed."""
     name = "evo agrees on the root's position"
-    program = evo_program()
+    program = find_evo()
     if program is None:
-        return Check(name, True, "not tried: evo is not installed")
+        return InstallationCheck(name, True, "not tried: evo is not installed")
     estimate = np.array(take.qpos)
     time_s = np.arange(len(take)) / take.rate_hz
     estimate[:, :3] += 0.1 * np.stack([np.sin(time_s), np.cos(3.0 * time_s), np.sin(2.0 * time_s)], axis=1)
-    scores = score(
+    scores = score_estimate(
         body, take.rate_hz, take.qpos, estimate, np.arange(len(take)), np.zeros(len(take), int),
         np.full(len(take), np.nan), warm_up_s=0.0,
     )  # fmt: skip
@@ -135,20 +145,20 @@ def _evo_agrees(body: Skeleton, take: Take) -> Check:
         for file, qpos in zip(files, (take.qpos, estimate), strict=True):
             np.savetxt(file, np.column_stack([time_s, qpos[:, :3], qpos[:, 4:7], qpos[:, 3]]), fmt="%.9f")
         try:
-            theirs_mm = 1e3 * evo_ape_mean_m(program, *files)
+            theirs_mm = 1e3 * run_evo_ape_m(program, *files)
         except (subprocess.SubprocessError, OSError) as error:
-            return Check(name, False, f"evo failed: {error}")
+            return InstallationCheck(name, False, f"evo failed: {error}")
     ours_mm = scores.metrics["root_position_mm"] or 0.0
-    return Check(name, abs(ours_mm - theirs_mm) < 1.5e-3, f"ours {ours_mm:.3f} mm, evo {theirs_mm:.3f} mm")
+    return InstallationCheck(name, abs(ours_mm - theirs_mm) < 1.5e-3, f"ours {ours_mm:.3f} mm, evo {theirs_mm:.3f} mm")
 
 
-def evo_program() -> str | None:
+def find_evo() -> str | None:
     """The `evo_ape` of this environment or of the path; None where it is not installed."""
     beside = Path(sys.executable).with_name("evo_ape")
     return str(beside) if beside.is_file() else shutil.which("evo_ape")
 
 
-def evo_ape_mean_m(program: str, truth: Path, estimate: Path) -> float:
+def run_evo_ape_m(program: str, truth: Path, estimate: Path) -> float:
     """Mean absolute pose error of two TUM files, translation part, nothing aligned [m], as evo prints it."""
     home = truth.parent  # evo writes its settings into the home folder when it first runs
     done = subprocess.run(

@@ -17,11 +17,11 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.stream.frame import TrackerFrame, TrackerStream
 
-PATIENCE = 1.5
+MAX_SPAN_PERIODS = 1.5
 """A frame spans no more than this many periods."""
 
 
-class BrokenStream(AssertionError):
+class StreamContractError(AssertionError):
     """A stream that breaks the contract; the message lists how."""
 
 
@@ -37,17 +37,17 @@ def check_stream(opened: Callable[[], TrackerStream], *, rate_hz: float, at_most
     if stream.stations != stations or len(set(stations)) < len(stations):
         broken.append(f"stations were {stations}, became {stream.stations}, and must be distinct and never change")
     stream.close()
-    broken += _rows(frames, len(stations))
+    broken += _check_row_count(frames, len(stations))
     whole = [frame for frame in frames if len(frame.measured_s) == len(stations)]
-    for rule in (_locked, _times, _spans, _validity, _repeats):
+    for rule in (_check_read_only, _check_times, _check_spans, _check_validity, _check_repeats):
         broken += rule(whole, len(stations), 1.0 / rate_hz)
-    broken += _closing(opened)
+    broken += _check_closing(opened)
     if broken:
-        raise BrokenStream("\n".join(broken))
+        raise StreamContractError("\n".join(broken))
     return frames
 
 
-def _rows(frames: Sequence[TrackerFrame], stations: int) -> list[str]:
+def _check_row_count(frames: Sequence[TrackerFrame], stations: int) -> list[str]:
     """Every frame has a row for every station."""
     return [
         f"frame {i} has {len(frame.measured_s)} rows for {stations} stations"
@@ -56,7 +56,7 @@ def _rows(frames: Sequence[TrackerFrame], stations: int) -> list[str]:
     ][:1]
 
 
-def _locked(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _check_read_only(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
     """Nobody can change a frame after the fact."""
     names = [field.name for field in fields(TrackerFrame) if field.name != "received_s"]
     return [
@@ -67,31 +67,31 @@ def _locked(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> l
     ][:1]
 
 
-def _times(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _check_times(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
     """Host times strictly increase; no station's device time steps back, suspect rows apart."""
     received = np.array([frame.received_s for frame in frames])
     broken = []
     if not np.isfinite(received).all() or np.any(np.diff(received) <= 0.0):
         broken.append("received_s does not strictly increase")
     for row in range(stations):
-        stamps_s = np.array([f.measured_s[row] for f in frames if _sound(f, row)])
+        stamps_s = np.array([f.measured_s[row] for f in frames if _has_device_time(f, row)])
         if np.any(np.diff(stamps_s) < 0.0):
             broken.append(f"measured_s of station {row} steps back")
     return broken
 
 
-def _spans(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _check_spans(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
     """A frame is one instant: its stations were measured within 1.5 periods."""
     spans_s = [
         _span_s(f.measured_s[~f.suspect & ~np.isnan(f.measured_s)]) for f in frames if len(f.suspect) == stations
     ]
     worst_s = max(spans_s, default=0.0)
-    if worst_s > PATIENCE * period_s:
+    if worst_s > MAX_SPAN_PERIODS * period_s:
         return [f"a frame spans {1e3 * worst_s:.1f} ms, more than 1.5 periods of {1e3 * period_s:.1f} ms"]
     return []
 
 
-def _validity(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _check_validity(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
     """What is valid can be used, what is not is NaN, and quality tells the same."""
     broken = []
     for i, f in enumerate(frames):
@@ -115,16 +115,20 @@ def _validity(frames: Sequence[TrackerFrame], stations: int, period_s: float) ->
     return broken
 
 
-def _repeats(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
+def _check_repeats(frames: Sequence[TrackerFrame], stations: int, period_s: float) -> list[str]:
     """A silent station is an invalid row, never the one before once more: device times strictly increase."""
     for i, (before, now) in enumerate(pairwise(frames)):
         for row in range(stations):
-            if _sound(before, row) and _sound(now, row) and before.measured_s[row] == now.measured_s[row]:
+            if (
+                _has_device_time(before, row)
+                and _has_device_time(now, row)
+                and before.measured_s[row] == now.measured_s[row]
+            ):
                 return [f"frame {i + 1} repeats station {row} of the frame before"]
     return []
 
 
-def _closing(opened: Callable[[], TrackerStream]) -> list[str]:
+def _check_closing(opened: Callable[[], TrackerStream]) -> list[str]:
     """Closing ends the iteration quietly, before the first frame and amidst, and may be done twice."""
     broken = []
     for read in (0, 1):
@@ -143,7 +147,7 @@ def _closing(opened: Callable[[], TrackerStream]) -> list[str]:
     return broken
 
 
-def _sound(frame: TrackerFrame, row: int) -> bool:
+def _has_device_time(frame: TrackerFrame, row: int) -> bool:
     return bool(not frame.suspect[row] and not np.isnan(frame.measured_s[row]))
 
 

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 
 from harness.bench import methods, peak_memory
-from harness.bench.peak_memory import NOTHING
+from harness.bench.peak_memory import NO_METHOD
 from harness.experiment import benchmark_clips
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
@@ -19,20 +19,22 @@ from harness.reconstruct.database import MotionDatabase
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Ten takes, two of each behaviour, one of them of the performer who is followed."""
     where = tmp_path_factory.mktemp("bench") / "database"
-    MotionDatabase.build(benchmark_clips.body(), benchmark_clips.makers(8_000, 1), folder=where)
+    MotionDatabase.build(
+        benchmark_clips.build_common_body(), benchmark_clips.make_take_factories(8_000, 1), folder=where
+    )
     return where
 
 
 def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "SECONDS", 2.0)
+    monkeypatch.setattr(methods, "CLIP_S", 2.0)
     learnt = MotionDatabase.open(folder)
-    fitted = {name: benchmark_clips.learner(name, learnt, 1) for name in ("weighted_blend", "ik")}
-    tallies = methods.beside_mink(fitted, 1, lambda *_: None)
+    fitted = {name: benchmark_clips.fit_named_method(name, learnt, 1) for name in ("weighted_blend", "ik")}
+    tallies = methods.time_with_mink(fitted, 1, lambda *_: None)
     assert set(tallies) == {"weighted_blend", "ik", "mink"}
     assert {len(tally.turn_s) for tally in tallies.values()} == {5}
     memory = methods.memory_row("weighted_blend", 0, 1_000_000, 1_000)
     assert memory.value == pytest.approx(1e6 / (4 * 1_000 * (55 + 60)))
-    row, tail = methods.rows_of("weighted_blend", tallies, [memory])
+    row, tail = methods.method_rows("weighted_blend", tallies, [memory])
     said = row.as_dict()
     assert said["method"] == "weighted_blend"
     assert said["fps"] == row.value > 0.0
@@ -43,9 +45,9 @@ def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monke
 
 
 def test_a_database_is_as_fast_as_itself(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "SECONDS", 2.0)
+    monkeypatch.setattr(methods, "CLIP_S", 2.0)
     learnt = MotionDatabase.open(folder)
-    row = methods.slower_row("weighted_blend", learnt, learnt, 1, lambda *_: None)
+    row = methods.large_database_row("weighted_blend", learnt, learnt, 1, lambda *_: None)
     assert 0.3 < row.value < 3.0
     assert row.target == "<= 1.5"
 
@@ -57,7 +59,7 @@ def test_options_change_the_hash() -> None:
 
 def test_memory_is_that_of_the_process_alone(folder: Path) -> None:
     held = np.ones(30_000_000)  # 240 MB that a child must not count
-    nothing = peak_memory.run_alone(NOTHING, folder, 1)
+    nothing = peak_memory.measure_peak_bytes(NO_METHOD, folder, 1)
     assert held[-1] == 1.0
     assert nothing > 50e6
     if sys.platform == "linux":

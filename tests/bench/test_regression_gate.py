@@ -4,29 +4,29 @@ import numpy as np
 import pytest
 
 from harness.bench import regression_gate
-from harness.bench.null_errors import KINDS, METRICS, Population, population
-from harness.compare.margins import GATED
+from harness.bench.null_errors import KINDS, METRICS, ErrorPopulation, load_population
+from harness.compare.margins import GATED_METRICS
 from harness.core.seeds import generator
 
 
 @pytest.fixture(scope="module")
-def settings() -> Population:
-    return population("settings")
+def settings() -> ErrorPopulation:
+    return load_population("settings")
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_stored_errors_are_real_differences_of_many_clips(kind: str) -> None:
-    people = population(kind)
+    people = load_population(kind)
     assert people.errors.shape == (5, len(METRICS), len(people.clips), 2)
     assert len(set(people.clips)) == len(people.clips) >= 24
     assert np.isfinite(people.errors).all()
     assert (people.errors > 0.0).all()
     assert (people.errors[..., 0] != people.errors[..., 1]).mean() > 0.95
-    assert set(METRICS) <= set(GATED)
+    assert set(METRICS) <= set(GATED_METRICS)
 
 
 @pytest.mark.parametrize("draw", [regression_gate.exchanged, regression_gate.heavy, regression_gate.centred])
-def test_drawn_studies_hold_nothing(draw: regression_gate.Draw, settings: Population) -> None:
+def test_drawn_studies_hold_nothing(draw: regression_gate.Resampler, settings: ErrorPopulation) -> None:
     """Over many draws no side is better in any line."""
     rng = generator(1, "many")
     means = []
@@ -37,7 +37,7 @@ def test_drawn_studies_hold_nothing(draw: regression_gate.Draw, settings: Popula
     assert (np.abs(mean) < 5.0 * sd / np.sqrt(400)).all()
 
 
-def test_an_exchange_keeps_what_metrics_of_a_clip_share(settings: Population) -> None:
+def test_an_exchange_keeps_what_metrics_of_a_clip_share(settings: ErrorPopulation) -> None:
     stored = {tuple(sorted(map(float, pair))) for pair in settings.errors[0, 0]}
     errors = regression_gate.exchanged(settings, 200, generator(1, "one"))
     assert {tuple(sorted(map(float, pair))) for pair in errors[0, 0]} <= stored
@@ -50,41 +50,41 @@ def test_an_exchange_keeps_what_metrics_of_a_clip_share(settings: Population) ->
         assert (errors[0, :, n] == kept).all() or (errors[0, :, n] == turned).all()
 
 
-def test_worse_is_what_a_comparison_calls_worse(settings: Population) -> None:
+def test_worse_is_what_a_comparison_calls_worse(settings: ErrorPopulation) -> None:
     """Studies skip intervals that cannot matter; verdicts stay those of the gate."""
     seen = 0
     for n in range(4):
         errors = regression_gate.exchanged(settings, 12, generator(1, "both ways", n))[:2]
         errors[n % 2, :, :, 1] *= 1.0 + 0.03 * n
-        study = regression_gate.study_of(errors)
+        study = regression_gate.make_comparison(errors)
         assert [verdict == "worse" for verdict in study.verdicts] == study.worse.tolist()
         seen += int(study.worse.sum())
     assert seen >= 4
 
 
-def test_most_lines_of_equally_good_sides_are_told_the_same(settings: Population) -> None:
-    assert 0.8 <= regression_gate.told_same(settings, 24, 3, 1) <= 1.0
+def test_most_lines_of_equally_good_sides_are_told_the_same(settings: ErrorPopulation) -> None:
+    assert 0.8 <= regression_gate.share_called_same(settings, 24, 3, 1) <= 1.0
 
 
 @pytest.mark.parametrize(("count", "of", "most"), [(0, 1000, 0.00299), (25, 1000, 0.0349), (50, 50, 1.0)])
 def test_rates_are_bounded_as_printed_tables_have_it(count: int, of: int, most: float) -> None:
-    assert regression_gate.at_most(count, of) == pytest.approx(most, rel=0.01)
-    assert regression_gate.at_least(of - count, of) == pytest.approx(1.0 - most, abs=1e-3)
+    assert regression_gate.upper_confidence_rate(count, of) == pytest.approx(most, rel=0.01)
+    assert regression_gate.lower_confidence_rate(of - count, of) == pytest.approx(1.0 - most, abs=1e-3)
 
 
 def false_alarms(
-    people: Population, studies: int, clips: int = 24, draw: regression_gate.Draw = regression_gate.exchanged
+    people: ErrorPopulation, studies: int, clips: int = 24, draw: regression_gate.Resampler = regression_gate.exchanged
 ) -> int:
-    return regression_gate.alarms(people, clips, studies, 1, draw)
+    return regression_gate.count_false_alarms(people, clips, studies, 1, draw)
 
 
-def test_few_of_the_studies_alarm_falsely(settings: Population) -> None:
+def test_few_of_the_studies_alarm_falsely(settings: ErrorPopulation) -> None:
     assert false_alarms(settings, 40) <= 2
 
 
-def test_most_changes_of_3_percent_are_found(settings: Population) -> None:
-    assert regression_gate.found(settings, 24, 20, 1).mean() >= 0.9
-    assert not regression_gate.found(settings, 24, 6, 1, change=0.0).any()
+def test_most_changes_of_3_percent_are_found(settings: ErrorPopulation) -> None:
+    assert regression_gate.detect_changes(settings, 24, 20, 1).mean() >= 0.9
+    assert not regression_gate.detect_changes(settings, 24, 6, 1, change=0.0).any()
 
 
 @pytest.mark.slow
@@ -98,12 +98,14 @@ def test_most_changes_of_3_percent_are_found(settings: Population) -> None:
         (24, regression_gate.centred),
     ],
 )
-def test_false_alarms_stay_below_5_percent(clips: int, draw: regression_gate.Draw, settings: Population) -> None:
-    count = false_alarms(settings, regression_gate.STUDIES, clips, draw)
-    print(f"{draw.__name__}, {clips} clips: {count} of {regression_gate.STUDIES}")
-    assert regression_gate.at_most(count, regression_gate.STUDIES) <= 0.05
+def test_false_alarms_stay_below_5_percent(
+    clips: int, draw: regression_gate.Resampler, settings: ErrorPopulation
+) -> None:
+    count = false_alarms(settings, regression_gate.COMPARISONS, clips, draw)
+    print(f"{draw.__name__}, {clips} clips: {count} of {regression_gate.COMPARISONS}")
+    assert regression_gate.upper_confidence_rate(count, regression_gate.COMPARISONS) <= 0.05
 
 
 @pytest.mark.slow
-def test_a_change_of_3_percent_is_found_in_9_of_10_studies(settings: Population) -> None:
-    assert regression_gate.found(settings, 24, regression_gate.CHANGED, 1).mean() >= 0.9
+def test_a_change_of_3_percent_is_found_in_9_of_10_studies(settings: ErrorPopulation) -> None:
+    assert regression_gate.detect_changes(settings, 24, regression_gate.CHANGED_COMPARISONS, 1).mean() >= 0.9

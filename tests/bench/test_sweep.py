@@ -5,12 +5,12 @@ from pathlib import Path
 
 from harness.bench import sweep
 from harness.experiment.scenario import variants
-from harness.experiment.sweep_config import expand, load_sweep
+from harness.experiment.sweep_config import expand_sweep, load_sweep
 
 
 def test_what_is_judged_beside_are_the_cells_of_the_sweep(tmp_path: Path) -> None:
-    (swept,) = expand(*load_sweep(sweep._study(tmp_path, 3)))
-    beside = sweep._small(3)
+    (swept,) = expand_sweep(*load_sweep(sweep._write_sweep(tmp_path, 3)))
+    beside = sweep._small_scenario(3)
     ours, theirs = ([replace(made, vary={}) for _, made in variants(scenario)] for scenario in (beside, swept))
     assert len(ours) == 3
     assert ours == theirs
@@ -24,12 +24,12 @@ def test_tables_are_compared_but_for_times(tmp_path: Path) -> None:
         "wrong": table.replace("2.5,", "2.6,"),
     }.items():
         (tmp_path / name).write_text(text)
-    assert sweep._differing(tmp_path / "one", tmp_path / "slower") == 0
-    assert sweep._differing(tmp_path / "one", tmp_path / "wrong") == 1
+    assert sweep._count_differing_lines(tmp_path / "one", tmp_path / "slower") == 0
+    assert sweep._count_differing_lines(tmp_path / "one", tmp_path / "wrong") == 1
 
 
 def test_two_jobs_are_given_the_same_shipped_clips(tmp_path: Path) -> None:
-    (tmp_path / "shared.toml").write_text(sweep.SHARED)
-    (scenario,) = expand(*load_sweep(tmp_path / "shared.toml"))
+    (tmp_path / "shared.toml").write_text(sweep.PARALLEL_SWEEP)
+    (scenario,) = expand_sweep(*load_sweep(tmp_path / "shared.toml"))
     assert scenario.motion.test == sweep.CLIPS
     assert len(variants(scenario)) == 16

@@ -10,17 +10,19 @@ import pytest
 
 from harness.body import anatomy, humanoid, mjcf, mounts
 from harness.core import humanoid24, skeleton
-from harness.core.package_data import share_folder
+from harness.core.package_data import data_folder
 from harness.core.skeleton import Skeleton
-from harness.core.workers import call_each
+from harness.core.workers import run_in_workers
 from harness.errors import BadInput
 from tests.body.conftest import random_qpos
 
-MODEL = share_folder("models") / "humanoid24" / "humanoid24.xml"
+MODEL = data_folder("models") / "humanoid24" / "humanoid24.xml"
 
 
 def test_the_model_file_is_up_to_date() -> None:
-    assert MODEL.read_text() == mjcf.mjcf(), "write it anew: python -m harness.body.mjcf > models/humanoid24/..."
+    assert MODEL.read_text() == mjcf.humanoid_mjcf(), (
+        "write it anew: python -m harness.body.mjcf > models/humanoid24/..."
+    )
 
 
 def test_plain_mujoco_loads_the_file_and_a_fall_ends_on_the_floor(tmp_path: Path) -> None:
@@ -39,26 +41,26 @@ def test_plain_mujoco_loads_the_file_and_a_fall_ends_on_the_floor(tmp_path: Path
 
 
 def test_bodies_and_hinges_are_those_of_the_paper() -> None:
-    model = humanoid.build().model
+    model = humanoid.build_body().model
     own = humanoid24.standard_skeleton()
     assert (model.nq, model.nv, model.njnt, model.nbody) == (55, 54, 49, 26)
     assert [model.body(b).name for b in range(1, 26)] == ["root", *own.names]
     names = np.array([model.joint(j).name for j in range(1, 49)])
     assert tuple(names[humanoid24.QPOS_OF_DOF]) == own.dof_names
     np.testing.assert_array_equal(model.jnt_qposadr[1:], np.arange(7, 55))
-    np.testing.assert_allclose(humanoid.build().limits_rad, humanoid24.limits_rad(), atol=1e-12)
+    np.testing.assert_allclose(humanoid.build_body().limits_rad, humanoid24.limits_rad(), atol=1e-12)
     assert model.jnt_limited[1:].all()
 
 
 def test_the_standard_body_is_the_model_file() -> None:
-    plain, built = mujoco.MjModel.from_xml_path(str(MODEL)), humanoid.build().model
+    plain, built = mujoco.MjModel.from_xml_path(str(MODEL)), humanoid.build_body().model
     for field in ("body_pos", "body_mass", "body_inertia", "jnt_axis", "geom_pos", "geom_size", "key_qpos"):
         np.testing.assert_allclose(getattr(built, field), getattr(plain, field), atol=1e-8, err_msg=field)
 
 
 def test_mujoco_and_the_core_pose_every_body_alike(lanky: Skeleton, rng: np.random.Generator) -> None:
-    body, qpos = humanoid.build(lanky), random_qpos(rng, 40)
-    pose = skeleton.forward(lanky, *humanoid24.unpack(qpos))
+    body, qpos = humanoid.build_body(lanky), random_qpos(rng, 40)
+    pose = skeleton.forward_kinematics(lanky, *humanoid24.unpack(qpos))
     data = mujoco.MjData(body.model)
     for frame, configuration in enumerate(qpos):
         data.qpos[:] = configuration
@@ -70,16 +72,19 @@ def test_mujoco_and_the_core_pose_every_body_alike(lanky: Skeleton, rng: np.rand
 
 def test_flesh_grows_with_the_skeleton() -> None:
     standard = humanoid24.standard_skeleton()
-    small, large = humanoid.build(standard).model, humanoid.build(standard.with_bones(1.1 * standard.bone_m)).model
+    small, large = (
+        humanoid.build_body(standard).model,
+        humanoid.build_body(standard.with_bones(1.1 * standard.bone_m)).model,
+    )
     np.testing.assert_allclose(large.geom_size[1:], 1.1 * small.geom_size[1:], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(large.geom_pos[1:], 1.1 * small.geom_pos[1:], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(large.body_subtreemass[1], 1.1**2 * small.body_subtreemass[1], rtol=1e-9)
 
 
 def test_segments_weigh_what_de_leva_says() -> None:
-    share = {s.name: 0.0 for s in anatomy.shapes(humanoid24.standard_skeleton())}
-    whole = sum(s.mass_kg for s in anatomy.shapes(humanoid24.standard_skeleton()))
-    for shape in anatomy.shapes(humanoid24.standard_skeleton()):
+    share = {s.name: 0.0 for s in anatomy.body_geoms(humanoid24.standard_skeleton())}
+    whole = sum(s.mass_kg for s in anatomy.body_geoms(humanoid24.standard_skeleton()))
+    for shape in anatomy.body_geoms(humanoid24.standard_skeleton()):
         share[shape.name] = 100.0 * shape.mass_kg / whole
     assert whole == pytest.approx(74.2, abs=0.1)
     parts = {
@@ -99,7 +104,7 @@ def test_segments_weigh_what_de_leva_says() -> None:
 
 
 def test_left_mirrors_right() -> None:
-    shapes = {s.name: s for s in anatomy.shapes(humanoid24.standard_skeleton())}
+    shapes = {s.name: s for s in anatomy.body_geoms(humanoid24.standard_skeleton())}
     for name, right in shapes.items():
         if name.startswith("r"):
             left = shapes["l" + name[1:]]
@@ -109,13 +114,13 @@ def test_left_mirrors_right() -> None:
 
 def test_the_t_pose_stands_on_the_floor(lanky: Skeleton) -> None:
     for own in (humanoid24.standard_skeleton(), lanky):
-        body = humanoid.build(own)
+        body = humanoid.build_body(own)
         data = mujoco.MjData(body.model)
         mujoco.mj_resetDataKeyframe(body.model, data, body.model.key("tpose").id)
         mujoco.mj_forward(body.model, data)
         ankle_m = min(data.body("lfoot").xpos[2], data.body("rfoot").xpos[2])
         assert ankle_m == pytest.approx(anatomy.sole_below_ankle_m(own), abs=1e-9)
-    body = humanoid.build()
+    body = humanoid.build_body()
     data = mujoco.MjData(body.model)
     mujoco.mj_resetDataKeyframe(body.model, data, 0)
     mujoco.mj_forward(body.model, data)
@@ -136,11 +141,11 @@ def _lowest_m(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> float:
 
 
 def test_a_body_is_the_same_bytes_every_time_and_in_every_process(lanky: Skeleton, tmp_path: Path) -> None:
-    trackers = tuple(mounts.DEFAULTS.values())
-    first = humanoid.build(lanky, trackers)
-    assert humanoid.build(lanky, trackers) is first
+    trackers = tuple(mounts.DEFAULT_MOUNTS.values())
+    first = humanoid.build_body(lanky, trackers)
+    assert humanoid.build_body(lanky, trackers) is first
     assert len(pickle.dumps(first)) < 5000  # which is how it goes there: what it is made from
-    ((_, done),) = call_each(save_model, [(first, tmp_path / "b")], 1)
+    ((_, done),) = run_in_workers(save_model, [(first, tmp_path / "b")], 1)
     done.result()
     save_model(first, tmp_path / "a")
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
@@ -153,13 +158,13 @@ def save_model(body: humanoid.Body, path: Path) -> None:
 def test_another_skeleton_is_refused() -> None:
     standard = humanoid24.standard_skeleton()
     with pytest.raises(BadInput, match="23 bones"):
-        humanoid.build(standard.subset(standard.names[:-1])[0])
+        humanoid.build_body(standard.subset(standard.names[:-1])[0])
     with pytest.raises(BadInput, match="humanoid's"):
-        humanoid.build(replace(standard, names=("spine", *standard.names[1:])))
+        humanoid.build_body(replace(standard, names=("spine", *standard.names[1:])))
 
 
 def test_a_bone_without_length_still_makes_a_body() -> None:
     standard = humanoid24.standard_skeleton()
     bone_m = np.array(standard.bone_m)
     bone_m[standard.index("lwrist")] = 0.0
-    assert humanoid.build(standard.with_bones(bone_m)).model.nq == 55
+    assert humanoid.build_body(standard.with_bones(bone_m)).model.nq == 55

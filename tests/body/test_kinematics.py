@@ -11,15 +11,15 @@ from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from tests.body.conftest import random_qpos
 
-STATIONS = tuple(mounts.DEFAULTS)
+STATIONS = tuple(mounts.DEFAULT_MOUNTS)
 
 
 @pytest.fixture
 def worn(lanky: Skeleton) -> tuple[Kinematics, list[int], Floats, Floats]:
     """A body with all trackers: kinematics, bones, mounts."""
-    places = [mounts.place(lanky, mounts.DEFAULTS[s]) for s in STATIONS]
-    bones = [lanky.index(mounts.DEFAULTS[s].bone) for s in STATIONS]
-    body = humanoid.build(lanky, mounts.DEFAULTS.values())
+    places = [mounts.locate_mount(lanky, mounts.DEFAULT_MOUNTS[s]) for s in STATIONS]
+    bones = [lanky.index(mounts.DEFAULT_MOUNTS[s].bone) for s in STATIONS]
+    body = humanoid.build_body(lanky, mounts.DEFAULT_MOUNTS.values())
     return Kinematics(body), bones, np.array([p for p, _ in places]), np.array([q for _, q in places])
 
 

@@ -55,7 +55,7 @@ def test_truth_is_seldom_outside_the_joint_limits(mocap: Path, capsys: pytest.Ca
     for name in CLIPS:
         clip = library.load(name)
         _, dofs = clip.skeleton.subset(humanoid24.BONES)
-        take, _ = retargeting.to_common_body(clip, standard)
+        take, _ = retargeting.retarget_to_common_body(clip, standard)
         own.append(np.rad2deg(excess_rad(clip.angles_rad[:, dofs])))
         envelope.append(np.rad2deg(excess_rad(clip.angles_rad[:, dofs], MARGIN_RAD)))
         common.append(np.rad2deg(excess_rad(humanoid24.unpack(take.qpos)[2])))

@@ -14,8 +14,8 @@ from harness.core import humanoid24, rotations, skeleton
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.mocap.library import MotionLibrary, skeleton_file
-from harness.mocap.read.acclaim import read_clip
+from harness.mocap.library import MotionLibrary, find_skeleton_file
+from harness.mocap.read.acclaim import read_amc_clip
 from tests.body.conftest import clip_on, random_qpos
 
 STANDARD = humanoid24.standard_skeleton()
@@ -26,17 +26,19 @@ def amcs(mocap: Path) -> list[Path]:
 
 
 def as_recorded(path: Path, mocap: Path) -> Clip:
-    return read_clip(skeleton_file(path, mocap.resolve()), path, rate_hz=120.0)
+    return read_amc_clip(find_skeleton_file(path, mocap.resolve()), path, rate_hz=120.0)
 
 
 def unwrapped(clip: Clip) -> Clip:
-    return replace(clip, angles_rad=skeleton.unwrapped(clip.skeleton, clip.angles_rad))
+    return replace(clip, angles_rad=skeleton.unwrap_angles(clip.skeleton, clip.angles_rad))
 
 
 def own_body_errors(clip: Clip, frames: range) -> tuple[float, float]:
     """Largest distance [m] and angle [rad] between MuJoCo's bodies and direct ASF kinematics of the 30 bones."""
-    body, take = retargeting.to_own_body(unwrapped(clip))
-    direct = skeleton.forward(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], clip.angles_rad[frames])
+    body, take = retargeting.retarget_to_own_body(unwrapped(clip))
+    direct = skeleton.forward_kinematics(
+        clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], clip.angles_rad[frames]
+    )
     kept = [clip.skeleton.index(name) for name in humanoid24.BONES]
     turns = rotations.from_matrix(direct.world_from_bone[:, kept])
     kin, metres, radians = kinematics.Kinematics(body), 0.0, 0.0
@@ -78,7 +80,7 @@ def test_every_frame_of_every_staged_clip_is_exact_on_its_own_body(
 
 def test_own_body_keeps_the_clip_to_the_bit(lanky: Skeleton, rng: np.random.Generator) -> None:
     qpos = random_qpos(rng, 5)
-    body, take = retargeting.to_own_body(clip_on(lanky, qpos))
+    body, take = retargeting.retarget_to_own_body(clip_on(lanky, qpos))
     np.testing.assert_array_equal(take.qpos, qpos)
     np.testing.assert_array_equal(body.skeleton.bone_m, lanky.bone_m)
     assert (take.name, take.rate_hz) == ("made_up", 60.0)
@@ -88,10 +90,10 @@ def test_clips_without_the_humanoids_bones_or_hinges_are_refused(rng: np.random.
     clip = clip_on(STANDARD, random_qpos(rng, 3))
     small, dofs = STANDARD.subset(STANDARD.names[:-1])
     with pytest.raises(UnknownName, match="rfoot"):
-        retargeting.to_own_body(replace(clip, skeleton=small, angles_rad=clip.angles_rad[:, dofs]))
+        retargeting.retarget_to_own_body(replace(clip, skeleton=small, angles_rad=clip.angles_rad[:, dofs]))
     stiff = Skeleton(STANDARD.names, STANDARD.parents, STANDARD.bone_m, (*STANDARD.hinges[:-1], ()), STANDARD.axes[:-2])
     with pytest.raises(BadInput, match="46 hinges"):
-        retargeting.to_own_body(replace(clip, skeleton=stiff, angles_rad=clip.angles_rad[:, :-2]))
+        retargeting.retarget_to_own_body(replace(clip, skeleton=stiff, angles_rad=clip.angles_rad[:, :-2]))
 
 
 def walking_in_place(own: Skeleton, rate_hz: float = 60.0) -> Clip:
@@ -104,14 +106,14 @@ def walking_in_place(own: Skeleton, rate_hz: float = 60.0) -> Clip:
         lift = np.maximum(0.0, sign * np.sin(np.pi * time_s))
         angles[:, own.dof_names.index(f"{side}femur.rx")] = -0.6 * lift
         angles[:, own.dof_names.index(f"{side}tibia.rx")] = 1.0 * lift
-    pose = skeleton.forward(own, root_m, turns, angles)
+    pose = skeleton.forward_kinematics(own, root_m, turns, angles)
     root_m = root_m - np.min(ground.sole_heights_m(own, pose), axis=1)[:, None] * np.array([0.0, 0.0, 1.0])
     return clip_on(own, humanoid24.pack(root_m, turns, angles), rate_hz)
 
 
 def test_a_body_of_the_same_shape_loses_nothing() -> None:
     clip = walking_in_place(STANDARD.with_bones(1.1 * STANDARD.bone_m))
-    take, report = retargeting.to_common_body(clip, STANDARD)
+    take, report = retargeting.retarget_to_common_body(clip, STANDARD)
     assert report.leg_scale == pytest.approx(1 / 1.1)
     assert max(report.deviation_mm, report.proportions_mm, report.float_mm, report.sink_mm) < 1e-3
     np.testing.assert_allclose(humanoid24.unpack(take.qpos)[2], clip.angles_rad, atol=1e-9)
@@ -121,11 +123,11 @@ def test_a_body_of_the_same_shape_loses_nothing() -> None:
 def test_a_raised_clip_comes_down_to_the_floor() -> None:
     clip = walking_in_place(STANDARD)
     raised = replace(clip, root_m=clip.root_m + np.array([0.0, 0.0, 0.04]))
-    take, report = retargeting.to_common_body(raised, STANDARD)
+    take, report = retargeting.retarget_to_common_body(raised, STANDARD)
     assert report.floor_m == pytest.approx(0.04, abs=1e-3)
     assert report.float_plain_mm == pytest.approx(40.0, abs=1.0)
     assert max(report.float_mm, report.sink_mm) < 0.1
-    np.testing.assert_allclose(take.qpos, retargeting.to_common_body(clip, STANDARD)[0].qpos, atol=1e-4)
+    np.testing.assert_allclose(take.qpos, retargeting.retarget_to_common_body(clip, STANDARD)[0].qpos, atol=1e-4)
 
 
 def test_other_proportions_are_met_as_far_as_they_allow() -> None:
@@ -134,12 +136,12 @@ def test_other_proportions_are_met_as_far_as_they_allow() -> None:
         for side in "lr":
             bone_m[STANDARD.index(side + bone)] *= stretch
     bone_m[STANDARD.index("lclavicle")] += [0.03, 0.0, 0.02]
-    take, report = retargeting.to_common_body(walking_in_place(STANDARD.with_bones(bone_m)), STANDARD)
+    take, report = retargeting.retarget_to_common_body(walking_in_place(STANDARD.with_bones(bone_m)), STANDARD)
     assert report.stance_share > 0.9
     assert report.float_plain_mm > 10.0
     assert report.deviation_mm < report.deviation_plain_mm
     assert max(report.float_mm, report.sink_mm) < 5.0
-    pose = kinematics.pose(STANDARD, take.qpos)
+    pose = kinematics.pose_from_qpos(STANDARD, take.qpos)
     lowest_mm = 1e3 * np.min(ground.sole_heights_m(STANDARD, pose), axis=1)
     assert np.max(np.abs(lowest_mm)) < 8.0
 
@@ -148,7 +150,7 @@ def test_a_common_body_may_keep_every_angle() -> None:
     own = STANDARD.with_bones(1.1 * STANDARD.bone_m)
     clip = walking_in_place(own)
     raised = replace(clip, root_m=clip.root_m + np.array([0.0, 0.0, 0.04]))
-    take, report = retargeting.with_angles_kept(raised, STANDARD)
+    take, report = retargeting.retarget_with_same_angles(raised, STANDARD)
     np.testing.assert_array_equal(humanoid24.unpack(take.qpos)[2], clip.angles_rad)
     np.testing.assert_array_equal(take.qpos[:, 3:7], clip.world_from_root)
     np.testing.assert_allclose(take.qpos[:, :3], clip.root_m / 1.1, atol=1e-3)
@@ -158,11 +160,13 @@ def test_a_common_body_may_keep_every_angle() -> None:
 
 def test_the_root_s_path_grows_with_the_legs_and_soles_stand_on_the_floor(lanky: Skeleton) -> None:
     clip = walking_in_place(lanky)
-    take, report = retargeting.with_angles_kept(clip, STANDARD)
+    take, report = retargeting.retarget_with_same_angles(clip, STANDARD)
     np.testing.assert_allclose(take.qpos[:, :2], report.leg_scale * clip.root_m[:, :2], atol=1e-12)
     np.testing.assert_allclose(np.diff(take.qpos[:, 2]), report.leg_scale * np.diff(clip.root_m[:, 2]), atol=1e-12)
-    pose = kinematics.pose(STANDARD, take.qpos)
-    standing = ground.stance(lanky, kinematics.pose(lanky, retargeting.to_own_body(clip)[1].qpos), clip.rate_hz)
+    pose = kinematics.pose_from_qpos(STANDARD, take.qpos)
+    standing = ground.detect_stance(
+        lanky, kinematics.pose_from_qpos(lanky, retargeting.retarget_to_own_body(clip)[1].qpos), clip.rate_hz
+    )
     assert np.median(ground.sole_heights_m(STANDARD, pose)[standing]) == pytest.approx(0.0, abs=5e-3)
 
 
@@ -172,18 +176,18 @@ def test_angles_of_files_are_kept_on_the_common_body(mocap: Path) -> None:
         clip = as_recorded(path, mocap)
         own, dofs = clip.skeleton.subset(humanoid24.BONES)
         np.testing.assert_allclose(own.axes, STANDARD.axes, atol=1e-9)
-        kept = humanoid24.unpack(retargeting.with_angles_kept(clip, STANDARD)[0].qpos)[2]
+        kept = humanoid24.unpack(retargeting.retarget_with_same_angles(clip, STANDARD)[0].qpos)[2]
         np.testing.assert_array_equal(kept, clip.angles_rad[:, dofs])
-        take, _ = retargeting.with_angles_kept(unwrapped(clip), STANDARD)
-        recorded = skeleton.forward(STANDARD, clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])
-        found = kinematics.pose(STANDARD, take.qpos)
+        take, _ = retargeting.retarget_with_same_angles(unwrapped(clip), STANDARD)
+        recorded = skeleton.forward_kinematics(STANDARD, clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])
+        found = kinematics.pose_from_qpos(STANDARD, take.qpos)
         np.testing.assert_allclose(found.world_from_bone, recorded.world_from_bone, atol=1e-9)
 
 
 def test_feet_that_never_stand_are_not_measured() -> None:
     clip = walking_in_place(STANDARD)
     flying = replace(clip, root_m=clip.root_m + 3.0 * np.arange(len(clip))[:, None] / clip.rate_hz)
-    report = retargeting.to_common_body(flying, STANDARD)[1]
+    report = retargeting.retarget_to_common_body(flying, STANDARD)[1]
     assert report.stance_share == 0.0
     assert np.isnan([report.float_mm, report.sink_mm, report.float_plain_mm, report.sink_plain_mm]).all()
     assert np.isfinite(report.deviation_mm)
@@ -191,7 +195,7 @@ def test_feet_that_never_stand_are_not_measured() -> None:
 
 def onto_standard(paths: list[Path], mocap: Path) -> Iterator[RetargetReport]:
     for path in paths:
-        yield retargeting.to_common_body(unwrapped(as_recorded(path, mocap)), STANDARD)[1]
+        yield retargeting.retarget_to_common_body(unwrapped(as_recorded(path, mocap)), STANDARD)[1]
 
 
 def hold(reports: list[RetargetReport]) -> None:
@@ -239,14 +243,14 @@ def test_every_staged_clip_on_the_standard_body(mocap: Path, capsys: pytest.Capt
 def test_the_root_needs_no_unit_quaternion_sign(rng: np.random.Generator) -> None:
     clip = walking_in_place(STANDARD.with_bones(1.05 * STANDARD.bone_m))
     flipped = replace(clip, world_from_root=-clip.world_from_root)
-    one, other = (retargeting.to_common_body(c, STANDARD)[0].qpos for c in (clip, flipped))
+    one, other = (retargeting.retarget_to_common_body(c, STANDARD)[0].qpos for c in (clip, flipped))
     np.testing.assert_allclose(one[:, 7:], other[:, 7:], atol=1e-12)
     np.testing.assert_allclose(one[:, :3], other[:, :3], atol=1e-12)
 
 
 def test_a_retargeted_take_poses_in_mujoco(lanky: Skeleton) -> None:
-    take, _ = retargeting.to_common_body(walking_in_place(lanky), STANDARD)
-    model = humanoid.build().model
+    take, _ = retargeting.retarget_to_common_body(walking_in_place(lanky), STANDARD)
+    model = humanoid.build_body().model
     data = mujoco.MjData(model)
     data.qpos[:] = take.qpos[10]
     mujoco.mj_forward(model, data)

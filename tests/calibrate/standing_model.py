@@ -6,19 +6,19 @@ from functools import cache
 
 import numpy as np
 
-from harness.body.humanoid import build
+from harness.body.humanoid import build_body
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULTS, Mount, place
+from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrate.skeleton_prior import BoneSpace, bone_space
-from harness.calibrate.tpose_calibration import LEVEL
+from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
+from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic import population
+from harness.mocap.synthetic import sample_skeletons
 from harness.stream.frame import TrackerFrame
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -27,9 +27,9 @@ FRAMES, SECONDS = 12, 2.4
 
 
 @cache
-def space() -> BoneSpace:
+def space() -> SkeletonPrior:
     """Bones of a hundred people, none of whom is judged."""
-    return bone_space(population(100, seed=0), source="others")
+    return fit_skeleton_prior(sample_skeletons(100, seed=0), source="others")
 
 
 def straightened(skeleton: Skeleton) -> Skeleton:
@@ -40,7 +40,7 @@ def straightened(skeleton: Skeleton) -> Skeleton:
 
 @cache
 def somebody(number: int, own_directions: bool = True) -> Skeleton:
-    own = population(120, seed=0)[100 + number]
+    own = sample_skeletons(120, seed=0)[100 + number]
     return own if own_directions else straightened(own)
 
 
@@ -63,17 +63,17 @@ class Model:
 
     @property
     def mounts(self) -> list[Mount]:
-        return [DEFAULTS[station] for station in self.stations]
+        return [DEFAULT_MOUNTS[station] for station in self.stations]
 
     @property
     def truth(self) -> Calibration:
         """The world's origin is where the first pose's root is in x and y, and the floor."""
         rng = generator(self.seed, "straps")
-        placed = [place(self.skeleton, mount) for mount in self.mounts]
+        placed = [locate_mount(self.skeleton, mount) for mount in self.mounts]
         turn = rng.normal(size=(len(placed), 4))
         turn /= np.linalg.norm(turn, axis=1, keepdims=True)
         beside_m = self.beside_m * rng.normal(size=(len(placed), 3))
-        world_from_tracker = rotations.multiply(LEVEL, rotations.about_z(self.yaw_rad))
+        world_from_tracker = rotations.multiply(LEVEL_FROM_TRACKER, rotations.about_z(self.yaw_rad))
         return Calibration(
             kind="exact",
             stations=self.stations,
@@ -92,7 +92,7 @@ class Model:
 
     def _missed(self, number: int) -> Floats:
         """The pose as it is held: missed, and but for the first stepped aside."""
-        rng, kinematics = generator(self.seed, "missed", number), Kinematics(build(self.skeleton))
+        rng, kinematics = generator(self.seed, "missed", number), Kinematics(build_body(self.skeleton))
         step = self.miss_rad * rng.normal(size=54)
         step[:3] = [*rng.normal(0.0, 0.05, 2), 0.0]
         step[5] = rng.normal(0.0, 0.1)
@@ -101,7 +101,7 @@ class Model:
         return kinematics.moved(configuration(POSES[number], self.skeleton), step)
 
     def _frames(self, qpos: Floats, number: int) -> list[TrackerFrame]:
-        truth, kinematics = self.truth, Kinematics(build(self.skeleton))
+        truth, kinematics = self.truth, Kinematics(build_body(self.skeleton))
         kinematics.set(qpos)
         bones = [self.skeleton.index(bone) for bone in truth.bones]
         place_m, turn = kinematics.station_poses(bones, truth.mount_m, truth.bone_from_station)

@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from harness.body.mounts import DEFAULTS
-from harness.calibrate.bundle_adjustment import Bundle, Expected, Normal, level_turn_rad, mean_turns
-from harness.calibrate.poses import POSES, angles_rad
-from harness.calibrate.unknowns import Shared, Solution
+from harness.body.mounts import DEFAULT_MOUNTS
+from harness.calibrate.bundle_adjustment import (
+    BundleAdjustment,
+    NormalEquations,
+    ResidualScales,
+    heading_between_rad,
+    mean_rotations,
+)
+from harness.calibrate.poses import POSES, pose_angles_rad
+from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
@@ -16,18 +22,18 @@ LIKE = standard_skeleton()
 STEP = 1e-6
 
 
-def setting(rng: np.random.Generator) -> tuple[Bundle, Solution, Expected]:
+def setting(rng: np.random.Generator) -> tuple[BundleAdjustment, CalibrationSolution, ResidualScales]:
     """A solution somewhere near the start, with readings that fit it but for a little."""
-    shared = Shared(LIKE, space(), [DEFAULTS[station] for station in SIX])
-    asked = np.array([angles_rad(pose, LIKE) for pose in POSES])
-    bundle = Bundle(shared, asked, rng.normal(size=(8, 6, 3)), np.tile(np.eye(3), (8, 6, 1, 1)))
+    shared = SharedUnknowns(LIKE, space(), [DEFAULT_MOUNTS[station] for station in SIX])
+    asked = np.array([pose_angles_rad(pose, LIKE) for pose in POSES])
+    bundle = BundleAdjustment(shared, asked, rng.normal(size=(8, 6, 3)), np.tile(np.eye(3), (8, 6, 1, 1)))
     at = bundle.start()
     own = 0.1 * rng.normal(size=(8, 6 + len(bundle.hinges)))
     at = bundle.moved(at, (0.01 * rng.normal(size=shared.count), own))
     reached = bundle.reach(at)
     bundle.place_m = reached.place_m + 1e-7 * rng.normal(size=(8, 6, 3))
     bundle.turn = reached.world_from_station @ _small_turns(1e-7, rng)
-    return bundle, at, Expected(0.04, 0.8, shared.flesh_m(at.bone_m), 0.002, 0.01)
+    return bundle, at, ResidualScales(0.04, 0.8, shared.flesh_m(at.bone_m), 0.002, 0.01)
 
 
 def _small_turns(size_rad: float, rng: np.random.Generator) -> Floats:
@@ -70,7 +76,7 @@ def test_expectations_against_differences(rng: np.random.Generator) -> None:
         np.testing.assert_allclose(slope[:, k], (ahead - behind) / (2.0 * STEP), atol=1e-4 * np.abs(slope).max())
 
 
-def whole(normal: Normal) -> tuple[Floats, Floats]:
+def whole(normal: NormalEquations) -> tuple[Floats, Floats]:
     """The normal matrix of everything at once, and its right side."""
     poses, own, shared = normal.across.shape
     matrix = np.zeros((shared + poses * own,) * 2)
@@ -108,9 +114,9 @@ def test_variances_are_those_of_everything_at_once(rng: np.random.Generator) -> 
 def test_the_level_turn_and_the_mean_turn(rng: np.random.Generator) -> None:
     points = rng.normal(size=(6, 3))
     there = rotations.rotate(rotations.about_z(2.5), points) + np.array([1.0, 2.0, 3.0])
-    assert level_turn_rad(points, there) == pytest.approx(2.5)
+    assert heading_between_rad(points, there) == pytest.approx(2.5)
     middle = rotations.exp(rng.normal(size=(4, 3)))
     near = rotations.multiply(middle, rotations.exp(1e-3 * rng.normal(size=(9, 4, 3))))
-    found = rotations.from_matrix(mean_turns(rotations.to_matrix(near)))
+    found = rotations.from_matrix(mean_rotations(rotations.to_matrix(near)))
     assert rotations.angle_between_rad(found, middle).max() < 2e-3
-    assert np.linalg.det(mean_turns(rng.normal(size=(3, 5, 3, 3)))) == pytest.approx(np.ones(5))
+    assert np.linalg.det(mean_rotations(rng.normal(size=(3, 5, 3, 3)))) == pytest.approx(np.ones(5))

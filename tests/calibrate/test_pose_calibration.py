@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from harness.calibrate import pose_checks
-from harness.calibrate.bundle_adjustment import Bundle
-from harness.calibrate.bundle_fit import fit
-from harness.calibrate.hold import NotStanding
-from harness.calibrate.pose_calibration import EightPoses, calibrate_poses
-from harness.calibrate.poses import POSES, angles_rad
-from harness.calibrate.tpose_calibration import LEVEL
-from harness.calibrate.unknowns import Shared
+from harness.calibrate.bundle_adjustment import BundleAdjustment
+from harness.calibrate.bundle_fit import fit_bundle
+from harness.calibrate.hold import UnusableHold
+from harness.calibrate.pose_calibration import PoseCalibration, calibrate_poses
+from harness.calibrate.poses import POSES, pose_angles_rad
+from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
+from harness.calibrate.unknowns import SharedUnknowns
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
@@ -26,11 +26,11 @@ BEYOND = ("head", "lwrist", "rwrist", "lhand", "rhand", "ltibia", "rtibia", "lfo
 """What lies beyond the last tracker, and the forearms' split, of which nothing is told."""
 
 
-def found_of(model: Model) -> EightPoses:
+def found_of(model: Model) -> PoseCalibration:
     return calibrate_poses(model.held(), space(), model.mounts)
 
 
-def elbow_off_m(found: EightPoses, model: Model) -> Floats:
+def elbow_off_m(found: PoseCalibration, model: Model) -> Floats:
     """(S,) errors of mounts; of a tracker on a wrist from the elbow, see docs/methods.md H15."""
     off_m = found.calibration.mount_m - model.truth.mount_m
     for row, bone in enumerate(found.calibration.bones):
@@ -40,7 +40,7 @@ def elbow_off_m(found: EightPoses, model: Model) -> Floats:
     return np.asarray(np.linalg.norm(off_m, axis=1))
 
 
-def turned_deg(found: EightPoses, model: Model) -> Floats:
+def turned_deg(found: PoseCalibration, model: Model) -> Floats:
     return np.rad2deg(rotations.angle_between_rad(found.calibration.bone_from_station, model.truth.bone_from_station))
 
 
@@ -169,7 +169,7 @@ def test_a_strap_put_on_the_other_way_round_is_told_of() -> None:
 
 
 def refusal(held: Sequence[Sequence[TrackerFrame]], model: Model) -> str:
-    with pytest.raises(NotStanding) as caught:
+    with pytest.raises(UnusableHold) as caught:
         calibrate_poses(held, space(), model.mounts)
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)  # noqa: S301  # our own
     return str(caught.value)
@@ -222,16 +222,16 @@ def test_someone_who_moved_is_told_in_which_pose() -> None:
 def test_stations_that_do_not_tell_the_heading_are_refused() -> None:
     """As a fit says that is not sure which way the performer faced."""
     model = Model(somebody(11), ("torso", "head"))
-    asked_rad = np.array([angles_rad(pose, standard_skeleton()) for pose in POSES])
+    asked_rad = np.array([pose_angles_rad(pose, standard_skeleton()) for pose in POSES])
     still = [rows[0] for rows in model.held()]
-    place_m = rotations.rotate(LEVEL, np.array([frame.position_m for frame in still]))
-    turn = rotations.multiply(LEVEL, np.array([frame.tracker_from_station for frame in still]))
-    shared = Shared(standard_skeleton(), space(), model.mounts)
-    bundle = Bundle(shared, asked_rad, place_m, rotations.to_matrix(turn))
-    found = fit(bundle, 0.001, 0.005)
-    pose_checks.require_poses(bundle, found)
-    with pytest.raises(NotStanding, match="torso, head do not tell which way the performer faces"):
-        pose_checks.require_poses(bundle, replace(found, heading_sd_rad=0.4))
+    place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([frame.position_m for frame in still]))
+    turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([frame.tracker_from_station for frame in still]))
+    shared = SharedUnknowns(standard_skeleton(), space(), model.mounts)
+    bundle = BundleAdjustment(shared, asked_rad, place_m, rotations.to_matrix(turn))
+    found = fit_bundle(bundle, 0.001, 0.005)
+    pose_checks.require_poses_held(bundle, found)
+    with pytest.raises(UnusableHold, match="torso, head do not tell which way the performer faces"):
+        pose_checks.require_poses_held(bundle, replace(found, heading_sd_rad=0.4))
 
 
 def test_other_numbers_of_poses_or_stations_are_refused() -> None:

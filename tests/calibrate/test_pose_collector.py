@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from harness.body import humanoid
-from harness.body.mounts import DEFAULTS
-from harness.body.retargeting import to_own_body
-from harness.calibrate.guided_calibration import HoldPoses
-from harness.calibrate.hold import stood_still
-from harness.calibrate.pose_classifier import Likeness
+from harness.body.mounts import DEFAULT_MOUNTS
+from harness.body.retargeting import retarget_to_own_body
+from harness.calibrate.guided_calibration import PoseGuide
+from harness.calibrate.hold import measure_hold
+from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
 from harness.calibrate.poses import POSES, configuration
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.simulate.held_poses import hold_times_s, holding
-from harness.simulate.noise import level
-from harness.simulate.simulation import TrackerConfig, simulate
+from harness.simulate.held_poses import hold_poses, hold_times_s
+from harness.simulate.noise import noise_preset
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 from tests.calibrate.test_tpose_calibration import changed
 
@@ -32,7 +32,7 @@ RATE_HZ = 25.0
 
 @cache
 def body() -> humanoid.Body:
-    return humanoid.build()
+    return humanoid.build_body()
 
 
 def pose(number: int) -> Floats:
@@ -58,9 +58,11 @@ def stream(
 ) -> list[TrackerFrame]:
     whose = who or body()
     rng = generator(seed, "held")
-    take = holding(whose, configurations, miss_rad=float(np.deg2rad(miss_deg)), rng=rng, rate_hz=50.0)
-    mounts = [DEFAULTS[name] for name in stations]
-    return list(simulate(whose, take, mounts, TrackerConfig(rate_hz=RATE_HZ), level(noise), seed=seed).frames)
+    take = hold_poses(whose, configurations, miss_rad=float(np.deg2rad(miss_deg)), rng=rng, rate_hz=50.0)
+    mounts = [DEFAULT_MOUNTS[name] for name in stations]
+    return list(
+        simulate_tracker(whose, take, mounts, TrackerConfig(rate_hz=RATE_HZ), noise_preset(noise), seed=seed).frames
+    )
 
 
 @cache
@@ -69,8 +71,8 @@ def eight(noise: str = "default") -> tuple[TrackerFrame, ...]:
 
 
 @cache
-def likeness(stations: tuple[str, ...] = SIX) -> Likeness:
-    return Likeness(body(), [DEFAULTS[name] for name in stations], [pose(n) for n in range(8)])
+def likeness(stations: tuple[str, ...] = SIX) -> PoseClassifier:
+    return PoseClassifier(body(), [DEFAULT_MOUNTS[name] for name in stations], [pose(n) for n in range(8)])
 
 
 def collected(
@@ -92,7 +94,7 @@ def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
     for held, began_s, (from_s, to_s) in zip(collector.held, collector.began_s, hold_times_s(8), strict=True):
         assert from_s - 0.3 < began_s < from_s + 0.6  # before it, the last bit of a movement is slow
         assert held[-1].received_s - first_s < to_s + 0.1
-        still = stood_still(held, SIX)  # which is what it is for
+        still = measure_hold(held, SIX)  # which is what it is for
         if noise == "clean":
             off_m = np.linalg.norm([frame.position_m - still.position_m for frame in held], axis=2)
             assert off_m[~np.array([frame.suspect for frame in held])].max() < 0.035
@@ -103,7 +105,7 @@ def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
 def test_poor_poses_of_other_people_are_taken(stations: tuple[str, ...], miss_deg: float) -> None:
     """Nothing is known of the performer."""
     clip = synthetic.generate("walking", "p3", 1, seed=1, duration_s=3.0)
-    who = to_own_body(clip)[0]
+    who = retarget_to_own_body(clip)[0]
     poses = [configuration(one, who.skeleton) for one in POSES]
     _, said = collected(stream(poses, stations, miss_deg=miss_deg, seed=3, who=who), stations)
     assert said == list(range(1, 9))
@@ -117,7 +119,7 @@ def test_a_rest_is_no_pose(place: int) -> None:
     assert said == list(range(1, 9))
     (passed,) = collector.passed
     assert passed.began_s == pytest.approx(4.5 * place, abs=0.6)
-    stills = [stood_still(held, SIX) for held in collector.held]
+    stills = [measure_hold(held, SIX) for held in collector.held]
     assert [likeness().nearest(still, stills[0]) for still in stills] == list(range(8))
     wanted = "all 8 poses were taken before" if place == 8 else f"pose {place + 1} is wanted"
     assert wanted in passed.why
@@ -147,7 +149,7 @@ def test_another_number_of_holds(count: int) -> None:
 def test_whoever_stops_early_is_told_what_there_was() -> None:
     frames = eight()[: round(12.0 * RATE_HZ)]
     told: list[str] = []
-    leading = HoldPoses(PoseCollector(SIX, 8, likeness()), POSES)
+    leading = PoseGuide(PoseCollector(SIX, 8, likeness()), POSES)
     with pytest.raises(Exception, match="3 of 8 poses were held") as caught:
         leading.lead(frames, told.append)
     assert repr(POSES[3].name) in str(caught.value)
@@ -156,9 +158,9 @@ def test_whoever_stops_early_is_told_what_there_was() -> None:
 
 
 def test_whoever_walks_holds_nothing() -> None:
-    who, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=8.0, rate_hz=60.0))
-    mounts = [DEFAULTS[name] for name in SIX]
-    frames = simulate(who, take, mounts, TrackerConfig(rate_hz=RATE_HZ), level("default"), seed=1).frames
+    who, take = retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=8.0, rate_hz=60.0))
+    mounts = [DEFAULT_MOUNTS[name] for name in SIX]
+    frames = simulate_tracker(who, take, mounts, TrackerConfig(rate_hz=RATE_HZ), noise_preset("default"), seed=1).frames
     collector, said = collected(frames, blind=True)
     assert not said
     assert not collector.passed

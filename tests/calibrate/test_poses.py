@@ -6,9 +6,9 @@ import pytest
 
 from harness.body import ground
 from harness.body.anatomy import sole_points_m
-from harness.body.humanoid import build
-from harness.body.kinematics import pose as forward
-from harness.calibrate.poses import POSES, CalibrationPose, angles_rad, configuration
+from harness.body.humanoid import build_body
+from harness.body.kinematics import pose_from_qpos as forward
+from harness.calibrate.poses import POSES, CalibrationPose, configuration, pose_angles_rad
 from harness.core.humanoid24 import limits_rad, standard_skeleton
 from harness.core.skeleton import Skeleton
 from tests.calibrate.standing_model import somebody
@@ -20,7 +20,7 @@ BODIES = [standard_skeleton(), *(somebody(number) for number in range(4))]
 def test_angles_are_of_the_model_and_within_its_limits(pose: CalibrationPose) -> None:
     assert set(pose.angles_deg) <= set(standard_skeleton().dof_names)
     low, high = limits_rad().T
-    angles = angles_rad(pose, standard_skeleton())
+    angles = pose_angles_rad(pose, standard_skeleton())
     assert np.all(low <= angles)
     assert np.all(angles <= high)
 
@@ -40,7 +40,7 @@ def test_it_stands(pose: CalibrationPose, skeleton: Skeleton) -> None:
         )
     ]
     standing = np.concatenate([points for points in soles if points[:, 2].min() < 0.02])[:, :2]
-    body = build(skeleton)
+    body = build_body(skeleton)
     data = mujoco.MjData(body.model)
     data.qpos[:] = qpos
     mujoco.mj_forward(body.model, data)
@@ -52,7 +52,7 @@ def test_it_stands(pose: CalibrationPose, skeleton: Skeleton) -> None:
 @pytest.mark.parametrize("pose", POSES, ids=lambda pose: pose.name)
 def test_no_limb_is_inside_another_part_of_the_body(pose: CalibrationPose) -> None:
     """Of bones more than three apart along the skeleton, flesh overlaps by 5 mm at most."""
-    body = build()
+    body = build_body()
     model, data = body.model, mujoco.MjData(body.model)
     data.qpos[:] = configuration(pose, body.skeleton)
     mujoco.mj_forward(model, data)
@@ -82,7 +82,7 @@ def test_the_first_is_the_t_pose_and_all_are_different() -> None:
     assert POSES[0].name == "T-pose"
     legs = {name for name, angle in POSES[0].angles_deg.items() if angle}
     assert legs == {"lfemur.rz", "rfemur.rz"}
-    angles = np.array([angles_rad(pose, skeleton) for pose in POSES])
+    angles = np.array([pose_angles_rad(pose, skeleton) for pose in POSES])
     for a in range(8):
         for b in range(a):
             assert np.rad2deg(np.linalg.norm(angles[a] - angles[b])) > 45.0
@@ -91,7 +91,7 @@ def test_the_first_is_the_t_pose_and_all_are_different() -> None:
 def test_every_joint_that_leads_to_a_station_of_the_first_paper_bends() -> None:
     """But the clavicle's, which moves by a few degrees in anybody: what stays straight cannot be told."""
     skeleton = standard_skeleton()
-    angles = np.array([angles_rad(pose, skeleton) for pose in POSES])
+    angles = np.array([pose_angles_rad(pose, skeleton) for pose in POSES])
     spans = dict(zip(skeleton.dof_names, np.rad2deg(np.ptp(angles, axis=0)), strict=True))
     trunk = ("lowerback", "upperback", "thorax", "lowerneck", "upperneck", "head")
     for bone in trunk:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from harness.calibrate.station_kinematics import Chain, Reached
+from harness.calibrate.station_kinematics import StationKinematics, StationPoses
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 
 POSES, STEP = 3, 1e-6
 BONES = ("lwrist", "rhand", "ltibia", "thorax", "head", "lhipjoint")
@@ -41,10 +41,10 @@ class State:
 
 SKELETON = standard_skeleton()
 CARRIERS: Ints = np.array([SKELETON.index(bone) for bone in BONES])
-CHAIN = Chain(SKELETON, CARRIERS)
+CHAIN = StationKinematics(SKELETON, CARRIERS)
 
 
-def reach(state: State) -> Reached:
+def reach(state: State) -> StationPoses:
     root, stations = rotations.to_matrix(state.root), rotations.to_matrix(state.stations)
     return CHAIN.reach(state.bone_m, state.root_m, root, state.angles_rad, state.mount_m, stations)
 
@@ -62,7 +62,7 @@ def slopes(change: Callable[[float], State]) -> tuple[Floats, Floats]:
 def test_bones_are_where_plain_kinematics_has_them(rng: np.random.Generator) -> None:
     state = State.random(rng)
     found = reach(state)
-    plain = forward(SKELETON.with_bones(state.bone_m), state.root_m, state.root, state.angles_rad)
+    plain = forward_kinematics(SKELETON.with_bones(state.bone_m), state.root_m, state.root, state.angles_rad)
     np.testing.assert_allclose(found.world_from_bone, plain.world_from_bone, atol=1e-12)
     np.testing.assert_allclose(found.joint_m, plain.start_m, atol=1e-12)
     expected = plain.start_m[:, CARRIERS] + (plain.world_from_bone[:, CARRIERS] @ state.mount_m[..., None])[..., 0]

@@ -12,20 +12,20 @@ import pytest
 from harness.body import humanoid
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics, joint_centres_m
-from harness.body.mounts import DEFAULTS, Mount, place
-from harness.body.retargeting import to_own_body
-from harness.calibrate.hold import NotStanding, median_rotation
-from harness.calibrate.tpose_calibration import LEVEL, TPoseCollector, calibrate_tpose
+from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
+from harness.body.retargeting import retarget_to_own_body
+from harness.calibrate.hold import UnusableHold, median_rotation
+from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER, TPoseCollector, calibrate_tpose
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.reconstruct.methods.ik import PREVIOUS
-from harness.simulate.noise import level
-from harness.simulate.simulation import TrackerConfig, simulate
+from harness.simulate.noise import noise_preset
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -47,7 +47,7 @@ class Session:
 
     @property
     def mounts(self) -> list[Mount]:
-        return [DEFAULTS[station] for station in self.stations]
+        return [DEFAULT_MOUNTS[station] for station in self.stations]
 
     @property
     def straps(self) -> Floats:
@@ -60,8 +60,10 @@ class Session:
 
         The room's axes are turned about the vertical and its origin is elsewhere.
         """
-        take = Take("one", "nobody", "test", "", 40.0, qpos)
-        found = simulate(self.body, take, self.mounts, TrackerConfig(), level(self.noise), seed=self.seed)
+        take = BodyMotion("one", "nobody", "test", "", 40.0, qpos)
+        found = simulate_tracker(
+            self.body, take, self.mounts, TrackerConfig(), noise_preset(self.noise), seed=self.seed
+        )
         told, turn = found.calibration, rotations.about_z(self.yaw_rad)
         shift_m = np.array([1.5, -0.7, 0.4])
         offset_m = self.beside_m * generator(self.seed, "beside").normal(size=(len(self.stations), 3))
@@ -96,8 +98,8 @@ class Session:
 @cache
 def bodies() -> tuple[Body, ...]:
     """The standard body, and three of other proportions."""
-    clips = [synthetic.generate("walking", who, 1, seed=1, duration_s=3.0) for who in synthetic.performers()[:3]]
-    return (humanoid.build(), *(to_own_body(clip)[0] for clip in clips))
+    clips = [synthetic.generate("walking", who, 1, seed=1, duration_s=3.0) for who in synthetic.performer_names()[:3]]
+    return (humanoid.build_body(), *(retarget_to_own_body(clip)[0] for clip in clips))
 
 
 def off_deg(found: Floats, truth: Floats) -> Floats:
@@ -205,7 +207,7 @@ def test_a_tracker_that_slid_along_its_limb_is_found_there() -> None:
     slid[0] = replace(slid[0], along=slid[0].along - 0.4)
     found = calibrate_tpose(frames, session.body, slid).calibration
     before_m = np.linalg.norm(
-        np.array([place(session.body.skeleton, mount)[0] for mount in slid]) - truth.mount_m, axis=1
+        np.array([locate_mount(session.body.skeleton, mount)[0] for mount in slid]) - truth.mount_m, axis=1
     )
     after_m = np.linalg.norm(found.mount_m - truth.mount_m, axis=1)
     assert before_m[0] > 0.02
@@ -214,7 +216,7 @@ def test_a_tracker_that_slid_along_its_limb_is_found_there() -> None:
 
 
 def refusal(session: Session, frames: Sequence[TrackerFrame]) -> str:
-    with pytest.raises(NotStanding) as caught:
+    with pytest.raises(UnusableHold) as caught:
         calibrate_tpose(frames, session.body, session.mounts)
     assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)  # noqa: S301  # our own
     return str(caught.value)
@@ -222,7 +224,7 @@ def refusal(session: Session, frames: Sequence[TrackerFrame]) -> str:
 
 @pytest.mark.parametrize("noise", ["clean", "default"])
 def test_someone_who_walks_is_told_to_stand(noise: str) -> None:
-    body, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.5, rate_hz=40.0))
+    body, take = retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.5, rate_hz=40.0))
     session = Session(body, noise=noise)
     assert "moved" in refusal(session, session.seen(take.qpos)[0])
 
@@ -322,8 +324,8 @@ def test_hanging_arms_are_no_t_pose(down_deg: float, stations: tuple[str, ...]) 
 
 def test_a_body_of_another_size_is_no_t_pose_of_this_one() -> None:
     own = bodies()[0].skeleton
-    session = Session(humanoid.build(own.with_bones(0.8 * own.bone_m)))
-    with pytest.raises(NotStanding, match="no T-pose of this body"):
+    session = Session(humanoid.build_body(own.with_bones(0.8 * own.bone_m)))
+    with pytest.raises(UnusableHold, match="no T-pose of this body"):
         calibrate_tpose(session.held()[0], bodies()[0], session.mounts)
 
 
@@ -348,7 +350,7 @@ def test_the_median_of_rotations_leaves_outliers_alone(rng: np.random.Generator)
 @pytest.mark.parametrize("noise", ["clean", "noise"])
 def test_a_method_reaches_nearly_as_far_as_with_the_truth(noise: str) -> None:
     """Half as far off again, in joint centres, as with the true calibration, and 5 mm where that is perfect."""
-    body, take = to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.0, rate_hz=40.0))
+    body, take = retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.0, rate_hz=40.0))
     session = Session(body, noise=noise)
     found = calibrate_tpose(session.held()[0], body, session.mounts).calibration
     frames, truth = session.seen(take.qpos)
@@ -363,4 +365,4 @@ def test_a_method_reaches_nearly_as_far_as_with_the_truth(noise: str) -> None:
 
 
 def test_the_tracker_looks_down() -> None:
-    np.testing.assert_allclose(rotations.rotate(LEVEL, np.eye(3)), np.diag([1.0, -1.0, -1.0]), atol=1e-12)
+    np.testing.assert_allclose(rotations.rotate(LEVEL_FROM_TRACKER, np.eye(3)), np.diag([1.0, -1.0, -1.0]), atol=1e-12)

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 
 from harness.stream.codec.records import from_yaw_pitch_roll_deg
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.server import serving
+from harness.stream.emulator.server import serve_emulator
 
 RADIUS_M, LAP_S, QUALITY = 0.3, 5.0, 214
 ROOT = Path(__file__).parents[2]
@@ -38,7 +38,7 @@ def tilt_deg(station: int) -> tuple[float, float]:
     return 4.0 * station, -7.0 * station
 
 
-def circling(stations: int, rate_hz: float) -> Samples:
+def circling(stations: int, rate_hz: float) -> DeviceSamples:
     """A lap of so many stations, sampled one after another."""
     instants = round(LAP_S * rate_hz)
     number = np.arange(1, stations + 1)
@@ -47,7 +47,7 @@ def circling(stations: int, rate_hz: float) -> Samples:
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
     tilts = np.broadcast_to(np.array([tilt_deg(int(k)) for k in number]), (instants, stations, 2))
     angles_deg = np.concatenate([np.rad2deg(angle)[:, :, None], tilts], axis=-1)
-    return Samples(
+    return DeviceSamples(
         stations=tuple(f"station {k}" for k in number),
         rate_hz=rate_hz,
         first_lap=instants,
@@ -126,7 +126,7 @@ def main() -> None:
     args = parser.parse_args()
     faults = tuple(Fault(**fault) for fault in args.config.pop("faults", ()))
     config = EmulatorConfig(faults=faults, **args.config)
-    with serving(circling(args.stations, args.rate_hz), config, pty=args.link) as server:
+    with serve_emulator(circling(args.stations, args.rate_hz), config, pty=args.link) as server:
         print("on", flush=True)
         sys.stdin.read()
         summary = server.summary()

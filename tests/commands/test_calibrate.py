@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.humanoid import Body, build
+from harness.body.humanoid import Body, build_body
 from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
 from harness.calibrate.poses import POSES
 from harness.cli import main
@@ -22,13 +22,13 @@ from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.humanoid24 import BONES
-from harness.core.motion import Take
-from harness.experiment.calibration_session import Posing
-from harness.experiment.playback import Rehearsal, rehearse
+from harness.core.motion import BodyMotion
+from harness.experiment.calibration_session import CalibrationSession
+from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
 from harness.reconstruct.methods.ik import PREVIOUS
-from harness.stream.emulator.server import serving
+from harness.stream.emulator.server import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.replay import RecordingStream
 from tests.interrupts import heeding_interrupts
@@ -38,8 +38,8 @@ STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle")
 
 
 @pytest.fixture(scope="module")
-def model() -> Rehearsal:
-    return rehearse("demo", clip=CLIP, stations=4, posing=True)
+def model() -> Playback:
+    return prepare_playback("demo", clip=CLIP, stations=4, posing=True)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +60,7 @@ def calibrated(recording: Path) -> Path:
 
 
 def test_eight_poses_of_a_recording(
-    recording: Path, tmp_path: Path, model: Rehearsal, capsys: pytest.CaptureFixture[str]
+    recording: Path, tmp_path: Path, model: Playback, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The bounds are those of docs/calibration.md for a miss of 5 deg; this performer's are off by 2.5."""
     path = tmp_path / "me.toml"
@@ -169,8 +169,8 @@ def test_stations_without_names_are_told_by_the_user(recording: Path, tmp_path: 
     assert main([*words, "--stations", "left_hand,right_hand,left_ankle,right_ankle"]) == 0
 
 
-def test_a_tpose_of_a_tracker_that_streams(model: Rehearsal, tmp_path: Path) -> None:
-    with serving(model.samples, tcp="127.0.0.1:0") as device:
+def test_a_tpose_of_a_tracker_that_streams(model: Playback, tmp_path: Path) -> None:
+    with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         words = ["--port", device.name, "--scenario", "demo", "--clip", CLIP, "--kind", "tpose"]
         assert main(["calibrate", "--live", *words, "--out", str(tmp_path / "me.toml")]) == 0
         assert not device.emulator.device.streaming
@@ -181,8 +181,8 @@ def test_a_tpose_of_a_tracker_that_streams(model: Rehearsal, tmp_path: Path) -> 
     assert np.linalg.norm(kept.calibration.mount_m - truth.mount_m, axis=1).max() < 0.06
 
 
-def test_ctrl_c_leaves_nothing_behind(model: Rehearsal, tmp_path: Path) -> None:
-    with serving(model.samples, tcp="127.0.0.1:0") as device:
+def test_ctrl_c_leaves_nothing_behind(model: Playback, tmp_path: Path) -> None:
+    with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         words = ["--port", device.name, "--scenario", "demo", "--out", str(tmp_path / "me.toml")]
         command = [sys.executable, "-m", "harness.cli", "calibrate", "--live", *words]
         with subprocess.Popen(
@@ -201,10 +201,10 @@ def test_ctrl_c_leaves_nothing_behind(model: Rehearsal, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_live_session_begins_with_eight_poses(model: Rehearsal, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_live_session_begins_with_eight_poses(model: Playback, monkeypatch: pytest.MonkeyPatch) -> None:
     witness = Witness()
     monkeypatch.setattr(registry, "resolve", lambda name: witness)
-    with serving(model.samples, tcp="127.0.0.1:0") as device:
+    with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         what = ["--scenario", "demo", "--clip", CLIP, "--calibration", "poses", "--seconds", "1"]
         assert main(["live", "--port", device.name, *what]) == 0
     told, frames = witness.sessions[-1]
@@ -214,10 +214,10 @@ def test_a_live_session_begins_with_eight_poses(model: Rehearsal, monkeypatch: p
 
 
 @pytest.mark.slow
-def test_eight_poses_of_a_tracker_that_streams(model: Rehearsal, recording: Path, tmp_path: Path) -> None:
+def test_eight_poses_of_a_tracker_that_streams(model: Playback, recording: Path, tmp_path: Path) -> None:
     """On a pty, with pictures; it takes as long as the poses do."""
     pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
-    with serving(model.samples, pty=tmp_path / "tracker") as device:
+    with serve_emulator(model.samples, pty=tmp_path / "tracker") as device:
         words = ["--port", device.name, "--scenario", "demo", "--out", str(tmp_path / "me.toml")]
         pictures = ["--view", "frames", "--pictures", str(tmp_path / "pictures")]
         assert main(["calibrate", "--live", *words, *pictures]) == 0
@@ -235,7 +235,7 @@ class Witness:
         self.bodies: list[Body] = []
         self.sessions: list[tuple[Calibration, list[TrackerFrame]]] = []
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Witness":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "Witness":
         self.bodies.append(body)
         return self
 
@@ -261,9 +261,9 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
     write_calibration(reordered, kept.of(STATIONS[::-1]))
     witness = Witness()
     monkeypatch.setattr(registry, "resolve", lambda name: witness)
-    rehearsal = rehearse("demo", clip=CLIP, stations=4)
+    rehearsal = prepare_playback("demo", clip=CLIP, stations=4)
     what = ["--scenario", "demo", "--clip", CLIP, "--calibration", str(reordered), "--poses", str(table)]
-    with serving(rehearsal.samples, tcp="127.0.0.1:0") as device:
+    with serve_emulator(rehearsal.samples, tcp="127.0.0.1:0") as device:
         assert main(["live", "--port", device.name, *what, "--seconds", "1"]) == 0
     assert kept.skeleton is not None
     np.testing.assert_array_equal(witness.bodies[0].skeleton.bone_m, kept.skeleton.bone_m)
@@ -271,7 +271,7 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
     assert told.stations == STATIONS
     np.testing.assert_array_equal(told.mount_m, kept.calibration.mount_m)
     np.testing.assert_array_equal(told.bone_from_station, kept.calibration.bone_from_station)
-    session = PREVIOUS.fit(build(kept.skeleton), [], np.random.default_rng(1)).begin(kept.calibration)
+    session = PREVIOUS.fit(build_body(kept.skeleton), [], np.random.default_rng(1)).begin(kept.calibration)
     with table.open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(frames) > 10
@@ -322,19 +322,19 @@ def test_simulated_performers(capsys: pytest.CaptureFixture[str]) -> None:
     assert content["errors"]["bone lengths"]["rms"] < content["errors"]["bone lengths"]["mean_skeleton"]
 
 
-def test_what_is_recorded_is_what_is_played(model: Rehearsal, recording: Path) -> None:
+def test_what_is_recorded_is_what_is_played(model: Playback, recording: Path) -> None:
     """The same frames, in the session of the clip: where trackers sit is the same as in the clip itself."""
     frames = list(RecordingStream(recording))
     assert len(frames) == model.samples.first_lap
     np.testing.assert_array_equal(
         [frame.position_m for frame in frames], [frame.position_m for frame in model.simulation.frames]
     )
-    clip = rehearse("demo", clip=CLIP, stations=4)
+    clip = prepare_playback("demo", clip=CLIP, stations=4)
     np.testing.assert_array_equal(clip.calibration.mount_m, model.calibration.mount_m)
 
 
 def test_a_performer_is_told_what_to_do_and_may_stop(recording: Path) -> None:
-    posing = Posing("demo", STATIONS, "tpose", CLIP)
+    posing = CalibrationSession("demo", STATIONS, "tpose", CLIP)
     told: list[str] = []
     shown: list[int] = []
 

@@ -4,7 +4,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from harness.commands.catalogue import catalogue
+from harness.commands.catalogue import build_catalogue
 from harness.reconstruct import registry
 from harness.reconstruct.methods.mean_pose import MeanPose
 
@@ -16,7 +16,7 @@ class Theirs(MeanPose):
 
 
 def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
-    methods = catalogue()["methods"]
+    methods = build_catalogue()["methods"]
     assert set(methods) == set(registry.methods())
     assert "needs examples, takes any inputs; Liu et al. 2011" in methods["dynamic_map"]
     assert "needs no examples" in methods["ik:previous"]
@@ -26,10 +26,10 @@ def test_every_method_is_named_with_its_needs_and_where_it_comes_from() -> None:
 def test_a_method_of_a_package_is_listed_with_its_own_source(monkeypatch: pytest.MonkeyPatch) -> None:
     entry = EntryPoint("theirs", "tests.commands.test_catalogue:Theirs", registry.GROUP)
     monkeypatch.setattr(registry, "entry_points", lambda group: [entry])
-    assert catalogue()["methods"]["theirs"].endswith("; Somebody 2031")
+    assert build_catalogue()["methods"]["theirs"].endswith("; Somebody 2031")
 
 
 def test_a_scenario_says_what_it_varies() -> None:
-    assert "varies noise" in catalogue()["scenarios"]["boxing"]
-    assert "walk" in catalogue()["placement studies"]["placement_walking"]
-    assert "noise default" in catalogue()["scenarios"]["demo"]
+    assert "varies noise" in build_catalogue()["scenarios"]["boxing"]
+    assert "walk" in build_catalogue()["placement studies"]["placement_walking"]
+    assert "noise default" in build_catalogue()["scenarios"]["demo"]

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.results.reader import Judged
+from harness.results.reader import ResultSet
 from tests.compare.sides import manifest, side, write_run
 from tests.compare.test_comparison import ANGLE, STEADY, TORN
 
@@ -20,7 +20,7 @@ SIDES = {
     "faster": side(defined_by={"tracker": {"rate_hz": 60.0, "items": [40, 2]}}),
     "part": side(metrics={"frames_matched": 150}),
     "holes": side(failed=["ik on walk_99"]),
-    "empty": Judged("empty", manifest(), (), 0),
+    "empty": ResultSet("empty", manifest(), (), 0),
     "two": side(methods={"ik": 1.0, "mean_pose": STEADY}),
 }
 
@@ -96,7 +96,7 @@ def test_an_interrupt_says_so(here: Path, capsys: pytest.CaptureFixture[str], mo
     def interrupted(*given: object, **named: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("harness.compare.comparison.compare", interrupted)
+    monkeypatch.setattr("harness.compare.comparison.compare_results", interrupted)
     assert main(["compare", "main", "again"]) == 130
     assert capsys.readouterr().out.splitlines() == ["interrupted"]
 

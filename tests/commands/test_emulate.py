@@ -12,14 +12,14 @@ from typing import get_args
 import pytest
 
 from harness.cli import main
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError
-from harness.experiment.clip_evaluation import Setting
+from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import Scenario, find_scenario, load_scenario, variants
-from harness.mocap.sources import open_source
+from harness.mocap.sources import open_motion_source
 from harness.reconstruct.methods.ik import PREVIOUS
 from harness.stream.driver.transport import open_transport
-from harness.stream.emulator.faults import Kind
+from harness.stream.emulator.faults import FaultKind
 from tests.interrupts import heeding_interrupts
 
 
@@ -106,15 +106,15 @@ def test_no_rate(rate: str, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_the_shipped_scenario_shows_every_fault() -> None:
-    assert {fault.kind for fault in load_scenario("emulator_faults").fault} == set(get_args(Kind))
+    assert {fault.kind for fault in load_scenario("emulator_faults").fault} == set(get_args(FaultKind))
 
 
 def test_runs_know_nothing_of_faults() -> None:
     scenario = load_scenario("emulator_faults")
-    source = open_source("builtin", None, seed=1, rate_hz=None)
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
 
     def inputs(of: Scenario) -> dict[str, object]:
-        return Setting(of, source, Part("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
+        return ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
 
     assert scenario.fault
     assert inputs(scenario) == inputs(replace(scenario, fault=()))

@@ -15,17 +15,17 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.experiment.playback import Rehearsal, rehearse
+from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
-from harness.stream.emulator.server import serving
+from harness.stream.emulator.server import serve_emulator
 from tests.interrupts import heeding_interrupts
 
 WHAT = ["--scenario", "demo", "--clip", "boxing_p1_01", "--method", "ik"]
 
 
 @pytest.fixture(scope="module")
-def rehearsal() -> Rehearsal:
-    return rehearse("demo", clip="boxing_p1_01", stations=4)
+def rehearsal() -> Playback:
+    return prepare_playback("demo", clip="boxing_p1_01", stations=4)
 
 
 @contextmanager
@@ -52,10 +52,10 @@ def wait_for_rows(path: Path, count: int, program: "subprocess.Popen[str]") -> N
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
-def test_ctrl_c_ends_it_well(tmp_path: Path, rehearsal: Rehearsal, ending: signal.Signals) -> None:
+def test_ctrl_c_ends_it_well(tmp_path: Path, rehearsal: Playback, ending: signal.Signals) -> None:
     poses, bvh = tmp_path / "poses.csv", tmp_path / "live.bvh"
     outputs = ["--poses", str(poses), "--bvh", str(bvh), "--json"]
-    with serving(rehearsal.samples, pty=tmp_path / "tracker") as device:
+    with serve_emulator(rehearsal.samples, pty=tmp_path / "tracker") as device:
         with live("--port", device.name, *outputs) as program:
             wait_for_rows(poses, 40, program)
             program.send_signal(ending)
@@ -77,9 +77,9 @@ def test_ctrl_c_ends_it_well(tmp_path: Path, rehearsal: Rehearsal, ending: signa
         _same_as_a_run(rehearsal, rows)
 
 
-def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Rehearsal) -> None:
+def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Playback) -> None:
     with (
-        serving(rehearsal.samples, tcp="127.0.0.1:0") as device,
+        serve_emulator(rehearsal.samples, tcp="127.0.0.1:0") as device,
         live("--port", device.name, "--poses", str(tmp_path / "poses.csv")) as program,
     ):
         assert program.stderr is not None
@@ -92,7 +92,7 @@ def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Rehear
     assert "Traceback" not in talk
 
 
-def _same_as_a_run(rehearsal: Rehearsal, rows: list[dict[str, str]]) -> None:
+def _same_as_a_run(rehearsal: Playback, rows: list[dict[str, str]]) -> None:
     """Poses of the first lap are those of a run over the simulation."""
     frames = rehearsal.simulation.frames
     session = rehearsal.setting.fitted(registry.resolve("ik"), "ik").begin(rehearsal.calibration)
@@ -106,13 +106,13 @@ def _same_as_a_run(rehearsal: Rehearsal, rows: list[dict[str, str]]) -> None:
         np.testing.assert_array_equal(qpos, estimate.qpos)
 
 
-def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: Rehearsal) -> None:
+def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: Playback) -> None:
     pytest.importorskip("pythonosc", reason="python-osc is not installed (extra `live`)")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
         vmc = ["--vmc", str(listener.getsockname()[1])]
         with (
-            serving(rehearsal.samples, tcp="127.0.0.1:0") as device,
+            serve_emulator(rehearsal.samples, tcp="127.0.0.1:0") as device,
             live("--port", device.name, "--seconds", "1", *vmc) as program,
         ):
             said, talk = program.communicate(timeout=120.0)
@@ -161,8 +161,8 @@ def test_refusals(changed: list[str], words: str, capsys: pytest.CaptureFixture[
 
 
 def test_another_rate_than_the_scenarios(capsys: pytest.CaptureFixture[str]) -> None:
-    faster = rehearse("demo", clip="boxing_p1_01", stations=4, rate_hz=50.0)
-    with serving(faster.samples, tcp="127.0.0.1:0") as device:
+    faster = prepare_playback("demo", clip="boxing_p1_01", stations=4, rate_hz=50.0)
+    with serve_emulator(faster.samples, tcp="127.0.0.1:0") as device:
         assert main(["live", "--port", device.name, *WHAT, "--seconds", "1"]) == 2
     assert "Say --rate 50" in capsys.readouterr().err
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import pytest
 
 from harness.cli import main
-from harness.experiment.playback import Rehearsal, rehearse
-from harness.stream.codec.blocks import CONFIGURED, HEADER, RECEIVED
-from harness.stream.driver import Is900, Wanted
-from harness.stream.emulator import EmulatorConfig, serving
-from harness.stream.recording.frame_table import COLUMNS
+from harness.experiment.playback import Playback, prepare_playback
+from harness.stream.codec.blocks import CONFIGURED, FILE_HEADER, RECEIVED
+from harness.stream.driver import DriverConfig, Is900
+from harness.stream.emulator import EmulatorConfig, serve_emulator
+from harness.stream.recording.frame_table import FRAME_COLUMNS
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from tests.interrupts import heeding_interrupts
@@ -31,8 +31,8 @@ CLIP = "boxing_p1_01"
 
 
 @pytest.fixture(scope="module")
-def played() -> Rehearsal:
-    return rehearse("demo", clip=CLIP, stations=4)
+def played() -> Playback:
+    return prepare_playback("demo", clip=CLIP, stations=4)
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +43,8 @@ def simulated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def port(played: Rehearsal) -> Iterator[str]:
-    with serving(played.samples, tcp="127.0.0.1:0") as device:
+def port(played: Playback) -> Iterator[str]:
+    with serve_emulator(played.samples, tcp="127.0.0.1:0") as device:
         yield device.name
 
 
@@ -80,7 +80,7 @@ def test_frames_come_as_a_table(simulated: Path, capsys: pytest.CaptureFixture[s
     assert said.err.startswith("60 frames")
     table = list(csv.DictReader(io.StringIO("\n".join(lines))))
     frames = list(RecordingStream(simulated))
-    assert (tuple(table[0]), len(table)) == (COLUMNS, 4 * len(frames))
+    assert (tuple(table[0]), len(table)) == (FRAME_COLUMNS, 4 * len(frames))
     assert [float(row["x_m"]) for row in table[:4]] == frames[0].position_m[:, 0].tolist()
     assert [float(row["received_s"]) for row in table[::4]] == [frame.received_s for frame in frames]
     assert main(["replay", str(simulated), "--frames", "--json"]) == 0
@@ -125,7 +125,7 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
     new.write_bytes(newer())
     text.write_text("hello\n")
     empty.touch()
-    bare.write_bytes(HEADER)
+    bare.write_bytes(FILE_HEADER)
     before = simulated.read_bytes()
     for words, expected in (
         (["replay", str(new)], "a recording of version 2; expected version 1 at most"),
@@ -161,13 +161,13 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
     assert simulated.read_bytes() == before
 
 
-def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Rehearsal, tmp_path: Path) -> None:
+def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Playback, tmp_path: Path) -> None:
     """Frame by frame, times of reception and all, through two connections into one file."""
     live = []
     for _ in range(2):
         with (
             RecordingWriter(tmp_path / "a.rec") as writer,
-            Is900(port, Wanted(stations=played.samples.stations), witness=writer) as device,
+            Is900(port, DriverConfig(stations=played.samples.stations), witness=writer) as device,
         ):
             frames = iter(device)
             live.append([next(frames) for _ in range(60)])
@@ -179,17 +179,17 @@ def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Re
     assert all((a.position_m == b.position_m).all() for a, b in zip(again, live[1], strict=True))
 
 
-def test_a_device_that_was_gone_replays_as_it_was_live(played: Rehearsal, tmp_path: Path) -> None:
+def test_a_device_that_was_gone_replays_as_it_was_live(played: Playback, tmp_path: Path) -> None:
     """Bit by bit, device time and times of reception included, whether decoded at once or chunk by chunk."""
-    link, path, wanted = tmp_path / "link", tmp_path / "a.rec", Wanted(stations=played.samples.stations)
+    link, path, wanted = tmp_path / "link", tmp_path / "a.rec", DriverConfig(stations=played.samples.stations)
     with RecordingWriter(path) as writer:
-        with serving(played.samples, pty=link):
+        with serve_emulator(played.samples, pty=link):
             device = Is900(str(link), wanted, witness=writer)
             frames = iter(device)
             live = [next(frames) for _ in range(40)]
         with device, ThreadPoolExecutor() as beside:
             rest = beside.submit(lambda: [next(frames) for _ in range(40)])
-            with serving(played.samples, pty=link):
+            with serve_emulator(played.samples, pty=link):
                 live += rest.result(timeout=120.0)
     assert [event["kind"] for event in read_recording(path).events][:2] == ["connected", "unplugged"]
     for speed in ("max", 1e9):
@@ -212,10 +212,10 @@ def test_seconds_end_a_recording(port: str, tmp_path: Path, capsys: pytest.Captu
 
 
 def test_old_firmware_is_recorded_by_mp_and_refused_without(
-    played: Rehearsal, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    played: Playback, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "a.rec"
-    with serving(played.samples, EmulatorConfig(firmware="4.1105"), tcp="127.0.0.1:0") as device:
+    with serve_emulator(played.samples, EmulatorConfig(firmware="4.1105"), tcp="127.0.0.1:0") as device:
         assert "--quality mp" in refused(["record", device.name, str(path), "--seconds", "0.5"], capsys)
         assert not path.exists()
         assert main(["record", device.name, str(path), "--seconds", "0.5", "--quality", "mp"]) == 0

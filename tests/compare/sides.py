@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.files import content_key, plain
+from harness.core.files import content_key, to_json_types
 from harness.core.seeds import generator
 from harness.results.manifest import Manifest
-from harness.results.reader import Judged, JudgedCell
+from harness.results.reader import CellResult, ResultSet
 from harness.score.metrics import DEFINITIONS, VERSIONS
 
 SIZES = {"joint_angle_mean_deg": 2.0, "mpjpe_mm": 12.0, "jitter_m_s3": 700.0}
@@ -20,7 +20,7 @@ def manifest(**circumstances: Any) -> Manifest:
     return Manifest({"name": "made_up", "seed": 1}, VERSIONS, {"commit": "abc", **circumstances})
 
 
-def cell(clip: str = "walk_01", method: str = "ik", times: float = 1.0, **fields: Any) -> JudgedCell:
+def cell(clip: str = "walk_01", method: str = "ik", times: float = 1.0, **fields: Any) -> CellResult:
     """Errors that belong to the clip, `times` as large; other fields by name, inputs that define it in `defined_by`."""
     size = float(np.exp(generator(1, "made up", clip).normal(0.0, 0.3)))
     metrics: dict[str, Any] = dict.fromkeys(DEFINITIONS)
@@ -49,7 +49,7 @@ def cell(clip: str = "walk_01", method: str = "ik", times: float = 1.0, **fields
         "metric_versions": VERSIONS,
         **content.pop("defined_by", {}),
     }
-    return JudgedCell(defined_by=defined_by, metrics=metrics, **content)
+    return CellResult(defined_by=defined_by, metrics=metrics, **content)
 
 
 def side(
@@ -58,16 +58,16 @@ def side(
     clips: int = 8,
     failed: Sequence[str] = (),
     **fields: Any,
-) -> Judged:
+) -> ResultSet:
     """Method -> how many times as large its errors are as made up, on all clips or on each."""
     cells = []
     for method, times in (methods or {"ik": 1.0}).items():
         each = [times] * clips if isinstance(times, int | float) else times
         cells += [cell(f"walk_{n:02}", method, float(t), **fields) for n, t in enumerate(each)]
-    return Judged(title, manifest(), tuple(cells), len(cells) + len(failed), tuple(failed))
+    return ResultSet(title, manifest(), tuple(cells), len(cells) + len(failed), tuple(failed))
 
 
-def write_run(out: Path, judged: Judged) -> Path:
+def write_run(out: Path, judged: ResultSet) -> Path:
     """As far as comparisons read one."""
     out.mkdir(parents=True)
     rows = []
@@ -93,4 +93,4 @@ def write_run(out: Path, judged: Judged) -> Path:
 
 def _write(path: Path, content: Mapping[str, Any]) -> None:
     """Without the flush to the disk that a run waits for."""
-    path.write_text(json.dumps(plain(content)))
+    path.write_text(json.dumps(to_json_types(content)))

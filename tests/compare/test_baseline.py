@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from harness.compare.baseline import save
-from harness.compare.comparison import compare
+from harness.compare.baseline import write_baseline
+from harness.compare.comparison import compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.results import storage
-from harness.results.cell import CARRIED, IDENTITY
+from harness.results.cell import IDENTITY, TRAILING_COLUMNS
 from harness.results.index import CellIndex
-from harness.results.reader import COUNTED, Judged, JudgedCell, read_judged
+from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
@@ -33,25 +33,25 @@ def baselines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return Path("results/baselines")
 
 
-def kept(judged: Judged) -> list[JudgedCell]:
+def kept(judged: ResultSet) -> list[CellResult]:
     """Without metrics that nothing can be said of."""
     cells = sorted(judged.cells, key=lambda cell: (cell.method, cell.clip))
-    return [replace(c, metrics={n: v for n, v in c.metrics.items() if n in (*COUNTED, *MARGINS)}) for c in cells]
+    return [replace(c, metrics={n: v for n, v in c.metrics.items() if n in (*COUNT_METRICS, *MARGINS)}) for c in cells]
 
 
 def test_what_a_baseline_keeps_is_what_the_run_measured(run: Path, baselines: Path) -> None:
-    assert save(run, "main") == baselines / "main"
-    found, there = read_judged("main"), read_judged(run)
+    assert write_baseline(run, "main") == baselines / "main"
+    found, there = load_results("main"), load_results(run)
     assert kept(found) == kept(there) == kept(side(methods=METHODS))
     assert (found.title, found.manifest, found.planned) == ("baseline main", there.manifest, 16)
-    assert read_judged(baselines / "main") == found
-    comparison = compare(found, there)
+    assert load_results(baselines / "main") == found
+    comparison = compare_results(found, there)
     assert (comparison.outcome, {line.difference for line in comparison.differences}) == (Outcome.PASS, {0.0})
 
 
 def test_a_baseline_is_small_sorted_and_always_the_same(run: Path, baselines: Path, tmp_path: Path) -> None:
     first, turned = side(methods=METHODS), write_run(tmp_path / "turned", side(methods=dict(reversed(METHODS.items()))))
-    one, other = save(run, "one"), save(turned, "other")
+    one, other = write_baseline(run, "one"), write_baseline(turned, "other")
     assert sorted(path.name for path in one.iterdir()) == ["cells.json", "manifest.json", "summary.json"]
     text = (one / "cells.json").read_text()
     assert text == (other / "cells.json").read_text()
@@ -69,7 +69,7 @@ def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: C
     for cell in cells:
         storage.write_cell(run_folder, cell)
     storage.write_summary(run_folder, keys=[cell.key for cell in cells], planned=3, failures={"ik on walk_3": "no"})
-    found = read_judged(run_folder)
+    found = load_results(run_folder)
     assert [cell.clip for cell in found.cells] == ["walk_2", "walk_1"]
     assert found.cells[0].metrics == cells[0].metrics
     assert found.cells[0].defined_by == cells[0].defined_by
@@ -79,63 +79,63 @@ def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: C
 def test_a_sweep_is_a_side_and_makes_a_baseline(run: Path, baselines: Path) -> None:
     rows = json.loads((run / "summary.json").read_text())["cells"]
     with CellIndex(run) as index:
-        index.add({**dict.fromkeys((*IDENTITY, *CARRIED)), **row} for row in rows)
+        index.add({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **row} for row in rows)
         index.expect([f"demo seed 1: {row['method']} on {row['clip']}" for row in rows])
         index.ended((f"demo seed 1: {row['method']} on {row['clip']}", row["key"], "") for row in rows)
     changed(run / "summary.json", cells=None, groups=[{"method": "ik"}])
-    assert kept(read_judged(run)) == kept(side(methods=METHODS))
-    summary = json.loads((save(run, "main") / "summary.json").read_text())
-    assert (summary["groups"], kept(read_judged("main"))) == ([{"method": "ik"}], kept(read_judged(run)))
+    assert kept(load_results(run)) == kept(side(methods=METHODS))
+    summary = json.loads((write_baseline(run, "main") / "summary.json").read_text())
+    assert (summary["groups"], kept(load_results("main"))) == ([{"method": "ik"}], kept(load_results(run)))
     with CellIndex(run) as index:
         index.ended([("demo seed 1: ik on walk_00", "", "no pose")])
-    found = read_judged(run)
+    found = load_results(run)
     assert (found.planned, len(found.cells), found.failed) == (16, 15, ("demo seed 1: ik on walk_00",))
-    run_itself = compare(found, found, methods=("mean_pose", "mean_pose"), metrics=["mpjpe_mm"])
+    run_itself = compare_results(found, found, methods=("mean_pose", "mean_pose"), metrics=["mpjpe_mm"])
     assert run_itself.outcome == Outcome.PASS, "another method's failure"
-    assert compare(found, found, methods=("ik", "ik"), metrics=["mpjpe_mm"]).outcome == Outcome.INCOMPLETE
+    assert compare_results(found, found, methods=("ik", "ik"), metrics=["mpjpe_mm"]).outcome == Outcome.INCOMPLETE
 
 
 @pytest.mark.parametrize("name", ["", ".", "..", "../out", "a/b", "/elsewhere", ".hidden", "a b", "-f", "a\n", "a\\b"])
 def test_a_name_never_leaves_its_folder(name: str, run: Path, baselines: Path, tmp_path: Path) -> None:
     before = sorted(tmp_path.rglob("*"))
     with pytest.raises(BadInput, match="no name of a baseline"):
-        save(run, name, force=True)
+        write_baseline(run, name, force=True)
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_baseline_is_replaced_only_by_force(run: Path, baselines: Path, tmp_path: Path) -> None:
-    target = save(run, "main")
+    target = write_baseline(run, "main")
     before = (target / "cells.json").read_text()
     worse = write_run(tmp_path / "worse", side(methods={"ik": 1.5}))
     with pytest.raises(BadInput, match=r"There is a baseline main already.*--force"):
-        save(worse, "main")
+        write_baseline(worse, "main")
     assert (target / "cells.json").read_text() == before
-    save(worse, "main", force=True)
-    assert read_judged("main").planned == 8
+    write_baseline(worse, "main", force=True)
+    assert load_results("main").planned == 8
     assert [path.name for path in baselines.iterdir()] == ["main"]
 
 
 def test_runs_with_holes_make_no_baseline(baselines: Path, tmp_path: Path) -> None:
     failed = write_run(tmp_path / "failed", side(failed=["ik on walk_99"]))
     with pytest.raises(BadInput, match="lacks 1 of 9 cells"):
-        save(failed, "main")
+        write_baseline(failed, "main")
     empty = write_run(tmp_path / "empty", replace(side(), cells=(), planned=0))
     with pytest.raises(BadInput, match="no cells"):
-        save(empty, "main")
+        write_baseline(empty, "main")
     with pytest.raises(BadInput, match="no folder"):
-        save(tmp_path / "nowhere", "main")
+        write_baseline(tmp_path / "nowhere", "main")
     assert not baselines.exists()
 
 
 def test_what_is_no_side_is_told(run: Path, baselines: Path, tmp_path: Path) -> None:
-    save(run, "main")
+    write_baseline(run, "main")
     with pytest.raises(UnknownName, match=r"no folder or baseline called 'mian'.*'main'"):
-        read_judged("mian")
+        load_results("mian")
     with pytest.raises(BadFile, match="no such folder"):
-        read_judged("some/where")
+        load_results("some/where")
     (tmp_path / "empty").mkdir()
     with pytest.raises(BadFile, match=r"manifest\.json"):
-        read_judged("empty")
+        load_results("empty")
 
 
 def changed(path: Path, **content: Any) -> None:
@@ -148,7 +148,7 @@ def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
         del row["scenario"]
     changed(run / "summary.json", cells=rows)
     with pytest.raises(BadFile, match=r"cells that name no scenario.*run again"):
-        read_judged(run)
+        load_results(run)
 
 
 @pytest.mark.parametrize(
@@ -165,34 +165,34 @@ def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
     ],
 )
 def test_damaged_baselines_are_refused(run: Path, baselines: Path, damage: dict[str, Any], why: str) -> None:
-    changed(save(run, "main") / "cells.json", **damage)
+    changed(write_baseline(run, "main") / "cells.json", **damage)
     with pytest.raises(BadFile, match=why):
-        read_judged("main")
+        load_results("main")
 
 
 @pytest.mark.parametrize(("field", "value"), [("clip", None), ("seed", "1"), ("varied", None), ("performer", 3)])
 def test_damaged_cells_are_refused(run: Path, baselines: Path, field: str, value: object) -> None:
-    path = save(run, "main") / "cells.json"
+    path = write_baseline(run, "main") / "cells.json"
     cells = json.loads(path.read_text())["cells"]
     changed(path, cells=[{**cells[0], field: value}, *cells[1:]])
     with pytest.raises(BadFile, match=f"{field} is"):
-        read_judged("main")
+        load_results("main")
 
 
 @pytest.mark.parametrize(("metric", "value"), [("mpjpe_mm", float("nan")), ("frames_matched", None), ("fps", "fast")])
 def test_damaged_figures_are_refused(run: Path, baselines: Path, metric: str, value: object) -> None:
-    path = save(run, "main") / "cells.json"
+    path = write_baseline(run, "main") / "cells.json"
     content = json.loads(path.read_text())
     content["cells"][0]["metrics"][content["metrics"].index(metric)] = value
     changed(path, **content)
     with pytest.raises(BadFile, match=f"{metric} is"):
-        read_judged("main")
+        load_results("main")
 
 
 @pytest.mark.parametrize("name", ["manifest.json", "summary.json", "cells"])
 def test_runs_that_lack_something_are_refused(run: Path, name: str) -> None:
     (run / name).rename(run / "elsewhere")
     with pytest.raises(BadFile):
-        read_judged(run)
+        load_results(run)
     with pytest.raises(BadFile):
-        save(run, "main")
+        write_baseline(run, "main")

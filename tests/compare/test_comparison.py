@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.compare.comparison import EVERYTHING, Comparison, compare
+from harness.compare.comparison import EVERYTHING, Comparison, compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import Outcome, UnknownName
-from harness.results.reader import Judged
+from harness.results.reader import ResultSet
 from harness.score.metrics import DEFINITIONS
 from tests.compare.sides import SIZES, cell, manifest, side
 
@@ -19,8 +19,8 @@ STEADY = [1.1 + 0.01 * n for n in range(8)]
 TORN = [0.7, 1.4, 0.8, 1.3, 0.7, 1.4, 0.9, 1.2]
 
 
-def found(b: Judged, a: Judged | None = None, **options: Any) -> Comparison:
-    return compare(a or side(), b, **{"metrics": [ANGLE], **options})
+def found(b: ResultSet, a: ResultSet | None = None, **options: Any) -> Comparison:
+    return compare_results(a or side(), b, **{"metrics": [ANGLE], **options})
 
 
 @pytest.mark.parametrize(
@@ -32,15 +32,15 @@ def found(b: Judged, a: Judged | None = None, **options: Any) -> Comparison:
         (side(methods={"ik": TORN}), Outcome.NOT_COMPARABLE, "reaches beyond the margin"),
         (side(clips=5), Outcome.NOT_COMPARABLE, "cells are only in A"),
         (side(scenario="other"), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (scenario: demo against"),
-        (Judged("B", manifest(), (), 0), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (a side has no"),
+        (ResultSet("B", manifest(), (), 0), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (a side has no"),
         (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, "nothing was measured on both sides"),
         (side(defined_by={"calibration": "poses"}), Outcome.NOT_COMPARABLE, "inputs differ: calibration: none against"),
         (side(failed=["ik on walk_99"]), Outcome.INCOMPLETE, "planned cells are missing: B: ik on walk_99"),
         (replace(side(), planned=11), Outcome.INCOMPLETE, "B: 3 cells are not finished"),
-        (Judged("B", manifest(), (), 1, ("ik on walk_00",)), Outcome.INCOMPLETE, "ik on walk_00"),
+        (ResultSet("B", manifest(), (), 1, ("ik on walk_00",)), Outcome.INCOMPLETE, "ik on walk_00"),
     ],
 )
-def test_outcomes(b: Judged, outcome: Outcome, why: str) -> None:
+def test_outcomes(b: ResultSet, outcome: Outcome, why: str) -> None:
     comparison = found(b)
     assert comparison.outcome == outcome
     assert why in comparison.why
@@ -71,7 +71,7 @@ def test_times_are_gated_between_equal_processors_alone() -> None:
 
 def test_a_result_beside_itself_differs_by_exactly_nothing() -> None:
     a = side(methods={"ik": 1.0, "mean_pose": 3.0})
-    comparison = compare(a, a)
+    comparison = compare_results(a, a)
     assert comparison.outcome == Outcome.PASS
     assert {line.verdict for line in comparison.differences} == {"same"}
     assert {(line.difference, line.low, line.high, line.p) for line in comparison.differences} == {(0.0, 0.0, 0.0, 1.0)}
@@ -88,7 +88,7 @@ def test_clips_are_what_counts_and_their_cells_are_averaged() -> None:
     """Seeds and varied values of one clip are no further witnesses."""
     times = [1.0, 1.1, 1.3]
     many = [cell("walk_01", times=t, seed=n) for n, t in enumerate(times)]
-    run = Judged("A", manifest(), (*side(clips=1).cells, *many), 4)
+    run = ResultSet("A", manifest(), (*side(clips=1).cells, *many), 4)
     comparison = found(run, run)
     (line,) = [line for line in comparison.differences if line.gated]
     assert (comparison.matched, line.clips) == (4, ("walk_00", "walk_01"))
@@ -98,7 +98,7 @@ def test_clips_are_what_counts_and_their_cells_are_averaged() -> None:
 
 def test_known_and_new_performers_inputs_and_protocols_are_never_pooled() -> None:
     parts = [side(), side(performer="new", seed=2), side(inputs="pos"), side(protocol="block")]
-    run = Judged("A", manifest(), tuple(c for part in parts for c in part.cells), 32)
+    run = ResultSet("A", manifest(), tuple(c for part in parts for c in part.cells), 32)
     groups = [line.group for line in found(run, run).differences if line.gated]
     texts = ["pos+ori, sequence, known", "pos+ori, sequence, new", "pos, sequence, known", "pos+ori, block, known"]
     assert groups == texts
@@ -115,10 +115,10 @@ def test_a_metric_that_should_rise_is_worse_when_it_falls() -> None:
 
 def test_two_methods_of_one_run() -> None:
     run = side(methods={"ik": 1.0, "mean_pose": STEADY}, failed=["best_match on walk_00"])
-    comparison = compare(run, run, methods=("ik", "mean_pose"), metrics=[ANGLE])
+    comparison = compare_results(run, run, methods=("ik", "mean_pose"), metrics=[ANGLE])
     assert (comparison.outcome, comparison.differences[0].method) == (Outcome.REGRESSED, "ik vs mean_pose")
-    assert compare(run, run, methods=("mean_pose", "ik"), metrics=[ANGLE]).outcome == Outcome.PASS
-    assert compare(run, run, methods=("ik", "ik"), metrics=[ANGLE]).differences[0].method == "ik"
+    assert compare_results(run, run, methods=("mean_pose", "ik"), metrics=[ANGLE]).outcome == Outcome.PASS
+    assert compare_results(run, run, methods=("ik", "ik"), metrics=[ANGLE]).differences[0].method == "ik"
 
 
 OTHER_RATE = {"tracker": {"rate_hz": 60.0, "items": [40, 2]}}

@@ -5,13 +5,19 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from harness.compare.paired_statistics import FEWEST_CLIPS, Paired, expanded, interval, paired
+from harness.compare.paired_statistics import (
+    MIN_CLIPS,
+    PairedDifference,
+    bootstrap_interval,
+    compare_paired,
+    expand_level,
+)
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 from harness.errors import BadInput
 
 
-def ends(found: Paired) -> list[float]:
+def ends(found: PairedDifference) -> list[float]:
     assert found.low is not None
     assert found.high is not None
     return [found.low, found.high]
@@ -25,7 +31,7 @@ def errors(values: Floats) -> dict[str, float | None]:
 def test_swapped_sides_mirror_the_interval_and_the_verdict(count: int, rng: np.random.Generator) -> None:
     for shift in (-3.0, 0.0, 0.4, 3.0):
         a, b = errors(rng.lognormal(size=count) + shift), errors(rng.lognormal(size=count))
-        there, back = paired(a, b), paired(b, a)
+        there, back = compare_paired(a, b), compare_paired(b, a)
         assert there.mean is not None
         assert there.low is not None
         assert there.high is not None
@@ -42,37 +48,37 @@ def test_swapped_sides_mirror_the_interval_and_the_verdict(count: int, rng: np.r
 def test_what_both_sides_share_does_not_count(rng: np.random.Generator) -> None:
     """Clips that are hard for both sides widen nothing: the comparison is paired."""
     difficulty, off = rng.uniform(0.0, 50.0, 9), rng.normal(0.5, 0.1, 9)
-    found = paired(errors(difficulty + off), errors(difficulty))
-    assert ends(found) == pytest.approx(interval(off), abs=1e-9)
+    found = compare_paired(errors(difficulty + off), errors(difficulty))
+    assert ends(found) == pytest.approx(bootstrap_interval(off), abs=1e-9)
     assert found.verdict == "reproduced"
 
 
 def test_an_interval_moves_and_grows_with_its_values(rng: np.random.Generator) -> None:
     values = rng.gamma(2.0, size=11)
-    low, high = interval(values)
-    np.testing.assert_allclose(interval(5.0 + 3.0 * values), [5.0 + 3.0 * low, 5.0 + 3.0 * high], atol=1e-9)
+    low, high = bootstrap_interval(values)
+    np.testing.assert_allclose(bootstrap_interval(5.0 + 3.0 * values), [5.0 + 3.0 * low, 5.0 + 3.0 * high], atol=1e-9)
     assert values.min() <= low < values.mean() < high <= values.max()
-    wider = interval(values, level=0.99)
+    wider = bootstrap_interval(values, level=0.99)
     assert wider[0] <= low
     assert wider[1] >= high
 
 
 def test_the_same_errors_give_the_same_interval_in_any_order(rng: np.random.Generator) -> None:
     a, b = errors(rng.normal(size=8)), errors(rng.normal(size=8))
-    assert paired(a, b) == paired(dict(reversed(a.items())), b)
+    assert compare_paired(a, b) == compare_paired(dict(reversed(a.items())), b)
 
 
 def test_only_clips_of_both_sides_count() -> None:
     a = {"x": 1.0, "y": 2.0, "gone": None, "mine": 9.0}
     b = {"y": 1.0, "x": 0.5, "gone": 1.0, "theirs": 9.0}
-    found = paired(a, b)
+    found = compare_paired(a, b)
     assert found.clips == ("x", "y")
     assert found.mean == 0.75
 
 
-@pytest.mark.parametrize("count", range(FEWEST_CLIPS))
+@pytest.mark.parametrize("count", range(MIN_CLIPS))
 def test_few_clips_tell_nothing(count: int) -> None:
-    found = paired(errors(np.full(count, 9.0) + np.arange(count)), errors(np.zeros(count)))
+    found = compare_paired(errors(np.full(count, 9.0) + np.arange(count)), errors(np.zeros(count)))
     assert found.low is found.high is None
     assert found.verdict == ("cannot tell" if count else "not run")
     assert ("too few clips" in found.why) if count else ("no clip" in found.why)
@@ -83,7 +89,7 @@ def test_few_clips_tell_nothing(count: int) -> None:
 )
 def test_equal_differences_have_an_interval_of_no_width(difference: float, verdict: str) -> None:
     b = np.arange(8.0)
-    found = paired(errors(b + difference), errors(b))
+    found = compare_paired(errors(b + difference), errors(b))
     assert found.verdict == verdict
     assert ends(found) == pytest.approx([difference, difference], abs=1e-12)
 
@@ -92,17 +98,17 @@ def test_equal_differences_have_an_interval_of_no_width(difference: float, verdi
     "values", [[0, 0, 0, 0, 0, 1], [1, 1, 1, 1, 1, 1 + 1e-6], [-1, 1, -1, 1, -1, 1], [0] * 30 + [1]]
 )
 def test_awkward_differences_have_finite_intervals(values: list[float]) -> None:
-    low, high = interval(np.array(values, float))
+    low, high = bootstrap_interval(np.array(values, float))
     assert min(values) <= low <= np.mean(values) <= high <= max(values)
 
 
 def test_what_was_not_measured_is_none_and_never_nan() -> None:
     with pytest.raises(BadInput, match="clip 01"):
-        paired(errors(np.array([1.0, np.nan])), errors(np.zeros(2)))
+        compare_paired(errors(np.array([1.0, np.nan])), errors(np.zeros(2)))
 
 
 def test_the_level_grows_as_clips_become_few() -> None:
-    levels = [expanded(0.95, count) for count in (6, 8, 12, 30, 100_000)]
+    levels = [expand_level(0.95, count) for count in (6, 8, 12, 30, 100_000)]
     assert levels == sorted(levels, reverse=True)
     assert levels[0] > 0.995
     assert levels[-1] == pytest.approx(0.95, abs=1e-4)
@@ -122,7 +128,7 @@ DRAWS: dict[str, tuple[Callable[[np.random.Generator, int], Floats], float]] = {
 def test_intervals_hold_the_truth_about_as_often_as_they_say(kind: str, count: int) -> None:
     draw, least = DRAWS[kind]
     rng, studies = generator(3, "coverage", kind, count), 400
-    ends = np.array([interval(draw(rng, count)) for _ in range(studies)])
+    ends = np.array([bootstrap_interval(draw(rng, count)) for _ in range(studies)])
     held = float(np.mean((ends[:, 0] <= 0.0) & (ends[:, 1] >= 0.0)))
     print(f"{kind}, {count} clips: {held:.1%} of {studies}")
     assert least < held < 0.98

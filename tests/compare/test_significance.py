@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.compare import significance
-from harness.compare.significance import Judgement, holm, judge, least_p, sign_flip_p
+from harness.compare.significance import SignificanceResult, decide_verdicts, holm, sign_flip_p, smallest_possible_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
@@ -53,17 +53,17 @@ def test_many_clips_are_drawn_as_exactly_as_few_are_counted(
     lines = [rng.normal(shift, 1.0, 15) for shift in (0.1, 0.4, 0.7)]
     exact = [sign_flip_p(line) for line in lines]
     monkeypatch.setattr(significance, "_EXACT_CLIPS", 10)
-    significance._signs.cache_clear()
+    significance._sign_flips.cache_clear()
     drawn = [sign_flip_p(line) for line in lines]
-    significance._signs.cache_clear()
+    significance._sign_flips.cache_clear()
     np.testing.assert_allclose(drawn, exact, atol=4.0 * np.sqrt(0.25 / 20_000))
     assert sign_flip_p(np.ones(40)) == 1 / 20_001
 
 
 def test_least_p_is_that_of_all_on_one_side(rng: np.random.Generator) -> None:
     difference = rng.normal(size=9)
-    assert least_p(difference) == sign_flip_p(np.abs(difference)) == 2 / 2**9
-    assert least_p(difference) <= sign_flip_p(difference)
+    assert smallest_possible_p(difference) == sign_flip_p(np.abs(difference)) == 2 / 2**9
+    assert smallest_possible_p(difference) <= sign_flip_p(difference)
 
 
 def test_holm_by_hand() -> None:
@@ -85,10 +85,10 @@ SCATTER: Floats = generator(1, "scatter").normal(size=12)
 SCATTER -= SCATTER.mean()
 
 
-def told(difference: Floats, margin: float, beside: int = 0) -> Judgement:
+def told(difference: Floats, margin: float, beside: int = 0) -> SignificanceResult:
     """Of a line that is judged beside so many others in which nothing is found."""
     others = [np.array([1.0, -1.0] * 4)] * beside
-    return judge([difference, *others], [margin, *[9.0] * beside])[0]
+    return decide_verdicts([difference, *others], [margin, *[9.0] * beside])[0]
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_six_clips_can_show_nothing_among_many_lines() -> None:
 
 def test_lines_without_any_difference_do_not_count_for_the_others() -> None:
     clear: Floats = 1.0 + 0.01 * np.arange(6.0)
-    found = judge([clear, np.zeros(6), np.zeros(8)], [0.1] * 3)
+    found = decide_verdicts([clear, np.zeros(6), np.zeros(8)], [0.1] * 3)
     assert [line.verdict for line in found] == ["worse", "same", "same"]
     assert [line.p_holm for line in found] == [2 / 64, 1.0, 1.0]
 
@@ -129,7 +129,7 @@ def test_lines_without_any_difference_do_not_count_for_the_others() -> None:
 def test_sides_exchanged_give_the_opposite_verdict(rng: np.random.Generator) -> None:
     opposite = {"worse": "better", "better": "worse"}
     lines = [rng.normal(shift, 0.1, 9) for shift in (-0.4, -0.1, 0.0, 0.4)]
-    there, back = judge(lines, [0.05] * 4), judge([-line for line in lines], [0.05] * 4)
+    there, back = decide_verdicts(lines, [0.05] * 4), decide_verdicts([-line for line in lines], [0.05] * 4)
     for one, other in zip(there, back, strict=True):
         assert other.verdict == opposite.get(one.verdict, one.verdict)
         assert one.low == pytest.approx(-(other.high or 0.0))

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.core.options import alternatives, named, split
+from harness.core.options import expand_alternatives, parse_name, split_outside_brackets
 from harness.errors import BadInput
 
 
@@ -24,7 +24,7 @@ from harness.errors import BadInput
     ],
 )
 def test_values_are_toml_s_and_words(text: str, options: dict[str, Any]) -> None:
-    assert named(text) == ("blend", options)
+    assert parse_name(text) == ("blend", options)
 
 
 @pytest.mark.parametrize(
@@ -34,33 +34,33 @@ def test_values_are_toml_s_and_words(text: str, options: dict[str, Any]) -> None
 )  # fmt: skip
 def test_what_is_not_written_so_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="OPTION=VALUE"):
-        named(text)
+        parse_name(text)
 
 
 def test_a_value_cannot_smuggle_in_others() -> None:
-    assert named("a[k=1\nj=2]") == ("a", {"k": "1\nj=2"})
+    assert parse_name("a[k=1\nj=2]") == ("a", {"k": "1\nj=2"})
 
 
 def test_alternatives_are_every_combination() -> None:
-    assert alternatives("map[k=1|2,on=true|false]+ik") == [
+    assert expand_alternatives("map[k=1|2,on=true|false]+ik") == [
         "map[k=1,on=true]+ik",
         "map[k=1,on=false]+ik",
         "map[k=2,on=true]+ik",
         "map[k=2,on=false]+ik",
     ]
-    assert alternatives("map+ik[s=1|2]") == ["map+ik[s=1]", "map+ik[s=2]"]
-    assert alternatives("map") == ["map"]
-    assert alternatives("map[w=[1,2]|[3,4]]") == ["map[w=[1,2]]", "map[w=[3,4]]"]
+    assert expand_alternatives("map+ik[s=1|2]") == ["map+ik[s=1]", "map+ik[s=2]"]
+    assert expand_alternatives("map") == ["map"]
+    assert expand_alternatives("map[w=[1,2]|[3,4]]") == ["map[w=[1,2]]", "map[w=[3,4]]"]
 
 
 def test_lists_of_names_are_cut_outside_brackets() -> None:
-    assert split("ik, map[k=1,j=2]+ik,my:Own", ",") == ["ik", "map[k=1,j=2]+ik", "my:Own"]
+    assert split_outside_brackets("ik, map[k=1,j=2]+ik,my:Own", ",") == ["ik", "map[k=1,j=2]+ik", "my:Own"]
     with pytest.raises(BadInput, match="do not match"):
-        split("ik,map[k=1", ",")
+        split_outside_brackets("ik,map[k=1", ",")
 
 
 @given(st.dictionaries(st.from_regex(r"[a-z_]{1,8}", fullmatch=True), st.integers() | st.booleans(), min_size=1))
 def test_what_is_written_is_read(options: dict[str, int | bool]) -> None:
     text = "x[" + ",".join(f"{key}={str(value).lower()}" for key, value in options.items()) + "]"
-    assert named(text) == ("x", options)
-    assert alternatives(text) == [text]
+    assert parse_name(text) == ("x", options)
+    assert expand_alternatives(text) == [text]

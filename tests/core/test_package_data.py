@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 import harness
-from harness.core.package_data import share_folder
+from harness.core.package_data import data_folder
 from harness.errors import UnknownName
 
 
 def test_models_lie_in_the_checkout() -> None:
-    assert (share_folder("models") / "humanoid24" / "humanoid24.xml").is_file()
+    assert (data_folder("models") / "humanoid24" / "humanoid24.xml").is_file()
 
 
 def test_an_installed_package_brings_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -18,13 +18,13 @@ def test_an_installed_package_brings_its_own(tmp_path: Path, monkeypatch: pytest
     (package / "share" / "models").mkdir(parents=True)
     (package.parent / "models").mkdir()  # some other package's
     monkeypatch.setattr(harness, "__file__", str(package / "__init__.py"))
-    assert share_folder("models") == package / "share" / "models"
+    assert data_folder("models") == package / "share" / "models"
     with pytest.raises(UnknownName):
-        share_folder("scenarios")
+        data_folder("scenarios")
 
 
 def test_nothing_else_is_shared() -> None:
     with pytest.raises(UnknownName, match=r"[Dd]id you mean 'models'"):
-        share_folder("model")
+        data_folder("model")
     with pytest.raises(UnknownName):
-        share_folder("tests")
+        data_folder("tests")

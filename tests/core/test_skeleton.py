@@ -8,7 +8,7 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.skeleton import forward, unwrapped
+from harness.core.skeleton import forward_kinematics, unwrap_angles
 
 
 def _smooth(frames: int, size: float, rng: np.random.Generator) -> Floats:
@@ -31,7 +31,7 @@ def _scrambled(angles: Floats, rng: np.random.Generator) -> Floats:
 def test_unwrapping_finds_smooth_angles_again(rng: np.random.Generator) -> None:
     skeleton = standard_skeleton()
     smooth = _smooth(300, 0.7, rng)
-    np.testing.assert_allclose(unwrapped(skeleton, _scrambled(smooth, rng)), smooth, atol=1e-9)
+    np.testing.assert_allclose(unwrap_angles(skeleton, _scrambled(smooth, rng)), smooth, atol=1e-9)
 
 
 @pytest.mark.parametrize("size", [0.5, 1.5, 3.0])
@@ -39,7 +39,7 @@ def test_unwrapping_changes_no_rotation(size: float, rng: np.random.Generator) -
     skeleton = standard_skeleton()
     angles = _scrambled(_smooth(50, size, rng), rng)
     root, turn = np.zeros((50, 3)), np.tile(rotations.IDENTITY, (50, 1))
-    before, after = (forward(skeleton, root, turn, a) for a in (angles, unwrapped(skeleton, angles)))
+    before, after = (forward_kinematics(skeleton, root, turn, a) for a in (angles, unwrap_angles(skeleton, angles)))
     np.testing.assert_allclose(after.world_from_bone, before.world_from_bone, atol=1e-9)
 
 
@@ -47,14 +47,14 @@ def test_unwrapping_changes_no_rotation(size: float, rng: np.random.Generator) -
 def test_no_step_is_longer_than_before(size: float, rng: np.random.Generator) -> None:
     skeleton = standard_skeleton()
     smooth = _smooth(400, size, rng)
-    steps = np.abs(np.diff(unwrapped(skeleton, _scrambled(smooth, rng)), axis=0))
+    steps = np.abs(np.diff(unwrap_angles(skeleton, _scrambled(smooth, rng)), axis=0))
     assert steps.max() < np.abs(np.diff(smooth, axis=0)).max() + 1e-9
 
 
 def test_the_median_of_each_column_is_within_a_half_turn(rng: np.random.Generator) -> None:
     skeleton = standard_skeleton()
     drifting = _smooth(300, 0.3, rng) + np.linspace(0.0, 40.0, 300)[:, None]
-    median = np.median(unwrapped(skeleton, drifting), axis=0)
+    median = np.median(unwrap_angles(skeleton, drifting), axis=0)
     assert np.all(median > -np.pi)
     assert np.all(median <= np.pi)
 
@@ -64,7 +64,7 @@ def test_a_bad_first_frame_does_not_choose_for_the_clip(rng: np.random.Generator
     smooth = _smooth(200, 0.3, rng)
     spoilt = np.array(smooth)
     spoilt[0] = rng.uniform(-np.pi, np.pi, size=spoilt.shape[1])
-    np.testing.assert_allclose(unwrapped(skeleton, spoilt)[50:], smooth[50:], atol=1e-9)
+    np.testing.assert_allclose(unwrap_angles(skeleton, spoilt)[50:], smooth[50:], atol=1e-9)
 
 
 def test_a_single_frame_takes_what_is_nearest_to_zero() -> None:
@@ -73,11 +73,11 @@ def test_a_single_frame_takes_what_is_nearest_to_zero() -> None:
     far = np.array(zero)
     femur = skeleton.dof_of_bone[skeleton.index("lfemur")]
     far[0, femur] = np.pi
-    np.testing.assert_allclose(unwrapped(skeleton, far), zero, atol=1e-12)
+    np.testing.assert_allclose(unwrap_angles(skeleton, far), zero, atol=1e-12)
 
 
 def test_a_long_clip_takes_no_time(rng: np.random.Generator) -> None:
     angles = _scrambled(_smooth(20_000, 1.0, rng), rng)
     start_s = time.process_time()
-    unwrapped(standard_skeleton(), angles)
+    unwrap_angles(standard_skeleton(), angles)
     assert time.process_time() - start_s < 2.0  # a loop over frames takes 8 s

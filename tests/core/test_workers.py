@@ -10,24 +10,24 @@ from typing import Any
 
 import pytest
 
-from harness.core.workers import Pool, call_each
+from harness.core.workers import Pool, run_in_workers
 
 
 def test_every_task_is_called_once_in_another_process() -> None:
-    found = {which: future.result() for which, future in call_each(divmod, [(7, 2), (9, 4), (5, 5)], 2)}
+    found = {which: future.result() for which, future in run_in_workers(divmod, [(7, 2), (9, 4), (5, 5)], 2)}
     assert found == {0: (3, 1), 1: (2, 1), 2: (1, 0)}
-    ((_, future),) = call_each(os.getpid, [()], 1)
+    ((_, future),) = run_in_workers(os.getpid, [()], 1)
     assert future.result() != os.getpid()
 
 
 def test_an_error_is_the_tasks_own() -> None:
-    failed = {which: future.exception() for which, future in call_each(divmod, [(7, 2), (1, 0)], 2)}
+    failed = {which: future.exception() for which, future in run_in_workers(divmod, [(7, 2), (1, 0)], 2)}
     assert failed[0] is None
     assert isinstance(failed[1], ZeroDivisionError)
 
 
 def test_a_worker_that_dies_is_told() -> None:
-    ((_, future),) = call_each(os._exit, [(3,)], 1)
+    ((_, future),) = run_in_workers(os._exit, [(3,)], 1)
     assert isinstance(future.exception(), BrokenExecutor)
 
 
@@ -52,7 +52,7 @@ def test_a_worker_that_dies_takes_nothing_with_it_but_its_task_which_is_begun_on
     (once := tmp_path / "once").mkdir()
     (always := tmp_path / "always").mkdir()
     tasks: list[tuple[Any, ...]] = [(dies, 1, once), (dies, 2, always), (takes_long, once), (takes_long, always)]
-    ended = list(call_each(_call, tasks, 2))
+    ended = list(run_in_workers(_call, tasks, 2))
     assert sorted(which for which, _ in ended[:2]) == [2, 3]
     came = dict(ended)
     assert came[2].result() == came[3].result() == "done"
@@ -78,7 +78,7 @@ def test_a_pool_keeps_its_workers_for_the_next_call_and_starts_no_more_than_it_n
 
 
 def test_stopping_early_stops_what_runs() -> None:
-    calls = call_each(time.sleep, [(0.0,), (600.0,), (600.0,)], 2)
+    calls = run_in_workers(time.sleep, [(0.0,), (600.0,), (600.0,)], 2)
     assert next(calls)[0] == 0
     begin = time.monotonic()
     calls.close()
@@ -87,4 +87,4 @@ def test_stopping_early_stops_what_runs() -> None:
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_the_order_of_tasks_does_not_matter_to_their_number(workers: int) -> None:
-    assert sorted(which for which, _ in call_each(abs, [(-n,) for n in range(5)], workers)) == [0, 1, 2, 3, 4]
+    assert sorted(which for which, _ in run_in_workers(abs, [(-n,) for n in range(5)], workers)) == [0, 1, 2, 3, 4]

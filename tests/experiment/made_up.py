@@ -9,8 +9,8 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.experiment import cells
-from harness.experiment.cells import Planned
-from harness.experiment.clip_evaluation import Setting
+from harness.experiment.cells import PlannedCell
+from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.reconstruct.contract import Method
 from harness.results.cell import Cell
 from harness.score.score import Scores
@@ -25,7 +25,7 @@ def template() -> Cell:
     return make_cell("walking", 1, "ik", 2.0, "pos+ori", Plan(duration_s=1.5), {})
 
 
-def judge(setting: Setting, method: Method, planned: Planned, key: str, command: str) -> Cell:
+def judge(setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str) -> Cell:
     if planned.method == FAILING and Path("broken").exists():
         raise ZeroDivisionError("on purpose")
     found = template()
@@ -49,7 +49,7 @@ def judge(setting: Setting, method: Method, planned: Planned, key: str, command:
 @pytest.fixture
 def made_up(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """Where tests work; what is judged there is made up, and its page without charts, which others look at."""
-    monkeypatch.setattr(cells, "judge", judge)
+    monkeypatch.setattr(cells, "evaluate_cell", judge)
     monkeypatch.setattr("harness.report.sweep.page.find_spec", lambda name: None)
     monkeypatch.chdir(tmp_path)
     return tmp_path

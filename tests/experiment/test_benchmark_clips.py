@@ -13,41 +13,45 @@ from harness.reconstruct.database import MotionDatabase
 @pytest.fixture(scope="module")
 def learnt() -> MotionDatabase:
     """Of each behaviour, one of them of the performer who is followed."""
-    return MotionDatabase.build(benchmark_clips.body(), benchmark_clips.makers(8_000, 1))
+    return MotionDatabase.build(benchmark_clips.build_common_body(), benchmark_clips.make_take_factories(8_000, 1))
 
 
 def test_a_database_is_of_distinct_takes_and_of_none_that_is_held_out(learnt: MotionDatabase) -> None:
     assert len({run.take for run in learnt.runs}) == len(learnt.runs)
     assert {run.behaviour for run in learnt.runs} == set(synthetic.BEHAVIOURS)
-    assert not {run.take for run in learnt.runs} & {take.name for take in benchmark_clips.held_out(10, 1, 2.0)}
+    assert not {run.take for run in learnt.runs} & {
+        take.name for take in benchmark_clips.generate_held_out_takes(10, 1, 2.0)
+    }
 
 
 @pytest.mark.parametrize("frames", [1, 800, 801, 802, 1_700])
 def test_takes_have_exactly_so_many_frames(frames: int) -> None:
-    made = [make() for make in benchmark_clips.makers(frames, 1, ("golf",))]
+    made = [make() for make in benchmark_clips.make_take_factories(frames, 1, ("golf",))]
     assert sum(map(len, made)) == frames
     assert {take.behaviour for take in made} == {"golf"}
     assert len({take.name for take in made}) == len(made)
 
 
 def test_takes_of_a_database_are_its_motion(learnt: MotionDatabase) -> None:
-    again = MotionDatabase.build(benchmark_clips.body(), benchmark_clips.takes(learnt)[:2])
+    again = MotionDatabase.build(benchmark_clips.build_common_body(), benchmark_clips.extract_takes(learnt)[:2])
     np.testing.assert_allclose(again.posture, learnt.posture[: len(again)], atol=1e-5)
     np.testing.assert_allclose(again.step, learnt.step[: len(again)], atol=1e-4)
 
 
 def test_a_method_takes_what_it_is_given(learnt: MotionDatabase) -> None:
-    learner = benchmark_clips.fitted(registry.resolve("ik"), benchmark_clips.body(), learnt, generator(1, "test"))
-    trial = benchmark_clips.trials(1, 1.0)[0]
+    learner = benchmark_clips.fit_method(
+        registry.resolve("ik"), benchmark_clips.build_common_body(), learnt, generator(1, "test")
+    )
+    trial = benchmark_clips.generate_held_out_clips(1, 1.0)[0]
     session = learner.begin(trial.simulation.calibration)
     found = np.array([session.step(frame).qpos for frame in trial.simulation.frames])
-    assert benchmark_clips.error_deg(found, trial.truth) < 8.0
+    assert benchmark_clips.joint_angle_error_deg(found, trial.truth) < 8.0
 
 
 def test_a_take_is_seen_by_the_stations_of_the_scenario() -> None:
-    takes = benchmark_clips.held_out(2, 1, 1.0, ("boxing",))
+    takes = benchmark_clips.generate_held_out_takes(2, 1, 1.0, ("boxing",))
     (five, _), (six, _) = (
-        benchmark_clips.trials_of(takes, 1, benchmark_clips.scenario(name))
+        benchmark_clips.simulate_clips(takes, 1, benchmark_clips.load_clean_scenario(name))
         for name in ("walking_five_stations", "walking")
     )
     assert five.simulation.stations == ("left_hand", "right_hand", "left_ankle", "right_ankle", "pelvis")

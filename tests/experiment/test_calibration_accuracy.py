@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from harness.errors import BadInput, UnknownName
-from harness.experiment.calibration_accuracy import Trials, trials
+from harness.experiment.calibration_accuracy import CalibrationAccuracy, measure_calibration_accuracy
 
 
 @cache
-def clean(seed: int) -> Trials:
-    return trials(1, miss_rad=0.0, noise="clean", seed=seed)
+def clean(seed: int) -> CalibrationAccuracy:
+    return measure_calibration_accuracy(1, miss_rad=0.0, noise="clean", seed=seed)
 
 
-def of(found: Trials, what: str) -> tuple[float, float, float]:
+def of(found: CalibrationAccuracy, what: str) -> tuple[float, float, float]:
     """Root mean square, bound and mean skeleton's."""
     return next((row.rms, row.bound, row.mean_skeleton) for row in found.spreads() if row.what == what)
 
@@ -37,13 +37,13 @@ def test_one_performer_without_errors() -> None:
 
 
 def test_the_same_again_and_others_for_another_seed() -> None:
-    one, again, other = clean(3), trials(1, miss_rad=0.0, noise="clean", seed=3), clean(4)
+    one, again, other = clean(3), measure_calibration_accuracy(1, miss_rad=0.0, noise="clean", seed=3), clean(4)
     np.testing.assert_array_equal(one.done[0].length_m, again.done[0].length_m)
     assert np.abs(one.done[0].mount_m - other.done[0].mount_m).max() > 1e-9
 
 
 def test_who_is_refused_is_named() -> None:
-    found = trials(1, miss_rad=float(np.deg2rad(25.0)), noise="clean")
+    found = measure_calibration_accuracy(1, miss_rad=float(np.deg2rad(25.0)), noise="clean")
     assert list(found.refused) == ["1 person 101"]
     assert "was not held as shown" in found.refused["1 person 101"]
     assert found.spreads() == []
@@ -52,9 +52,9 @@ def test_who_is_refused_is_named() -> None:
 
 def test_what_there_is_not() -> None:
     with pytest.raises(UnknownName, match="noise level"):
-        trials(1, noise="loud")
+        measure_calibration_accuracy(1, noise="loud")
     with pytest.raises(BadInput):
-        trials(1, folder=Path(__file__).parent)
+        measure_calibration_accuracy(1, folder=Path(__file__).parent)
 
 
 @pytest.mark.slow
@@ -65,7 +65,7 @@ def test_what_there_is_not() -> None:
 def test_twenty_performers(miss_deg: float, noise: str, mount_mm: float, mount_deg: float, length_mm: float) -> None:
     """What the project holds calibration to; and the bound is reached, but for the wander of the device that it does
     not know of."""
-    found = trials(20, miss_rad=float(np.deg2rad(miss_deg)), noise=noise)
+    found = measure_calibration_accuracy(20, miss_rad=float(np.deg2rad(miss_deg)), noise=noise)
     print("\n".join(found.lines()))  # the table is what this test is for
     assert not found.refused
     lengths, bound, mean = of(found, "bone lengths")

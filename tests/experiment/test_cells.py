@@ -8,35 +8,35 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import BadFile
-from harness.experiment.cells import Job, forget_motion, run_job
-from harness.experiment.scenario import Motion, Scenario, load_scenario, variants
+from harness.experiment.cells import ClipTask, clear_caches, run_clip_task
+from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario, variants
 from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
 from harness.results.storage import Cell
 
 SMALL = Scenario(
     name="small",
-    motion=Motion("builtin", ("walking_p1_01",), ("walking",), ("walking_p1_02",), longest_s=1.5),
+    motion=ScenarioMotion("builtin", ("walking_p1_01",), ("walking",), ("walking_p1_02",), longest_s=1.5),
     stations=load_scenario("demo").stations,
     methods=("ik:previous", "mean_pose"),
     vary={"noise": ["clean", "default"]},
 )
 
 
-def job(**changes: object) -> Job:
-    return replace(Job(SMALL, Part("walking_p1_01"), "walking", None, "harness run small"), **changes)  # type: ignore[arg-type]
+def job(**changes: object) -> ClipTask:
+    return replace(ClipTask(SMALL, ClipPart("walking_p1_01"), "walking", None, "harness run small"), **changes)  # type: ignore[arg-type]
 
 
-def made(out: Path, *jobs: Job) -> dict[str, Cell]:
-    ended = [cell for one in jobs for cell in run_job(one, out)]
+def made(out: Path, *jobs: ClipTask) -> dict[str, Cell]:
+    ended = [cell for one in jobs for cell in run_clip_task(one, out)]
     assert all(cell.failure == "" for cell in ended)
     return {cell.cell: read_cell(cell_folder(out, cell.key)) for cell in ended}
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Cell]]:
-    forget_motion()
+    clear_caches()
     out = tmp_path_factory.mktemp("cells")
     return out, made(out, job())
 
@@ -50,7 +50,7 @@ def test_chosen_variants_of_a_job_are_those_cells_and_no_others() -> None:
 
 def test_a_row_is_the_same_when_a_cell_ends_and_when_it_is_found(whole: tuple[Path, dict[str, Cell]]) -> None:
     out, found = whole
-    again = list(run_job(job(), out))
+    again = list(run_clip_task(job(), out))
     assert [cell.cell for cell in again] == list(found)
     for ended in again:
         assert ended.seconds == 0.0
@@ -68,7 +68,7 @@ def test_what_a_process_keeps_from_its_last_job_changes_no_result(
     _, found = whole
     other = job(scenario=replace(SMALL, methods=("mean_pose",)), chosen=(1,))
     rest = [job(chosen=(0,)), job(scenario=replace(SMALL, methods=("ik:previous",)), chosen=(1,))]
-    forget_motion()
+    clear_caches()
     parts = made(tmp_path, other) if first == "alone" else made(tmp_path, other, *rest)
     assert set(parts) == set(list(found)[-1:] if first == "alone" else found)
     for name, cell in parts.items():
@@ -89,7 +89,7 @@ def test_scenarios_of_another_name_share_no_cell(whole: tuple[Path, dict[str, Ce
 def test_a_job_ends_early_once_it_is_asked_to(tmp_path: Path) -> None:
     stop = tmp_path / "stop"
     ended = []
-    for cell in run_job(job(scenario=replace(SMALL, methods=("ik:previous",))), tmp_path, stop):
+    for cell in run_clip_task(job(scenario=replace(SMALL, methods=("ik:previous",))), tmp_path, stop):
         ended.append(cell)
         stop.touch()
     assert len(ended) == 1

@@ -10,38 +10,38 @@ import pytest
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, standard_skeleton, unpack
 from harness.core.motion import Clip
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import reconstruct
-from harness.experiment.clip_evaluation import Setting
-from harness.experiment.scenario import Motion, Scenario, Station
-from harness.mocap.sources import open_source
+from harness.experiment.cells import run_method
+from harness.experiment.clip_evaluation import ClipEvaluation
+from harness.experiment.scenario import Scenario, ScenarioMotion, Station
+from harness.mocap.sources import open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.ik import PREVIOUS
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.simulate import noise
-from harness.simulate.components.white_noise import White
-from harness.stream.inputs import combination
+from harness.simulate.components.white_noise import WhiteNoise
+from harness.stream.inputs import make_inputs
 
 SCENARIO = Scenario(
     name="small",
-    motion=Motion("builtin", ("walking_p1_01",), ("walking",), longest_s=2.5),
+    motion=ScenarioMotion("builtin", ("walking_p1_01",), ("walking",), longest_s=2.5),
     stations={"head": Station("head"), "torso": Station("thorax")},
     methods=("ik",),
 )
 
 
 def inputs(scenario: Scenario = SCENARIO) -> dict[str, object]:
-    source = open_source("builtin", None, seed=1, rate_hz=None)
-    return Setting(scenario, source, Part("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
+    return ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
 
 
 def test_what_retargeting_cost_is_told() -> None:
     motion = replace(SCENARIO.motion, examples=("walking_p1_02", "walking_p2_01"), body="standard")
-    source = open_source("builtin", None, seed=1, rate_hz=None)
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
     own, common = (
-        Setting(replace(SCENARIO, motion=m), source, Part("walking_p1_01"), "walking")
+        ClipEvaluation(replace(SCENARIO, motion=m), source, ClipPart("walking_p1_01"), "walking")
         for m in (SCENARIO.motion, motion)
     )
     assert len(own.take) == len(common.take)
@@ -53,8 +53,8 @@ def test_what_retargeting_cost_is_told() -> None:
 
 def test_the_common_body_keeps_the_angles_of_test_clip_and_examples() -> None:
     motion = replace(SCENARIO.motion, examples=("walking_p1_02", "walking_p2_01"), body="common")
-    source = open_source("builtin", None, seed=1, rate_hz=None)
-    setting = Setting(replace(SCENARIO, motion=motion), source, Part("walking_p1_01"), "walking")
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
+    setting = ClipEvaluation(replace(SCENARIO, motion=motion), source, ClipPart("walking_p1_01"), "walking")
     np.testing.assert_array_equal(setting.body.skeleton.bone_m, standard_skeleton().bone_m)
     np.testing.assert_array_equal(unpack(setting.whole.qpos)[2], _angles(setting.clip))
     for clip, take in zip(setting.example_clips, setting.examples, strict=True):
@@ -67,15 +67,16 @@ def test_what_is_withheld_is_in_no_example() -> None:
     """Whole takes are gone; of a part, its frames and a second on both sides, exactly."""
     motion = replace(SCENARIO.motion, examples=("walking_p1_02", "walking_p1_03", "walking_p2_01"))
     held = replace(motion, withheld=("walking_p1_02@0.40-0.60", "walking_p2_01", "walking_p3_01"))
-    source = open_source("builtin", None, seed=1, rate_hz=None)
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
     free, closed = (
-        Setting(replace(SCENARIO, motion=m), source, Part("walking_p1_01"), "walking") for m in (motion, held)
+        ClipEvaluation(replace(SCENARIO, motion=m), source, ClipPart("walking_p1_01"), "walking")
+        for m in (motion, held)
     )
     assert [c.name for c in closed.example_clips] == ["walking_p1_02", "walking_p1_03"]
     assert [t.name for t in closed.examples] == ["walking_p1_02", "walking_p1_02", "walking_p1_03"]
     whole, (before, after, other) = free.examples[0], closed.examples
     clip = closed.example_clips[0]
-    block, guard = Part("walking_p1_02", 0.4, 0.6).frames(len(clip)), round(clip.rate_hz)
+    block, guard = ClipPart("walking_p1_02", 0.4, 0.6).frames(len(clip)), round(clip.rate_hz)
     assert before.qpos[-1, :3] == pytest.approx(whole.qpos[len(before) - 1, :3], abs=1e-9)
     assert (len(before) - 1) / 40.0 == pytest.approx((block.start - guard - 1) / clip.rate_hz, abs=1 / 40.0)
     assert (len(after) - 1) / 40.0 == pytest.approx((len(clip) - block.stop - guard - 1) / clip.rate_hz, abs=1 / 40.0)
@@ -89,7 +90,7 @@ def _angles(clip: Clip) -> Floats:
 
 
 def test_a_copy_of_the_test_clip_is_no_example() -> None:
-    clip = open_source("builtin", None, seed=1, rate_hz=None).load("walking_p1_01")
+    clip = open_motion_source("builtin", None, seed=1, rate_hz=None).load("walking_p1_01")
 
     class Copying:
         title = "copies"
@@ -98,7 +99,9 @@ def test_a_copy_of_the_test_clip_is_no_example() -> None:
             return {"load": lambda name: replace(clip, name=name), "subject": lambda name: name}[asked]
 
     motion = replace(SCENARIO.motion, examples=("sneaky_01",))
-    setting = Setting(replace(SCENARIO, motion=motion), cast(Any, Copying()), Part("walking_p1_01"), "walking")
+    setting = ClipEvaluation(
+        replace(SCENARIO, motion=motion), cast(Any, Copying()), ClipPart("walking_p1_01"), "walking"
+    )
     with pytest.raises(BadInput, match="under another name"):
         _ = setting.examples
 
@@ -130,18 +133,18 @@ def test_what_a_scenario_changes_is_named(changed: Scenario, key: str) -> None:
 
 def test_a_level_that_the_code_redefines_is_another_input(monkeypatch: pytest.MonkeyPatch) -> None:
     before = inputs()
-    level: Callable[[str], noise.Noise] = noise.level
-    monkeypatch.setattr(noise, "level", lambda name: replace(level(name), white=White(position_m=0.001)))
+    level: Callable[[str], noise.Noise] = noise.noise_preset
+    monkeypatch.setattr(noise, "noise_preset", lambda name: replace(level(name), white=WhiteNoise(position_m=0.001)))
     assert inputs()["components"] != before["components"]
     assert {k for k, v in inputs().items() if v != before[k]} == {"components"}
 
 
 def test_a_part_is_warmed_up_on_what_comes_before_it() -> None:
     """The second before a block is guarded, so no method has learnt from it, and the whole block is scored."""
-    source = open_source("builtin", None, seed=1, rate_hz=None)
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
     scenario = replace(SCENARIO, motion=replace(SCENARIO.motion, longest_s=0.0, protocol="block"))
-    part = Part("walking_p1_01", 0.4, 0.6)
-    setting = Setting(scenario, source, part, "walking")
+    part = ClipPart("walking_p1_01", 0.4, 0.6)
+    setting = ClipEvaluation(scenario, source, part, "walking")
     block = part.frames(len(setting.whole))
     rate_hz = setting.whole.rate_hz
     assert len(setting.take) == len(block) + round(rate_hz)
@@ -153,21 +156,21 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
     motion = replace(SCENARIO.motion, examples=("walking_p1_02",), body="common", longest_s=1.5)
     scenario = replace(SCENARIO, motion=motion)
     elsewhere = replace(scenario, stations={"torso": Station("thorax", 0.6, 30.0), "knee": Station("ltibia", 0.1)})
-    source, method = open_source("builtin", None, seed=1, rate_hz=None), registry.resolve("dynamic_map")
-    first = Setting(scenario, source, Part("walking_p1_01"), "walking")
+    source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.resolve("dynamic_map")
+    first = ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking")
     results = [_estimated(first, method)]
     shared = first.under(elsewhere)
     assert shared is not None
     assert shared.whole is first.whole
     assert shared.fitted(method, "dynamic_map") is first.fitted(method, "dynamic_map")
     results.append(_estimated(shared, method))
-    anew = Setting(elsewhere, source, Part("walking_p1_01"), "walking")
+    anew = ClipEvaluation(elsewhere, source, ClipPart("walking_p1_01"), "walking")
     np.testing.assert_array_equal(results[1], _estimated(anew, method))
     assert shared.inputs_of(method, "pos+ori") == anew.inputs_of(method, "pos+ori")
     assert np.abs(results[0] - results[1]).max() > 1e-3
 
 
-def _estimated(setting: Setting, method: Method) -> Floats:
-    seen = combination("pos+ori", setting.simulation.stations)
+def _estimated(setting: ClipEvaluation, method: Method) -> Floats:
+    seen = make_inputs("pos+ori", setting.simulation.stations)
     fitted = setting.fitted(method, "dynamic_map")
-    return reconstruct(fitted, setting.calibrated.calibration, setting.simulation, seen)[0]
+    return run_method(fitted, setting.calibrated.calibration, setting.simulation, seen)[0]

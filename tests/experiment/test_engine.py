@@ -18,13 +18,13 @@ from harness.body.humanoid import Body
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.files import TEMPORARY
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput, Outcome, UnknownName
 from harness.experiment import engine
-from harness.experiment.scenario import Motion, Scenario, Station, load_scenario
+from harness.experiment.scenario import Scenario, ScenarioMotion, Station, load_scenario
 from harness.reconstruct.contract import Reconstructor, Session
-from harness.report.run.text import table
-from harness.results.expected_orders import Order
+from harness.report.run.text import run_table
+from harness.results.expected_orders import ExpectedOrder
 from harness.results.storage import read_cells, read_summary
 from harness.stream.frame import TrackerFrame
 from tests.interrupts import heeding_interrupts
@@ -32,7 +32,7 @@ from tests.short_demo import short_demo
 
 SMALL = Scenario(
     name="small",
-    motion=Motion(
+    motion=ScenarioMotion(
         "builtin", ("walking_p1_01", "boxing_p2_01"), ("walking", "boxing"), ("walking_p1_02",), longest_s=2.5
     ),
     stations=load_scenario("demo").stations,
@@ -82,14 +82,14 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
 
 def test_expected_orders_are_judged_and_are_no_part_of_what_a_run_is(tmp_path: Path) -> None:
     out = tmp_path / "run"
-    expected = Order("nobody", methods=SMALL.methods)
+    expected = ExpectedOrder("nobody", methods=SMALL.methods)
     engine.run(replace(SMALL, order=(expected,)), out)
     walking, boxing = read_summary(out)["orders"]
     assert (walking["behaviour"], boxing["behaviour"], boxing["clips"]) == ("walking", "boxing", 1)
     errors = [row["joint_angle_mean_deg"] for row in rows(out) if row["behaviour"] == "boxing"]
     assert boxing["means_deg"] == errors
     assert boxing["holds"] == (round(errors[0], 2) < round(errors[1], 2))
-    assert "expected orders: " in table(read_summary(out))
+    assert "expected orders: " in run_table(read_summary(out))
     made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     engine.run(SMALL, out)
     assert {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()} == made
@@ -126,7 +126,7 @@ class Broken:
     summary: str = "dies on purpose"
     needs_examples: bool = False
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Reconstructor:
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Reconstructor:
         return self
 
     def begin(self, calibration: Calibration) -> Session:
@@ -195,7 +195,7 @@ def test_every_clip_runs_with_every_combination_of_varied_values(tmp_path: Path)
     assert all(row["sequences"] == 1 for row in summary["methods"])
     text = (tmp_path / "one" / "summary.csv").read_text()
     assert ",known,noise=clean motion.longest_s=2," in text
-    shown = table(summary)
+    shown = run_table(summary)
     assert "noise=clean motion.longest_s=2.5" in shown
     assert "noise clean, noise" in shown
     assert shown.count("known") == 4
@@ -376,7 +376,7 @@ def test_a_line_that_is_too_slow_is_told_and_measures_nothing(tmp_path: Path) ->
     """Six stations at 1000 Hz are nineteen times what 115200 baud carry."""
     fast = replace(SMALL, methods=("mean_pose",), tracker=replace(SMALL.tracker, rate_hz=1000.0))
     assert engine.run(fast, tmp_path / "run") is Outcome.NOT_COMPARABLE
-    said = table(read_summary(tmp_path / "run"))
+    said = run_table(read_summary(tmp_path / "run"))
     assert "THE LINE IS TOO SLOW: 9" in said
     assert "not measured" in said
 

@@ -17,7 +17,7 @@ import pytest
 
 from harness.errors import BadInput, MissingExtra
 from harness.experiment import executors
-from harness.experiment.executors import dask, processes
+from harness.experiment.executors import dask_executor, process_executor
 from harness.results.manifest import source_hash
 from tests.interrupts import heeding_interrupts
 
@@ -44,35 +44,35 @@ def dies() -> None:
 
 
 def test_a_single_job_is_done_here() -> None:
-    ended = processes(1)(divmod, [(7, 2), (9, 4)])
+    ended = process_executor(1)(divmod, [(7, 2), (9, 4)])
     assert {which: future.result() for which, future in ended} == {0: (3, 1), 1: (2, 1)}
-    ((_, future),) = processes(1)(os.getpid, [()])
+    ((_, future),) = process_executor(1)(os.getpid, [()])
     assert future.result() == os.getpid()
-    ((_, failed),) = processes(1)(fails, [()])
+    ((_, failed),) = process_executor(1)(fails, [()])
     assert isinstance(failed.exception(), ZeroDivisionError)
 
 
 def test_a_worker_that_was_started_after_an_edit_refuses() -> None:
-    assert executors._on_worker(source_hash(), os.getcwd(), divmod, 7, 2) == (3, 1)
+    assert executors._run_on_worker(source_hash(), os.getcwd(), divmod, 7, 2) == (3, 1)
     with pytest.raises(BadInput, match="another version"):
-        executors._on_worker("before the edit", os.getcwd(), divmod, 7, 2)
+        executors._run_on_worker("before the edit", os.getcwd(), divmod, 7, 2)
 
 
 def test_without_the_extra_it_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(executors, "find_spec", lambda name: None)
-    with pytest.raises(MissingExtra, match=r"tracker-harness\[cluster\]"), dask("local"):
+    with pytest.raises(MissingExtra, match=r"tracker-harness\[cluster\]"), dask_executor("local"):
         pass
 
 
 @needs_dask
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:1", "nonsense", "bar://127.0.0.1:1", "mute"])
 def test_an_address_where_no_scheduler_answers_is_refused(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "ANSWER_S", 0.3)
+    monkeypatch.setattr(executors, "SCHEDULER_TIMEOUT_S", 0.3)
     with ExitStack() as stack:
         if address == "mute":
             port = stack.enter_context(socket.create_server(("127.0.0.1", 0))).getsockname()[1]
             address = f"tcp://127.0.0.1:{port}"
-        with pytest.raises(BadInput, match=f"No Dask scheduler at {address}"), dask(address):
+        with pytest.raises(BadInput, match=f"No Dask scheduler at {address}"), dask_executor(address):
             pass
 
 
@@ -82,7 +82,7 @@ def test_a_local_cluster_outlives_its_workers_and_listens_to_this_machine_alone(
 ) -> None:
     import psutil
 
-    with dask("local", workers=1) as each:
+    with dask_executor("local", workers=1) as each:
         ((_, future),) = each(says_who_it_is, [(tmp_path / "killed",)])
         assert future.result() != os.getpid()
         family = [psutil.Process(), *psutil.Process().children(recursive=True)]
@@ -97,7 +97,7 @@ def test_a_local_cluster_outlives_its_workers_and_listens_to_this_machine_alone(
 @needs_dask
 @pytest.mark.slow
 def test_a_local_cluster_reports_what_its_workers_die_of_and_goes_on(tmp_path: Path) -> None:
-    with dask("local", workers=2) as each:
+    with dask_executor("local", workers=2) as each:
         tasks = [(dies, ()), (fails, ()), (says_who_it_is, (tmp_path / "killed",)), *[(os.getpid, ())] * 20]
         ended = dict(each(_call, tasks))
     assert isinstance(ended[0].exception(), BrokenExecutor)
@@ -131,8 +131,8 @@ def scheduler_and_worker(*, workers: int = 1) -> Iterator[tuple[str, subprocess.
 @needs_dask
 @pytest.mark.slow
 def test_a_scheduler_that_dies_ends_the_wait_with_one_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(executors, "ANSWER_S", 30.0)
-    with scheduler_and_worker() as (address, scheduler), dask(address) as each:
+    monkeypatch.setattr(executors, "SCHEDULER_TIMEOUT_S", 30.0)
+    with scheduler_and_worker() as (address, scheduler), dask_executor(address) as each:
         calls = each(time.sleep, [(0.0,), (600.0,), (600.0,)])
         assert next(calls)[0] == 0
         scheduler.kill()

@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadInput, HarnessError, UnknownName
-from harness.experiment.playback import rehearse
+from harness.experiment.playback import prepare_playback
 from harness.experiment.scenario import find_scenario
 
 
 def test_what_is_not_asked_for_is_as_the_scenario_has_it() -> None:
-    made = rehearse("demo")
+    made = prepare_playback("demo")
     assert str(made.setting.part) == "walking_p1_01"
     assert made.setting.behaviour == "walking"
     assert made.samples.stations == made.calibration.stations == tuple(made.scenario.stations)
@@ -18,22 +18,22 @@ def test_what_is_not_asked_for_is_as_the_scenario_has_it() -> None:
 
 
 def test_clip_stations_rate_and_noise_are_put_in() -> None:
-    made = rehearse("demo", clip="boxing_p1_02", stations=4, rate_hz=75.0, noise="clean")
+    made = prepare_playback("demo", clip="boxing_p1_02", stations=4, rate_hz=75.0, noise="clean")
     assert made.samples.stations == ("left_hand", "right_hand", "left_ankle", "right_ankle")
     assert made.samples.rate_hz == made.tracker.rate_hz == 75.0
     assert made.tracker.slot_s == 0.0
     assert made.setting.behaviour == "boxing"
-    assert rehearse("demo", stations=["head", "torso"]).calibration.stations == ("head", "torso")
+    assert prepare_playback("demo", stations=["head", "torso"]).calibration.stations == ("head", "torso")
 
 
 def test_only_what_the_scenario_wears_is_worn(tmp_path: Path) -> None:
     shipped = find_scenario("demo").read_text(encoding="utf-8")
     file = tmp_path / "two.toml"
     file.write_text(shipped.replace("schema = 1", 'schema = 1\nworn = ["torso", "left_hand"]'), encoding="utf-8")
-    made = rehearse(file)
+    made = prepare_playback(file)
     assert made.samples.stations == made.calibration.stations == tuple(made.scenario.stations) == ("left_hand", "torso")
     with pytest.raises(UnknownName, match="Known: left_hand, torso"):
-        rehearse(file, stations=["head"])
+        prepare_playback(file, stations=["head"])
 
 
 @pytest.mark.parametrize(
@@ -50,4 +50,4 @@ def test_only_what_the_scenario_wears_is_worn(tmp_path: Path) -> None:
 )
 def test_what_cannot_be_worn_is_refused(asked: dict[str, object], kind: type[Exception], says: str) -> None:
     with pytest.raises(kind, match=says):
-        rehearse(**asked)  # type: ignore[arg-type]
+        prepare_playback(**asked)  # type: ignore[arg-type]

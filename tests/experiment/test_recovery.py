@@ -8,7 +8,7 @@ import pytest
 from harness.errors import Outcome, UnknownName
 from harness.experiment import engine
 from harness.experiment.scenario import load_scenario
-from harness.report.run.text import table
+from harness.report.run.text import run_table
 from harness.results.storage import read_cells, read_summary
 
 SCENARIO = """
@@ -55,7 +55,7 @@ def test_recovery_is_measured_by_a_run(tmp_path: Path) -> None:
     found = {name: (row["judged"], row["status_right"]) for name, row in rows.items()}
     assert found == {"all_lost": (40, 1.0), "start_off": (40, 1.0)}
     assert all(row["ratio"] == pytest.approx(row["disturbed_deg"] / row["undisturbed_deg"]) for row in rows.values())
-    assert "all_lost" in table(summary).split("recovery: ")[1]
+    assert "all_lost" in run_table(summary).split("recovery: ")[1]
 
 
 def test_a_station_that_nobody_wears_is_refused_before_anything_is_written(tmp_path: Path) -> None:

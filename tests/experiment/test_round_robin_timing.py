@@ -5,43 +5,49 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.experiment import benchmark_clips
-from harness.experiment.benchmark_clips import WARM_UP, Trial
-from harness.experiment.round_robin_timing import TURN, Follower, contest, following
+from harness.experiment.benchmark_clips import WARM_UP_FRAMES, BenchmarkClip
+from harness.experiment.round_robin_timing import FRAMES_PER_TURN, TimedStep, time_method, time_round_robin
 from harness.reconstruct.database import MotionDatabase
 from harness.stream.frame import TrackerFrame
 
 
 @pytest.fixture(scope="module")
-def shown() -> list[Trial]:
-    return benchmark_clips.trials_of(benchmark_clips.held_out(2, 1, 4.1), 1, benchmark_clips.scenario())
+def shown() -> list[BenchmarkClip]:
+    return benchmark_clips.simulate_clips(
+        benchmark_clips.generate_held_out_takes(2, 1, 4.1), 1, benchmark_clips.load_clean_scenario()
+    )
 
 
-def test_contenders_take_turns_and_meet_every_frame_once(shown: list[Trial]) -> None:
+def test_contenders_take_turns_and_meet_every_frame_once(shown: list[BenchmarkClip]) -> None:
     met: list[tuple[str, float]] = []
-    tallies = contest({name: Begin(name, met) for name in ("one", "other")}, shown, lambda *_: None)
-    turns = [met[at : at + TURN] for at in range(0, len(met), TURN)]
+    tallies = time_round_robin({name: Begin(name, met) for name in ("one", "other")}, shown, lambda *_: None)
+    turns = [met[at : at + FRAMES_PER_TURN] for at in range(0, len(met), FRAMES_PER_TURN)]
     assert all(len({name for name, _ in turn}) == 1 for turn in turns)
     assert [turn[0][0] for turn in turns] == ["one", "other"] * (len(turns) // 2)
     times = {name: [t for who, t in met if who == name] for name in tallies}
     assert times["one"] == times["other"]
-    expected = [f.received_s for s in shown for f in s.simulation.frames[: len(s.simulation.frames) // TURN * TURN]]
+    expected = [
+        f.received_s
+        for s in shown
+        for f in s.simulation.frames[: len(s.simulation.frames) // FRAMES_PER_TURN * FRAMES_PER_TURN]
+    ]
     assert times["one"] == expected
 
 
-def test_the_first_second_counts_for_nothing_and_the_first_frame_for_itself(shown: list[Trial]) -> None:
-    tally = contest({"one": Begin("one", [])}, shown, lambda *_: None)["one"]
-    turns = sum(len(s.simulation.frames) // TURN - WARM_UP // TURN for s in shown)
+def test_the_first_second_counts_for_nothing_and_the_first_frame_for_itself(shown: list[BenchmarkClip]) -> None:
+    tally = time_round_robin({"one": Begin("one", [])}, shown, lambda *_: None)["one"]
+    turns = sum(len(s.simulation.frames) // FRAMES_PER_TURN - WARM_UP_FRAMES // FRAMES_PER_TURN for s in shown)
     assert len(tally.turn_s) == len(tally.error_deg) == turns
-    assert len(tally.step_ms) == turns * TURN
+    assert len(tally.step_ms) == turns * FRAMES_PER_TURN
     assert tally.first_ms == pytest.approx([5_000.0] * len(shown))
     assert tally.step_ms == pytest.approx([2.0] * len(tally.step_ms))
     assert tally.fps == pytest.approx(500.0)
     assert tally.error_deg == pytest.approx([0.0] * turns)
 
 
-def test_what_follows_learns_nothing_of_the_truth(shown: list[Trial]) -> None:
-    learnt = MotionDatabase.build(benchmark_clips.body(), benchmark_clips.makers(801, 1))
-    follow = following(benchmark_clips.learner("ik", learnt, 1))
+def test_what_follows_learns_nothing_of_the_truth(shown: list[BenchmarkClip]) -> None:
+    learnt = MotionDatabase.build(benchmark_clips.build_common_body(), benchmark_clips.make_take_factories(801, 1))
+    follow = time_method(benchmark_clips.fit_named_method("ik", learnt, 1))
     frames = shown[0].simulation.frames[:5]
     paths = []
     for before in (shown[0].truth[0], np.zeros(55)):
@@ -56,7 +62,7 @@ class Begin:
     def __init__(self, name: str, met: list[tuple[str, float]]) -> None:
         self.name, self.met = name, met
 
-    def __call__(self, trial: Trial) -> Follower:
+    def __call__(self, trial: BenchmarkClip) -> TimedStep:
         truth = iter(trial.truth)
         first = trial.simulation.frames[0].received_s
 

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from harness.core.fields import changed
-from harness.core.split import Part
+from harness.core.fields import replace_fields
+from harness.core.split import ClipPart
 from harness.errors import BadFile, HarnessError, UnknownName
 from harness.experiment.scenario import Station, load_scenario, shipped_scenarios, variants
 from harness.results.cell import varied_text
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.lost_station import LostStation
-from harness.simulate.noise import level
+from harness.simulate.noise import noise_preset
 
 MINIMAL = """
 methods = ["ik"]
@@ -37,7 +37,7 @@ def test_every_shipped_scenario_loads(path: Path) -> None:
     assert scenario.name == path.stem
     assert scenario == load_scenario(path.stem)
     for text in scenario.motion.test:
-        Part.parse(text)
+        ClipPart.parse(text)
 
 
 def test_there_is_one_for_each_behaviour_and_the_demo() -> None:
@@ -169,17 +169,17 @@ class _Outer:
 
 
 def test_single_values_of_a_record_can_be_changed() -> None:
-    assert changed(_Outer(), {"echo": {"share": 0.1}}, "components") == _Outer(_Inner(0.1))
-    assert changed(_Outer(), {"rate_hz": 60}, "tracker").rate_hz == 60.0
+    assert replace_fields(_Outer(), {"echo": {"share": 0.1}}, "components") == _Outer(_Inner(0.1))
+    assert replace_fields(_Outer(), {"rate_hz": 60}, "tracker").rate_hz == 60.0
     with pytest.raises(UnknownName, match="share"):
-        changed(_Outer(), {"echo": {"shar": 0.1}}, "components")
+        replace_fields(_Outer(), {"echo": {"shar": 0.1}}, "components")
 
 
 def test_noise_components_are_changed_added_and_listed() -> None:
-    assert changed(level("default"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
-    assert changed(level("clean"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
+    assert replace_fields(noise_preset("default"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
+    assert replace_fields(noise_preset("clean"), {"echo": {"share": 0.1}}, "components").echo == Echo(share=0.1)
     lost = [{"station": "head", "from_s": 1.0, "to_s": 2.0}]
-    assert changed(level("clean"), {"lost": lost}, "components").lost == (LostStation("head", 1.0, 2.0),)
+    assert replace_fields(noise_preset("clean"), {"lost": lost}, "components").lost == (LostStation("head", 1.0, 2.0),)
 
 
 VARIED = """
@@ -213,7 +213,9 @@ def test_what_is_worn_is_taken_from_the_stations_in_their_order(tmp_path: Path) 
 
 def test_a_component_can_be_varied_away(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL + '[vary]\n"components.echo" = ["none", { share = 0.1 }]\n'))
-    without, with_it = (changed(level("default"), made.components, "components") for _, made in variants(scenario))
+    without, with_it = (
+        replace_fields(noise_preset("default"), made.components, "components") for _, made in variants(scenario)
+    )
     assert without.echo is None
     assert with_it.echo == Echo(share=0.1)
 

@@ -9,16 +9,16 @@ import pytest
 
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
-from harness.experiment.cells import reconstruct
-from harness.experiment.playback import Rehearsal, rehearse
+from harness.experiment.cells import run_method
+from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.scenario import find_scenario
-from harness.experiment.score_recording import Judged, judge, rehearsal_of, table
+from harness.experiment.score_recording import RecordingScore, find_playback, format_score_table, score_methods
 from harness.reconstruct import registry
-from harness.score.score import score
+from harness.score.score import score_estimate
 from harness.stream.codec import commands
 from harness.stream.codec.reader import WireFormat
 from harness.stream.emulator.device import Device
-from harness.stream.inputs import combination
+from harness.stream.inputs import make_inputs
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 from tests.stream.wire import same
@@ -28,24 +28,24 @@ NOTE = {"scenario": "demo", "clip": CLIP, "rate_hz": 40.0}
 
 
 @pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory) -> Rehearsal:
+def played(tmp_path_factory: pytest.TempPathFactory) -> Playback:
     """The demo, with fewer examples to learn from."""
     text = find_scenario("demo").read_text(encoding="utf-8")
     fewer = re.sub(r"examples = \[[^]]*\]", 'examples = ["boxing_p1_02", "boxing_p2_01"]', text)
     assert fewer != text
     path = tmp_path_factory.mktemp("scenario") / "small.toml"
     path.write_text(fewer, encoding="utf-8")
-    return rehearse(path, clip=CLIP, stations=4)
+    return prepare_playback(path, clip=CLIP, stations=4)
 
 
 @pytest.fixture(scope="module")
-def simulated(played: Rehearsal, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def simulated(played: Playback, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("simulated") / "a.rec"
     record_capture(path, played.simulation.wire_format, played.simulation.wire, NOTE)
     return path
 
 
-def emulated(played: Rehearsal, path: Path, turns_s: Sequence[float], names: Sequence[str] = ()) -> Path:
+def emulated(played: Playback, path: Path, turns_s: Sequence[float], names: Sequence[str] = ()) -> Path:
     """What a device says that is set up anew before each of these stretches of time, looked at every 10 ms."""
     wire = WireFormat(tuple(names) or played.samples.stations, played.tracker.rate_hz)
     device, now_s = Device(played.samples), 0.0
@@ -53,7 +53,7 @@ def emulated(played: Rehearsal, path: Path, turns_s: Sequence[float], names: Seq
         for turn_s in turns_s:
             device.receive(commands.STOP, now_s)
             for station in wire.characters.decode():
-                device.receive(commands.output_list(station, wire.items), now_s)
+                device.receive(commands.set_output_list(station, wire.items), now_s)
             device.receive(commands.BINARY + commands.CENTIMETRES + commands.ZERO_CLOCK, now_s)
             device.advance(now_s)
             writer.configured(wire, now_s, now_s)
@@ -65,7 +65,7 @@ def emulated(played: Rehearsal, path: Path, turns_s: Sequence[float], names: Seq
     return path
 
 
-def errors(judged: Sequence[Judged]) -> list[dict[str, float | None]]:
+def errors(judged: Sequence[RecordingScore]) -> list[dict[str, float | None]]:
     """All that was measured but how long it took."""
     timed = ("step_", "fps")
     return [{n: v for n, v in one.metrics.items() if not n.startswith(timed)} for one in judged]
@@ -74,7 +74,7 @@ def errors(judged: Sequence[Judged]) -> list[dict[str, float | None]]:
 @pytest.mark.parametrize("rate_hz", [40.0, 100.0])
 def test_a_recorded_simulation_has_its_frames_bit_by_bit(rate_hz: float, tmp_path: Path) -> None:
     """Times of reception as well, and where the line is too slow, so that records are late and lost."""
-    simulation = rehearse("demo", clip=CLIP, stations=4, rate_hz=rate_hz).simulation
+    simulation = prepare_playback("demo", clip=CLIP, stations=4, rate_hz=rate_hz).simulation
     assert bool(simulation.health["records_dropped"]) == (rate_hz == 100.0)
     record_capture(tmp_path / "a.rec", simulation.wire_format, simulation.wire, {})
     frames = list(RecordingStream(tmp_path / "a.rec"))
@@ -82,86 +82,86 @@ def test_a_recorded_simulation_has_its_frames_bit_by_bit(rate_hz: float, tmp_pat
     assert all(same(one, other) for one, other in zip(frames, simulation.frames, strict=True))
 
 
-def test_a_recording_scores_as_the_simulation_does(played: Rehearsal, simulated: Path) -> None:
-    judged = judge(RecordingStream(simulated), played, METHODS)
+def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: Path) -> None:
+    judged = score_methods(RecordingStream(simulated), played, METHODS)
     simulation = played.simulation
     for one in judged:
         fitted = played.setting.fitted(registry.resolve(one.method), one.method)
-        qpos, status, step_ms, _ = reconstruct(
-            fitted, simulation.calibration, simulation, combination("pos+ori", simulation.stations)
+        qpos, status, step_ms, _ = run_method(
+            fitted, simulation.calibration, simulation, make_inputs("pos+ori", simulation.stations)
         )
         assert not (status == Status.LOST).all()
         truth = simulation.truth_qpos, qpos, simulation.frame_index, status, step_ms
-        scores = score(played.body.skeleton, played.tracker.rate_hz, *truth)
+        scores = score_estimate(played.body.skeleton, played.tracker.rate_hz, *truth)
         (measured,) = errors([one])
         assert measured == {name: scores.metrics[name] for name in measured}
         assert one.frames_matched == scores.metrics["frames_matched"] == one.frames_expected
     assert errors(judged)[0]["mpjpe_mm"] is not None
 
 
-def test_scores_at_1x_and_max_are_equal(played: Rehearsal, tmp_path: Path) -> None:
+def test_scores_at_1x_and_max_are_equal(played: Playback, tmp_path: Path) -> None:
     path, simulation = tmp_path / "a.rec", played.simulation
     record_capture(path, simulation.wire_format, simulation.wire, NOTE, seconds=2.5)
-    at_once, in_time = (judge(RecordingStream(path, speed), played, METHODS) for speed in ("max", 1.0))
+    at_once, in_time = (score_methods(RecordingStream(path, speed), played, METHODS) for speed in ("max", 1.0))
     assert errors(at_once) == errors(in_time)
     assert [one.frames_matched for one in at_once] == [one.frames_matched for one in in_time] == [60, 60]
     assert all(value is not None for value in errors(at_once)[0].values())
 
 
-def test_later_laps_fold_back_and_the_way_back_is_not_judged(played: Rehearsal, tmp_path: Path) -> None:
+def test_later_laps_fold_back_and_the_way_back_is_not_judged(played: Playback, tmp_path: Path) -> None:
     samples = played.samples
     path = emulated(played, tmp_path / "a.rec", [2.2 * samples.lap_s])
-    (judged,) = judge(RecordingStream(path), played, ["best_match"])
+    (judged,) = score_methods(RecordingStream(path), played, ["best_match"])
     warm_up, rest = round(played.tracker.rate_hz), round(0.2 * len(samples))
     assert judged.frames_expected == pytest.approx(2 * samples.first_lap - warm_up + rest, abs=2)
     assert judged.frames_matched == judged.frames_expected
-    (once,) = judge(RecordingStream(emulated(played, tmp_path / "b.rec", [samples.lap_s])), played, ["best_match"])
+    (once,) = score_methods(
+        RecordingStream(emulated(played, tmp_path / "b.rec", [samples.lap_s])), played, ["best_match"]
+    )
     assert judged.metrics["mpjpe_mm"] == pytest.approx(once.metrics["mpjpe_mm"], rel=0.1)
 
 
-def test_a_device_that_was_set_up_anew_plays_from_the_beginning(played: Rehearsal, tmp_path: Path) -> None:
+def test_a_device_that_was_set_up_anew_plays_from_the_beginning(played: Playback, tmp_path: Path) -> None:
     path = emulated(played, tmp_path / "a.rec", [3.0, 2.0])
-    (judged,) = judge(RecordingStream(path), played, ["best_match"])
+    (judged,) = score_methods(RecordingStream(path), played, ["best_match"])
     assert judged.frames_matched == judged.frames_expected == pytest.approx(40 * (3 - 1 + 2), abs=4)
-    (once,) = judge(RecordingStream(emulated(played, tmp_path / "b.rec", [3.0])), played, ["best_match"])
+    (once,) = score_methods(RecordingStream(emulated(played, tmp_path / "b.rec", [3.0])), played, ["best_match"])
     assert judged.metrics["mpjpe_mm"] == pytest.approx(once.metrics["mpjpe_mm"], rel=0.3)
 
 
-def test_a_device_whose_stations_had_no_names_wore_the_first_of_the_scenarios(
-    played: Rehearsal, tmp_path: Path
-) -> None:
+def test_a_device_whose_stations_had_no_names_wore_the_first_of_the_scenarios(played: Playback, tmp_path: Path) -> None:
     stream = RecordingStream(emulated(played, tmp_path / "a.rec", [3.0], names="1234"))
-    rehearsal = rehearsal_of(stream, scenario="demo", clip=CLIP)
+    rehearsal = find_playback(stream, scenario="demo", clip=CLIP)
     assert rehearsal.samples.stations == played.samples.stations
     named = emulated(played, tmp_path / "b.rec", [3.0])
-    told = [judge(s, rehearsal, ["ik:previous"]) for s in (stream, RecordingStream(named))]
+    told = [score_methods(s, rehearsal, ["ik:previous"]) for s in (stream, RecordingStream(named))]
     assert errors(told[0]) == errors(told[1])
 
 
-def test_too_little_is_not_measured(played: Rehearsal, tmp_path: Path) -> None:
+def test_too_little_is_not_measured(played: Playback, tmp_path: Path) -> None:
     """All of it is warm-up."""
     path, simulation = tmp_path / "a.rec", played.simulation
     record_capture(path, simulation.wire_format, simulation.wire, NOTE, seconds=0.5)
-    (judged,) = judge(RecordingStream(path), played, ["ik:previous"])
+    (judged,) = score_methods(RecordingStream(path), played, ["ik:previous"])
     assert (judged.frames_matched, judged.frames_expected) == (0, 0)
     assert set(judged.metrics.values()) == {None}
-    assert "not measured" in table([judged])
+    assert "not measured" in format_score_table([judged])
 
 
 @pytest.mark.parametrize("other", [{"clip": "walking_p1_01"}, {"seed": 2, "noise": "default"}])
 def test_another_motion_is_refused(other: dict[str, str], simulated: Path) -> None:
     stream = RecordingStream(simulated)
     with pytest.raises(BadInput, match=r"of another motion: .* frames belong to this one"):
-        judge(stream, rehearsal_of(stream, scenario="demo", **other), ["ik:previous"])  # type: ignore[arg-type]
+        score_methods(stream, find_playback(stream, scenario="demo", **other), ["ik:previous"])  # type: ignore[arg-type]
 
 
-def test_names_that_do_not_exist_are_refused(played: Rehearsal, simulated: Path, tmp_path: Path) -> None:
+def test_names_that_do_not_exist_are_refused(played: Playback, simulated: Path, tmp_path: Path) -> None:
     stream = RecordingStream(simulated)
     with pytest.raises(UnknownName, match="no method called 'il'"):
-        judge(stream, played, ["il"])
+        score_methods(stream, played, ["il"])
     with pytest.raises(UnknownName, match="no scenario called 'dem'"):
-        rehearsal_of(stream, scenario="dem")
+        find_playback(stream, scenario="dem")
     bare = tmp_path / "a.rec"
     record_capture(bare, played.simulation.wire_format, played.simulation.wire, {})
     with pytest.raises(BadInput, match=r"Nothing says what .*a\.rec was played from"):
-        rehearsal_of(RecordingStream(bare))
+        find_playback(RecordingStream(bare))

@@ -10,30 +10,36 @@ import pytest
 from harness.body import kinematics
 from harness.body.humanoid import Body
 from harness.calibrate.poses import POSES, configuration
-from harness.calibrate.skeleton_prior import BoneSpace, bone_space
+from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core import rotations
-from harness.core.motion import Take
-from harness.core.split import Part
+from harness.core.motion import BodyMotion
+from harness.core.split import ClipPart
 from harness.errors import BadInput, Outcome
 from harness.experiment import engine
-from harness.experiment.cells import reconstruct
-from harness.experiment.clip_evaluation import Setting, mounts_of, noise_of, tracker_of
-from harness.experiment.scenario import Calibrating, Motion, Scenario, load_scenario
-from harness.experiment.simulated_calibration import Calibrated, TrackerSession, by_poses, by_tpose, errors_of
+from harness.experiment.cells import run_method
+from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
+from harness.experiment.scenario import CalibrationSettings, Scenario, ScenarioMotion, load_scenario
+from harness.experiment.simulated_calibration import (
+    PerformerCalibration,
+    TrackerSession,
+    measure_calibration_errors,
+    simulate_poses_calibration,
+    simulate_tpose_calibration,
+)
 from harness.mocap import synthetic
-from harness.mocap.sources import open_source
+from harness.mocap.sources import open_motion_source
 from harness.reconstruct.methods.ik import PREVIOUS
 from harness.reconstruct.methods.mean_pose import FittedMeanPose, MeanPose
-from harness.report.run.text import table
+from harness.report.run.text import run_table
 from harness.results.storage import read_cells, read_summary
-from harness.simulate.simulation import Simulation, exact_calibration, simulate
+from harness.simulate.simulation import Simulation, exact_calibration, simulate_tracker
 from harness.stream.frame import TrackerFrame
-from harness.stream.inputs import combination
+from harness.stream.inputs import make_inputs
 
-BESIDE = Calibrating(beside_m=0.015, turned_deg=180.0)
+BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
 SMALL = Scenario(
     name="small",
-    motion=Motion(
+    motion=ScenarioMotion(
         "builtin", ("walking_p1_01", "boxing_p2_01"), ("walking", "boxing"), ("walking_p3_01",), longest_s=2.5
     ),
     stations=load_scenario("demo").stations,
@@ -42,9 +48,9 @@ SMALL = Scenario(
 KINDS = ("exact", "tpose", "poses")
 
 
-def setting(scenario: Scenario = SMALL, clip: str = "walking_p1_01") -> Setting:
-    source = open_source("builtin", None, seed=scenario.seed, rate_hz=None)
-    return Setting(scenario, source, Part(clip), "walking")
+def setting(scenario: Scenario = SMALL, clip: str = "walking_p1_01") -> ClipEvaluation:
+    source = open_motion_source("builtin", None, seed=scenario.seed, rate_hz=None)
+    return ClipEvaluation(scenario, source, ClipPart(clip), "walking")
 
 
 def same_frames(a: tuple[TrackerFrame, ...], b: tuple[TrackerFrame, ...]) -> bool:
@@ -60,7 +66,7 @@ def same_frames(a: tuple[TrackerFrame, ...], b: tuple[TrackerFrame, ...]) -> boo
 def plainly(scenario: Scenario) -> Simulation:
     """The take worn as if nobody had ever calibrated."""
     made = setting(scenario)
-    return simulate(
+    return simulate_tracker(
         made.body, made.take, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
     )
 
@@ -81,11 +87,14 @@ def test_without_calibrating_everything_is_as_it_was(noise: str) -> None:
 
 def test_who_stands_model_how_is_no_input_where_nobody_does() -> None:
     told = [
-        setting(replace(SMALL, calibrating=Calibrating(miss_deg=deg))).inputs_of(PREVIOUS, "pos+ori") for deg in (1, 5)
+        setting(replace(SMALL, calibrating=CalibrationSettings(miss_deg=deg))).inputs_of(PREVIOUS, "pos+ori")
+        for deg in (1, 5)
     ]
     assert told[0] == told[1]
     found = [
-        setting(replace(SMALL, calibration="tpose", calibrating=Calibrating(miss_deg=deg))).inputs_of(PREVIOUS, "")
+        setting(replace(SMALL, calibration="tpose", calibrating=CalibrationSettings(miss_deg=deg))).inputs_of(
+            PREVIOUS, ""
+        )
         for deg in (1, 5)
     ]
     assert {key for key in found[0] if found[0][key] != found[1][key]} == {"calibrating"}
@@ -93,18 +102,18 @@ def test_who_stands_model_how_is_no_input_where_nobody_does() -> None:
 
 def test_where_trackers_really_sit_is_an_input() -> None:
     plain, beside = (
-        setting(replace(SMALL, calibrating=how)).inputs_of(PREVIOUS, "") for how in (Calibrating(), BESIDE)
+        setting(replace(SMALL, calibrating=how)).inputs_of(PREVIOUS, "") for how in (CalibrationSettings(), BESIDE)
     )
     assert {key for key in plain if plain[key] != beside[key]} == {"mounts_digest"}
 
 
-@pytest.mark.parametrize("how", [Calibrating(), BESIDE], ids=["nominal", "beside"])
-def test_the_stream_under_test_is_the_same_whatever_the_calibration(how: Calibrating) -> None:
+@pytest.mark.parametrize("how", [CalibrationSettings(), BESIDE], ids=["nominal", "beside"])
+def test_the_stream_under_test_is_the_same_whatever_the_calibration(how: CalibrationSettings) -> None:
     streams = [setting(replace(SMALL, calibration=kind, calibrating=how)).simulation for kind in KINDS]  # type: ignore[arg-type]
     for stream in streams[1:]:
         assert same_frames(stream.frames, streams[0].frames)
         np.testing.assert_array_equal(stream.truth_qpos, streams[0].truth_qpos)
-    assert same_frames(streams[0].frames, plainly(SMALL).frames) == (how == Calibrating())
+    assert same_frames(streams[0].frames, plainly(SMALL).frames) == (how == CalibrationSettings())
 
 
 def test_exact_knows_where_trackers_really_sit() -> None:
@@ -115,7 +124,7 @@ def test_exact_knows_where_trackers_really_sit() -> None:
     off_m = np.linalg.norm(known.mount_m - setting().calibrated.calibration.mount_m, axis=1)
     assert off_m.min() > 0.002
     fitted = made.fitted(PREVIOUS, "ik:previous")
-    qpos, *_ = reconstruct(fitted, known, made.simulation, combination("pos+ori", known.stations))
+    qpos, *_ = run_method(fitted, known, made.simulation, make_inputs("pos+ori", known.stations))
     there_m = made.simulation.truth_qpos[made.simulation.frame_index][:, :3]
     assert np.linalg.norm(qpos[40:, :3] - there_m[40:], axis=1).mean() < 0.02
 
@@ -126,7 +135,7 @@ def session(scenario: Scenario = SMALL) -> TrackerSession:
 
 def test_a_perfect_model_of_perfect_trackers_is_calibrated_exactly() -> None:
     scenario = replace(
-        SMALL, noise="clean", calibration="tpose", calibrating=Calibrating(miss_deg=0.0, turned_deg=180.0)
+        SMALL, noise="clean", calibration="tpose", calibrating=CalibrationSettings(miss_deg=0.0, turned_deg=180.0)
     )
     errors = setting(scenario).calibrated.errors
     assert errors["mount_deg"] < 0.01
@@ -147,15 +156,18 @@ def test_errors_are_what_they_say() -> None:
     )
     longer = skeleton.with_bones(skeleton.bone_m * (1.0 + 0.01 / skeleton.length_m)[:, None])
     expected = {"mount_mm": 5.0, "mount_deg": 5.0, "length_mm": 10.0, "room_heading_deg": 7.0, "room_origin_mm": 100.0}
-    assert errors_of(wrong, longer, worn) == pytest.approx(expected, abs=1e-9)
-    assert errors_of(true, skeleton, worn) == pytest.approx(dict.fromkeys(expected, 0.0), abs=1e-6)
+    assert measure_calibration_errors(wrong, longer, worn) == pytest.approx(expected, abs=1e-9)
+    assert measure_calibration_errors(true, skeleton, worn) == pytest.approx(dict.fromkeys(expected, 0.0), abs=1e-6)
 
 
 def test_whoever_misses_the_pose_more_pays_more() -> None:
     """The same draws, four times as large."""
     worn = session(replace(SMALL, noise="clean"))
     few, many = (
-        [by_tpose(replace(worn, seed=s), miss_rad=np.deg2rad(deg), hold_s=2.0).errors["mount_deg"] for s in range(4)]
+        [
+            simulate_tpose_calibration(replace(worn, seed=s), miss_rad=np.deg2rad(deg), hold_s=2.0).errors["mount_deg"]
+            for s in range(4)
+        ]
         for deg in (0.5, 2.0)
     )
     assert np.mean(many) == pytest.approx(4.0 * np.mean(few), rel=0.1)
@@ -163,7 +175,7 @@ def test_whoever_misses_the_pose_more_pays_more() -> None:
 
 def test_a_model_that_nobody_takes_for_one_fails_its_cells(tmp_path: Path) -> None:
     """Of two performers who are far off their pose, each cell fails with the reason; nothing stops the run."""
-    scenario = replace(SMALL, calibration="tpose", calibrating=Calibrating(miss_deg=30.0))
+    scenario = replace(SMALL, calibration="tpose", calibrating=CalibrationSettings(miss_deg=30.0))
     with pytest.raises(BadInput, match="Nothing could be run"):
         engine.run(scenario, tmp_path / "run")
     failures = read_summary(tmp_path / "run")["failures"]
@@ -190,7 +202,7 @@ def test_calibrations_print_side_by_side(tmp_path: Path) -> None:
         assert (cell.estimate_bone_m == cell.bone_m).all() == (cell.calibration != "poses")
         np.testing.assert_array_equal(cell.bone_m, cells[0].bone_m)
         np.testing.assert_array_equal(cell.truth_qpos, cells[0].truth_qpos)
-    printed = table(read_summary(tmp_path))
+    printed = run_table(read_summary(tmp_path))
     assert f"calibration {', '.join(KINDS)}" in printed
     assert all(f"calibration={kind}" in printed for kind in KINDS)
     made = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()}
@@ -223,18 +235,20 @@ def test_what_was_learnt_is_shared_while_the_body_is_the_same() -> None:
 
 
 @pytest.fixture(scope="module")
-def found() -> tuple[TrackerSession, Calibrated, BoneSpace]:
+def found() -> tuple[TrackerSession, PerformerCalibration, SkeletonPrior]:
     """What eight poses of p2 told."""
     scenario = replace(SMALL, calibration="poses", calibrating=BESIDE)
     made = setting(scenario, "walking_p2_01")
-    return made.session, made.calibrated, bone_space(list(made.people.values()))
+    return made.session, made.calibrated, fit_skeleton_prior(list(made.people.values()))
 
 
-def test_eight_poses_find_bones_mounts_and_room(found: tuple[TrackerSession, Calibrated, BoneSpace]) -> None:
+def test_eight_poses_find_bones_mounts_and_room(
+    found: tuple[TrackerSession, PerformerCalibration, SkeletonPrior],
+) -> None:
     worn, calibrated, space = found
     assert calibrated.calibration.kind == "poses"
     nominal = exact_calibration(worn.body, worn.nominal, worn.tracker)
-    untold = errors_of(nominal, space.mean_skeleton(worn.body.skeleton), worn)
+    untold = measure_calibration_errors(nominal, space.mean_skeleton(worn.body.skeleton), worn)
     assert calibrated.errors["length_mm"] < 0.7 * untold["length_mm"]
     assert calibrated.errors["mount_mm"] < 0.7 * untold["mount_mm"]
     assert calibrated.errors["mount_deg"] < 6.0
@@ -242,16 +256,16 @@ def test_eight_poses_find_bones_mounts_and_room(found: tuple[TrackerSession, Cal
 
 
 def test_nothing_of_the_performer_but_the_stream_is_told(
-    found: tuple[TrackerSession, Calibrated, BoneSpace], monkeypatch: pytest.MonkeyPatch
+    found: tuple[TrackerSession, PerformerCalibration, SkeletonPrior], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where p1 stands but the stream of p2 is heard, what is found is p2's to the bit; its errors alone are others."""
     worn, calibrated, space = found
     poses = [configuration(pose, worn.body.skeleton) for pose in POSES]
     heard = worn.standing_model(poses, miss_rad=np.deg2rad(BESIDE.miss_deg), hold_s=BESIDE.hold_s)
-    other = session(replace(SMALL, calibrating=Calibrating(beside_m=0.3)))
+    other = session(replace(SMALL, calibrating=CalibrationSettings(beside_m=0.3)))
     assert other.body is not worn.body
     monkeypatch.setattr(TrackerSession, "standing_model", lambda *_, **__: heard)
-    again = by_poses(other, space, miss_rad=0.0, hold_s=3.0)
+    again = simulate_poses_calibration(other, space, miss_rad=0.0, hold_s=3.0)
     for name in ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m"):
         one, two = (getattr(c.calibration, name) for c in (calibrated, again))
         np.testing.assert_array_equal(one, two)
@@ -260,12 +274,12 @@ def test_nothing_of_the_performer_but_the_stream_is_told(
 
 
 def test_methods_and_their_examples_stand_on_the_body_that_was_found(
-    found: tuple[TrackerSession, Calibrated, BoneSpace],
+    found: tuple[TrackerSession, PerformerCalibration, SkeletonPrior],
 ) -> None:
     made, bodies = setting(), []
 
     class Watching(MeanPose):
-        def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> FittedMeanPose:
+        def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> FittedMeanPose:
             bodies.append((body, [example.qpos for example in examples]))
             return super().fit(body, examples, rng)
 
@@ -284,8 +298,8 @@ def test_methods_and_their_examples_stand_on_the_body_that_was_found(
 
 
 def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
-    source = open_source("builtin", None, seed=1, rate_hz=None)
-    performers = [synthetic.skeleton(name).length_m for name in synthetic.performers()]
+    source = open_motion_source("builtin", None, seed=1, rate_hz=None)
+    performers = [synthetic.performer_skeleton(name).length_m for name in synthetic.performer_names()]
     for skeleton in source.people("p1").values():
         assert min(np.abs(skeleton.length_m - own).max() for own in performers) > 0.002
 
@@ -293,14 +307,14 @@ def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
 @pytest.mark.parametrize("wrong", [{"miss_deg": -1.0}, {"hold_s": 1.0}, {"beside_m": 2.0}, {"turned_deg": -5.0}])
 def test_absurd_models_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(BadInput, match=next(iter(wrong))):
-        Calibrating(**wrong)
+        CalibrationSettings(**wrong)
 
 
 def test_nobody_s_own_skeleton_is_learnt_from_a_library(mocap: Path) -> None:
     scenario = load_scenario("calibration_cmu")
-    source = open_source("cmu", mocap, seed=1, rate_hz=120.0)
+    source = open_motion_source("cmu", mocap, seed=1, rate_hz=120.0)
     for clip in scenario.motion.test:
-        made = Setting(scenario, source, Part(clip), "walking")
+        made = ClipEvaluation(scenario, source, ClipPart(clip), "walking")
         own = made.body.skeleton.length_m
         assert source.subject(clip) not in made.people
         assert len(made.people) == len(source.people("")) - 1 >= 19

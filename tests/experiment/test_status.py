@@ -9,9 +9,9 @@ import pytest
 
 from harness.cli import main
 from harness.errors import BadFile
-from harness.experiment.status import status
+from harness.experiment.status import read_status
 from harness.results.index import CellIndex
-from harness.results.lock import at_work
+from harness.results.lock import folder_lock
 from harness.results.storage import read_cells, summary_rows
 from tests.report.fabricate import Plan, fabricate
 
@@ -56,13 +56,13 @@ def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path
     index(out, rows[:3], 10, started_s=1000.0, seen_s=1030.0, made=3)
     (out / "cells" / "finished_but_not_in_the_index").mkdir(parents=True)
     (out / "cells" / ".unfinished-1-abc").mkdir()
-    found = status(out)
+    found = read_status(out)
     assert (found.kind, found.name, found.planned, found.finished) == ("sweep", "tiny", 10, 4)
     assert found.failures == {"cell 9": "Traceback\nValueError: on purpose"}
     assert not found.running
     assert found.left_s == pytest.approx(30.0 / 3 * 5)
-    with at_work(out):
-        assert status(out).running
+    with folder_lock(out):
+        assert read_status(out).running
 
 
 def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -83,14 +83,14 @@ def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 def test_a_run_is_counted_by_its_cells_until_it_ends(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = status(run)
+    found = read_status(run)
     assert (found.kind, found.planned, found.finished, found.running) == ("run", 4, 4, False)
     assert main(["status", str(run)]) == 0
     (run / "summary.json").unlink()
-    found = status(run)
+    found = read_status(run)
     assert (found.planned, found.finished, found.failures) == (8, 4, {})
-    with at_work(run, alone=False):
-        assert status(run).running
+    with folder_lock(run, alone=False):
+        assert read_status(run).running
     assert main(["status", str(run)]) == 4
     assert "run run: not running, 4 of 8 cells finished, 0 failed" in capsys.readouterr().out
 
@@ -98,13 +98,13 @@ def test_a_run_is_counted_by_its_cells_until_it_ends(run: Path, capsys: pytest.C
 def test_a_paper_is_all_its_runs(run: Path) -> None:
     shutil.copytree(run, run.parent / "another")
     (run / "summary.json").unlink()
-    found = status(run.parent)
+    found = read_status(run.parent)
     assert (found.kind, found.planned, found.finished) == ("paper", 12, 8)
 
 
 def test_what_is_no_work_of_ours_is_told(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="no such folder"):
-        status(tmp_path / "nowhere")
+        read_status(tmp_path / "nowhere")
     (tmp_path / "mine").mkdir()
     with pytest.raises(BadFile, match=r"neither index\.sqlite nor manifest\.json"):
-        status(tmp_path / "mine")
+        read_status(tmp_path / "mine")

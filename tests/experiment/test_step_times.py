@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.experiment.cells import reconstruct
-from harness.experiment.reference_workload import EVERY
+from harness.experiment.cells import run_method
+from harness.experiment.reference_workload import FRAMES_PER_TIMING
 
 
 class Diary:
@@ -27,15 +27,20 @@ class Diary:
 
 
 def test_reference_work_lies_between_steps_and_the_step_after_it_is_not_timed() -> None:
-    frames = 3 * EVERY + 2
+    frames = 3 * FRAMES_PER_TIMING + 2
     diary: Any = Diary()
     made: Any = SimpleNamespace(frames=range(frames))
-    qpos, status, step_ms, (cpu_ms, reference_ms) = reconstruct(diary, diary, made, diary)
+    qpos, status, step_ms, (cpu_ms, reference_ms) = run_method(diary, diary, made, diary)
     assert diary.seen == list(range(frames))
     np.testing.assert_array_equal(qpos[:, 0], np.arange(frames))
     assert len(status) == len(step_ms) == len(cpu_ms) == len(reference_ms) == frames
-    np.testing.assert_array_equal(np.flatnonzero(np.isfinite(reference_ms)), [EVERY - 1, 2 * EVERY - 1, 3 * EVERY - 1])
+    np.testing.assert_array_equal(
+        np.flatnonzero(np.isfinite(reference_ms)),
+        [FRAMES_PER_TIMING - 1, 2 * FRAMES_PER_TIMING - 1, 3 * FRAMES_PER_TIMING - 1],
+    )
     for times_ms in (step_ms, cpu_ms):
-        np.testing.assert_array_equal(np.flatnonzero(np.isnan(times_ms)), [EVERY, 2 * EVERY, 3 * EVERY])
+        np.testing.assert_array_equal(
+            np.flatnonzero(np.isnan(times_ms)), [FRAMES_PER_TIMING, 2 * FRAMES_PER_TIMING, 3 * FRAMES_PER_TIMING]
+        )
     assert (step_ms[np.isfinite(step_ms)] > 0.0).all()
     assert (reference_ms[np.isfinite(reference_ms)] > 0.0).all()

@@ -17,31 +17,31 @@ from harness.cli import main
 from harness.core.files import TEMPORARY
 from harness.errors import BadInput, Outcome
 from harness.experiment import cells
-from harness.experiment.cell_scheduler import planned_cells, run_cells, tasks_of
-from harness.experiment.cells import Job
-from harness.experiment.executors import Each, R, here
+from harness.experiment.cell_scheduler import cell_names, plan_tasks, run_cells
+from harness.experiment.cells import ClipTask
+from harness.experiment.executors import R, TaskExecutor, run_in_process
 from harness.experiment.scenario import load_scenario
 from harness.experiment.sweep import run_sweep
-from harness.experiment.sweep_config import expand, load_sweep
-from harness.results.lock import at_work
+from harness.experiment.sweep_config import expand_sweep, load_sweep
+from harness.results.lock import folder_lock
 from harness.results.storage import read_cells
-from harness.results.table import TIMES
+from harness.results.table import TIME_COLUMNS
 from tests.experiment.made_up import FAILING, judge, made_up, sweep_file
 
 __all__ = ["made_up"]
 
 
-def sweep(file: Path, out: Path, each: Each = here, workers: int = 1, **more: Any) -> Outcome:
+def sweep(file: Path, out: Path, each: TaskExecutor = run_in_process, workers: int = 1, **more: Any) -> Outcome:
     read, path = load_sweep(file)
     return run_sweep(
-        read, expand(read, path), out, folder=None, each=each, workers=workers, command="harness sweep x", **more
+        read, expand_sweep(read, path), out, folder=None, each=each, workers=workers, command="harness sweep x", **more
     )
 
 
 def untimed(table: Path) -> list[list[str]]:
     """The table without what is never twice the same."""
     header, *lines = (line.split(",") for line in table.read_text().splitlines())
-    kept = [place for place, name in enumerate(header) if name not in TIMES]
+    kept = [place for place, name in enumerate(header) if name not in TIME_COLUMNS]
     return [[line[place] for place in kept] for line in (header, *lines)]
 
 
@@ -54,7 +54,7 @@ def backwards(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """As workers that end in another order than they began."""
-    yield from reversed(list(here(function, tasks)))
+    yield from reversed(list(run_in_process(function, tasks)))
 
 
 def test_every_cell_is_in_the_table_in_planned_order(made_up: Path) -> None:
@@ -93,8 +93,8 @@ def test_tasks_are_all_cells_once_and_enough_for_all_workers(workers: int) -> No
     scenario = replace(load_scenario("demo"), vary={"noise": ["clean", "noise", "default"], "seed": [1, 2]})
     one = replace(scenario, motion=replace(scenario.motion, test=("golf_p1_01",), behaviours=("golf",)))
     for asked in (scenario, one, replace(one, vary={})):
-        names = planned_cells(asked)
-        tasks = tasks_of([asked], None, "", workers)
+        names = cell_names(asked)
+        tasks = plan_tasks([asked], None, "", workers)
         cut = [cell for task in tasks for cell in task.cells()]
         assert sorted(cut) == sorted(names)
         assert len(tasks) >= min(workers, len(names))
@@ -130,7 +130,7 @@ def test_more_methods_are_added_and_other_sweeps_refused(made_up: Path) -> None:
     (made_up / "mine" / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
         sweep(sweep_file(made_up), made_up / "mine")
-    with at_work(out), pytest.raises(BadInput, match="Another process is at work"):
+    with folder_lock(out), pytest.raises(BadInput, match="Another process is at work"):
         sweep(sweep_file(made_up), out)
 
 
@@ -174,13 +174,13 @@ def test_a_worker_that_dies_takes_one_cell_with_it(made_up: Path) -> None:
         function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
     ) -> Generator[tuple[int, Future[R]], None, None]:
         for which, task in enumerate(tasks):
-            (job,) = (part for part in task if isinstance(part, Job))
+            (job,) = (part for part in task if isinstance(part, ClipTask))
             if any(str(c) == "ik:previous+ik on boxing_p1_01 (noise=clean tracker.rate_hz=40)" for c in job.cells()):
                 future = Future[R]()
                 future.set_exception(BrokenExecutor("killed"))
                 yield which, future
             else:
-                yield from ((which, future) for _, future in here(function, [task]))
+                yield from ((which, future) for _, future in run_in_process(function, [task]))
 
     out = made_up / "out"
     assert sweep(sweep_file(made_up), out, each=deadly) is Outcome.INCOMPLETE
@@ -195,11 +195,11 @@ def test_the_first_ctrl_c_lets_cells_finish(
     made_up: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], number: signal.Signals
 ) -> None:
     def struck(*asked: Any) -> Any:
-        monkeypatch.setattr(cells, "judge", judge)
+        monkeypatch.setattr(cells, "evaluate_cell", judge)
         os.kill(os.getpid(), number)
         return judge(*asked)
 
-    monkeypatch.setattr(cells, "judge", struck)
+    monkeypatch.setattr(cells, "evaluate_cell", struck)
     command = ["sweep", str(sweep_file(made_up)), "--out", "out"]
     assert main(command) == 130
     said = capfd.readouterr()
@@ -218,7 +218,7 @@ def test_the_second_ctrl_c_stops_at_once(made_up: Path, monkeypatch: pytest.Monk
         os.kill(os.getpid(), signal.SIGINT)
         return judge(*asked)
 
-    monkeypatch.setattr(cells, "judge", struck)
+    monkeypatch.setattr(cells, "evaluate_cell", struck)
     assert main(["sweep", str(sweep_file(made_up)), "--out", "out"]) == 130
     assert list((made_up / "out" / "cells").iterdir()) == []
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -230,7 +230,7 @@ def test_what_measured_nothing_is_not_comparable(made_up: Path, monkeypatch: pyt
         none = dict.fromkeys(cell.metrics, None)
         return replace(cell, scores=replace(cell.scores, metrics={**none, "frames_matched": 0, "frames_expected": 9}))
 
-    monkeypatch.setattr(cells, "judge", silent)
+    monkeypatch.setattr(cells, "evaluate_cell", silent)
     assert sweep(sweep_file(made_up), made_up / "out") is Outcome.NOT_COMPARABLE
 
 
@@ -240,16 +240,16 @@ def test_cells_are_asked_for_again_and_again_in_one_folder(made_up: Path) -> Non
     one = replace(scenario.motion, test=("walking_p1_01",), behaviours=("walking",))
     scenario = replace(scenario, motion=one, vary={"noise": ["clean", "default"]})
     (made_up / "broken").touch()
-    first = run_cells([scenario], made_up, folder=None, each=here, command="")
+    first = run_cells([scenario], made_up, folder=None, each=run_in_process, command="")
     assert (first.planned, len(first.rows), len(first.failures)) == (4, 2, 2)
     made = {cell.key for cell in read_cells_of(made_up)}
     more = replace(scenario, methods=("ik:previous",), vary={"noise": ["noise", "clean"]})
-    second = run_cells([more], made_up, folder=None, each=here, command="")
+    second = run_cells([more], made_up, folder=None, each=run_in_process, command="")
     assert [row["varied"]["noise"] for row in second.rows] == ["noise", "clean"]
     assert [row["seconds"] is not None for row in second.rows] == [True, True]
     assert len({cell.key for cell in read_cells_of(made_up)} - made) == 1
     with pytest.raises(BadInput, match="Two cells are called 'demo seed 1: ik:previous on walking_p1_01"):
-        run_cells([more, more], made_up, folder=None, each=here, command="")
+        run_cells([more, more], made_up, folder=None, each=run_in_process, command="")
 
 
 def read_cells_of(out: Path) -> list[Any]:
@@ -296,7 +296,7 @@ def test_scenarios_beside_the_sweep_and_what_they_vary_are_taken(made_up: Path) 
     text = (Path(__file__).parents[2] / demo).read_text()
     (made_up / "mine.toml").write_text(f"{text}\n[vary]\nnoise = ['noise']\ncalibration = ['exact', 'tpose']\n")
     read, path = load_sweep(sweep_file(made_up, scenarios='["mine"]', seeds="[3, 4]"))
-    made = expand(read, path)
+    made = expand_sweep(read, path)
     assert [(scenario.name, scenario.seed) for scenario in made] == [("mine", 3), ("mine", 4)]
     assert made[0].vary == {
         "noise": ["clean", "default"],
@@ -304,10 +304,10 @@ def test_scenarios_beside_the_sweep_and_what_they_vary_are_taken(made_up: Path) 
         "tracker.rate_hz": [20.0, 40.0],
     }
     assert made[0].motion.behaviours == ("walking", "boxing")
-    assert [scenario.seed for scenario in expand(read, path, seed=9)] == [9]
+    assert [scenario.seed for scenario in expand_sweep(read, path, seed=9)] == [9]
 
 
 def test_shipped_sweeps_exist_and_can_be_run() -> None:
     read, path = load_sweep("noise_and_rate")
-    (scenario,) = expand(read, path)
-    assert len(planned_cells(scenario)) == 216
+    (scenario,) = expand_sweep(read, path)
+    assert len(cell_names(scenario)) == 216

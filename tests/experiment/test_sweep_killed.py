@@ -21,11 +21,11 @@ import numpy as np
 import pytest
 
 from harness.core.files import TEMPORARY
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cell_scheduler import Cells, run_cells, run_task
-from harness.experiment.cells import Job
-from harness.experiment.executors import Each, dask, here, processes
+from harness.experiment.cell_scheduler import CellResults, run_cells, run_task
+from harness.experiment.cells import ClipTask
+from harness.experiment.executors import TaskExecutor, dask_executor, process_executor, run_in_process
 from harness.experiment.scenario import Scenario
 from tests.study.papers.tiny import WALKS
 
@@ -36,7 +36,7 @@ TIMED = ("step_", "reference_cpu_ms", "first_step_ms", "fps", "seconds")
 """How names begin of what no two runs have alike."""
 
 
-def told(cells: Cells) -> list[str]:
+def told(cells: CellResults) -> list[str]:
     """The table: all that each row says but for times."""
     return [json.dumps({k: v for k, v in row.items() if not k.startswith(TIMED)}) for row in cells.rows]
 
@@ -58,7 +58,7 @@ def kept(out: Path) -> dict[str, str]:
     return digests
 
 
-def ran(out: Path, each: Each, scenario: Scenario = NOISY, workers: int = 2) -> Cells:
+def ran(out: Path, each: TaskExecutor, scenario: Scenario = NOISY, workers: int = 2) -> CellResults:
     out.mkdir(exist_ok=True)
     return run_cells([scenario], out, folder=None, each=each, command="harness sweep it", workers=workers)
 
@@ -95,7 +95,7 @@ def killing(out: Path, after: Callable[[int], bool], times: int = 1) -> Iterator
 
 def test_cells_cut_for_one_worker_or_sixteen_have_the_same_bytes(tmp_path: Path) -> None:
     scenario = replace(NOISY, vary={"components.echo.share": [0.0, 0.1]}, methods=("mean_pose",))
-    one = ran(tmp_path / "one", here, scenario, workers=1)
+    one = ran(tmp_path / "one", run_in_process, scenario, workers=1)
     many = ran(tmp_path / "many", backwards, scenario, workers=16)
     assert told(one) == told(many)
     assert kept(tmp_path / "one") == kept(tmp_path / "many")
@@ -103,7 +103,7 @@ def test_cells_cut_for_one_worker_or_sixteen_have_the_same_bytes(tmp_path: Path)
 
 
 def test_a_worker_that_does_not_see_the_folder_makes_none_of_its_own(tmp_path: Path) -> None:
-    job = Job(NOISY, Part("walking_p1_01"), "walking", None, "")
+    job = ClipTask(NOISY, ClipPart("walking_p1_01"), "walking", None, "")
     with pytest.raises(BadInput, match="does not see"):
         run_task("session", job, tmp_path / "elsewhere", tmp_path / "stop")
     assert not list(tmp_path.iterdir())
@@ -113,16 +113,16 @@ def backwards(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
     """As workers may end: the last task first."""
-    for which, future in here(function, tasks[::-1]):
+    for which, future in run_in_process(function, tasks[::-1]):
         yield len(tasks) - 1 - which, future
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("jobs", [2, 16])
 def test_workers_of_whom_some_are_killed_give_the_bytes_of_one(tmp_path: Path, jobs: int) -> None:
-    one = ran(tmp_path / "one", here)
+    one = ran(tmp_path / "one", run_in_process)
     with killing(tmp_path / "many", lambda count: count >= 2, times=2) as killed:
-        many = ran(tmp_path / "many", processes(jobs), workers=jobs)
+        many = ran(tmp_path / "many", process_executor(jobs), workers=jobs)
     assert len(killed) == 2
     assert many.failures == {}
     assert told(one) == told(many)
@@ -132,8 +132,8 @@ def test_workers_of_whom_some_are_killed_give_the_bytes_of_one(tmp_path: Path, j
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("distributed") is None, reason="no Dask: extra `cluster` is not installed")
 def test_workers_of_a_cluster_of_whom_some_are_killed_give_the_bytes_of_one(tmp_path: Path) -> None:
-    one = ran(tmp_path / "one", here)
-    with dask("local", workers=2) as each, killing(tmp_path / "many", lambda count: count >= 2, 2) as killed:
+    one = ran(tmp_path / "one", run_in_process)
+    with dask_executor("local", workers=2) as each, killing(tmp_path / "many", lambda count: count >= 2, 2) as killed:
         many = ran(tmp_path / "many", each)
     assert len(killed) == 2
     assert many.failures == {}

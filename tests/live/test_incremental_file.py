@@ -13,15 +13,15 @@ from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
 from harness.core.humanoid24 import unpack
 from harness.errors import BadFile
-from harness.live.bvh import Bvh
+from harness.live.bvh import BvhOutput
 from harness.live.pose import LivePose
-from harness.live.pose_table import Table
+from harness.live.pose_table import PoseTableOutput
 from harness.mocap.write.bvh import bvh_files
-from harness.mocap.write.posed_motion import Motion
+from harness.mocap.write.posed_motion import PosedMotion
 from tests.live.posing import configuration, frame, live_pose
 
 RATE_HZ = 40.0
-BODY = humanoid.build()
+BODY = humanoid.build_body()
 
 
 def walked(rng: np.random.Generator, frames: int) -> Floats:
@@ -42,16 +42,16 @@ def exported(qpos: Floats, frame_index: list[int]) -> str:
         joints_m.append(pose.joints_m)
         bones.append(rotations.to_matrix(pose.bones[1]))
     index = np.array(frame_index)
-    motion = Motion(
+    motion = PosedMotion(
         BODY.skeleton, RATE_HZ, index, index / RATE_HZ, world_from_root,
         angles_rad, np.array(joints_m), np.array(bones), {},
     )  # fmt: skip
     return bvh_files(motion)[".bvh"]
 
 
-def written(path: Path, qpos: Floats, frame_index: list[int]) -> Bvh:
+def written(path: Path, qpos: Floats, frame_index: list[int]) -> BvhOutput:
     """A BVH output that was sent these frames, still open."""
-    output, kinematics = Bvh(path, BODY.skeleton, RATE_HZ), Kinematics(BODY)
+    output, kinematics = BvhOutput(path, BODY.skeleton, RATE_HZ), Kinematics(BODY)
     for row, index in zip(qpos, frame_index, strict=True):
         at_s = index / RATE_HZ
         output.send(LivePose(index, frame(at_s), at_s, at_s, at_s, Estimate(row, Status.SOLVED), kinematics))
@@ -86,7 +86,7 @@ def test_a_long_break_is_one_frame(tmp_path: Path, rng: np.random.Generator) -> 
 
 def test_a_table_is_read_back_exactly(tmp_path: Path, rng: np.random.Generator) -> None:
     qpos, kinematics = walked(rng, 4), Kinematics(BODY)
-    output = Table(tmp_path / "poses.csv", BODY.skeleton, ("head", "hand"))
+    output = PoseTableOutput(tmp_path / "poses.csv", BODY.skeleton, ("head", "hand"))
     for n, row in enumerate(qpos):
         output.send(
             LivePose(n, frame(n / 3, n / 7), n / 3 + 0.1, n / 3 + 0.2, 0.0, Estimate(row, Status.HELD), kinematics)
@@ -109,24 +109,24 @@ def test_a_table_is_read_back_exactly(tmp_path: Path, rng: np.random.Generator) 
 def test_nothing_is_written_over_unless_told(tmp_path: Path, rng: np.random.Generator) -> None:
     path = tmp_path / "there"
     path.write_text("mine")
-    for make in (lambda: Bvh(path, BODY.skeleton, RATE_HZ), lambda: Table(path, BODY.skeleton, ())):
+    for make in (lambda: BvhOutput(path, BODY.skeleton, RATE_HZ), lambda: PoseTableOutput(path, BODY.skeleton, ())):
         with pytest.raises(BadFile, match="it exists"):
             make()
     assert path.read_text() == "mine"
-    output = Table(path, BODY.skeleton, ("a", "b"), force=True)
+    output = PoseTableOutput(path, BODY.skeleton, ("a", "b"), force=True)
     output.send(live_pose(configuration(rng)))
     output.close()
     assert path.read_text().startswith("frame,status")
     with pytest.raises(BadFile, match="cannot be written"):
-        Table(tmp_path / "no" / "folder", BODY.skeleton, ())
+        PoseTableOutput(tmp_path / "no" / "folder", BODY.skeleton, ())
 
 
 def test_a_file_is_written_over_by_the_first_pose_not_before(tmp_path: Path, rng: np.random.Generator) -> None:
     path, link = tmp_path / "there", tmp_path / "link"
     link.symlink_to(path)
     for make in (
-        lambda: Bvh(link, BODY.skeleton, RATE_HZ, force=True),
-        lambda: Table(path, BODY.skeleton, ("a", "b"), force=True),
+        lambda: BvhOutput(link, BODY.skeleton, RATE_HZ, force=True),
+        lambda: PoseTableOutput(path, BODY.skeleton, ("a", "b"), force=True),
     ):
         path.write_text("mine")
         output = make()
@@ -154,8 +154,8 @@ def test_what_cannot_take_its_place_leaves_the_old_file(
     path.write_text("mine")
     monkeypatch.setattr("os.replace", refused)
     for output in (
-        Bvh(path, BODY.skeleton, RATE_HZ, force=True),
-        Table(path, BODY.skeleton, ("a", "b"), force=True),
+        BvhOutput(path, BODY.skeleton, RATE_HZ, force=True),
+        PoseTableOutput(path, BODY.skeleton, ("a", "b"), force=True),
     ):
         with pytest.raises(PermissionError):
             output.send(live_pose(configuration(rng)))
@@ -163,11 +163,14 @@ def test_what_cannot_take_its_place_leaves_the_old_file(
         assert path.read_text() == "mine"
         assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(BadFile, match="it is no file"):
-        Table(tmp_path, BODY.skeleton, (), force=True)
+        PoseTableOutput(tmp_path, BODY.skeleton, (), force=True)
 
 
 def test_no_file_is_left_of_no_frame(tmp_path: Path) -> None:
-    for output in (Bvh(tmp_path / "a.bvh", BODY.skeleton, RATE_HZ), Table(tmp_path / "a.csv", BODY.skeleton, ())):
+    for output in (
+        BvhOutput(tmp_path / "a.bvh", BODY.skeleton, RATE_HZ),
+        PoseTableOutput(tmp_path / "a.csv", BODY.skeleton, ()),
+    ):
         output.close()
         output.close()
     assert not list(tmp_path.iterdir())

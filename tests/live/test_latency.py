@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from harness.live.clock import HostTime
-from harness.live.latency import Durations, Stages
+from harness.live.clock import HostClockEstimator
+from harness.live.latency import DurationHistogram, StageLatencies
 from tests.live.posing import frame
 
 
 def test_quantiles_are_those_of_the_values(rng: np.random.Generator) -> None:
-    values_s, durations = rng.exponential(0.004, size=5000), Durations()
+    values_s, durations = rng.exponential(0.004, size=5000), DurationHistogram()
     for value_s in values_s.tolist():
         durations.add(value_s)
     for share in (0.5, 0.9, 0.99):
@@ -19,7 +19,7 @@ def test_quantiles_are_those_of_the_values(rng: np.random.Generator) -> None:
 
 
 def test_few_none_and_long_ones() -> None:
-    durations = Durations()
+    durations = DurationHistogram()
     assert np.isnan(durations.quantile_s(0.5))
     assert durations.as_dict() == {"p50_ms": None, "p99_ms": None, "max_ms": None}
     durations.add(0.00301)
@@ -31,7 +31,7 @@ def test_few_none_and_long_ones() -> None:
 
 
 def test_stages_add_up_and_only_the_late_are_late() -> None:
-    stages = Stages(deadline_s=0.010)
+    stages = StageLatencies(deadline_s=0.010)
     stages.add(1.000, 1.001, 1.004, 1.006)
     stages.add(2.000, 2.003, 2.0101, 2.011)
     assert stages.missed == 1
@@ -41,7 +41,7 @@ def test_stages_add_up_and_only_the_late_are_late() -> None:
 
 
 def test_the_host_time_of_a_measurement_forgets_late_frames(rng: np.random.Generator) -> None:
-    clock, true_s, delay_s = HostTime(), np.arange(4000) / 75.0, 0.005
+    clock, true_s, delay_s = HostClockEstimator(), np.arange(4000) / 75.0, 0.005
     held_up_s = rng.exponential(0.004, size=4000)
     drift = 1.0 + 2e-5
     found_s = [
@@ -54,7 +54,7 @@ def test_the_host_time_of_a_measurement_forgets_late_frames(rng: np.random.Gener
 
 
 def test_a_device_that_sets_its_clock_anew_is_followed() -> None:
-    clock = HostTime()
+    clock = HostClockEstimator()
     clock.measured_s(frame(100.0, 50.0))
     assert clock.measured_s(frame(100.1, 50.1)) == pytest.approx(100.1)
     assert clock.measured_s(frame(100.2, 0.0)) == pytest.approx(100.2)

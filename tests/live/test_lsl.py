@@ -8,19 +8,19 @@ import pytest
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics, joint_centres_m
 from harness.errors import BadInput, MissingExtra
-from harness.live.lsl import Lsl, library
+from harness.live.lsl import LslOutput, import_pylsl
 from tests.live.posing import configuration, live_pose
 
 try:
-    pylsl = library()
+    pylsl = import_pylsl()
 except MissingExtra as missing:
     pytest.skip(f"no Lab Streaming Layer here: {missing}", allow_module_level=True)
 
 
 def test_samples_arrive_with_their_times(rng: np.random.Generator) -> None:
-    body = humanoid.build()
+    body = humanoid.build_body()
     name = f"test-{rng.integers(1 << 60)}"
-    output = Lsl(name, body.skeleton, 75.0)
+    output = LslOutput(name, body.skeleton, 75.0)
     inlets = {}
     for kind in ("qpos", "joints"):
         (found,) = pylsl.resolve_byprop("name", f"{name}-{kind}", timeout=30.0)
@@ -49,4 +49,4 @@ def test_samples_arrive_with_their_times(rng: np.random.Generator) -> None:
 
 def test_a_stream_has_a_name() -> None:
     with pytest.raises(BadInput, match="without a name"):
-        Lsl(" ", humanoid.build().skeleton, 75.0)
+        LslOutput(" ", humanoid.build_body().skeleton, 75.0)

@@ -8,14 +8,14 @@ from PIL import Image
 from harness.calibrate.poses import POSES
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadFile
-from harness.live.pose_sheet import SHEET, draw_poses
+from harness.live.pose_sheet import SHEET_NAME, draw_poses
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
 
 
 def test_each_pose_and_all_on_a_sheet(tmp_path: Path) -> None:
     drawn = draw_poses(POSES[:2], standard_skeleton(), tmp_path, force=False)
-    assert [path.name for path in drawn] == ["pose_1.png", "pose_2.png", SHEET]
+    assert [path.name for path in drawn] == ["pose_1.png", "pose_2.png", SHEET_NAME]
     assert sorted(tmp_path.iterdir()) == drawn
     pictures = [Image.open(path).convert("RGB") for path in drawn]
     assert pictures[0].size == pictures[1].size == (640, 640)

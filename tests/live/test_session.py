@@ -11,28 +11,28 @@ import numpy as np
 import pytest
 
 from harness.body import humanoid
-from harness.calibrate.guided_calibration import Say, StandInTPose
-from harness.calibrate.hold import NotStanding
+from harness.calibrate.guided_calibration import Notifier, TPoseCalibrator
+from harness.calibrate.hold import UnusableHold
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.experiment.clip_evaluation import mounts_of, noise_of
-from harness.experiment.playback import Rehearsal, rehearse
+from harness.experiment.playback import Playback, prepare_playback
 from harness.live import summary
 from harness.live.pose import LivePose
-from harness.live.scheduling_jitter import Floor
-from harness.live.session import Performed, Plan, perform, warm_up
-from harness.simulate.simulation import simulate
+from harness.live.scheduling_jitter import JitterProbe
+from harness.live.session import LiveOptions, LiveResult, run_session, warm_up
+from harness.simulate.simulation import simulate_tracker
 from harness.stream.frame import TrackerFrame, TrackerStream
 from tests.live.posing import frame
 from tests.live.streams import Broken, Paced
 
-BODY = humanoid.build()
+BODY = humanoid.build_body()
 WORN = Calibration(
     "exact", ("a", "b"), ("head", "lhand"), np.zeros((2, 3)), np.tile([1.0, 0, 0, 0], (2, 1)),
     np.array([1.0, 0, 0, 0]), np.zeros(3),
 )  # fmt: skip
-PLAN = Plan(rate_hz=100.0)
+PLAN = LiveOptions(rate_hz=100.0)
 
 
 class Counting:
@@ -82,8 +82,8 @@ def _nothing_is_left() -> Iterator[None]:
     assert (sys.getswitchinterval(), gc.isenabled(), gc.get_freeze_count()) == (interval, enabled, 0)
 
 
-def performed(stream: TrackerStream, method: Counting, *outputs: Kept, plan: Plan = PLAN) -> Performed:
-    return perform(stream, BODY, method, WORN, outputs, plan)
+def performed(stream: TrackerStream, method: Counting, *outputs: Kept, plan: LiveOptions = PLAN) -> LiveResult:
+    return run_session(stream, BODY, method, WORN, outputs, plan)
 
 
 def frames(count: int) -> list[TrackerFrame]:
@@ -92,7 +92,7 @@ def frames(count: int) -> list[TrackerFrame]:
 
 def test_every_frame_becomes_a_pose_when_there_is_time() -> None:
     stream, method, output = Paced(frames(20), 0.005), Counting(), Kept()
-    done = performed(stream, method, output, plan=Plan(100.0, queue_frames=100))
+    done = performed(stream, method, output, plan=LiveOptions(100.0, queue_frames=100))
     assert (done.captured, done.poses, done.dropped, done.before) == (20, 20, 0, 0)
     assert [float(f.measured_s[0]) for f in method.seen] == [n / 100.0 for n in range(20)]
     assert [pose.number for pose in output.poses] == list(range(20))
@@ -105,7 +105,7 @@ def test_every_frame_becomes_a_pose_when_there_is_time() -> None:
 def test_a_slow_method_gets_the_newest_and_capture_never_waits() -> None:
     method = Counting(takes_s=0.05)
     began_s = time.monotonic()
-    done = performed(Paced(frames(200), 0.001), method, plan=Plan(1000.0, queue_frames=2))
+    done = performed(Paced(frames(200), 0.001), method, plan=LiveOptions(1000.0, queue_frames=2))
     assert done.captured == 200
     assert done.poses + done.dropped == 200
     assert done.dropped > 50
@@ -116,7 +116,7 @@ def test_a_slow_method_gets_the_newest_and_capture_never_waits() -> None:
 
 def test_it_ends_after_its_time() -> None:
     stream = Paced(frames(3), ends=False)
-    assert performed(stream, Counting(), plan=Plan(100.0, seconds=0.3)).captured == 3
+    assert performed(stream, Counting(), plan=LiveOptions(100.0, seconds=0.3)).captured == 3
     assert stream.closed.is_set()
 
 
@@ -130,7 +130,7 @@ def test_ctrl_c_is_a_normal_end() -> None:
             raise KeyboardInterrupt
         return time.monotonic()
 
-    done = perform(stream, BODY, method, WORN, [output], Plan(100.0, seconds=60.0), clock=clock)
+    done = run_session(stream, BODY, method, WORN, [output], LiveOptions(100.0, seconds=60.0), clock=clock)
     assert done.captured == 3
     assert output.closed == 1
     assert stream.closed.is_set()
@@ -147,8 +147,14 @@ def test_what_breaks_is_raised_after_all_is_closed() -> None:
 
 def test_an_output_that_fails_is_left_out_and_the_others_go_on() -> None:
     good, bad, said = Kept(), Kept(fails_at=2), list[str]()
-    done = perform(
-        Paced(frames(5), 0.005), BODY, Counting(), WORN, [bad, good], Plan(100.0, queue_frames=9), say=said.append
+    done = run_session(
+        Paced(frames(5), 0.005),
+        BODY,
+        Counting(),
+        WORN,
+        [bad, good],
+        LiveOptions(100.0, queue_frames=9),
+        say=said.append,
     )
     assert (len(good.poses), len(bad.poses), bad.closed) == (5, 2, 1)
     assert done.failed == {"kept": "no room"}
@@ -165,8 +171,8 @@ def test_any_error_of_an_output_leaves_it_out() -> None:
 
     good, bad, stuck, said = Kept(), Kept(2, ValueError("the library failed")), Unclosable(), list[str]()
     outputs = [good, bad, stuck]
-    done = perform(
-        Paced(frames(5), 0.005), BODY, Counting(), WORN, outputs, Plan(100.0, queue_frames=9), say=said.append
+    done = run_session(
+        Paced(frames(5), 0.005), BODY, Counting(), WORN, outputs, LiveOptions(100.0, queue_frames=9), say=said.append
     )
     assert (len(good.poses), len(bad.poses), len(stuck.poses)) == (5, 2, 5)
     assert (good.closed, bad.closed, stuck.closed) == (1, 1, 1)
@@ -180,10 +186,10 @@ class AfterTwo:
     def __init__(self) -> None:
         self.frames = 0
 
-    def begin(self, say: Say) -> None:
+    def begin(self, say: Notifier) -> None:
         say("stand still")
 
-    def add(self, frame: TrackerFrame, say: Say) -> Calibration | None:
+    def add(self, frame: TrackerFrame, say: Notifier) -> Calibration | None:
         self.frames += 1
         return WORN if self.frames == 2 else None
 
@@ -191,39 +197,41 @@ class AfterTwo:
 def test_calibration_comes_before_the_first_pose() -> None:
     said: list[str] = []
     method = Counting()
-    done = perform(Paced(frames(10), 0.01), BODY, method, AfterTwo(), [], Plan(100.0, queue_frames=99), say=said.append)
+    done = run_session(
+        Paced(frames(10), 0.01), BODY, method, AfterTwo(), [], LiveOptions(100.0, queue_frames=99), say=said.append
+    )
     assert said == ["stand still"]
     assert method.worn is WORN
     assert done.before >= 2
     assert done.before + done.poses == 10
-    assert perform(Paced(frames(1)), BODY, Counting(), AfterTwo(), [], PLAN, say=said.append).poses == 0
+    assert run_session(Paced(frames(1)), BODY, Counting(), AfterTwo(), [], PLAN, say=said.append).poses == 0
     assert said[-1] == "calibration: the stream ended before it was done"
 
 
 @pytest.fixture(scope="module")
-def worn() -> Rehearsal:
-    return rehearse("demo", clip="boxing_p1_01", noise="clean")
+def worn() -> Playback:
+    return prepare_playback("demo", clip="boxing_p1_01", noise="clean")
 
 
-def test_nobody_in_t_pose_is_told_so(worn: Rehearsal) -> None:
+def test_nobody_in_t_pose_is_told_so(worn: Playback) -> None:
     said: list[str] = []
     boxing = worn.simulation.frames
-    standing = StandInTPose(worn.body, mounts_of(worn.scenario), attempts=2)
-    recorded, plan = Paced(boxing, stamped=False), Plan(40.0, queue_frames=9999, stamped_here=False)
-    with pytest.raises(NotStanding):
-        perform(recorded, worn.body, Counting(), standing, [], plan, say=said.append)
+    standing = TPoseCalibrator(worn.body, mounts_of(worn.scenario), attempts=2)
+    recorded, plan = Paced(boxing, stamped=False), LiveOptions(40.0, queue_frames=9999, stamped_here=False)
+    with pytest.raises(UnusableHold):
+        run_session(recorded, worn.body, Counting(), standing, [], plan, say=said.append)
     assert said[0].startswith("calibration: stand in T-pose")
     assert "Trying again" in said[1]
     assert len(said) == 2
 
 
-def test_a_t_pose_is_calibrated_from(worn: Rehearsal) -> None:
+def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     from harness.reconstruct import registry
 
     upright = humanoid.tpose(worn.body.skeleton)
-    take = Take("stand", "p1", "test", "", 40.0, np.tile(upright, (200, 1)))
+    take = BodyMotion("stand", "p1", "test", "", 40.0, np.tile(upright, (200, 1)))
     noise = noise_of(worn.scenario)
-    standing = simulate(worn.body, take, mounts_of(worn.scenario), worn.tracker, noise, seed=1).frames
+    standing = simulate_tracker(worn.body, take, mounts_of(worn.scenario), worn.tracker, noise, seed=1).frames
     output, said = Kept(), list[str]()
 
     def stands() -> Iterator[TrackerFrame]:
@@ -235,13 +243,13 @@ def test_a_t_pose_is_calibrated_from(worn: Rehearsal) -> None:
             last = standing[-1]
             yield replace(last, received_s=last.received_s + n / 40.0, measured_s=last.measured_s + n / 40.0)
 
-    perform(
+    run_session(
         Paced(stands(), 0.005, stamped=False),
         worn.body,
         worn.setting.fitted(registry.resolve("ik"), "ik"),
-        StandInTPose(worn.body, mounts_of(worn.scenario)),
+        TPoseCalibrator(worn.body, mounts_of(worn.scenario)),
         [output],
-        Plan(40.0, queue_frames=999, stamped_here=False),
+        LiveOptions(40.0, queue_frames=999, stamped_here=False),
         say=said.append,
     )
     assert said[1].startswith("calibration: done")
@@ -250,7 +258,7 @@ def test_a_t_pose_is_calibrated_from(worn: Rehearsal) -> None:
         np.testing.assert_allclose(pose.root_m, upright[:3], atol=0.03)
 
 
-def test_live_estimates_are_those_of_a_run(worn: Rehearsal) -> None:
+def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
     from harness.reconstruct import registry
 
     boxing = worn.simulation.frames[:60]
@@ -259,7 +267,7 @@ def test_live_estimates_are_those_of_a_run(worn: Rehearsal) -> None:
     session = reconstructor.begin(worn.calibration)
     offline = [session.step(frame) for frame in boxing]
     output = Kept()
-    perform(Paced(boxing), worn.body, reconstructor, worn.calibration, [output], Plan(40.0, queue_frames=99))
+    run_session(Paced(boxing), worn.body, reconstructor, worn.calibration, [output], LiveOptions(40.0, queue_frames=99))
     assert len(output.poses) == 60
     for pose, estimate in zip(output.poses, offline, strict=True):
         np.testing.assert_array_equal(pose.estimate.qpos, estimate.qpos)
@@ -267,7 +275,7 @@ def test_live_estimates_are_those_of_a_run(worn: Rehearsal) -> None:
 
 
 def test_a_summary_says_what_happened() -> None:
-    done = performed(Paced(frames(5), 0.01), Counting(), plan=Plan(100.0, queue_frames=9))
+    done = performed(Paced(frames(5), 0.01), Counting(), plan=LiveOptions(100.0, queue_frames=9))
     times = {"p50_ms": 0.1, "p99_ms": 0.25, "max_ms": 7.5}
     beside = {"timer": times, "handover": times, "sleeps": 7}
     content = summary.as_dict(done, beside)
@@ -281,7 +289,7 @@ def test_a_summary_says_what_happened() -> None:
 
 
 def test_the_floor_is_measured_until_asked() -> None:
-    with Floor() as floor:
+    with JitterProbe() as floor:
         time.sleep(1.0)
         found = floor.finish()
     assert found["sleeps"] > 0

@@ -10,11 +10,11 @@ import pytest
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
 from harness.errors import BadFile, BadInput
-from harness.live.viewer import View, _made
+from harness.live.viewer import ViewerOutput, _prepare_folder
 from tests.live.posing import live_pose
 
 pytest.importorskip("pyvista", reason="pyvista is not installed (extra `viz`)")
-OWN = humanoid.build().skeleton
+OWN = humanoid.build_body().skeleton
 
 
 def wait_for(pictures: int, folder: Path) -> list[Path]:
@@ -28,8 +28,8 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
     from matplotlib.image import imread
 
     shown, kinematics = (
-        View("frames", OWN, tmp_path / "frames", force=False),
-        Kinematics(humanoid.build()),
+        ViewerOutput("frames", OWN, tmp_path / "frames", force=False),
+        Kinematics(humanoid.build_body()),
     )
     try:
         qpos = np.array(humanoid.tpose(OWN))
@@ -48,7 +48,7 @@ def test_frames_show_the_newest_pose(tmp_path: Path) -> None:
     assert first.shape[:2] == (640, 640)
     assert np.abs(first - last).mean() > 1e-3
     with pytest.raises(BadFile, match="pictures in it"):
-        View("frames", OWN, tmp_path / "frames", force=False)
+        ViewerOutput("frames", OWN, tmp_path / "frames", force=False)
 
 
 def test_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
@@ -57,14 +57,14 @@ def test_pictures_of_others_are_left_alone(tmp_path: Path) -> None:
     for path in (*mine, *ours):
         path.write_text("")
     with pytest.raises(BadFile, match="there are 2 pictures in it"):
-        _made(tmp_path, force=False)
-    _made(tmp_path, force=True)
+        _prepare_folder(tmp_path, force=False)
+    _prepare_folder(tmp_path, force=True)
     assert sorted(tmp_path.iterdir()) == sorted(mine)
-    _made(tmp_path, force=False)
+    _prepare_folder(tmp_path, force=False)
 
 
 def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
-    shown = View("frames", OWN, tmp_path, force=False)
+    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
     shown._process.kill()
     shown._process.join()
     with pytest.raises(OSError, match="ended"):
@@ -74,19 +74,19 @@ def test_a_dead_view_is_an_output_that_failed(tmp_path: Path) -> None:
 
 def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadInput, match="needs a folder"):
-        View("frames", OWN, force=False)
+        ViewerOutput("frames", OWN, force=False)
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(BadInput, match="there is no screen"):
-        View("window", OWN, force=False)
+        ViewerOutput("window", OWN, force=False)
     (tmp_path / "file").write_text("")
     with pytest.raises(BadFile, match="cannot be made"):
-        View("frames", OWN, tmp_path / "file", force=False)
+        ViewerOutput("frames", OWN, tmp_path / "file", force=False)
 
 
 def test_a_pose_is_shown_until_the_next(tmp_path: Path) -> None:
-    shown = View("frames", OWN, tmp_path, force=False)
+    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
     try:
         for number in (1, 2):
             shown.show(number, np.array(humanoid.tpose(OWN)))

@@ -13,7 +13,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.live.unity import HIPS, UNITY_BONES, UnityPose
-from harness.live.vmc import Vmc, parse_address
+from harness.live.vmc import VmcOutput, parse_address
 from tests.live.posing import configuration, live_pose
 
 osc_packet = pytest.importorskip("pythonosc.osc_packet", reason="python-osc is not installed (extra `live`)")
@@ -64,9 +64,9 @@ def rebuilt(messages: list[Message]) -> dict[str, tuple[Floats, Floats]]:
 
 
 def test_a_receiver_rebuilds_the_joints(rng: np.random.Generator) -> None:
-    skeleton = humanoid.build().skeleton
+    skeleton = humanoid.build_body().skeleton
     with receiver() as ours:
-        output = Vmc(f"127.0.0.1:{ours.getsockname()[1]}", skeleton)
+        output = VmcOutput(f"127.0.0.1:{ours.getsockname()[1]}", skeleton)
         try:
             for _ in range(20):
                 pose = live_pose(configuration(rng))
@@ -84,7 +84,7 @@ def test_a_receiver_rebuilds_the_joints(rng: np.random.Generator) -> None:
 
 def test_the_messages_are_those_of_the_protocol(rng: np.random.Generator) -> None:
     with receiver() as ours:
-        output = Vmc(str(ours.getsockname()[1]), humanoid.build().skeleton)
+        output = VmcOutput(str(ours.getsockname()[1]), humanoid.build_body().skeleton)
         output.send(live_pose(configuration(rng), at_s=5.0))
         received(ours, 2)
         output.send(live_pose(configuration(rng), at_s=5.5))
@@ -101,7 +101,7 @@ def test_the_messages_are_those_of_the_protocol(rng: np.random.Generator) -> Non
 
 
 def test_the_t_pose_turns_no_bone() -> None:
-    body = humanoid.build()
+    body = humanoid.build_body()
     local = UnityPose(body.skeleton).local(live_pose(humanoid.tpose(body.skeleton)))
     np.testing.assert_allclose(local[:, 3:], np.tile([0.0, 0.0, 0.0, 1.0], (len(local), 1)), atol=1e-9)
     at_m = dict(zip((HIPS, *UNITY_BONES), local[:, :3], strict=True))
@@ -112,7 +112,7 @@ def test_the_t_pose_turns_no_bone() -> None:
 
 def test_a_raised_forearm_turns_as_in_unity() -> None:
     """Left elbow bent by 90 deg, the hand ahead: from pointing left (-x) to forward (+z) about y, left-handed: +90."""
-    body = humanoid.build()
+    body = humanoid.build_body()
     qpos = np.array(humanoid.tpose(body.skeleton))
     kinematics = Kinematics(body)
     hinge = int(body.model.joint("lradius.rx").qposadr[0])
@@ -137,4 +137,4 @@ def test_a_port_alone_is_on_this_computer() -> None:
     assert parse_address("39539") == parse_address(":39539") == ("127.0.0.1", 39539)
     assert parse_address("[::1]:39539") == ("::1", 39539)
     with pytest.raises(BadInput, match="no such host"):
-        Vmc("no..host:39539", humanoid.build().skeleton)
+        VmcOutput("no..host:39539", humanoid.build_body().skeleton)

@@ -189,6 +189,6 @@ def test_real_files_pass_as_cmus(mocap: Path, tmp_path: Path, monkeypatch: pytes
     """Two real files through the checks that a download goes through."""
     for name in ("13.asf", "13_30.amc"):
         (tmp_path / name).write_bytes((mocap / "cmu" / "13" / name).read_bytes())
-        fetch._check(tmp_path / name, name, shipped_sha256()[f"13/{name}"], tmp_path)
+        fetch._check_file(tmp_path / name, name, shipped_sha256()[f"13/{name}"], tmp_path)
     with pytest.raises(BadFile, match="SHA-256"):
-        fetch._check(tmp_path / "13_30.amc", "13_30.amc", shipped_sha256()["13/13_17.amc"], tmp_path)
+        fetch._check_file(tmp_path / "13_30.amc", "13_30.amc", shipped_sha256()["13/13_17.amc"], tmp_path)

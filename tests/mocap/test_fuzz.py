@@ -42,7 +42,7 @@ SOUND: dict[str, tuple[bytes, Callable[[Path], object]]] = {
     "asf": (asf_text(SKELETON).encode(), read_asf),
     "amc": (amc_text(clip(3)).encode(), lambda path: read_amc(path, SKELETON, rate_hz=120.0)),
     "bvh": (bvh_text(clip(2)).encode(), bvh.read_bvh),
-    "npz": (_npz(), amass.read_npz),
+    "npz": (_npz(), amass.read_amass),
     "c3d": (_c3d(), check_header),
 }
 PLACE = st.floats(0.0, 1.0, exclude_max=True)

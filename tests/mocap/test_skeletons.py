@@ -8,17 +8,17 @@ import pytest
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput
 from harness.mocap import synthetic
-from harness.mocap.skeletons import skeletons
+from harness.mocap.skeletons import read_skeletons
 from tests.mocap.sample_files import asf_text
 
 
 def test_copies_count_once_and_lengths_come_back_in_metres(tmp_path: Path) -> None:
-    people = synthetic.population(3, seed=1)
+    people = synthetic.sample_skeletons(3, seed=1)
     for subject, person in zip(("9", "10", "11"), people, strict=True):
         for where in ("asf", f"cmu/{subject}"):
             (tmp_path / where).mkdir(parents=True, exist_ok=True)
             (tmp_path / where / f"{subject}.asf").write_text(asf_text(person))
-    found = skeletons(tmp_path)
+    found = read_skeletons(tmp_path)
     assert tuple(found) == ("10", "11", "9")
     for subject, person in zip(("9", "10", "11"), people, strict=True):
         assert found[subject].names == BONES
@@ -27,21 +27,21 @@ def test_copies_count_once_and_lengths_come_back_in_metres(tmp_path: Path) -> No
 
 
 def test_two_skeletons_of_one_subject_are_refused(tmp_path: Path) -> None:
-    first, second = synthetic.population(2, seed=1)
+    first, second = synthetic.sample_skeletons(2, seed=1)
     for where, person in (("a", first), ("b", second)):
         (tmp_path / where).mkdir()
         (tmp_path / where / "91.asf").write_text(asf_text(person))
     with pytest.raises(BadFile, match="another skeleton of subject 91"):
-        skeletons(tmp_path)
+        read_skeletons(tmp_path)
 
 
 def test_what_is_no_skeleton_of_24_bones_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no ASF"):
-        skeletons(tmp_path)
+        read_skeletons(tmp_path)
     trunk = standard_skeleton().subset(BONES[:6])[0]
     (tmp_path / "91.asf").write_text(asf_text(trunk))
     with pytest.raises(BadFile, match=r"91\.asf.*lclavicle"):
-        skeletons(tmp_path)
+        read_skeletons(tmp_path)
 
 
 def test_files_outside_the_folder_are_not_read(tmp_path: Path) -> None:
@@ -49,11 +49,11 @@ def test_files_outside_the_folder_are_not_read(tmp_path: Path) -> None:
     (tmp_path / "library").mkdir()
     (tmp_path / "library" / "91.asf").symlink_to(tmp_path / "elsewhere.asf")
     with pytest.raises(BadInput, match="no ASF"):
-        skeletons(tmp_path / "library")
+        read_skeletons(tmp_path / "library")
 
 
 def test_the_library_has_twenty_people_of_a_persons_size(mocap: Path) -> None:
-    found = skeletons(mocap)
+    found = read_skeletons(mocap)
     assert len(found) == len(list((mocap / "asf").glob("*.asf"))) == 20
     legs = [person.length_m[[BONES.index("ltibia"), BONES.index("lfemur")]].sum() for person in found.values()]
     assert 0.73 < min(legs) < max(legs) < 0.91

@@ -7,18 +7,18 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import joint_centres_m
-from harness.body.retargeting import to_own_body
+from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
 from harness.reconstruct.contract import Method
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
-from harness.stream.inputs import combination
-from harness.testing.frames import exact_frames, worn
+from harness.stream.inputs import make_inputs
+from harness.testing.frames import exact_calibration, exact_frames
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class Scene:
 
     body: Body
     calibration: Calibration
-    take: Take
+    take: BodyMotion
     frames: list[TrackerFrame]
 
     def run(self, method: Method, frames: list[TrackerFrame] | None = None) -> list[Estimate]:
@@ -37,7 +37,7 @@ class Scene:
 
     def only(self, inputs: str) -> list[TrackerFrame]:
         """The frames with nothing but these inputs."""
-        kept = combination(inputs, self.calibration.stations)
+        kept = make_inputs(inputs, self.calibration.stations)
         return [kept.masked(frame) for frame in self.frames]
 
     def off_m(self, estimates: list[Estimate], truth: Floats) -> Floats:
@@ -58,9 +58,9 @@ class Scene:
 
 
 def scene(behaviour: str, take: int = 1, seconds: float = 3.0) -> Scene:
-    clip = synthetic.generate(behaviour, synthetic.performers()[0], take, seed=1, duration_s=seconds, rate_hz=40.0)
-    body, on_body = to_own_body(clip)
-    calibration = worn(body)
+    clip = synthetic.generate(behaviour, synthetic.performer_names()[0], take, seed=1, duration_s=seconds, rate_hz=40.0)
+    body, on_body = retarget_to_own_body(clip)
+    calibration = exact_calibration(body)
     return Scene(body, calibration, on_body, exact_frames(body, calibration, on_body.qpos))
 
 

@@ -11,21 +11,21 @@ import numpy as np
 import pytest
 
 from harness.body.kinematics import joint_centres_m
-from harness.body.retargeting import to_common_body
+from harness.body.retargeting import retarget_to_common_body
 from harness.core.estimate import Status
-from harness.core.motion import Take
-from harness.core.workers import call_each
+from harness.core.motion import BodyMotion
+from harness.core.workers import run_in_workers
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
-from harness.score.angles import wrapped
+from harness.score.angles import wrap_angle
 from harness.testing import method_checks
-from harness.testing.contract_case import make_trial
+from harness.testing.contract_case import make_case
 from harness.testing.frames import exact_frames
 from harness.testing.method_checks import check_method
 from harness.testing.rules import RULES
-from harness.testing.rules.assertions import same
-from harness.testing.rules.reproducibility import answers, bears_another_process
+from harness.testing.rules.assertions import require_identical
+from harness.testing.rules.reproducibility import estimate_qpos, works_in_another_process
 
 from .conftest import Scene, moved, scene
 
@@ -63,15 +63,16 @@ def walk() -> Scene:
 
 
 @cache
-def others() -> tuple[Take, ...]:
+def others() -> tuple[BodyMotion, ...]:
     """Two takes of other people, on the body of the one who walks."""
     clips = [
-        synthetic.generate(b, synthetic.performers()[p], 1, seed=1, duration_s=4.0, rate_hz=40.0) for b, p in _OTHERS
+        synthetic.generate(b, synthetic.performer_names()[p], 1, seed=1, duration_s=4.0, rate_hz=40.0)
+        for b, p in _OTHERS
     ]
-    return tuple(to_common_body(clip, walk().body.skeleton)[0] for clip in clips)
+    return tuple(retarget_to_common_body(clip, walk().body.skeleton)[0] for clip in clips)
 
 
-def errors(method: Method, examples: list[Take], shown: Scene) -> tuple[float, float]:
+def errors(method: Method, examples: list[BodyMotion], shown: Scene) -> tuple[float, float]:
     """Mean hinge error [deg] and joint distance [mm] after the first half second."""
     session = method.fit(shown.body, examples if method.needs_examples else [], np.random.default_rng(1)).begin(
         shown.calibration
@@ -81,7 +82,7 @@ def errors(method: Method, examples: list[Take], shown: Scene) -> tuple[float, f
     said, true = np.array([e.qpos for e in estimates])[20:], shown.take.qpos[20:]
     skeleton = shown.body.skeleton
     off_m = np.linalg.norm(joint_centres_m(skeleton, said) - joint_centres_m(skeleton, true), axis=2)
-    return float(np.rad2deg(np.abs(wrapped(said[:, 7:] - true[:, 7:]))).mean()), 1e3 * float(off_m.mean())
+    return float(np.rad2deg(np.abs(wrap_angle(said[:, 7:] - true[:, 7:]))).mean()), 1e3 * float(off_m.mean())
 
 
 @cache
@@ -115,7 +116,7 @@ def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> N
 @pytest.mark.parametrize("name", [*NAMES, *ALSO])
 def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """All but the rule that is the next test's."""
-    rules = {rule: check for rule, check in RULES.items() if check is not bears_another_process}
+    rules = {rule: check for rule, check in RULES.items() if check is not works_in_another_process}
     assert len(rules) == len(RULES) - 1
     monkeypatch.setattr(method_checks, "RULES", rules)
     check_method(registry.resolve(name))
@@ -123,8 +124,8 @@ def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_what_was_fitted_may_go_to_another_process() -> None:
     """One for all methods, as a process takes seconds to start."""
-    trials = [make_trial(registry.resolve(name)) for name in (*NAMES, *ALSO)]
+    trials = [make_case(registry.resolve(name)) for name in (*NAMES, *ALSO)]
     tasks = [(trial.fitted(), trial.calibration, trial.frames) for trial in trials]
-    there = {which: future.result() for which, future in call_each(answers, tasks, 1)}
+    there = {which: future.result() for which, future in run_in_workers(estimate_qpos, tasks, 1)}
     for which, task in enumerate(tasks):
-        same(answers(*task), there[which])
+        require_identical(estimate_qpos(*task), there[which])

@@ -7,11 +7,11 @@ import pytest
 
 from harness.core import rotations
 from harness.core.humanoid24 import unpack
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.mean_pose import MeanPose, mean_posture
-from harness.testing.frames import exact_frames, without
+from harness.testing.frames import drop_stations, exact_frames
 
 from .conftest import Scene, moved
 
@@ -46,7 +46,7 @@ def test_finds_the_very_example_wherever_it_is_performed(walk: Scene, yaw_deg: f
 
 
 def test_finds_it_with_half_of_the_stations_lost(walk: Scene) -> None:
-    frames = [without(f, [0, 2, 5]) for f in walk.frames]
+    frames = [drop_stations(f, [0, 2, 5]) for f in walk.frames]
     assert np.max(walk.off_m(walk.run(BestMatch(), frames), walk.take.qpos)[2:]) < 1e-3
 
 
@@ -58,7 +58,7 @@ def test_finds_it_from_one_kind_of_reading(walk: Scene, kind: str) -> None:
 
 
 def test_takes_the_nearer_of_two_examples(walk: Scene, boxing: Scene) -> None:
-    other = Take("b", "b", "b", "boxing", 40.0, boxing.take.qpos)
+    other = BodyMotion("b", "b", "b", "boxing", 40.0, boxing.take.qpos)
     session = BestMatch().fit(walk.body, [other, walk.take], np.random.default_rng(0)).begin(walk.calibration)
     found = np.array([session.step(f).qpos[7:] for f in walk.frames])
     assert np.max(np.abs(found[2:] - walk.take.qpos[2:, 7:])) < 1e-6

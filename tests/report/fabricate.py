@@ -14,7 +14,7 @@ from harness.core.humanoid24 import BONES, pack, unpack
 from harness.core.seeds import generator
 from harness.mocap.synthetic import SOURCE, generate
 from harness.results import manifest, storage
-from harness.score.score import score
+from harness.score.score import score_estimate
 
 RATE_HZ = 40.0
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
@@ -51,7 +51,7 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
     methods = METHODS if plan.methods is None else plan.methods
     scenario = {"name": "fabricated", "methods": list(methods), **asdict(replace(plan, methods=None))}
     command = "harness run fabricated.toml --out results/fabricated"
-    storage.open_run(out, manifest.of_run(scenario, motion_source=SOURCE, command=command))
+    storage.open_run(out, manifest.describe_run(scenario, motion_source=SOURCE, command=command))
     keys, failures, planned = [], {}, 0
     takes = range(1, plan.takes + 1)
     for times, behaviour, take, inputs in itertools.product(
@@ -99,7 +99,7 @@ def make_cell(
         noise="default",
         seed=1,
         defined_by=defined_by,
-        scores=score(skeleton, RATE_HZ, truth, estimate, seen, status, step_ms),
+        scores=score_estimate(skeleton, RATE_HZ, truth, estimate, seen, status, step_ms),
         health={"records": 6 * len(truth), "frames_dropped": 3, "out_of_order": 0, "clock_ppm": 12.5},
         bone_m=skeleton.bone_m,
         source_hash="0123456789abcdef",

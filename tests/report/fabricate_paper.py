@@ -6,7 +6,15 @@ from itertools import pairwise
 from pathlib import Path
 
 from harness.core.seeds import generator
-from harness.results.findings import Bars, Claim, Experiment, Findings, Lines, Table, write_findings
+from harness.results.findings import (
+    BarChart,
+    Claim,
+    FindingsTable,
+    LineChart,
+    PaperExperiment,
+    PaperFindings,
+    write_findings,
+)
 
 METHODS: Mapping[str, float] = {"dynamic_map": 1.0, "local_pca": 1.6, "ik": 2.4}
 """Method -> size of its errors [deg], in the order that the paper expects."""
@@ -24,14 +32,14 @@ CIRCUMSTANCES = {
 }
 
 
-def write_study(folder: Path, findings: Findings) -> Path:
+def write_study(folder: Path, findings: PaperFindings) -> Path:
     """The folder of a study that has no runs."""
     folder.mkdir(parents=True, exist_ok=True)
     write_findings(folder / "findings.json", findings)
     return folder
 
 
-def liu() -> Findings:
+def liu() -> PaperFindings:
     """Every kind of figure and every verdict."""
     errors = {name: _errors(name, size) for name, size in METHODS.items()}
     orders = [_order(n, *pair, errors) for n in range(len(BEHAVIOURS)) for pair in pairwise(METHODS)]
@@ -42,14 +50,14 @@ def liu() -> Findings:
     modes = Claim("five modes keep about 99 %", "99 %", "91.2 %", "not reproduced", "fewer skeletons, more noise")
     speed = Claim("35 frames a second with 65,922 frames", "35 frames/s", "", "not run", "there was no time")
     question = "Is the paper's order the order here? The paper shows bars of mean and standard deviation (Fig. 6)."
-    return Findings(
+    return PaperFindings(
         paper="liu2011",
         reference="Liu, Wei, Chai, Ha, Rhee: Realtime human motion control, I3D 2011",
         motion="built-in performer",
         command="harness paper liu2011",
         seed=1,
         experiments=(
-            Experiment(
+            PaperExperiment(
                 "leave_one_out",
                 "One sequence left out",
                 question,
@@ -60,42 +68,42 @@ def liu() -> Findings:
                 ("leave_one_out", "not_there"),
                 ("local_pca falls behind ik on performers whom the database does not know.",),
             ),
-            Experiment("frame_by_frame", "Frame by frame", question, (GENERATED,), figures=(curves(400),)),
-            Experiment("inputs", "Inputs", question, (), tuple(figures), figures=(_inputs(),)),
-            Experiment("eigenmodes", "Eigenmodes of bone lengths", question, (), (modes,)),
-            Experiment("speed", "Frame rate", question, (), (speed,)),
+            PaperExperiment("frame_by_frame", "Frame by frame", question, (GENERATED,), figures=(curves(400),)),
+            PaperExperiment("inputs", "Inputs", question, (), tuple(figures), figures=(_inputs(),)),
+            PaperExperiment("eigenmodes", "Eigenmodes of bone lengths", question, (), (modes,)),
+            PaperExperiment("speed", "Frame rate", question, (), (speed,)),
         ),
         circumstances=CIRCUMSTANCES,
-        tables=(Table("Databases", ("behaviour", "frames"), (("walking", "17,920"), ("boxing", "31,360"))),),
+        tables=(FindingsTable("Databases", ("behaviour", "frames"), (("walking", "17,920"), ("boxing", "31,360"))),),
     )
 
 
-def kim() -> Findings:
+def kim() -> PaperFindings:
     """31 lying bars and a sparse database."""
     differences = ("All 31 sets of the five trackers were run.",)
     best = Claim("boxing: RH+LH+PEL errs least", "called suitable", "1st of 10", "cannot tell", "5 clips, of 6", 5)
     figures = tuple(sets(behaviour) for behaviour in ("walking", "boxing"))
-    return Findings(
+    return PaperFindings(
         paper="kim2012",
         reference="Kim, Seol, Lee: Realtime performance animation using sparse 3D motion sensors, 2012",
         motion="cmu",
         command="harness paper kim2012 --mocap mocap",
         seed=1,
         experiments=(
-            Experiment("sets", "Sets of trackers", "15 sets (Fig. 3).", differences, (best,), figures=figures),
-            Experiment("sparse", "Sparse databases", "43 frames of walking.", (), figures=(curves(300),)),
+            PaperExperiment("sets", "Sets of trackers", "15 sets (Fig. 3).", differences, (best,), figures=figures),
+            PaperExperiment("sparse", "Sparse databases", "43 frames of walking.", (), figures=(curves(300),)),
         ),
         circumstances=CIRCUMSTANCES,
     )
 
 
-def sets(behaviour: str) -> Bars:
+def sets(behaviour: str) -> BarChart:
     """All 31 sets of five trackers."""
     rng = generator(1, "made-up findings", behaviour)
     masks = sorted(range(1, 2 ** len(STATIONS)), key=lambda mask: mask.bit_count())
     names = tuple("+".join(name for bit, name in enumerate(STATIONS) if mask >> bit & 1) for mask in masks)
     errors = tuple(12.0 / mask.bit_count() + float(rng.uniform(0.0, 1.5)) for mask in masks)
-    return Bars(
+    return BarChart(
         f"All 31 sets of trackers, {behaviour}",
         "deg",
         names,
@@ -106,7 +114,7 @@ def sets(behaviour: str) -> Bars:
     )
 
 
-def curves(frames: int) -> Lines:
+def curves(frames: int) -> LineChart:
     """Errors over time; ik has a gap."""
     rng = generator(1, "made-up findings", frames)
     series = {
@@ -117,7 +125,7 @@ def curves(frames: int) -> Lines:
         for name, size in METHODS.items()
     }
     x = tuple(n / 40.0 for n in range(frames))
-    return Lines("walking_p1_01", "time [s]", "mean joint-angle error [deg]", x, series)
+    return LineChart("walking_p1_01", "time [s]", "mean joint-angle error [deg]", x, series)
 
 
 def _errors(name: str, size: float) -> tuple[float, ...]:
@@ -143,8 +151,8 @@ def _order(n: int, less: str, more: str, errors: Mapping[str, tuple[float, ...]]
     )
 
 
-def _grouped(errors: Mapping[str, tuple[float, ...]]) -> Bars:
-    return Bars(
+def _grouped(errors: Mapping[str, tuple[float, ...]]) -> BarChart:
+    return BarChart(
         "One sequence left out",
         "deg",
         BEHAVIOURS,
@@ -156,9 +164,9 @@ def _grouped(errors: Mapping[str, tuple[float, ...]]) -> Bars:
     )
 
 
-def _inputs() -> Bars:
+def _inputs() -> BarChart:
     """One bar is missing, one interval too."""
-    return Bars(
+    return BarChart(
         "Four combinations of inputs, boxing",
         "deg",
         tuple(INPUTS),
@@ -169,8 +177,8 @@ def _inputs() -> Bars:
     )
 
 
-def _table(errors: Mapping[str, tuple[float, ...]]) -> Table:
+def _table(errors: Mapping[str, tuple[float, ...]]) -> FindingsTable:
     rows = [
         (b, name, f"{each[n]:.2f} ± 0.40", "8", "") for n, b in enumerate(BEHAVIOURS) for name, each in errors.items()
     ]
-    return Table("Errors", ("behaviour", "method", "joint angle [deg]", "clips", "remark"), tuple(rows))
+    return FindingsTable("Errors", ("behaviour", "method", "joint angle [deg]", "clips", "remark"), tuple(rows))

@@ -10,37 +10,37 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.compare.paired_statistics import FEWEST_CLIPS, Paired
+from harness.compare.paired_statistics import MIN_CLIPS, PairedDifference
 from harness.core.seeds import generator
 from harness.results.findings import Claim
 from harness.results.placement_findings import (
-    Agreement,
-    Best,
-    Condition,
-    Place,
+    BestSet,
+    MarginalContribution,
+    PlacementCondition,
     PlacementFindings,
-    Ranked,
+    PlacementSearch,
+    RankAgreement,
+    RankedSet,
     Ranking,
-    Search,
-    Stations,
-    Step,
-    Tried,
-    Worth,
+    SearchStep,
+    StationNames,
+    StationPlacement,
+    StationSetResult,
     write_placement,
 )
 
 PLACES = (
-    Place("head", "head", 1.0, 0.0),
-    Place("sternum", "thorax", 0.5, 0.0),
-    Place("pelvis", "lhipjoint", 0.0, 165.0),
-    Place("left_hand", "lhand", 1.0, -90.0, side="left"),
-    Place("right_hand", "rhand", 1.0, 90.0, side="right"),
-    Place("left_upper_arm", "lhumerus", 0.5, -90.0, side="left"),
-    Place("right_upper_arm", "rhumerus", 0.5, 90.0, side="right"),
-    Place("left_thigh", "lfemur", 0.6, -90.0, side="left"),
-    Place("right_thigh", "rfemur", 0.6, 90.0, side="right"),
-    Place("left_ankle", "ltibia", 0.9, -90.0, side="left"),
-    Place("right_ankle", "rtibia", 0.9, 90.0, side="right"),
+    StationPlacement("head", "head", 1.0, 0.0),
+    StationPlacement("sternum", "thorax", 0.5, 0.0),
+    StationPlacement("pelvis", "lhipjoint", 0.0, 165.0),
+    StationPlacement("left_hand", "lhand", 1.0, -90.0, side="left"),
+    StationPlacement("right_hand", "rhand", 1.0, 90.0, side="right"),
+    StationPlacement("left_upper_arm", "lhumerus", 0.5, -90.0, side="left"),
+    StationPlacement("right_upper_arm", "rhumerus", 0.5, 90.0, side="right"),
+    StationPlacement("left_thigh", "lfemur", 0.6, -90.0, side="left"),
+    StationPlacement("right_thigh", "rfemur", 0.6, 90.0, side="right"),
+    StationPlacement("left_ankle", "ltibia", 0.9, -90.0, side="left"),
+    StationPlacement("right_ankle", "rtibia", 0.9, 90.0, side="right"),
 )
 WORTH = {
     "walking": (0.1, 0.3, 0.9, 0.25, 0.25, 0.1, 0.1, 0.5, 0.5, 1.1, 1.1),
@@ -49,7 +49,7 @@ WORTH = {
 """What each of the places above takes off the error [deg]."""
 CLIPS = tuple(f"p{n}_walking_{n}" for n in range(1, 9))
 _AT_MOST = 3
-Errors = Mapping[Stations, Mapping[str, float]]
+Errors = Mapping[StationNames, Mapping[str, float]]
 
 
 def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementFindings:
@@ -65,7 +65,9 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
     more = _errors(list(added), "walking", clips)
     tried = [_tried(stations, {**whole, **errors, **more}[stations]) for stations in {**whole, **errors, **more}]
     walking, boxing = (_condition(name, found, sets) for name, found in (("walking", errors), ("boxing", elsewhere)))
-    noisy = Condition("default*", "noise", walking.best, tuple(m and 1.1 * m for m in walking.means), len(clips))
+    noisy = PlacementCondition(
+        "default*", "noise", walking.best, tuple(m and 1.1 * m for m in walking.means), len(clips)
+    )
     return PlacementFindings(
         name="placement_walking",
         title="Which of eleven places serve walking best?",
@@ -91,9 +93,9 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
         compared=tuple(sets),
         conditions=(walking, boxing, noisy),
         agreements=(
-            Agreement("walking", "boxing", 0.31, len(sets), 0.22, 0.4),
-            Agreement("walking", "default*", 1.0, len(sets)),
-            Agreement("boxing", "default*", 0.31, len(sets)),
+            RankAgreement("walking", "boxing", 0.31, len(sets), 0.22, 0.4),
+            RankAgreement("walking", "default*", 1.0, len(sets)),
+            RankAgreement("boxing", "default*", 0.31, len(sets)),
         ),
         claims=(
             Claim(
@@ -124,7 +126,7 @@ def write_made_up(folder: Path, findings: PlacementFindings | None = None) -> Pa
     return folder
 
 
-def _errors(sets: Sequence[Stations], behaviour: str, clips: Sequence[str]) -> dict[Stations, dict[str, float]]:
+def _errors(sets: Sequence[StationNames], behaviour: str, clips: Sequence[str]) -> dict[StationNames, dict[str, float]]:
     """Set -> clip -> error [deg]; what is worn beside much else is worth less."""
     worth = dict(zip((place.name for place in PLACES), WORTH[behaviour], strict=True))
     found = {}
@@ -136,69 +138,75 @@ def _errors(sets: Sequence[Stations], behaviour: str, clips: Sequence[str]) -> d
     return found
 
 
-def _tried(stations: Stations, errors: Mapping[str, float]) -> Tried:
+def _tried(stations: StationNames, errors: Mapping[str, float]) -> StationSetResult:
     known = _paired(errors)
     rate_hz = float(min(100, 300 // len(stations)))
-    return Tried(stations, rate_hz, dict(errors), known.mean, known.low, known.high)
+    return StationSetResult(stations, rate_hz, dict(errors), known.mean, known.low, known.high)
 
 
-def _ranking(title: str, sets: Sequence[Stations], errors: Errors) -> Ranking:
+def _ranking(title: str, sets: Sequence[StationNames], errors: Errors) -> Ranking:
     ranked = sorted(sets, key=lambda stations: _mean(errors[stations]))[:20]
     rows = []
     for rank, stations in enumerate(ranked, start=1):
         behind = _paired(errors[stations], errors[ranked[0]])
         tied = rank == 1 or behind.low is None or behind.low <= 0.0
         low, high = max(1, rank - 2), min(len(sets), rank + 2)
-        rows.append(Ranked(stations, rank, low, high, behind.mean, behind.low, behind.high, tied))
+        rows.append(RankedSet(stations, rank, low, high, behind.mean, behind.low, behind.high, tied))
     return Ranking("exhaustive", title, tuple(rows))
 
 
-def _ties(best: Stations, sets: Sequence[Stations], errors: Errors) -> tuple[Stations, ...]:
+def _ties(best: StationNames, sets: Sequence[StationNames], errors: Errors) -> tuple[StationNames, ...]:
     rivals = [(s, _paired(errors[s], errors[best])) for s in sets if len(s) == len(best) and s != best]
     return tuple(stations for stations, behind in rivals if behind.low is None or behind.low <= 0.0)
 
 
-def _best(stations: Stations, ties: tuple[Stations, ...], errors: Errors) -> Best:
+def _best(stations: StationNames, ties: tuple[StationNames, ...], errors: Errors) -> BestSet:
     """Judged on clips that were held out, a little worse there."""
     of, there = sum(len(other) == len(stations) for other in errors), 1.05 * _mean(errors[stations])
-    return Best(
+    return BestSet(
         stations, ties, True, of, 0.83, there, held_out=there, held_out_low=there - 0.4, held_out_high=there + 0.4,
         held_out_clips=6,
     )  # fmt: skip
 
 
-def _greedy(path: Sequence[Stations], errors: Errors) -> Search:
-    steps = [Step(path[0], f"+ {path[0][0]}")]
+def _greedy(path: Sequence[StationNames], errors: Errors) -> PlacementSearch:
+    steps = [SearchStep(path[0], f"+ {path[0][0]}")]
     for before, now in itertools.pairwise(path):
         gain = _paired(errors[before], errors[now])
         new = next(iter(set(now) - set(before)))
-        steps.append(Step(now, f"+ {new}", gain.mean, gain.low, gain.high, ("head",)))
-    return Search("greedy", "from none", tuple(steps), "as many as were asked for", 1.2, 0.9, 1.6, 6)
+        steps.append(SearchStep(now, f"+ {new}", gain.mean, gain.low, gain.high, ("head",)))
+    return PlacementSearch("greedy", "from none", tuple(steps), "as many as were asked for", 1.2, 0.9, 1.6, 6)
 
 
-def _worth(name: str, mode: str, base: Stations, less: Mapping[str, float], more: Mapping[str, float]) -> Worth:
+def _worth(
+    name: str, mode: str, base: StationNames, less: Mapping[str, float], more: Mapping[str, float]
+) -> MarginalContribution:
     gain = _paired(less, more)
-    return Worth(name, "add" if mode == "add" else "ablate", base, gain.mean, gain.low, gain.high, len(gain.clips))
+    return MarginalContribution(
+        name, "add" if mode == "add" else "ablate", base, gain.mean, gain.low, gain.high, len(gain.clips)
+    )
 
 
-def _condition(name: str, errors: Errors, sets: Sequence[Stations]) -> Condition:
+def _condition(name: str, errors: Errors, sets: Sequence[StationNames]) -> PlacementCondition:
     best = {
         str(n): min((s for s in sets if len(s) == n), key=lambda s: _mean(errors[s]))
         for n in sorted({len(s) for s in sets})
     }
-    return Condition(name, "behaviour", best, tuple(_mean(errors[s]) for s in sets), len(next(iter(errors.values()))))
+    return PlacementCondition(
+        name, "behaviour", best, tuple(_mean(errors[s]) for s in sets), len(next(iter(errors.values())))
+    )
 
 
-def _without(names: Stations, name: str) -> Stations:
+def _without(names: StationNames, name: str) -> StationNames:
     return tuple(n for n in names if n != name)
 
 
-def _paired(a: Mapping[str, float], b: Mapping[str, float] | None = None) -> Paired:
+def _paired(a: Mapping[str, float], b: Mapping[str, float] | None = None) -> PairedDifference:
     """Quicker than the bootstrap: these intervals need to look right only."""
     values = np.array([a[clip] - (b[clip] if b else 0.0) for clip in a])
     mean, half = float(values.mean()), 2.3 * float(values.std(ddof=1)) / len(values) ** 0.5
-    enough = len(values) >= FEWEST_CLIPS
-    return Paired(tuple(a), mean, mean - half if enough else None, mean + half if enough else None)
+    enough = len(values) >= MIN_CLIPS
+    return PairedDifference(tuple(a), mean, mean - half if enough else None, mean + half if enough else None)
 
 
 def _mean(errors: Mapping[str, float]) -> float:

@@ -5,16 +5,25 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadFile
-from harness.results.findings import Bars, Claim, Experiment, Findings, Lines, Table, read_findings, write_findings
+from harness.results.findings import (
+    BarChart,
+    Claim,
+    FindingsTable,
+    LineChart,
+    PaperExperiment,
+    PaperFindings,
+    read_findings,
+    write_findings,
+)
 
-FINDINGS = Findings(
+FINDINGS = PaperFindings(
     paper="liu2011",
     reference="Liu et al. 2011",
     motion="built-in performer",
     command="harness paper liu2011",
     seed=1,
     experiments=(
-        Experiment(
+        PaperExperiment(
             name="inputs",
             title="Four choices of inputs",
             question="Which readings are needed?",
@@ -22,10 +31,10 @@ FINDINGS = Findings(
             claims=(
                 Claim("a errs less than b", "order", "-0.4 deg", "reproduced", clips=6, difference=-0.4, unit="deg"),
             ),
-            tables=(Table("errors", ("method", "deg"), (("ik", "2.0"),)),),
+            tables=(FindingsTable("errors", ("method", "deg"), (("ik", "2.0"),)),),
             figures=(
-                Bars("errors", "deg", ("walking",), {"ik": (None,)}, low={"ik": (1.0,)}),
-                Lines("over time", "time [s]", "error [deg]", (0.0, 0.025), {"ik": (1.0, None)}),
+                BarChart("errors", "deg", ("walking",), {"ik": (None,)}, low={"ik": (1.0,)}),
+                LineChart("over time", "time [s]", "error [deg]", (0.0, 0.025), {"ik": (1.0, None)}),
             ),
             runs=("inputs",),
             notes=("a note",),

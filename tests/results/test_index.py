@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile, BadInput
-from harness.results.index import INDEX, CellIndex, Counts
-from harness.results.lock import at_work, is_running
+from harness.results.index import INDEX_FILE, CellCounts, CellIndex
+from harness.results.lock import folder_lock, is_running
 from harness.results.storage import read_cells, summary_rows
-from harness.results.table import SUMMED, TIMES, groups, write_table
+from harness.results.table import SUMMARY_METRICS, TIME_COLUMNS, compute_group_statistics, write_table
 from tests.report.fabricate import Plan, fabricate
 
 
@@ -48,7 +48,7 @@ def test_rows_come_out_as_they_went_in_and_in_planned_order(run: Path, tmp_path:
         keys = [row["key"] for row in rows[::-3]]
         assert [row["key"] for row in index.rows_of(keys)] == keys
         assert [row["clip"] for row in index.rows(method="ik", behaviour="walking")] == ["walking_p1_01"] * 2
-        assert index.counts() == Counts(8, 8, 0)
+        assert index.counts() == CellCounts(8, 8, 0)
         with pytest.raises(ValueError, match="no column"):
             next(index.rows(rest="x"))
         with pytest.raises(ValueError, match="no column"):
@@ -59,13 +59,13 @@ def test_what_failed_is_counted_and_kept_until_it_is_made_again(tmp_path: Path) 
     with CellIndex(tmp_path) as index:
         index.expect(["a", "b", "c"])
         index.ended([("a", "key", ""), ("c", "", "Traceback"), ("b", "", "no such clip")])
-        assert index.counts() == Counts(3, 1, 2)
+        assert index.counts() == CellCounts(3, 1, 2)
         assert list(index.failures().items()) == [("b", "no such clip"), ("c", "Traceback")]
         index.expect(["c", "d"])
         index.reset(["c"])
-        assert index.counts() == Counts(4, 1, 1)
+        assert index.counts() == CellCounts(4, 1, 1)
         index.plan(["e", "b", "a"])
-        assert index.counts() == Counts(3, 1, 1)
+        assert index.counts() == CellCounts(3, 1, 1)
         assert list(index.failures()) == ["b"]
 
 
@@ -85,15 +85,15 @@ def test_cells_that_the_index_lacks_are_gathered_from_their_folders(run: Path) -
 def test_a_damaged_or_older_index_is_made_anew(run: Path, tmp_path: Path, damage: str) -> None:
     filled(tmp_path, rows_of(run))
     if damage == "cut":
-        (tmp_path / INDEX).write_bytes(b"no database at all" * 100)
+        (tmp_path / INDEX_FILE).write_bytes(b"no database at all" * 100)
     else:
-        with sqlite3.connect(tmp_path / INDEX) as db:
+        with sqlite3.connect(tmp_path / INDEX_FILE) as db:
             db.execute("PRAGMA user_version = 7")
         db.close()
     with pytest.raises(BadFile, match=r"index\.sqlite.*Give the command"):
         CellIndex(tmp_path, read_only=True)
     with CellIndex(tmp_path) as index:
-        assert index.counts() == Counts(0, 0, 0)
+        assert index.counts() == CellCounts(0, 0, 0)
     with CellIndex(tmp_path, read_only=True) as index:
         assert list(index.rows()) == []
 
@@ -101,7 +101,7 @@ def test_a_damaged_or_older_index_is_made_anew(run: Path, tmp_path: Path, damage
 def test_a_folder_without_an_index_is_told(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="no such file"):
         CellIndex(tmp_path, read_only=True)
-    assert not (tmp_path / INDEX).exists()
+    assert not (tmp_path / INDEX_FILE).exists()
 
 
 def test_the_table_is_the_same_in_whatever_order_cells_ended(run: Path, tmp_path: Path) -> None:
@@ -113,7 +113,7 @@ def test_the_table_is_the_same_in_whatever_order_cells_ended(run: Path, tmp_path
             index.add(order)
             index.ended((named(row), row["key"], "") for row in order)
             write_table(index, tmp_path / name / "table.csv")
-            (tmp_path / name / "groups.json").write_text(json.dumps(groups(index)))
+            (tmp_path / name / "groups.json").write_text(json.dumps(compute_group_statistics(index)))
     for file in ("table.csv", "groups.json"):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
     header, first, *_ = (tmp_path / "one" / "table.csv").read_text().splitlines()
@@ -121,7 +121,7 @@ def test_the_table_is_the_same_in_whatever_order_cells_ended(run: Path, tmp_path
     assert found["scenario"] == "fabricated"
     assert (found["vary.noise"], found["noise"]) == ("clean", "default")
     assert float(found["mpjpe_mm"]) == pytest.approx(rows[0]["mpjpe_mm"], rel=1e-8)
-    assert set(TIMES) <= set(found)
+    assert set(TIME_COLUMNS) <= set(found)
 
 
 def test_groups_average_each_clip_first(run: Path, tmp_path: Path) -> None:
@@ -133,18 +133,18 @@ def test_groups_average_each_clip_first(run: Path, tmp_path: Path) -> None:
         index.expect(["0", "1", "2", "3"])
         index.add(rows)
         index.ended((row["key"], row["key"], "") for row in rows)
-        (group,) = groups(index)
+        (group,) = compute_group_statistics(index)
     assert (group["cells"], group["clips"], group["varied"]) == (4, 2, {"noise": "clean"})
     assert group["metrics"]["mpjpe_mm"] == {"mean": 4.0, "sd": pytest.approx(8.0**0.5), "clips": 2}
-    assert set(group["metrics"]) == set(SUMMED)
+    assert set(group["metrics"]) == set(SUMMARY_METRICS)
 
 
 def test_a_folder_has_one_coordinator(tmp_path: Path) -> None:
     assert not is_running(tmp_path)
-    with at_work(tmp_path):
+    with folder_lock(tmp_path):
         assert is_running(tmp_path)
-        with pytest.raises(BadInput, match="at work"), at_work(tmp_path, alone=False):
+        with pytest.raises(BadInput, match="at work"), folder_lock(tmp_path, alone=False):
             pass
     assert not is_running(tmp_path)
-    with at_work(tmp_path, alone=False), at_work(tmp_path, alone=False):
+    with folder_lock(tmp_path, alone=False), folder_lock(tmp_path, alone=False):
         assert is_running(tmp_path)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile
-from harness.results.placement_findings import is_placement, read_placement, write_placement
+from harness.results.placement_findings import is_placement_findings, read_placement, write_placement
 from tests.report.fabricate_placement import made_up
 
 Damage = Callable[[dict[str, Any]], Any]
@@ -18,7 +18,7 @@ def test_findings_come_back_as_they_were_written(tmp_path: Path) -> None:
     findings, path = made_up(at_most=2), tmp_path / "findings.json"
     write_placement(path, findings)
     assert read_placement(path) == findings
-    assert is_placement(path)
+    assert is_placement_findings(path)
     first = path.read_bytes()
     write_placement(path, read_placement(path))
     assert path.read_bytes() == first
@@ -27,7 +27,7 @@ def test_findings_come_back_as_they_were_written(tmp_path: Path) -> None:
 def test_a_paper_is_no_placement(tmp_path: Path) -> None:
     path = tmp_path / "findings.json"
     path.write_text('{"paper": "liu2011", "schema": 1}')
-    assert not is_placement(path)
+    assert not is_placement_findings(path)
     with pytest.raises(BadFile, match="no key in findings called 'paper'"):
         read_placement(path)
 

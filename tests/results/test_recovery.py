@@ -8,8 +8,8 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
-from harness.core.files import plain
-from harness.results.recovery import Recoveries, table
+from harness.core.files import to_json_types
+from harness.results.recovery import RecoveryCollector, tabulate_recovery
 from harness.results.storage import Cell
 
 MakeCell = Callable[..., Cell]
@@ -47,7 +47,7 @@ def test_the_ratio_is_that_of_the_second_from_one_second_after_the_last_bad_fram
         bent("one_off", course(TIME_S, (0.0, 30.0), (LAST_BAD_S + 1.01, 2.5), (LAST_BAD_S + 2.01, 90.0))),
     ]
     for order in (cells, cells[::-1]):
-        recoveries = Recoveries()
+        recoveries = RecoveryCollector()
         for cell in order:
             recoveries.add(cell)
         (found,) = recoveries.pairs()
@@ -60,7 +60,7 @@ def test_the_ratio_is_that_of_the_second_from_one_second_after_the_last_bad_fram
 
 @pytest.mark.parametrize(("back_s", "expected"), [(0.0, 1.0 / 40.0), (0.5, 0.525), (3.0, None)])
 def test_how_long_it_took_to_come_back(bent: Callable[..., Cell], back_s: float, expected: float | None) -> None:
-    recoveries = Recoveries()
+    recoveries = RecoveryCollector()
     recoveries.add(bent("none", 2.0))
     recoveries.add(bent("all_lost", course(TIME_S, (0.0, 8.0), (LAST_BAD_S + back_s + 0.01, 2.0))))
     (found,) = recoveries.pairs()
@@ -78,14 +78,14 @@ def test_status_is_held_against_what_the_readings_call_for(bent: Callable[..., C
     shares = {"right": 1.0, "never lost": 1.0 - 58 / judged.sum(), "boasting": 1.0 - 80 / judged.sum()}
     said = {"right": right, "never lost": np.minimum(right, Status.HELD), "boasting": 0 * right}
     for name, share in shares.items():
-        recoveries = Recoveries()
+        recoveries = RecoveryCollector()
         recoveries.add(bent("none", 2.0))
         recoveries.add(bent("all_lost", 2.0, status=said[name], **readings))
         assert recoveries.pairs()[0].status_right == pytest.approx(share, abs=1.1 / judged.sum()), name
 
 
 def test_only_twins_are_paired(bent: Callable[..., Cell], make_cell: MakeCell) -> None:
-    recoveries = Recoveries()
+    recoveries = RecoveryCollector()
     recoveries.add(make_cell())  # knows no disturbances
     recoveries.add(bent("none", 2.0))
     recoveries.add(bent("one_lost", 3.0, method="mean_pose"))
@@ -96,21 +96,21 @@ def test_only_twins_are_paired(bent: Callable[..., Cell], make_cell: MakeCell) -
 
 def test_a_take_that_ends_too_soon_tells_nothing(bent: Callable[..., Cell]) -> None:
     late = {"lasts_s": 2.0, "begins_s": 6.5, "ends_s": 8.5}
-    recoveries = Recoveries()
+    recoveries = RecoveryCollector()
     for kind in ("none", "one_lost"):
         recoveries.add(bent(kind, 2.0, defined_by={"clip": "walk_01", "disturbance": {"kind": kind, **late}}))
     assert [found.judged for found in recoveries.pairs()] == [0]
-    (row,) = table(json.loads(json.dumps(plain(recoveries.rows()))))
+    (row,) = tabulate_recovery(json.loads(json.dumps(to_json_types(recoveries.rows()))))
     assert (row["clips"], row["after"]) == (0, {"one_lost": None})
 
 
 def test_the_table_pools_clips_and_shows_the_worst(bent: Callable[..., Cell]) -> None:
-    recoveries = Recoveries()
+    recoveries = RecoveryCollector()
     for clip, plain_deg, other_deg in (("a", 2.0, 2.0), ("b", 1.0, 2.5)):
         for kind, off_deg in (("none", plain_deg), ("all_turned", other_deg)):
             disturbance = {"kind": kind, "lasts_s": 2.0, "begins_s": 3.0, "ends_s": 5.0}
             recoveries.add(bent(kind, off_deg, clip=clip, defined_by={"clip": clip, "disturbance": disturbance}))
-    rows = json.loads(json.dumps(plain(recoveries.rows())))
-    (row,) = table(rows)
+    rows = json.loads(json.dumps(to_json_types(recoveries.rows())))
+    (row,) = tabulate_recovery(rows)
     assert (row["method"], row["clips"], row["undisturbed_deg"]) == ("ik", 2, 1.5)
     assert row["after"] == {"all_turned": {"ratio": 1.5, "during": 1.75, "worst": 2.5, "back_after_s": None}}

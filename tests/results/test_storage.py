@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.core.files import TEMPORARY, plain
+from harness.core.files import TEMPORARY, to_json_types
 from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
@@ -31,7 +31,7 @@ NOBODY = 2**22 + 1
 
 def manifest(**changes: object) -> manifests.Manifest:
     scenario = {"name": "demo", "seed": 1, "motion": {"test": ["a", "b"]}, "methods": ["ik"], **changes}
-    return manifests.of_run(scenario, motion_source="built-in performer", command="harness run demo")
+    return manifests.describe_run(scenario, motion_source="built-in performer", command="harness run demo")
 
 
 def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCell) -> None:
@@ -43,7 +43,7 @@ def test_a_cell_reads_back_as_it_was_written(run_folder: Path, make_cell: MakeCe
     for name in storage.Cell.__dataclass_fields__:
         if name != "scores":
             np.testing.assert_array_equal(getattr(back, name), getattr(cell, name), err_msg=name)
-    assert back.metrics == plain(cell.metrics)
+    assert back.metrics == to_json_types(cell.metrics)
     assert back.scores.per_joint == cell.scores.per_joint
     assert back.truth_qpos.dtype == np.float64
     for name, values in cell.scores.per_frame.items():
@@ -98,7 +98,7 @@ def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: P
     assert mpjpe["frame_weighted"] == pytest.approx((300 * 10.0 + 100 * 50.0) / 400, rel=1e-5)
     assert method["metrics"]["step_p50_ms"]["frame_weighted"] == pytest.approx(2.0)
     assert (method["frames_matched"], method["frames_expected"]) == (400, 800)
-    assert json.loads((run_folder / "summary.json").read_text()) == plain(content)
+    assert json.loads((run_folder / "summary.json").read_text()) == to_json_types(content)
 
 
 def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, make_cell: MakeCell) -> None:

@@ -15,8 +15,8 @@ from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
-from harness.score.pair import Pair, hinged_bones, posed
-from harness.score.score import score
+from harness.score.pair import Pair, compute_poses, hinged_bones
+from harness.score.score import score_estimate
 from tests.scored_run import FRAMES, RATE_HZ, Judge
 
 SKELETON = standard_skeleton()
@@ -44,7 +44,7 @@ def test_a_larger_body_in_the_right_pose_is_off_by_as_much_as_it_is_larger(judge
     scores = judge(truth_qpos, estimate_skeleton=larger)
     for name in ("joint_angle_mean_deg", "mpjre_deg", "root_position_mm", "root_angle_deg"):
         assert scores.metrics[name] == 0.0, name
-    reach_m = np.linalg.norm(posed(SKELETON, truth_qpos).joints_m - truth_qpos[:, None, :3], axis=2)
+    reach_m = np.linalg.norm(compute_poses(SKELETON, truth_qpos).joints_m - truth_qpos[:, None, :3], axis=2)
     np.testing.assert_allclose(scores.per_frame["mpjpe_mm"], 100.0 * reach_m.mean(axis=1), rtol=1e-9)
     np.testing.assert_allclose(scores.per_frame["mpjpe_root_mm"], 100.0 * reach_m.mean(axis=1), rtol=1e-9)
 
@@ -114,7 +114,7 @@ def test_a_turn_about_the_vertical_moves_the_root_and_no_joint(
 
 
 def test_the_best_rotation_is_never_a_mirror_image(truth_qpos: Floats) -> None:
-    truth = posed(SKELETON, truth_qpos)
+    truth = compute_poses(SKELETON, truth_qpos)
     turned_m = truth.joints_m[..., [1, 2, 0]] + [1.0, -2.0, 3.0]
     for joints_m, low_mm, high_mm in ((turned_m, 0.0, 1e-9), (truth.joints_m * [1.0, -1.0, 1.0], 20.0, 500.0)):
         pair = Pair(truth, replace(truth, joints_m=joints_m), np.arange(FRAMES), RATE_HZ)
@@ -162,7 +162,7 @@ def test_axis_angle_components_of_a_bone_at_rest(judge: Judge) -> None:
     bent = still.copy()
     bent[:, 7:] = pack(np.zeros(3), rotations.IDENTITY, np.eye(48)[SKELETON.dof_names.index("head.rz")] * 0.3)[7:]
     status, step = np.zeros(FRAMES, dtype=int), np.full(FRAMES, np.nan)
-    found = score(SKELETON, RATE_HZ, still, bent, np.arange(FRAMES), status, step).metrics
+    found = score_estimate(SKELETON, RATE_HZ, still, bent, np.arange(FRAMES), status, step).metrics
     assert found["mpjre_axis_angle_deg"] == pytest.approx(np.rad2deg(0.3) / (22 * 3))
     assert found["lag_ms"] is None  # nothing moves, so no shift is better than another
     assert found["fps"] is None
@@ -177,7 +177,7 @@ def test_a_constant_jerk_is_the_jitter(judge: Judge, truth_qpos: Floats) -> None
     still = np.repeat(truth_qpos[:1], FRAMES, axis=0)
     still[:, 0] += 2.5 * t**3 / 6.0
     status, step = np.zeros(FRAMES, dtype=int), np.full(FRAMES, np.nan)
-    found = score(SKELETON, RATE_HZ, truth_qpos, still, np.arange(FRAMES), status, step).metrics
+    found = score_estimate(SKELETON, RATE_HZ, truth_qpos, still, np.arange(FRAMES), status, step).metrics
     assert found["jitter_m_s3"] == pytest.approx(2.5, rel=1e-6)
 
 
@@ -208,13 +208,13 @@ def test_feet_that_slide_skate_at_their_speed() -> None:
     standing = pack(
         np.tile([0.0, 0.0, 0.92], (FRAMES, 1)), np.tile(rotations.IDENTITY, (FRAMES, 1)), np.zeros((FRAMES, 48))
     )
-    toe_m = posed(SKELETON, standing[:1]).joints_m[0, 1 + SKELETON.index("lfoot"), 2]
+    toe_m = compute_poses(SKELETON, standing[:1]).joints_m[0, 1 + SKELETON.index("lfoot"), 2]
     standing[:, 2] += 0.02 - toe_m  # toes 2 cm up, as they lie inside the foot
     sliding = standing.copy()
     sliding[:, 0] += 0.3 * np.arange(FRAMES) / RATE_HZ
     sliding[:, 2] -= 0.05
     status, step = np.zeros(FRAMES, dtype=int), np.full(FRAMES, np.nan)
-    found = score(SKELETON, RATE_HZ, standing, sliding, np.arange(FRAMES), status, step).metrics
+    found = score_estimate(SKELETON, RATE_HZ, standing, sliding, np.arange(FRAMES), status, step).metrics
     assert found["foot_skate_mm_s"] == pytest.approx(300.0)
     assert found["penetration_mm"] == pytest.approx(50.0)
     assert found["float_mm"] == 0.0
@@ -222,7 +222,7 @@ def test_feet_that_slide_skate_at_their_speed() -> None:
         assert found[name] == pytest.approx(0.0, abs=1e-9), name
     lifted = standing.copy()
     lifted[:, 2] += 0.03
-    assert score(SKELETON, RATE_HZ, standing, lifted, np.arange(FRAMES), status, step).metrics[
+    assert score_estimate(SKELETON, RATE_HZ, standing, lifted, np.arange(FRAMES), status, step).metrics[
         "float_mm"
     ] == pytest.approx(30.0)
 
@@ -234,11 +234,11 @@ def test_feet_in_the_air_or_in_motion_are_not_in_contact() -> None:
     sliding = still.copy()
     sliding[:, 0] += 0.16 * np.arange(FRAMES) / RATE_HZ
     for truth, contacts in ((still, FRAMES - 1), (hopping, 299), (sliding, 0)):
-        pose = posed(SKELETON, truth)
+        pose = compute_poses(SKELETON, truth)
         pair = Pair(pose, pose, np.arange(FRAMES), RATE_HZ, contact.ground_m(pose))
         np.testing.assert_array_equal(contact.in_contact(pair).sum(axis=0), [contacts] * 4)
     status, step = np.zeros(FRAMES, dtype=int), np.full(FRAMES, np.nan)
-    found = score(SKELETON, RATE_HZ, sliding, still, np.arange(FRAMES), status, step).metrics
+    found = score_estimate(SKELETON, RATE_HZ, sliding, still, np.arange(FRAMES), status, step).metrics
     assert found["foot_skate_mm_s"] is None
     assert found["float_mm"] is None
     assert found["mpjpe_mm"] is not None
@@ -304,7 +304,7 @@ def test_status_is_counted_and_steps_are_timed(truth_qpos: Floats) -> None:
     scored = SKELETON, RATE_HZ, truth_qpos, truth_qpos, np.arange(FRAMES), status, step_ms
     cpu_ms = 0.5 * step_ms, np.full(FRAMES, np.nan)
     cpu_ms[0][2], cpu_ms[1][:3] = np.nan, (0.5, 0.4, 9.0)
-    found = score(*scored, cpu_ms=cpu_ms, warm_up_s=0.0).metrics
+    found = score_estimate(*scored, cpu_ms=cpu_ms, warm_up_s=0.0).metrics
     assert (found["frames_held"], found["frames_lost"]) == (10, 5)
     assert found["first_step_ms"] == 500.0
     assert found["step_p50_ms"] == pytest.approx(2.0)
@@ -312,7 +312,7 @@ def test_status_is_counted_and_steps_are_timed(truth_qpos: Floats) -> None:
     assert found["fps"] == pytest.approx(500.0)
     assert found["step_relative"] == pytest.approx(2.0, rel=0.01)
     for untimed in (None, (cpu_ms[0], np.full(FRAMES, np.nan)), (cpu_ms[0], np.zeros(FRAMES))):
-        assert score(*scored, cpu_ms=untimed, warm_up_s=0.0).metrics["step_relative"] is None
+        assert score_estimate(*scored, cpu_ms=untimed, warm_up_s=0.0).metrics["step_relative"] is None
 
 
 def test_input_that_makes_no_sense_is_refused(truth_qpos: Floats) -> None:
@@ -320,13 +320,13 @@ def test_input_that_makes_no_sense_is_refused(truth_qpos: Floats) -> None:
     zeros = np.zeros(FRAMES)
     for index in (rows[::-1], np.zeros(FRAMES, dtype=int), rows + 1):
         with pytest.raises(BadInput, match="frame_index"):
-            score(SKELETON, RATE_HZ, truth_qpos, truth_qpos, index, rows * 0, zeros)
+            score_estimate(SKELETON, RATE_HZ, truth_qpos, truth_qpos, index, rows * 0, zeros)
     with pytest.raises(ShapeError, match="step_ms"):
-        score(SKELETON, RATE_HZ, truth_qpos, truth_qpos, rows, rows * 0, zeros[1:])
+        score_estimate(SKELETON, RATE_HZ, truth_qpos, truth_qpos, rows, rows * 0, zeros[1:])
     with pytest.raises(ShapeError, match="estimate_qpos"):
-        score(SKELETON, RATE_HZ, truth_qpos, truth_qpos[:, :54], rows, rows * 0, zeros)
+        score_estimate(SKELETON, RATE_HZ, truth_qpos, truth_qpos[:, :54], rows, rows * 0, zeros)
     with pytest.raises(BadInput, match="truth"):
-        score(SKELETON, RATE_HZ, truth_qpos * np.nan, truth_qpos, rows, rows * 0, zeros)
+        score_estimate(SKELETON, RATE_HZ, truth_qpos * np.nan, truth_qpos, rows, rows * 0, zeros)
 
 
 @settings(max_examples=60, deadline=None)
@@ -347,7 +347,7 @@ def test_laws_over_random_motion(seed: int) -> None:
         quaternion = rotations.exp(rng.normal(size=(frames, 3)))
         return pack(rng.normal(size=(frames, 3)), quaternion, rng.uniform(-1.5, 1.5, (frames, 48)))
 
-    a, b = posed(SKELETON, motion()), posed(SKELETON, motion())
+    a, b = compute_poses(SKELETON, motion()), compute_poses(SKELETON, motion())
     there, back = Pair(a, b, np.arange(frames), RATE_HZ), Pair(b, a, np.arange(frames), RATE_HZ)
     for name, function in FRAME_METRICS.items():
         if "true" in name or name in OWN_VALUE:

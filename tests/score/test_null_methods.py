@@ -5,21 +5,21 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.score.metrics import FRAME_METRICS
-from harness.score.null_methods import NULLS, bounds
+from harness.score.null_methods import NULL_METHODS, score_null_methods
 from harness.testing import score_checks
 from tests.scored_run import RATE_HZ
 
 
 @pytest.fixture
-def take(truth_qpos: Floats) -> Take:
-    return Take("walk_01", "a", "by hand", "walking", RATE_HZ, truth_qpos)
+def take(truth_qpos: Floats) -> BodyMotion:
+    return BodyMotion("walk_01", "a", "by hand", "walking", RATE_HZ, truth_qpos)
 
 
 def test_null_methods_bound_the_scale(truth_qpos: Floats) -> None:
-    found = {name: s.metrics for name, s in bounds(standard_skeleton(), RATE_HZ, truth_qpos).items()}
-    assert list(found) == list(NULLS)
+    found = {name: s.metrics for name, s in score_null_methods(standard_skeleton(), RATE_HZ, truth_qpos).items()}
+    assert list(found) == list(NULL_METHODS)
     angle = {name: metrics["joint_angle_mean_deg"] or 0.0 for name, metrics in found.items()}
     assert angle["oracle"] == 0.0
     assert 0.0 < angle["last_value"] < 0.2 * angle["frozen_pose"]
@@ -33,11 +33,11 @@ def test_null_methods_bound_the_scale(truth_qpos: Floats) -> None:
 @pytest.fixture
 def _without_evo(monkeypatch: pytest.MonkeyPatch) -> None:
     """Which takes seconds to start and has a test of its own."""
-    monkeypatch.setattr(score_checks, "evo_program", lambda: None)
+    monkeypatch.setattr(score_checks, "find_evo", lambda: None)
 
 
 @pytest.mark.usefixtures("_without_evo")
-def test_the_doctor_finds_these_scores_sound(take: Take) -> None:
+def test_the_doctor_finds_these_scores_sound(take: BodyMotion) -> None:
     checks = score_checks.check_scores([take])
     assert all(check.ok for check in checks), [c for c in checks if not c.ok]
     assert len({check.name for check in checks}) == len(checks) >= 6
@@ -54,7 +54,9 @@ def test_the_doctor_finds_these_scores_sound(take: Take) -> None:
         ("root_position_mm", "scores zero"),
     ],
 )
-def test_the_doctor_finds_a_wrong_metric(take: Take, name: str, fails: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_doctor_finds_a_wrong_metric(
+    take: BodyMotion, name: str, fails: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A metric made wrong by hand: a check must fail, or the checks are worth nothing."""
     right = FRAME_METRICS[name]
     wrong = {"mpjpe_mm": lambda p: 1.01 * right(p), "joint_angle_mean_deg": lambda p: 0.0 * right(p)}
@@ -64,14 +66,14 @@ def test_the_doctor_finds_a_wrong_metric(take: Take, name: str, fails: str, monk
 
 
 @pytest.mark.usefixtures("_without_evo")
-def test_evo_is_asked_only_where_it_is_installed(take: Take) -> None:
+def test_evo_is_asked_only_where_it_is_installed(take: BodyMotion) -> None:
     (check,) = [c for c in score_checks.check_scores([take]) if "evo" in c.name]
     assert check.ok
     assert "not installed" in check.detail
 
 
-def test_evo_and_the_root_position_agree(take: Take) -> None:
-    if score_checks.evo_program() is None:
+def test_evo_and_the_root_position_agree(take: BodyMotion) -> None:
+    if score_checks.find_evo() is None:
         pytest.skip("evo is not installed (extra dev)")
     (check,) = [c for c in score_checks.check_scores([take]) if "evo" in c.name]
     assert check.ok, check.detail

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from harness.core.humanoid24 import pack, standard_skeleton
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.mocap.library import MotionLibrary
-from harness.score.null_methods import bounds
+from harness.score.null_methods import score_null_methods
 from harness.testing import score_checks
 from harness.testing.score_checks import check_scores
 
@@ -17,14 +17,14 @@ from harness.testing.score_checks import check_scores
 def test_a_real_clip_is_scored_soundly(mocap: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """By evo too, for one of them: it takes seconds to start."""
     if name != "64_01":
-        monkeypatch.setattr(score_checks, "evo_program", lambda: None)
+        monkeypatch.setattr(score_checks, "find_evo", lambda: None)
     clip = MotionLibrary(mocap).load(name)
     skeleton, dofs = clip.skeleton.subset(standard_skeleton().names)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])[::3]
-    take = Take(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz / 3, qpos)
+    take = BodyMotion(clip.name, clip.subject, clip.source, clip.behaviour, clip.rate_hz / 3, qpos)
     checks = check_scores([take], skeleton)
     assert all(check.ok for check in checks), [c for c in checks if not c.ok]
-    truth = bounds(skeleton, take.rate_hz, qpos)["oracle"]
+    truth = score_null_methods(skeleton, take.rate_hz, qpos)["oracle"]
     assert np.isfinite(truth.per_frame["foot_skate_true_mm_s"][truth.scored]).mean() > 0.6  # share of time in contact
     for metric, most in (("foot_skate_true_mm_s", 100.0), ("float_true_mm", 10.0), ("penetration_true_mm", 15.0)):
         value = truth.metrics[metric]

@@ -8,10 +8,10 @@ import pytest
 from harness.body import mounts, retargeting
 from harness.body.humanoid import Body
 from harness.body.mounts import Mount
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
 from harness.mocap import synthetic
-from harness.simulate.readings import Sensed
+from harness.simulate.readings import SimulatedReadings
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
@@ -19,16 +19,16 @@ SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head"
 class Still(Protocol):
     """Makes trackers that lie still for so long, each somewhere, with quaternions of halves: products are exact."""
 
-    def __call__(self, duration_s: float, stations: int = 4, *, seed: int = 1) -> Sensed: ...
+    def __call__(self, duration_s: float, stations: int = 4, *, seed: int = 1) -> SimulatedReadings: ...
 
 
 @pytest.fixture
 def still() -> Still:
-    def made(duration_s: float, stations: int = 4, *, seed: int = 1) -> Sensed:
+    def made(duration_s: float, stations: int = 4, *, seed: int = 1) -> SimulatedReadings:
         rng = generator(1, "still")
         time_s = np.repeat(np.arange(round(40.0 * duration_s))[:, None] / 40.0, stations, axis=1)
         places_m, turns = rng.uniform(0.5, 2.0, (stations, 3)), rng.choice([-0.5, 0.5], (stations, 4))
-        return Sensed(
+        return SimulatedReadings(
             seed=seed,
             take="still",
             stations=tuple(f"s{row}" for row in range(stations)),
@@ -49,16 +49,16 @@ def still() -> Still:
 
 def worn(*stations: str) -> list[Mount]:
     """Default mounts of these stations, or of the six."""
-    return [mounts.DEFAULTS[station] for station in stations or SIX]
+    return [mounts.DEFAULT_MOUNTS[station] for station in stations or SIX]
 
 
 @pytest.fixture(scope="session")
-def boxer() -> tuple[Body, Take]:
+def boxer() -> tuple[Body, BodyMotion]:
     """Twelve seconds of the built-in performer, on the performer's own body."""
-    return retargeting.to_own_body(synthetic.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
+    return retargeting.retarget_to_own_body(synthetic.generate("boxing", "p1", 1, seed=1, duration_s=12.0))
 
 
 @pytest.fixture(scope="session")
-def walker() -> tuple[Body, Take]:
+def walker() -> tuple[Body, BodyMotion]:
     """Five seconds of the built-in performer's walk, on the performer's own body."""
-    return retargeting.to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=5.0))
+    return retargeting.retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=5.0))

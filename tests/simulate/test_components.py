@@ -16,19 +16,19 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.errors import BadInput, UnknownName
 from harness.simulate.components.clock import Clock
-from harness.simulate.components.drift_noise import Slow
+from harness.simulate.components.drift_noise import DriftNoise
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.orientation_offset import Turned
-from harness.simulate.components.position_offset import Displaced
-from harness.simulate.components.session_bias import Session
-from harness.simulate.components.speed_error import Speed
-from harness.simulate.components.white_noise import White
-from harness.simulate.noise import Noise, level
-from harness.simulate.readings import Sensed
+from harness.simulate.components.orientation_offset import OrientationOffset
+from harness.simulate.components.position_offset import PositionOffset
+from harness.simulate.components.session_bias import SessionBias
+from harness.simulate.components.speed_error import SpeedError
+from harness.simulate.components.white_noise import WhiteNoise
+from harness.simulate.noise import Noise, noise_preset
+from harness.simulate.readings import SimulatedReadings
 from tests.simulate.conftest import Still
 
 ODDS = 1e-6
@@ -36,12 +36,12 @@ Z = float(stats.norm.isf(ODDS / 2))
 """A normal deviate is farther out once in a million."""
 
 
-def errors(true: Sensed, seen: Sensed) -> tuple[Floats, Floats]:
+def errors(true: SimulatedReadings, seen: SimulatedReadings) -> tuple[Floats, Floats]:
     """Position error (N, S, 3) and the small rotation (N, S, 3) about the tracker's axes."""
     return shifted(true, seen), rotations.log(rotations.multiply(seen.turn, rotations.inverse(true.turn)))
 
 
-def shifted(true: Sensed, seen: Sensed) -> Floats:
+def shifted(true: SimulatedReadings, seen: SimulatedReadings) -> Floats:
     """Position error (N, S, 3) alone: of hours, rotations take long."""
     return seen.position_m - true.position_m
 
@@ -77,7 +77,7 @@ def runs(busy: Bools) -> list[tuple[int, int, int]]:
 
 def test_white(still: Still) -> None:
     true, seen = still(300.0), still(300.0)
-    White(position_m=0.00075, orientation_rad=0.001).spoil(seen)
+    WhiteNoise(position_m=0.00075, orientation_rad=0.001).spoil(seen)
     shift, turn = errors(true, seen)
     for axis in range(3):
         assert_sd(shift[..., axis], 0.00075)
@@ -92,7 +92,7 @@ def test_white(still: Still) -> None:
 def test_slow(still: Still, correlation_s: float) -> None:
     """Its innovations are white and of the right size, and neighbours are as alike as exp(-dt/tau)."""
     true, seen = still(600.0), still(600.0)
-    slow = Slow(position_m=0.0015, pitch_roll_rad=0.004, yaw_rad=0.008, correlation_s=correlation_s)
+    slow = DriftNoise(position_m=0.0015, pitch_roll_rad=0.004, yaw_rad=0.008, correlation_s=correlation_s)
     slow.spoil(seen)
     shift, turn = errors(true, seen)
     a = np.exp(-1.0 / (40.0 * correlation_s))
@@ -108,21 +108,21 @@ def test_slow_is_stationary_from_the_start(still: Still) -> None:
     first = []
     for seed in range(60):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
-        Slow().spoil(seen)
+        DriftNoise().spoil(seen)
         first.append(shifted(true, seen)[0])
-    assert_sd(np.array(first), Slow().position_m)
+    assert_sd(np.array(first), DriftNoise().position_m)
 
 
 def test_session(still: Still) -> None:
     scales, offsets = [], []
     for seed in range(300):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
-        Session(scale=0.002, station_offset_m=0.0).spoil(seen)
+        SessionBias(scale=0.002, station_offset_m=0.0).spoil(seen)
         ratio = seen.position_m / true.position_m - 1.0
         assert np.ptp(ratio) < 1e-12, "one scale for all stations and moments"
         scales.append(ratio[0, 0, 0])
         seen = still(0.1, seed=seed)
-        Session(scale=0.0, station_offset_m=0.001).spoil(seen)
+        SessionBias(scale=0.0, station_offset_m=0.001).spoil(seen)
         moved = rotations.rotate(rotations.inverse(true.turn), shifted(true, seen))
         assert np.ptp(moved, axis=0).max() < 1e-12
         offsets.append(moved[0])
@@ -268,7 +268,7 @@ def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coas
 
 def test_a_lost_station_keeps_sending_what_it_said_last(still: Still) -> None:
     seen = still(10.0)
-    White().spoil(seen)
+    WhiteNoise().spoil(seen)
     before = seen.position_m.copy()
     LostStation("s2", from_s=2.0, to_s=5.0).spoil(seen)
     lost = (seen.time_s[:, 2] >= 2.0) & (seen.time_s[:, 2] < 5.0)
@@ -294,7 +294,7 @@ def test_quality_falls_before_a_station_is_lost(still: Still) -> None:
 
 def test_displaced_stations_are_off_for_a_while_and_by_so_much(still: Still) -> None:
     true, seen = still(6.0), still(6.0)
-    Displaced(("s1", "s3"), from_s=2.0, to_s=4.0, offset_m=(0.0, -0.3, 0.1)).spoil(seen)
+    PositionOffset(("s1", "s3"), from_s=2.0, to_s=4.0, offset_m=(0.0, -0.3, 0.1)).spoil(seen)
     off = (true.time_s >= 2.0) & (true.time_s < 4.0) & np.array([False, True, False, True])
     moved_m, turned_rad = errors(true, seen)
     np.testing.assert_allclose(moved_m[off], np.tile([0.0, -0.3, 0.1], (off.sum(), 1)), atol=1e-12)
@@ -302,14 +302,14 @@ def test_displaced_stations_are_off_for_a_while_and_by_so_much(still: Still) -> 
     assert (seen.quality == 1.0).all()  # it does not know
     np.testing.assert_array_equal(seen.hits["displaced"], off)
     with pytest.raises(UnknownName, match="'s9'"):
-        Displaced(("s9",)).spoil(seen)
+        PositionOffset(("s9",)).spoil(seen)
     with pytest.raises(BadInput, match="to_s"):
-        Displaced((), from_s=2.0, to_s=1.0)
+        PositionOffset((), from_s=2.0, to_s=1.0)
 
 
 def test_turned_stations_face_elsewhere_for_a_while_and_stay_in_place(still: Still) -> None:
     true, seen = still(6.0), still(6.0)
-    Turned((), from_s=1.0, to_s=3.0, angle_rad=0.5).spoil(seen)
+    OrientationOffset((), from_s=1.0, to_s=3.0, angle_rad=0.5).spoil(seen)
     off = (true.time_s >= 1.0) & (true.time_s < 3.0)
     moved_m, turned_rad = errors(true, seen)
     np.testing.assert_allclose(turned_rad[off], np.tile([0.0, 0.0, 0.5], (off.sum(), 1)), atol=1e-12)
@@ -317,13 +317,13 @@ def test_turned_stations_face_elsewhere_for_a_while_and_stay_in_place(still: Sti
     assert np.abs(moved_m).max() == 0.0
     np.testing.assert_array_equal(seen.hits["turned"], off)
     with pytest.raises(UnknownName, match="'s9'"):
-        Turned(("s9",)).spoil(seen)
+        OrientationOffset(("s9",)).spoil(seen)
 
 
 def test_speed(still: Still, rng: np.random.Generator) -> None:
     true, seen = still(1.0), still(1.0)
     seen.velocity_m_s = rng.normal(size=seen.velocity_m_s.shape)
-    Speed(ahead_s=0.002).spoil(seen)
+    SpeedError(ahead_s=0.002).spoil(seen)
     np.testing.assert_allclose(shifted(true, seen), 0.002 * seen.velocity_m_s, atol=1e-15)
 
 
@@ -366,7 +366,7 @@ def test_more_stations_leave_the_draws_of_the_others_alone(still: Still) -> None
     few, many = still(60.0, 2), still(60.0, 5)
     many.position_m[:, :2], many.turn[:, :2] = few.position_m, few.turn
     for sensed in (few, many):
-        level("default").spoil(sensed)
+        noise_preset("default").spoil(sensed)
     for name in ("position_m", "turn", "quality", "device_s"):
         np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[:, :2])
 
@@ -382,7 +382,7 @@ def test_one_component_less_leaves_the_draws_of_the_others_alone(still: Still, l
         shift[seen.quality == 0.0] = 0.0
         return shift
 
-    whole = dataclasses.replace(level("default"), dropout=None, session=Session(scale=0.0))
+    whole = dataclasses.replace(noise_preset("default"), dropout=None, session=SessionBias(scale=0.0))
     nothing: dict[str, Any] = {left_out: None}
     rest = dataclasses.replace(whole, **nothing)
     alone = dataclasses.replace(Noise(), **{left_out: getattr(whole, left_out)})
@@ -393,30 +393,30 @@ def test_noise_differs_by_seed_take_and_station(still: Still) -> None:
     one, other, next_take = still(1.0), still(1.0, seed=2), still(1.0)
     next_take.take = "another"
     for sensed in (one, other, next_take):
-        White().spoil(sensed)
+        WhiteNoise().spoil(sensed)
     shifts = [s.position_m - still(1.0).position_m for s in (one, other, next_take)]
     assert len({float(x) for shift in shifts for x in shift[0].ravel()}) == 3 * 4 * 3
 
 
 def test_levels_are_the_table_of_the_protocol() -> None:
     """docs/is900.md 13.5, number by number."""
-    assert level("clean") == Noise()
-    noise, default = level("noise"), level("default")
+    assert noise_preset("clean") == Noise()
+    noise, default = noise_preset("noise"), noise_preset("default")
     assert {name for name, part in vars(noise).items() if part} == {"white", "slow", "session", "clock"}
     assert {name for name, part in vars(default).items() if part} == {
         *("white", "slow", "session", "clock"),
         *("excursion", "echo", "dropout", "speed"),
     }
     deg = np.pi / 180.0
-    assert default.white == White(0.00075, 0.05 * deg)
-    assert default.slow == Slow(0.0015, 0.25 * deg, 0.5 * deg, 1.0)
-    assert default.session == Session(0.001, 0.001)
+    assert default.white == WhiteNoise(0.00075, 0.05 * deg)
+    assert default.slow == DriftNoise(0.0015, 0.25 * deg, 0.5 * deg, 1.0)
+    assert default.session == SessionBias(0.001, 0.001)
     assert default.excursion == Excursion(1.0, (0.005, 0.03), (1.0, 5.0), 0.2)
     assert default.echo == Echo(0.03, (1, 8), (0.05, 0.30))
     assert default.dropout is not None
     assert (default.dropout.share, default.dropout.gap_s) == (0.01, (0.1, 0.5))
-    assert default.speed == Speed(0.002)
+    assert default.speed == SpeedError(0.002)
     assert default.clock is not None
     assert default.clock.drift_ppm == 20.0
     with pytest.raises(UnknownName, match="default"):
-        level("defualt")
+        noise_preset("defualt")

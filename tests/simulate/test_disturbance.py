@@ -5,22 +5,22 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.simulate.disturbance import KINDS, Disturbance, Kind
-from harness.simulate.noise import level
-from harness.simulate.simulation import Simulation, TrackerConfig, simulate
+from harness.simulate.noise import noise_preset
+from harness.simulate.simulation import Simulation, TrackerConfig, simulate_tracker
 from tests.simulate.conftest import SIX, worn
 
 BEGIN_S, END_S = 3.0, 5.0
 
 
 @pytest.fixture(scope="module")
-def seen(boxer: tuple[Body, Take]) -> dict[Kind, Simulation]:
+def seen(boxer: tuple[Body, BodyMotion]) -> dict[Kind, Simulation]:
     """The same take with the same noise under every disturbance, at moments clear of the edges."""
     found: dict[Kind, Simulation] = {}
     for kind in KINDS:
-        noise = Disturbance(kind, station="right_wrist", from_s=BEGIN_S).added(level("default"), SIX)
-        found[kind] = simulate(*boxer, worn(), TrackerConfig(slot_s=0.0), noise, seed=4)
+        noise = Disturbance(kind, station="right_wrist", from_s=BEGIN_S).added(noise_preset("default"), SIX)
+        found[kind] = simulate_tracker(*boxer, worn(), TrackerConfig(slot_s=0.0), noise, seed=4)
     return found
 
 

@@ -5,20 +5,20 @@ import pytest
 
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.motion import Take
-from harness.simulate.loop import lap
-from harness.simulate.noise import level
-from harness.simulate.simulation import TrackerConfig, simulate
+from harness.core.motion import BodyMotion
+from harness.simulate.loop import simulate_loop
+from harness.simulate.noise import noise_preset
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from tests.simulate.conftest import worn
 
 TRACKER = TrackerConfig(slot_s=0.0033)
 
 
 @pytest.mark.parametrize("noise", ["clean", "default"])
-def test_the_first_lap_is_what_the_simulation_says(boxer: tuple[Body, Take], noise: str) -> None:
+def test_the_first_lap_is_what_the_simulation_says(boxer: tuple[Body, BodyMotion], noise: str) -> None:
     body, take = boxer
-    played = lap(body, take, worn(), TRACKER, level(noise), seed=3)
-    seen = simulate(body, take, worn(), TRACKER, level(noise), seed=3)
+    played = simulate_loop(body, take, worn(), TRACKER, noise_preset(noise), seed=3)
+    seen = simulate_tracker(body, take, worn(), TRACKER, noise_preset(noise), seed=3)
     assert played.first_lap == len(seen.frames)
     for row, frame in enumerate(seen.frames):
         np.testing.assert_allclose(frame.measured_s, played.device_s[row], atol=1e-6)
@@ -26,9 +26,9 @@ def test_the_first_lap_is_what_the_simulation_says(boxer: tuple[Body, Take], noi
         np.testing.assert_allclose(frame.position_m[sound], played.position_m[row][sound], atol=1e-6)
 
 
-def test_the_way_back_goes_on_from_the_end_to_the_beginning(boxer: tuple[Body, Take]) -> None:
+def test_the_way_back_goes_on_from_the_end_to_the_beginning(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
-    played = lap(body, take, worn(), TRACKER, level("clean"), seed=3)
+    played = simulate_loop(body, take, worn(), TRACKER, noise_preset("clean"), seed=3)
     assert len(played) >= played.first_lap + TRACKER.rate_hz
     steps_m = np.linalg.norm(np.diff(played.position_m, axis=0, append=played.position_m[:1]), axis=2)
     assert steps_m[played.first_lap - 1 :].max() <= steps_m[: played.first_lap - 1].max()
@@ -39,9 +39,9 @@ def test_the_way_back_goes_on_from_the_end_to_the_beginning(boxer: tuple[Body, T
     assert played.lap_s == pytest.approx(played.taken_s[-1, 0] + 1.0 / TRACKER.rate_hz)
 
 
-def test_the_clock_runs_on_through_the_lap(boxer: tuple[Body, Take]) -> None:
+def test_the_clock_runs_on_through_the_lap(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
-    played = lap(body, take, worn(), TRACKER, level("noise"), seed=3)
+    played = simulate_loop(body, take, worn(), TRACKER, noise_preset("noise"), seed=3)
     pace_s = np.diff(played.device_s[:, 0])
     np.testing.assert_allclose(pace_s, (1.0 + 20e-6) / TRACKER.rate_hz, rtol=1e-9)
     assert played.device_lap_s == pytest.approx((1.0 + 20e-6) * played.lap_s)

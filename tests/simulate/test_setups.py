@@ -10,24 +10,24 @@ from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
 from harness.body.mounts import Mount
 from harness.core import rotations
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput, UnknownName
 from harness.simulate.components.clock import Clock
-from harness.simulate.components.drift_noise import Slow
+from harness.simulate.components.drift_noise import DriftNoise
 from harness.simulate.components.dropout import Dropout
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.excursion import Excursion
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountOffset, MountSlip
-from harness.simulate.components.session_bias import Session
-from harness.simulate.components.speed_error import Speed
-from harness.simulate.components.white_noise import White
+from harness.simulate.components.session_bias import SessionBias
+from harness.simulate.components.speed_error import SpeedError
+from harness.simulate.components.white_noise import WhiteNoise
 from harness.simulate.link import TrackerConfig
-from harness.simulate.noise import Noise, level
-from harness.simulate.simulation import Simulation, simulate
+from harness.simulate.noise import Noise, noise_preset
+from harness.simulate.simulation import Simulation, simulate_tracker
 from tests.simulate.conftest import SIX, worn
 
-Boxer = tuple[Body, Take]
+Boxer = tuple[Body, BodyMotion]
 HANDS = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
 FEET = ("left_wrist", "right_wrist", "left_foot", "right_foot", "torso", "head")
 FIVE = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "pelvis")
@@ -48,7 +48,7 @@ def error_m(body: Body, simulation: Simulation) -> float:
 @pytest.mark.parametrize("stations", [SIX, HANDS, FEET, FIVE, ("head",)], ids=["six", "hands", "feet", "five", "one"])
 def test_every_set_up_gives_whole_frames(boxer: Boxer, stations: tuple[str, ...]) -> None:
     """Read all at once (no skew), decoded stations are where MuJoCo has them at the frame's time."""
-    simulation = simulate(*boxer, worn(*stations), TrackerConfig(slot_s=0.0), level("clean"), seed=1)
+    simulation = simulate_tracker(*boxer, worn(*stations), TrackerConfig(slot_s=0.0), noise_preset("clean"), seed=1)
     assert simulation.stations == simulation.calibration.stations == stations
     assert len(simulation.frames) == simulation.expected == 481
     assert all(frame.position_m.shape == (len(stations), 3) for frame in simulation.frames)
@@ -59,7 +59,7 @@ def test_ankle_trackers_sit_on_the_shin_and_may_sit_on_the_foot(boxer: Boxer) ->
     bones = {
         station: bone
         for stations in (SIX, FEET)
-        for known in [simulate(*boxer, worn(*stations), TrackerConfig(), Noise(), seed=1).calibration]
+        for known in [simulate_tracker(*boxer, worn(*stations), TrackerConfig(), Noise(), seed=1).calibration]
         for station, bone in zip(known.stations, known.bones, strict=True)
     }
     assert (bones["left_ankle"], bones["right_ankle"]) == ("ltibia", "rtibia")
@@ -68,7 +68,7 @@ def test_ankle_trackers_sit_on_the_shin_and_may_sit_on_the_foot(boxer: Boxer) ->
 
 def test_readings_in_the_health_add_up(boxer: Boxer) -> None:
     tracker = TrackerConfig(rate_hz=60.0)
-    simulation = simulate(*boxer, worn(), tracker, level("default"), seed=1)
+    simulation = simulate_tracker(*boxer, worn(), tracker, noise_preset("default"), seed=1)
     health, frames = simulation.health, simulation.frames
     assert health["frames_sampled"] == simulation.expected
     assert health["frames_received"] == len(frames)
@@ -80,7 +80,7 @@ def test_readings_in_the_health_add_up(boxer: Boxer) -> None:
 REFUSED: dict[str, Callable[[], object]] = {
     "negative share": lambda: Echo(share=-0.1),
     "all echo": lambda: Echo(share=1.0),
-    "no number": lambda: White(position_m=float("nan")),
+    "no number": lambda: WhiteNoise(position_m=float("nan")),
     "bursts of nothing": lambda: Echo(burst_records=(0, 0)),
     "descending": lambda: Excursion(stay_s=(5.0, 1.0)),
     "negative size": lambda: Echo(size_m=(-0.1, 0.3)),
@@ -88,10 +88,10 @@ REFUSED: dict[str, Callable[[], object]] = {
     "negative ramp": lambda: Excursion(ramp_s=-0.1),
     "all lost": lambda: Dropout(share=1.0),
     "gaps of nothing": lambda: Dropout(gap_s=(0.0, 0.5)),
-    "no memory": lambda: Slow(correlation_s=0.0),
-    "negative noise": lambda: White(orientation_rad=-0.01),
-    "scale": lambda: Session(scale=2.0),
-    "speed": lambda: Speed(ahead_s=float("inf")),
+    "no memory": lambda: DriftNoise(correlation_s=0.0),
+    "negative noise": lambda: WhiteNoise(orientation_rad=-0.01),
+    "scale": lambda: SessionBias(scale=2.0),
+    "speed": lambda: SpeedError(ahead_s=float("inf")),
     "clock before zero": lambda: Clock(offset_s=-1.0),
     "clock backwards": lambda: Clock(drift_ppm=-2e6),
     "ends before it begins": lambda: LostStation("head", 3.0, 1.0),
@@ -115,12 +115,12 @@ def test_the_message_names_component_field_and_range() -> None:
 
 def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
     with pytest.raises(BadInput, match="a name twice"):
-        simulate(*boxer, worn("head", "head"), TrackerConfig(), Noise(), seed=1)
+        simulate_tracker(*boxer, worn("head", "head"), TrackerConfig(), Noise(), seed=1)
     with pytest.raises(BadInput, match="1 to 12"):
-        simulate(*boxer, [], TrackerConfig(), Noise(), seed=1)
+        simulate_tracker(*boxer, [], TrackerConfig(), Noise(), seed=1)
     thirteen = [Mount(f"s{k}", "head", 1.0) for k in range(13)]
     with pytest.raises(BadInput, match="1 to 12"):
-        simulate(*boxer, thirteen, TrackerConfig(), Noise(), seed=1)
+        simulate_tracker(*boxer, thirteen, TrackerConfig(), Noise(), seed=1)
 
 
 @pytest.mark.parametrize(
@@ -136,4 +136,4 @@ def test_a_tracker_that_cannot_be_is_told_by_its_key(key: str, value: Any) -> No
 @pytest.mark.parametrize("noise", [Noise(lost=(LostStation("haed"),)), Noise(slip=(MountSlip("haed"),))])
 def test_faults_of_stations_that_are_not_worn_are_refused(boxer: Boxer, noise: Noise) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'head'"):
-        simulate(*boxer, worn(), TrackerConfig(), noise, seed=1)
+        simulate_tracker(*boxer, worn(), TrackerConfig(), noise, seed=1)

@@ -10,33 +10,33 @@ from numpy.typing import NDArray
 
 from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
-from harness.body.mounts import DEFAULTS
+from harness.body.mounts import DEFAULT_MOUNTS
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.simulate.components.clock import Clock
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.mount import MountSlip
 from harness.simulate.link import TrackerConfig
-from harness.simulate.noise import LEVELS, Noise, level
-from harness.simulate.simulation import Simulation, sampling_times_s, simulate
+from harness.simulate.noise import NOISE_PRESETS, Noise, noise_preset
+from harness.simulate.simulation import Simulation, sampling_times_s, simulate_tracker
 from harness.simulate.trajectory import Trajectory
-from harness.stream.codec.capture import Capture
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import CaptureStream, FrameReader
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
 from tests.simulate.conftest import worn
 
-Boxer = tuple[Body, Take]
+Boxer = tuple[Body, BodyMotion]
 OVERLOADED = TrackerConfig(rate_hz=60.0)
 """Six stations at 60 Hz are a fifth more than 115200 baud can carry."""
 
 
 @cache
 def seen(boxer: Boxer, noise: Noise | str = "clean", tracker: TrackerConfig | None = None, seed: int = 1) -> Simulation:
-    chosen = level(noise) if isinstance(noise, str) else noise
-    return simulate(*boxer, worn(), tracker or TrackerConfig(), chosen, seed=seed)
+    chosen = noise_preset(noise) if isinstance(noise, str) else noise
+    return simulate_tracker(*boxer, worn(), tracker or TrackerConfig(), chosen, seed=seed)
 
 
 def column(simulation: Simulation, name: str) -> NDArray[Any]:
@@ -98,7 +98,7 @@ def test_the_tracker_looks_forward_right_and_down(boxer: Boxer) -> None:
     np.testing.assert_allclose(known.tracker_origin_m, TrackerConfig().origin_m)
 
 
-@pytest.mark.parametrize("noise", LEVELS)
+@pytest.mark.parametrize("noise", NOISE_PRESETS)
 @pytest.mark.parametrize("tracker", [TrackerConfig(), OVERLOADED], ids=["40 Hz", "overload"])
 def test_bytes_in_any_pieces_give_the_same_frames(
     boxer: Boxer, noise: str, tracker: TrackerConfig, rng: np.random.Generator
@@ -189,12 +189,12 @@ def test_default_noise_errs_by_what_its_parts_allow(boxer: Boxer) -> None:
 def test_a_slipped_strap_is_a_tracker_mounted_elsewhere(boxer: Boxer) -> None:
     """Round a capsule, slipping by an angle from the beginning is being put on at that angle."""
     body, take = boxer
-    shin = DEFAULTS["left_ankle"]
+    shin = DEFAULT_MOUNTS["left_ankle"]
     slip = MountSlip("left_ankle", around_rad=0.5, along_m=-0.03)
     length_m = body.skeleton.length_m[body.skeleton.index(shin.bone)]
     elsewhere = dataclasses.replace(shin, around_rad=shin.around_rad + 0.5, along=shin.along - 0.03 / length_m)
-    slipped = simulate(body, take, [shin], TrackerConfig(), Noise(slip=(slip,)), seed=1)
-    there = simulate(body, take, [elsewhere], TrackerConfig(), Noise(), seed=1)
+    slipped = simulate_tracker(body, take, [shin], TrackerConfig(), Noise(slip=(slip,)), seed=1)
+    there = simulate_tracker(body, take, [elsewhere], TrackerConfig(), Noise(), seed=1)
     gap = column(slipped, "position_m") - column(there, "position_m")
     assert np.abs(gap).max() < 1e-6
     angle = rotations.angle_between_rad(column(slipped, "tracker_from_station"), column(there, "tracker_from_station"))
@@ -204,10 +204,10 @@ def test_a_slipped_strap_is_a_tracker_mounted_elsewhere(boxer: Boxer) -> None:
 @pytest.mark.parametrize(
     ("noise", "tracker"),
     [
-        (level("clean"), TrackerConfig()),
-        (level("default"), TrackerConfig()),
-        (level("default"), OVERLOADED),
-        (level("default"), TrackerConfig(rate_hz=20.0, slot_s=0.0)),
+        (noise_preset("clean"), TrackerConfig()),
+        (noise_preset("default"), TrackerConfig()),
+        (noise_preset("default"), OVERLOADED),
+        (noise_preset("default"), TrackerConfig(rate_hz=20.0, slot_s=0.0)),
         (Noise(lost=(LostStation("head"),)), TrackerConfig(baud=38400, rate_hz=20.0)),
     ],
     ids=["clean", "default", "overload", "no skew", "lost"],
@@ -233,7 +233,7 @@ def test_a_take_shorter_than_a_frame_is_refused(boxer: Boxer) -> None:
     body, take = boxer
     short = dataclasses.replace(take, qpos=take.qpos[:2])
     with pytest.raises(BadInput, match="shorter than one frame"):
-        simulate(body, short, worn(), TrackerConfig(), Noise(), seed=1)
+        simulate_tracker(body, short, worn(), TrackerConfig(), Noise(), seed=1)
 
 
 def test_the_wire_can_be_cut_at_any_byte(boxer: Boxer, rng: np.random.Generator) -> None:
@@ -242,7 +242,7 @@ def test_the_wire_can_be_cut_at_any_byte(boxer: Boxer, rng: np.random.Generator)
     wire = simulation.wire
     for cut in rng.integers(1000, 5000, 5).tolist():
         kept = int(np.searchsorted(wire.ends, cut, side="right"))
-        part = Capture(wire.data[:cut], np.append(wire.ends[:kept], cut), wire.received_s[: kept + 1])
+        part = ByteCapture(wire.data[:cut], np.append(wire.ends[:kept], cut), wire.received_s[: kept + 1])
         frames = list(CaptureStream(simulation.wire_format, part))
         assert len(frames) in (kept // 6, kept // 6 + 1)
         assert all(same(a, b) for a, b in zip(frames[: kept // 6], simulation.frames, strict=False))

@@ -7,10 +7,10 @@ import pytest
 from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
-from harness.simulate.noise import level
-from harness.simulate.simulation import TrackerConfig, simulate
+from harness.simulate.noise import noise_preset
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.simulate.trajectory import Trajectory
 from tests.simulate.conftest import worn
 
@@ -18,7 +18,7 @@ STEP_S = 1e-5
 
 
 @pytest.fixture(scope="module")
-def trajectory(boxer: tuple[Body, Take]) -> Trajectory:
+def trajectory(boxer: tuple[Body, BodyMotion]) -> Trajectory:
     return Trajectory(*boxer)
 
 
@@ -28,7 +28,7 @@ def moments_s(trajectory: Trajectory) -> Floats:
     return out
 
 
-def test_it_goes_through_every_frame(boxer: tuple[Body, Take], trajectory: Trajectory) -> None:
+def test_it_goes_through_every_frame(boxer: tuple[Body, BodyMotion], trajectory: Trajectory) -> None:
     _, take = boxer
     qpos = trajectory.qpos(np.arange(len(take)) / take.rate_hz)
     assert np.abs(qpos[:, :3] - take.qpos[:, :3]).max() < 1e-9
@@ -37,7 +37,9 @@ def test_it_goes_through_every_frame(boxer: tuple[Body, Take], trajectory: Traje
     assert trajectory.duration_s == pytest.approx((len(take) - 1) / take.rate_hz)
 
 
-def test_velocity_is_the_slope_of_position(boxer: tuple[Body, Take], trajectory: Trajectory, moments_s: Floats) -> None:
+def test_velocity_is_the_slope_of_position(
+    boxer: tuple[Body, BodyMotion], trajectory: Trajectory, moments_s: Floats
+) -> None:
     body, _ = boxer
     before, after = trajectory.qpos(moments_s - STEP_S), trajectory.qpos(moments_s + STEP_S)
     slope = np.empty((len(moments_s), body.model.nv))
@@ -51,7 +53,7 @@ def test_acceleration_is_the_slope_of_velocity(trajectory: Trajectory, moments_s
     assert np.abs(slope - trajectory.qacc(moments_s)).max() < 1e-3 * np.abs(slope).max()
 
 
-def test_acceleration_does_not_jump_at_frames(boxer: tuple[Body, Take], trajectory: Trajectory) -> None:
+def test_acceleration_does_not_jump_at_frames(boxer: tuple[Body, BodyMotion], trajectory: Trajectory) -> None:
     """Twice continuously differentiable: the step over a frame is what the third derivative makes of 2 us."""
     _, take = boxer
     frames_s = np.arange(1, len(take) - 1) / take.rate_hz
@@ -62,11 +64,13 @@ def test_acceleration_does_not_jump_at_frames(boxer: tuple[Body, Take], trajecto
 
 @pytest.mark.parametrize("station", ["left_hand", "right_ankle", "left_foot", "torso", "head", "pelvis"])
 def test_stations_move_as_mujoco_says(
-    boxer: tuple[Body, Take], trajectory: Trajectory, moments_s: Floats, station: str
+    boxer: tuple[Body, BodyMotion], trajectory: Trajectory, moments_s: Floats, station: str
 ) -> None:
     """Place, velocity and acceleration of a station, against mj_forward on the same configuration: under 1e-6."""
     body, take = boxer
-    calibration = simulate(body, take, worn(station), TrackerConfig(), level("clean"), seed=1).calibration
+    calibration = simulate_tracker(
+        body, take, worn(station), TrackerConfig(), noise_preset("clean"), seed=1
+    ).calibration
     motion = trajectory.station_motion(calibration, moments_s[:, None])
     model, data = body.model, mujoco.MjData(body.model)
     bone = int(body.bone_body_ids[body.skeleton.index(calibration.bones[0])])
@@ -97,9 +101,9 @@ def test_stations_move_as_mujoco_says(
         assert rotations.angle_between_rad(motion.world_from_station[i, 0], turned) < 1e-6
 
 
-def test_orientation_has_no_flips(trajectory: Trajectory, boxer: tuple[Body, Take]) -> None:
+def test_orientation_has_no_flips(trajectory: Trajectory, boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
-    seen = simulate(body, take, worn(), TrackerConfig(), level("clean"), seed=1)
+    seen = simulate_tracker(body, take, worn(), TrackerConfig(), noise_preset("clean"), seed=1)
     time_s = np.repeat(np.linspace(0.0, trajectory.duration_s, 2000)[:, None], 6, axis=1)
     turn = trajectory.station_motion(seen.calibration, time_s).world_from_station
     assert (np.sum(turn[1:] * turn[:-1], axis=-1) > 0.9).all()
@@ -111,7 +115,7 @@ def test_moments_outside_the_take_are_refused(trajectory: Trajectory, moment_s: 
         trajectory.qpos(np.array([1.0, moment_s]))
 
 
-def test_one_frame_is_no_motion(boxer: tuple[Body, Take]) -> None:
+def test_one_frame_is_no_motion(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
     with pytest.raises(BadInput, match="two at least"):
-        Trajectory(body, Take("short", "p1", "test", "", 120.0, take.qpos[:1]))
+        Trajectory(body, BodyMotion("short", "p1", "test", "", 120.0, take.qpos[:1]))

@@ -10,25 +10,25 @@ from numpy.typing import NDArray
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.codec.capture import Capture
-from harness.stream.codec.decoder import Decoder, Event, Records
-from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, size
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.decoder import Decoder, DecoderEvent, RecordRun
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
 from harness.stream.codec.reader import FrameReader, WireFormat
-from harness.stream.codec.records import Said, Settings, encode, to_bytes
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 
 Kind = Literal["flipped", "changed", "lost", "added"]
 KINDS: tuple[Kind, ...] = ("flipped", "changed", "lost", "added")
 RATE_HZ, STATIONS, ROUNDS = 40.0, 4, 8
-LISTS: dict[str, tuple[tuple[int, ...], Settings]] = {
-    "standard": (STANDARD_LIST, Settings()),
-    "16-bit": ((40, 18, 19, 21, 1), Settings()),
-    "VRPN": ((2, 11, 0), Settings(metres_per_unit=0.0254)),
-    "angles": ((2, 4, 1), Settings(metres_per_unit=0.0254)),
-    "no end": ((40, 2, 11, 21), Settings()),
-    "16-bit, no end": ((18, 20), Settings()),
-    "ASCII standard": (STANDARD_LIST, Settings(binary=False)),
-    "ASCII default": ((2, 4, 1), Settings(metres_per_unit=0.0254, binary=False)),
-    "ASCII, no end": ((40, 2, 11), Settings(binary=False)),
+LISTS: dict[str, tuple[tuple[int, ...], RecordFormat]] = {
+    "standard": (STANDARD_LIST, RecordFormat()),
+    "16-bit": ((40, 18, 19, 21, 1), RecordFormat()),
+    "VRPN": ((2, 11, 0), RecordFormat(metres_per_unit=0.0254)),
+    "angles": ((2, 4, 1), RecordFormat(metres_per_unit=0.0254)),
+    "no end": ((40, 2, 11, 21), RecordFormat()),
+    "16-bit, no end": ((18, 20), RecordFormat()),
+    "ASCII standard": (STANDARD_LIST, RecordFormat(binary=False)),
+    "ASCII default": ((2, 4, 1), RecordFormat(metres_per_unit=0.0254, binary=False)),
+    "ASCII, no end": ((40, 2, 11), RecordFormat(binary=False)),
 }
 """What is tried: a name, an output list and the settings."""
 
@@ -38,17 +38,17 @@ class Sound:
     """Rounds of four stations that move about a room as bodies do, as bytes and as values."""
 
     items: tuple[int, ...]
-    settings: Settings
-    said: Said
+    settings: RecordFormat
+    said: RecordValues
     stations: NDArray[np.uint8]
 
     @cached_property
     def data(self) -> bytes:
-        return to_bytes(self.items, encode(self.items, self.stations, self.said, self.settings), self.settings)
+        return to_bytes(self.items, encode_records(self.items, self.stations, self.said, self.settings), self.settings)
 
     @property
     def size(self) -> int:
-        return size(self.items, self.settings.binary, self.settings.stylus_bytes)
+        return record_size(self.items, self.settings.binary, self.settings.stylus_bytes)
 
     @cached_property
     def records(self) -> list[bytes]:
@@ -71,7 +71,7 @@ def sound(name: str, seed: int, rounds: int = ROUNDS) -> Sound:
     time_s = 12.0 + np.repeat(np.arange(rounds), STATIONS) / RATE_HZ + 0.0033 * number
     place_m, turn_rad = rng.uniform(-0.8, 0.8, (2, STATIONS, 3))
     sway = np.sin(2.0 * np.pi * rng.uniform(0.5, 2.0, STATIONS)[number] * time_s)[:, None]
-    given = Said(
+    given = RecordValues(
         measured_s=time_s,
         position_m=place_m[number] + 0.2 * sway + 1e-3 * rng.normal(size=(len(number), 3)),
         tracker_from_station=rotations.exp(3.0 * turn_rad[number] + 0.5 * sway),
@@ -90,12 +90,12 @@ def hurt(data: bytes, kind: Kind, at: int, rng: np.random.Generator) -> bytes:
     return data[:at] + data[at + 1 :] if kind == "lost" else data[:at] + bytes([new]) + data[at:]
 
 
-def found(events: list[Event], given: Sound) -> Counter[bytes]:
+def found(events: list[DecoderEvent], given: Sound) -> Counter[bytes]:
     """The records that came out, as bytes."""
     return Counter(
         to_bytes(given.items, event.table[k : k + 1], given.settings)
         for event in events
-        if isinstance(event, Records)
+        if isinstance(event, RecordRun)
         for k in range(len(event.table))
     )
 
@@ -149,7 +149,7 @@ def _rows(given: Sound, data: bytes) -> list[_Row]:
     reader = FrameReader(given.wire)
     ends = np.append(np.arange(given.size, len(data), given.size), len(data))
     record = np.minimum((ends - 1) // given.size, len(given.records) - 1)
-    capture = Capture(data, ends, given.said.measured_s[record] + 100.0)
+    capture = ByteCapture(data, ends, given.said.measured_s[record] + 100.0)
     out: list[_Row] = []
     for number, frame in enumerate([*reader.feed_all(capture), *reader.finish()]):
         values = np.column_stack([frame.measured_s, frame.position_m, frame.tracker_from_station])

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.experiment.playback import Rehearsal, rehearse
+from harness.experiment.playback import Playback, prepare_playback
 from harness.reconstruct import registry
-from harness.stream.driver import Is900, Wanted
-from harness.stream.emulator import serving
+from harness.stream.driver import DriverConfig, Is900
+from harness.stream.emulator import serve_emulator
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
@@ -28,13 +28,13 @@ Sources = dict[str, list[TrackerFrame]]
 
 
 @pytest.fixture(scope="module")
-def played() -> Rehearsal:
+def played() -> Playback:
     """Four stations with all errors of the device, at a rate that a busy computer can keep."""
-    return rehearse("demo", clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
+    return prepare_playback("demo", clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
 
 
 @pytest.fixture(scope="module")
-def seen(played: Rehearsal, tmp_path_factory: pytest.TempPathFactory) -> Sources:
+def seen(played: Playback, tmp_path_factory: pytest.TempPathFactory) -> Sources:
     """The frames of each source; those of ports are read in real time, at the same time."""
     folder = tmp_path_factory.mktemp("conformance")
     simulation = played.simulation
@@ -51,13 +51,13 @@ def seen(played: Rehearsal, tmp_path_factory: pytest.TempPathFactory) -> Sources
     }
 
 
-def _from_port(played: Rehearsal, into: Path, *, pty: Path | None = None, tcp: str | None = None) -> list[TrackerFrame]:
+def _from_port(played: Playback, into: Path, *, pty: Path | None = None, tcp: str | None = None) -> list[TrackerFrame]:
     """A frame is closed when its stations are late, so a computer that holds the emulator up is no device to compare
     with: then it is tried again."""
     for _ in range(ATTEMPTS):
         into.unlink(missing_ok=True)
-        with serving(played.samples, pty=pty, tcp=tcp) as device, RecordingWriter(into) as recording:
-            stream = Is900(device.name, Wanted(stations=played.samples.stations), witness=recording)
+        with serve_emulator(played.samples, pty=pty, tcp=tcp) as device, RecordingWriter(into) as recording:
+            stream = Is900(device.name, DriverConfig(stations=played.samples.stations), witness=recording)
             frames = list(islice(stream, FRAMES))
             stream.close()
         if device.summary()["pacing_max_ms"] < LATEST_MS:
@@ -86,14 +86,14 @@ def _differences(one: Iterable[TrackerFrame], other: Iterable[TrackerFrame]) -> 
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_every_source_gives_the_frames_of_the_simulation(played: Rehearsal, seen: Sources, source: str) -> None:
+def test_every_source_gives_the_frames_of_the_simulation(played: Playback, seen: Sources, source: str) -> None:
     simulated, came = _common(played.simulation.frames, seen[source])
     assert _differences(simulated, came) == []
     assert any(not frame.position_valid.all() for frame in came), "no loss was among them: the motion is too tame"
 
 
 @pytest.mark.parametrize("name", sorted(registry.methods()))
-def test_every_method_answers_alike_whatever_the_source(played: Rehearsal, seen: Sources, name: str) -> None:
+def test_every_method_answers_alike_whatever_the_source(played: Playback, seen: Sources, name: str) -> None:
     """Bit by bit, although a busy host receives the frames of ports at other times than the simulation says."""
     fitted = played.setting.fitted(registry.resolve(name), name)
     sources = {"simulation": list(played.simulation.frames), **seen}

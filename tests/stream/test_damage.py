@@ -8,7 +8,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from harness.stream.codec.decoder import LONGEST_REPLY, Event, Garbage, Records, joined
+from harness.stream.codec.decoder import LONGEST_REPLY, DecoderEvent, Garbage, RecordRun, merge_adjacent
 from tests.stream.damage import FATES, KINDS, LISTS, Fate, Kind, cost, fate, fate_of_wrong_station, found, sound
 
 
@@ -103,11 +103,11 @@ def test_every_split_gives_the_same_events(name: str, rng: np.random.Generator) 
 
 def _pieces(name: str, data: bytes, cuts: tuple[int, ...]) -> list[object]:
     one = sound(name, 3, 4).decoder()
-    events: list[Event] = []
+    events: list[DecoderEvent] = []
     for start, stop in zip((0, *cuts), (*cuts, len(data)), strict=True):
         events += one.feed(data[start:stop])
-    out = joined(events + one.finish())
-    return [(e.offset, e.size, e.table.tobytes()) if isinstance(e, Records) else e for e in out]
+    out = merge_adjacent(events + one.finish())
+    return [(e.offset, e.size, e.table.tobytes()) if isinstance(e, RecordRun) else e for e in out]
 
 
 @pytest.mark.parametrize("name", LISTS)
@@ -116,7 +116,7 @@ def test_a_clean_stream_is_all_there_and_replies_are_found_between_records(name:
     lines = [b"21S3FB         4.2301 IS900VET" + b" " * 23 + b"\r\n", b"31Sg00\r\n", b"21l1111\r\n"]
     data = b"".join(record + (lines[k % 3] if k % 5 == 4 else b"") for k, record in enumerate(given.records))
     one = given.decoder()
-    events = joined([*one.feed(data), *one.finish()])
+    events = merge_adjacent([*one.feed(data), *one.finish()])
     assert found(events, given) == Counter(given.records)
     assert not [event for event in events if isinstance(event, Garbage)]
     assert len(events) == 13, "a run of records is one event, and each reply another"

@@ -5,7 +5,7 @@ import pytest
 
 from harness.errors import BadInput, UnknownName
 from harness.stream.frame import TrackerFrame
-from harness.stream.inputs import COMBINATIONS, combination
+from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
@@ -34,7 +34,7 @@ def frame(stations: int) -> TrackerFrame:
     ],
 )
 def test_a_combination_keeps_what_it_names(name: str, position: set[str], orientation: set[str]) -> None:
-    masked = combination(name, SIX).masked(frame(6))
+    masked = make_inputs(name, SIX).masked(frame(6))
     assert {s for s, v in zip(SIX, masked.position_valid, strict=True) if v} == position
     assert {s for s, v in zip(SIX, masked.orientation_valid, strict=True) if v} == orientation
     assert np.array_equal(np.isnan(masked.position_m).any(1), ~masked.position_valid)
@@ -43,10 +43,10 @@ def test_a_combination_keeps_what_it_names(name: str, position: set[str], orient
 
 def test_a_station_that_is_not_worn_is_named() -> None:
     with pytest.raises(BadInput, match="torso"):
-        combination("pos+torso_ori", ("head", "pelvis"))
+        make_inputs("pos+torso_ori", ("head", "pelvis"))
 
 
 def test_an_unknown_combination_is_refused() -> None:
     with pytest.raises(UnknownName, match="pos"):
-        combination("position", SIX)
-    assert set(COMBINATIONS) == {"pos+ori", "pos", "ori", "pos+torso_ori", "mixed"}
+        make_inputs("position", SIX)
+    assert set(INPUT_COMBINATIONS) == {"pos+ori", "pos", "ori", "pos+torso_ori", "mixed"}

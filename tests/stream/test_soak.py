@@ -13,11 +13,11 @@ from threading import Timer
 import numpy as np
 import pytest
 
-from harness.experiment.playback import rehearse
+from harness.experiment.playback import prepare_playback
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_type
-from harness.stream.codec.records import Settings
-from harness.stream.driver import Is900, LineEvent, Wanted
-from harness.stream.emulator import EmulatorConfig, Sent, serving
+from harness.stream.codec.records import RecordFormat
+from harness.stream.driver import DriverConfig, Is900, LineEvent
+from harness.stream.emulator import EmulatorConfig, SentMessage, serve_emulator
 from harness.stream.frame import TrackerFrame
 
 AWAY = {"unplugged", "stalled", "silent", "reset", "wrong list", "refused"}
@@ -34,7 +34,7 @@ Reading = tuple[int, bytes]
 
 @dataclass
 class Soak:
-    sent: list[Sent] = field(default_factory=list)
+    sent: list[SentMessage] = field(default_factory=list)
     events: list[LineEvent] = field(default_factory=list)
     came: dict[Reading, list[float]] = field(default_factory=lambda: defaultdict(list))
     """When each reading came [s]."""
@@ -64,11 +64,11 @@ class Soak:
 
 
 def soak(seconds: float, folder: Path, seed: int) -> Soak:
-    played, out = rehearse("emulator_faults", stations=4, seed=seed), Soak()
+    played, out = prepare_playback("emulator_faults", stations=4, seed=seed), Soak()
     config = EmulatorConfig(faults=played.scenario.fault, seed=seed)
     with (
-        serving(played.samples, config, pty=folder / "tracker", on_sent=out.sent.append) as device,
-        Is900(device.name, Wanted(stations=played.samples.stations), on_event=out.events.append) as stream,
+        serve_emulator(played.samples, config, pty=folder / "tracker", on_sent=out.sent.append) as device,
+        Is900(device.name, DriverConfig(stations=played.samples.stations), on_event=out.events.append) as stream,
     ):
         end = Timer(seconds, stream.close)
         end.start()
@@ -96,7 +96,7 @@ def judge(seen: Soak) -> dict[str, int]:
         if not record["quality"]:
             continue
         counts["undamaged"] += 1
-        position_m = record["position"].astype(float) * Settings().metres_per_unit
+        position_m = record["position"].astype(float) * RecordFormat().metres_per_unit
         reading = STATION_CHARACTERS.index(record["station"]), position_m.tobytes()
         if seen.arrived(reading, sent.written_s):
             continue

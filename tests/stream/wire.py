@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.core.arrays import Floats
-from harness.stream.codec.capture import Capture
-from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, size
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS, record_size
 from harness.stream.codec.reader import FrameReader, WireFormat
-from harness.stream.codec.records import Said, Settings, encode
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
 from harness.stream.frame import TrackerFrame
 
 RATE_HZ, SLOT_S = 40.0, 0.0033
-RECORD = size(STANDARD_LIST)
+RECORD = record_size(STANDARD_LIST)
 FOUR = WireFormat(("head", "torso", "left_wrist", "right_wrist"), RATE_HZ)
 
 
@@ -28,23 +28,25 @@ def sent(stamp_s: Floats, stations: int = 4, seed: int = 1) -> bytes:
     rng = np.random.default_rng(seed)
     number = np.arange(len(stamp_s)) % stations
     turn = np.random.default_rng(seed + 1).normal(size=(12, 4))[number] + 0.05 * rng.normal(size=(len(stamp_s), 4))
-    said = Said(
+    said = RecordValues(
         measured_s=stamp_s,
         position_m=number[:, None] + 0.01 * rng.normal(size=(len(stamp_s), 3)),
         tracker_from_station=turn / np.linalg.norm(turn, axis=1, keepdims=True),
         quality=rng.uniform(0.1, 1.0, len(stamp_s)),
     )
-    return encode(STANDARD_LIST, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], said, Settings()).tobytes()
+    return encode_records(
+        STANDARD_LIST, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], said, RecordFormat()
+    ).tobytes()
 
 
-def received(data: bytes, stamp_s: Floats, chunk: int = RECORD) -> Capture:
+def received(data: bytes, stamp_s: Floats, chunk: int = RECORD) -> ByteCapture:
     """The bytes in chunks, each of which comes 5 ms after the stamp of the record that its last byte belongs to."""
     ends = np.append(np.arange(chunk, len(data), chunk), len(data))
     record = np.minimum((ends - 1) // RECORD, len(stamp_s) - 1)
-    return Capture(data, ends, stamp_s[record] - stamp_s[0] + 100.005)
+    return ByteCapture(data, ends, stamp_s[record] - stamp_s[0] + 100.005)
 
 
-def frames_of(capture: Capture, wire: WireFormat = FOUR) -> list[TrackerFrame]:
+def frames_of(capture: ByteCapture, wire: WireFormat = FOUR) -> list[TrackerFrame]:
     reader = FrameReader(wire)
     return [*reader.feed_all(capture), *reader.finish()]
 

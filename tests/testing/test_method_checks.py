@@ -19,11 +19,11 @@ from harness.cli import main
 from harness.core import rotations
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
-from harness.core.motion import Take
-from harness.reconstruct.solver.status_monitor import Coverage
+from harness.core.motion import BodyMotion
+from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 from harness.testing import method_checks
-from harness.testing.method_checks import MethodBroken, check_method, examine
+from harness.testing.method_checks import MethodContractError, check_method, check_rules
 from harness.testing.rules import RULES
 
 
@@ -36,7 +36,7 @@ class Standing:
     summary: str = "the T-pose, always"
     needs_examples: bool = False
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Stood":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "Stood":
         return Stood(self.session, body)
 
 
@@ -56,7 +56,7 @@ class Stood:
 class StandingSession:
     def __init__(self, fitted: Stood, calibration: Calibration) -> None:
         self.fitted, self.known = fitted, calibration
-        self.qpos, self.coverage = fitted.standing.copy(), Coverage()
+        self.qpos, self.coverage = fitted.standing.copy(), StatusMonitor()
         self.start()
 
     @classmethod
@@ -233,7 +233,7 @@ class Tampering(Standing):
 
     needs_examples: bool = True
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> Stood:
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Stood:
         for take in examples:
             take.qpos.flags.writeable = True
             take.qpos[:, :3] = 0.0
@@ -340,7 +340,7 @@ BROKEN: tuple[tuple[type[StandingSession], str], ...] = (
 
 
 def amiss(method: Standing) -> dict[str, str]:
-    return {finding.rule: finding.seen for finding in examine(method) if not finding.ok}
+    return {finding.rule: finding.seen for finding in check_rules(method) if not finding.ok}
 
 
 @pytest.fixture
@@ -395,7 +395,7 @@ def test_every_rule_has_its_broken_one() -> None:
 
 
 def test_the_first_rule_that_is_broken_is_raised_by_name() -> None:
-    with pytest.raises(MethodBroken, match="standing breaks the rule that losses are borne: ") as caught:
+    with pytest.raises(MethodContractError, match="standing breaks the rule that losses are borne: ") as caught:
         check_method(Standing(ZeroFed))
     assert "far from every station" in caught.value.seen
 

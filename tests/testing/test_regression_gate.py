@@ -19,9 +19,9 @@ from harness.experiment import engine
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.results import manifest
 from harness.results.manifest import Manifest
-from harness.results.reader import read_judged
-from harness.testing.github_annotations import annotations
-from harness.testing.regression_gate import Gate, scenario_of
+from harness.results.reader import load_results
+from harness.testing.github_annotations import format_annotations
+from harness.testing.regression_gate import RegressionGate, scenario_from_manifest
 from tests.compare.sides import side, write_run
 from tests.testing import upright
 
@@ -48,7 +48,7 @@ CHANGE = {"now": 1.0}
 def measured(scenario: Scenario, out: Path, *, command: str = "", **changes: Any) -> Path:
     """The folder of a run of eight clips that was never run, of errors as `CHANGE` has them."""
     sides = side(methods=dict.fromkeys(scenario.methods, CHANGE["now"]), scenario=scenario.name, **changes)
-    of_it = manifest.of_run(asdict(scenario), motion_source="made up", command=command)
+    of_it = manifest.describe_run(asdict(scenario), motion_source="made up", command=command)
     return write_run(out, replace(sides, manifest=of_it))
 
 
@@ -68,7 +68,7 @@ def project(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytes
     monkeypatch.delenv("GITHUB_ACTIONS", raising=False)
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     first = measured(replace(TINY, methods=("mine:Mine", "ik")), pytester.path / "first")
-    baseline.save(first, "main", pytester.path / "results/baselines")
+    baseline.write_baseline(first, "main", pytester.path / "results/baselines")
     return pytester
 
 
@@ -152,18 +152,18 @@ def test_a_first_baseline_is_kept_and_then_held_to(project: pytest.Pytester) -> 
     result = gated(project, source, "--harness-save", "-rs")
     result.assert_outcomes(skipped=1)
     result.stdout.fnmatch_lines(["SKIPPED*kept as baseline *results/baselines/fresh: nothing was compared"])
-    kept = read_judged(project.path / "results/baselines/fresh")
+    kept = load_results(project.path / "results/baselines/fresh")
     assert {cell.method for cell in kept.cells} == {"mine:Mine"}
     assert kept.manifest.inputs["name"] == "demo"
     gated(project, source).assert_outcomes(passed=1)
 
 
 def test_a_baseline_is_renewed_on_its_own_scenario_but_loses_no_method(project: pytest.Pytester) -> None:
-    alone = Gate(project.path / "out", project.path / "results/baselines")
+    alone = RegressionGate(project.path / "out", project.path / "results/baselines")
     alone.keep("mine:Mine", "own", scenario="demo")
     CHANGE["now"] = 1.1
-    replaced = Gate(project.path / "again", project.path / "results/baselines").keep("mine:Mine", "own")
-    assert read_judged(replaced).manifest.inputs["name"] == "demo"
+    replaced = RegressionGate(project.path / "again", project.path / "results/baselines").keep("mine:Mine", "own")
+    assert load_results(replaced).manifest.inputs["name"] == "demo"
     result = gated(project, ONE.format(""), "--harness-save")
     result.assert_outcomes(failed=1)
     result.stdout.fnmatch_lines(["harness: Baseline main also has ik, which would be lost.*"])
@@ -217,22 +217,26 @@ VERDICTS: Mapping[str, str] = {
 
 
 def test_annotations_are_escaped_as_github_reads_them() -> None:
-    (warning,) = annotations(VERDICTS, "tests/a:b.py", 7)
+    (warning,) = format_annotations(VERDICTS, "tests/a:b.py", 7)
     place = "file=tests/a%3Ab.py,line=7"
     assert warning == f"::warning {place},title=fps[pos+ori%2C known] cannot tell::-3 frames/s, 95 %25 interval ?"
-    (error,) = annotations({name: VERDICTS[name] for name in ("harness.outcome", "harness.why")}, "a.py", 1)
+    (error,) = format_annotations({name: VERDICTS[name] for name in ("harness.outcome", "harness.why")}, "a.py", 1)
     assert error == "::error file=a.py,line=1,title=not comparable::too few: 5%25,%0Aof 6"
-    assert list(annotations({}, "a.py", 1)) == list(annotations({"harness.outcome": "pass"}, "a.py", 1)) == []
+    assert (
+        list(format_annotations({}, "a.py", 1))
+        == list(format_annotations({"harness.outcome": "pass"}, "a.py", 1))
+        == []
+    )
 
 
 def test_a_scenario_is_read_off_a_manifest_and_only_a_runs() -> None:
     scenario = replace(load_scenario("builtin_walking"), order=())
     of_it = Manifest(
-        **json.loads(json.dumps(manifest.of_run(asdict(scenario), motion_source="", command="").as_dict()))
+        **json.loads(json.dumps(manifest.describe_run(asdict(scenario), motion_source="", command="").as_dict()))
     )
-    assert scenario_of(of_it) == replace(scenario, methods=(), fault=())
+    assert scenario_from_manifest(of_it) == replace(scenario, methods=(), fault=())
     with pytest.raises(BadInput, match="missing motion"):
-        scenario_of(replace(of_it, inputs={"name": "a sweep"}))
+        scenario_from_manifest(replace(of_it, inputs={"name": "a sweep"}))
 
 
 def test_other_projects_pay_nothing_for_the_plugin() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.stream.frame import TrackerFrame, TrackerStream
-from harness.testing.stream_checks import BrokenStream, check_stream
+from harness.testing.stream_checks import StreamContractError, check_stream
 
 RATE_HZ = 40.0
 Frames = list[TrackerFrame]
@@ -142,7 +142,7 @@ BROKEN: dict[str, tuple[Callable[[], Frames], str]] = {
 @pytest.mark.parametrize("name", BROKEN)
 def test_broken_frames_are_found(name: str) -> None:
     frames, complaint = BROKEN[name]
-    with pytest.raises(BrokenStream, match=complaint):
+    with pytest.raises(StreamContractError, match=complaint):
         check_stream(lambda: Listed(frames()), rate_hz=RATE_HZ)
 
 
@@ -183,12 +183,12 @@ class Once(Listed):
     ],
 )
 def test_streams_that_misbehave_are_found(kind: type[Listed], complaint: str) -> None:
-    with pytest.raises(BrokenStream, match=complaint):
+    with pytest.raises(StreamContractError, match=complaint):
         check_stream(lambda: kind(sound_frames()), rate_hz=RATE_HZ)
 
 
 def test_stations_of_one_name_are_found() -> None:
-    with pytest.raises(BrokenStream, match="distinct"):
+    with pytest.raises(StreamContractError, match="distinct"):
         check_stream(lambda: Listed(sound_frames(), ("head", "head", "torso")), rate_hz=RATE_HZ)
 
 
@@ -196,5 +196,5 @@ def test_everything_that_is_wrong_is_told_at_once() -> None:
     def opened() -> TrackerStream:
         return Deaf(changed(5, received_s=0.0, quality=filled(2.0, 3)))
 
-    with pytest.raises(BrokenStream, match=r"(?s)received_s.*frame 5: quality.*after closing"):
+    with pytest.raises(StreamContractError, match=r"(?s)received_s.*frame 5: quality.*after closing"):
         check_stream(opened, rate_hz=RATE_HZ)

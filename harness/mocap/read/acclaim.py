@@ -1,6 +1,6 @@
 """Acclaim ASF and AMC files under one name."""
 
-from harness.mocap.read.amc import read_amc, read_clip
+from harness.mocap.read.amc import read_amc, read_amc_clip
 from harness.mocap.read.asf import AsfFile, read_asf, read_asf_file
 
-__all__ = ["AsfFile", "read_amc", "read_asf", "read_asf_file", "read_clip"]
+__all__ = ["AsfFile", "read_amc", "read_asf", "read_asf_file", "read_amc_clip"]

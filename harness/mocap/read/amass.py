@@ -23,8 +23,8 @@ from harness.core.arrays import Floats
 from harness.core.motion import Clip
 from harness.errors import BadFile
 from harness.mocap.read.asf import WORLD_FROM_ASF
-from harness.mocap.read.file_checks import LARGEST, LIMIT_BYTES, check_size
-from harness.mocap.read.joint_clip import Drive, JointClip, JointMap, to_clip
+from harness.mocap.read.file_checks import LIMIT_BYTES, MAX_VALUE, check_size
+from harness.mocap.read.joint_clip import BoneMapping, JointClip, JointMap, to_clip
 
 JOINTS: tuple[tuple[str, int], ...] = (
     ("pelvis", -1),
@@ -52,42 +52,42 @@ JOINTS: tuple[tuple[str, int], ...] = (
 )
 """Name and parent of the joints that SMPL, SMPL-H and SMPL-X share, in the order of `poses`."""
 
-_WHAT = "an AMASS npz"
-_BROKEN = (
+_FORMAT = "an AMASS npz"
+_ARCHIVE_ERRORS = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
     *(OSError, EOFError, ValueError, OverflowError, NotImplementedError, RuntimeError),
 )
 """What zipfile raises, as far as it is known, for damaged archives."""
-_WIDTHS = (72, 156, 165)
-_RATES = ("mocap_framerate", "mocap_frame_rate")
+_POSE_WIDTHS = (72, 156, 165)
+_RATE_KEYS = ("mocap_framerate", "mocap_frame_rate")
 
 
-def _turn(axis: int, angle_deg: float) -> tuple[float, float, float, float]:
+def _axis_quaternion(axis: int, angle_deg: float) -> tuple[float, float, float, float]:
     w, x, y, z = rotations.exp(np.deg2rad(angle_deg) * np.eye(3)[axis])
     return float(w), float(x), float(y), float(z)
 
 
-def _smpl_map() -> dict[str, Drive]:
+def _smpl_map() -> dict[str, BoneMapping]:
     """In the skeleton's rest pose the legs stand 20 deg out, and elbows bend forward and 30 deg up; in SMPL's not."""
     drives = {
-        "root": Drive("pelvis"),
-        "lowerback": Drive("spine1"),
-        "upperback": Drive("spine2"),
-        "thorax": Drive("spine3"),
-        "lowerneck": Drive("neck"),
-        "upperneck": Drive("neck"),
-        "head": Drive("head"),
+        "root": BoneMapping("pelvis"),
+        "lowerback": BoneMapping("spine1"),
+        "upperback": BoneMapping("spine2"),
+        "thorax": BoneMapping("spine3"),
+        "lowerneck": BoneMapping("neck"),
+        "upperneck": BoneMapping("neck"),
+        "head": BoneMapping("head"),
     }
     for side, s, out_deg in (("left", "l", -20.0), ("right", "r", 20.0)):
-        drives[f"{s}clavicle"] = Drive(f"{side}_collar")
-        drives[f"{s}humerus"] = Drive(f"{side}_shoulder", joint_from_bone=_turn(1, 30.0))
-        drives[f"{s}radius"] = Drive(f"{side}_elbow", joint_from_bone=_turn(1, 30.0))
-        drives[f"{s}wrist"] = Drive(f"{side}_elbow")
-        drives[f"{s}hand"] = Drive(f"{side}_wrist")
-        drives[f"{s}hipjoint"] = Drive("pelvis")
-        drives[f"{s}femur"] = Drive(f"{side}_hip", joint_from_bone=_turn(0, out_deg))
-        drives[f"{s}tibia"] = Drive(f"{side}_knee", joint_from_bone=_turn(0, out_deg))
-        drives[f"{s}foot"] = Drive(f"{side}_ankle", joint_from_bone=_turn(0, out_deg))
+        drives[f"{s}clavicle"] = BoneMapping(f"{side}_collar")
+        drives[f"{s}humerus"] = BoneMapping(f"{side}_shoulder", joint_from_bone=_axis_quaternion(1, 30.0))
+        drives[f"{s}radius"] = BoneMapping(f"{side}_elbow", joint_from_bone=_axis_quaternion(1, 30.0))
+        drives[f"{s}wrist"] = BoneMapping(f"{side}_elbow")
+        drives[f"{s}hand"] = BoneMapping(f"{side}_wrist")
+        drives[f"{s}hipjoint"] = BoneMapping("pelvis")
+        drives[f"{s}femur"] = BoneMapping(f"{side}_hip", joint_from_bone=_axis_quaternion(0, out_deg))
+        drives[f"{s}tibia"] = BoneMapping(f"{side}_knee", joint_from_bone=_axis_quaternion(0, out_deg))
+        drives[f"{s}foot"] = BoneMapping(f"{side}_ankle", joint_from_bone=_axis_quaternion(0, out_deg))
     return drives
 
 
@@ -95,26 +95,26 @@ SMPL_MAP: JointMap = _smpl_map()
 """The forearm's twist goes to the wrist bone; toes are left out, for the 24 bones have none."""
 
 
-def read_npz(path: Path | str) -> JointClip:
+def read_amass(path: Path | str) -> JointClip:
     """The motion of an AMASS file on the 22 body joints; offsets are zero, for the file has none. Raises BadFile.
 
     Only the named arrays are read, as plain numbers; nothing in the archive is ever unpickled.
     """
     path = Path(path)
-    check_size(path, _WHAT)
+    check_size(path, _FORMAT)
     try:
         with zipfile.ZipFile(path) as archive:
-            poses = _array(path, archive, "poses")
-            trans = _array(path, archive, "trans")
+            poses = _read_array(path, archive, "poses")
+            trans = _read_array(path, archive, "trans")
             rate_hz = _rate_hz(path, archive)
-    except _BROKEN as error:
-        raise BadFile(path, f"a broken archive ({error})", _WHAT, "Fetch it again.") from error
+    except _ARCHIVE_ERRORS as error:
+        raise BadFile(path, f"a broken archive ({error})", _FORMAT, "Fetch it again.") from error
     frames = trans.shape[0] if trans.ndim else 0
     if (
         frames == 0
         or trans.shape != (frames, 3)
         or poses.ndim != 2
-        or poses.shape not in [(frames, w) for w in _WIDTHS]
+        or poses.shape not in [(frames, w) for w in _POSE_WIDTHS]
     ):
         found = f"poses {poses.shape} and trans {trans.shape}"
         raise BadFile(path, found, "(T, 72, 156 or 165) and (T, 3), T at least 1", "Is it another kind of npz?")
@@ -136,26 +136,28 @@ def read_npz(path: Path | str) -> JointClip:
     )
 
 
-def read_clip(path: Path | str) -> Clip:
+def read_amass_clip(path: Path | str) -> Clip:
     """An AMASS file as a clip on the mean skeleton of the 24 bones."""
-    return to_clip(read_npz(path), SMPL_MAP)
+    return to_clip(read_amass(path), SMPL_MAP)
 
 
 def _rate_hz(path: Path, archive: zipfile.ZipFile) -> float:
-    present = [key for key in _RATES if f"{key}.npy" in archive.namelist()]
+    present = [key for key in _RATE_KEYS if f"{key}.npy" in archive.namelist()]
     if not present:
-        raise BadFile(path, "no frame rate", " or ".join(_RATES), "Is it another kind of npz?")
-    rate = _array(path, archive, present[0])
+        raise BadFile(path, "no frame rate", " or ".join(_RATE_KEYS), "Is it another kind of npz?")
+    rate = _read_array(path, archive, present[0])
     if rate.size != 1 or not 0.0 < float(rate.flat[0]) < 1e5:
         raise BadFile(path, f"{present[0]} of {rate.tolist()!s:.40}", "one rate above 0 Hz", "Fetch it again.")
     return float(rate.flat[0])
 
 
-def _array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
+def _read_array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
     """One array of real, finite numbers, the size that its header says and within the limit."""
     if f"{key}.npy" not in archive.namelist():
         have = ", ".join(name.removesuffix(".npy") for name in archive.namelist()[:12])
-        raise BadFile(path, f"no array {key} (but {have or 'none'})", f"poses, trans, {_RATES[0]}", f"Is it {_WHAT}?")
+        raise BadFile(
+            path, f"no array {key} (but {have or 'none'})", f"poses, trans, {_RATE_KEYS[0]}", f"Is it {_FORMAT}?"
+        )
     info = archive.getinfo(f"{key}.npy")
     with archive.open(info) as file:
         try:
@@ -163,13 +165,13 @@ def _array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
             header = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}[version]
             shape, fortran, dtype = header(file)
         except (ValueError, KeyError) as error:
-            raise BadFile(path, f"array {key} without a readable header", _WHAT, "Fetch it again.") from error
+            raise BadFile(path, f"array {key} without a readable header", _FORMAT, "Fetch it again.") from error
         size = math.prod(shape) * dtype.itemsize
         if dtype.kind not in "fiu" or size != info.file_size - file.tell() or size > LIMIT_BYTES:
             found = f"array {key} of {dtype} {shape} in {info.file_size} bytes"
             raise BadFile(path, found, f"plain numbers, at most {LIMIT_BYTES >> 20} MB", "Fetch it again.")
         flat = np.frombuffer(file.read(), dtype=dtype)
     values: Floats = flat.reshape(shape, order="F" if fortran else "C").astype(float)
-    if not bool(np.all(np.abs(values) < LARGEST)):
+    if not bool(np.all(np.abs(values) < MAX_VALUE)):
         raise BadFile(path, f"a value of {key} that is no finite number", "finite numbers", "Fetch it again.")
     return values

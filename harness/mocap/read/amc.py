@@ -19,18 +19,18 @@ from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput
 from harness.mocap.read.asf import INCH_M, ROOT_ORDER, WORLD_FROM_ASF, read_asf_file
-from harness.mocap.read.file_checks import LARGEST, check_last_line, check_size, numbers
+from harness.mocap.read.file_checks import MAX_VALUE, check_last_line, check_size, parse_numbers
 
 CMU_UNIT_M = INCH_M / 0.45
 """Length of 1 in every file of the CMU library, 0.056444 m."""
 
-_WHAT = "an AMC motion"
-_CUT = "The file is cut; fetch it again."
+_FORMAT = "an AMC motion"
+_FETCH_AGAIN = "The file is cut; fetch it again."
 
 _Line = tuple[int, str]
 
 
-def read_clip(asf: Path | str, amc: Path | str, *, rate_hz: float) -> Clip:
+def read_amc_clip(asf: Path | str, amc: Path | str, *, rate_hz: float) -> Clip:
     """A motion on its skeleton, in the unit of the skeleton's file; see `read_amc`."""
     file = read_asf_file(asf)
     return read_amc(amc, file.skeleton, rate_hz=rate_hz, unit_m=file.unit_m)
@@ -46,7 +46,7 @@ def read_amc(path: Path | str, skeleton: Skeleton, *, rate_hz: float, unit_m: fl
     path = Path(path)
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
         raise BadInput(f"a rate of {rate_hz} Hz for {path.name}.", "CMU's clips have 120, some 60.")
-    check_size(path, _WHAT)
+    check_size(path, _FORMAT)
     names = ("root", *(name for name, channels in zip(skeleton.names, skeleton.hinges, strict=True) if channels))
     counts = dict(zip(skeleton.names, map(len, skeleton.hinges), strict=True)) | {"root": len(ROOT_ORDER)}
     with path.open(encoding="latin-1") as file:
@@ -69,11 +69,11 @@ def read_amc(path: Path | str, skeleton: Skeleton, *, rate_hz: float, unit_m: fl
 
 def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str, ...], Floats]:
     """The order of a frame's rows, and every frame's values (T, sum of counts) in that order."""
-    lines = _content(file)
-    block = _header(path, lines, 1 + len(counts))
+    lines = _content_lines(file)
+    block = _read_first_frame(path, lines, 1 + len(counts))
     order = tuple(text.split(None, 1)[0] for _, text in block[1:])
     if sorted(order) != sorted(counts):
-        _explain(path, counts, tuple(counts), block, None)
+        _raise_frame_error(path, counts, tuple(counts), block, None)
     words_in_frame = 1 + len(order) + sum(counts.values())
     starts = np.cumsum([1, *(1 + counts[name] for name in order[:-1])]).tolist()
     names_of = itemgetter(0, *starts)
@@ -84,9 +84,9 @@ def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str,
         words = " ".join([text for _, text in block]).split()
         row = None
         if len(words) == words_in_frame and names_of(words) == (str(expected), *order):
-            row = _floats(values_of(words))
+            row = _parse_floats(values_of(words))
         if row is None:
-            _explain(path, counts, order, block, expected)
+            _raise_frame_error(path, counts, order, block, expected)
         values.extend(row)
         expected += 1
         block = list(islice(lines, 1 + len(order)))
@@ -94,7 +94,7 @@ def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str,
     return order, np.frombuffer(values).reshape(expected - first, -1)
 
 
-def _content(file: TextIO) -> Iterator[_Line]:
+def _content_lines(file: TextIO) -> Iterator[_Line]:
     """Numbered lines, stripped, without comments and blank ones."""
     for line, text in enumerate(file, start=1):
         text = text.strip()
@@ -102,39 +102,39 @@ def _content(file: TextIO) -> Iterator[_Line]:
             yield line, text
 
 
-def _header(path: Path, lines: Iterator[_Line], lines_in_frame: int) -> list[_Line]:
+def _read_first_frame(path: Path, lines: Iterator[_Line], lines_in_frame: int) -> list[_Line]:
     """Read past the keywords; the lines of the first frame."""
     keywords = set()
     for line, text in lines:
         if not text.startswith(":"):
-            if ":DEGREES" not in keywords or not _is_number(text):
-                raise BadFile(path, f"{text[:40]!r}", ":DEGREES and then frame 1", f"Is it {_WHAT}?", line)
+            if ":DEGREES" not in keywords or not _is_frame_number(text):
+                raise BadFile(path, f"{text[:40]!r}", ":DEGREES and then frame 1", f"Is it {_FORMAT}?", line)
             return [(line, text), *islice(lines, lines_in_frame - 1)]
         keywords.add(text.upper())
-    raise BadFile(path, "no frames", _WHAT, _CUT)
+    raise BadFile(path, "no frames", _FORMAT, _FETCH_AGAIN)
 
 
-def _floats(words: tuple[str, ...]) -> list[float] | None:
+def _parse_floats(words: tuple[str, ...]) -> list[float] | None:
     """The numbers, unless one is none or of no sensible size."""
     try:
         row = list(map(float, words))
     except ValueError:
         return None
-    return row if all(abs(value) < LARGEST for value in row) else None
+    return row if all(abs(value) < MAX_VALUE for value in row) else None
 
 
-def _is_number(text: str) -> bool:
+def _is_frame_number(text: str) -> bool:
     """Whether a line can be a frame's number."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 
-def _explain(
+def _raise_frame_error(
     path: Path, counts: dict[str, int], order: tuple[str, ...], block: list[_Line], expected: int | None
 ) -> NoReturn:
     """What is wrong with a frame that does not read as all the others."""
     line, text = block[0]
     if expected is not None and text != str(expected):
-        again = _is_number(text) and int(text) < expected
+        again = _is_frame_number(text) and int(text) < expected
         found = f"frame {text} again" if again else f"{text[:40]!r}"
         advice = "Frames are repeated." if again else "Frames or rows are missing or too many; fetch the file again."
         raise BadFile(path, found, f"frame {expected}", advice, line)
@@ -142,8 +142,8 @@ def _explain(
     for (line, text), name in zip(block[1:], order, strict=False):
         found, *values = text.split()
         missing = ", ".join(n for n in counts if n not in seen)
-        if _is_number(found):
-            raise BadFile(path, f"frame {found} before {missing}", "every bone of the skeleton", _CUT, line)
+        if _is_frame_number(found):
+            raise BadFile(path, f"frame {found} before {missing}", "every bone of the skeleton", _FETCH_AGAIN, line)
         if found not in counts:
             advice = "Does the ASF belong to this AMC?"
             raise BadFile(path, f"unknown bone {found[:40]!r}", f"one of {missing}", advice, line)
@@ -151,10 +151,10 @@ def _explain(
             raise BadFile(path, f"bone {found} twice in one frame", f"one of {missing}", "Remove one.", line)
         if expected is not None and found != name:
             raise BadFile(path, f"bone {found}", f"{name}, as in the first frame", "Rows are mixed up.", line)
-        numbers(path, values, counts[found], f"{found} (does the ASF belong to this AMC?)", line)
+        parse_numbers(path, values, counts[found], f"{found} (does the ASF belong to this AMC?)", line)
         seen.add(found)
     where = f"the end of the file inside frame {block[0][1]}"
-    raise BadFile(path, where, f"{len(counts)} rows", _CUT, line)
+    raise BadFile(path, where, f"{len(counts)} rows", _FETCH_AGAIN, line)
 
 
 def _root_rotation(angles_rad: Floats) -> Floats:

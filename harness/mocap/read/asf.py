@@ -17,7 +17,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile
-from harness.mocap.read.file_checks import numbers, read_lines
+from harness.mocap.read.file_checks import parse_numbers, read_lines
 
 WORLD_FROM_ASF: Floats = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Acclaim's axes (x left, y up, z forward) in the world's (x forward, y left, z up)."""
@@ -26,12 +26,12 @@ LIMIT_BYTES = 2**20
 """Largest ASF file that is read; CMU's have 6 to 7 kB."""
 ROOT_ORDER = ("TX", "TY", "TZ", "RX", "RY", "RZ")
 
-_WHAT = "an ASF skeleton"
-_AXIS = {"X": 0, "Y": 1, "Z": 2}
+_FORMAT = "an ASF skeleton"
+_AXIS_INDEX = {"X": 0, "Y": 1, "Z": 2}
 
 
 @dataclass
-class _Bone:
+class _BoneData:
     line: int
     name: str = ""
     direction: Sequence[float] = ()
@@ -42,13 +42,13 @@ class _Bone:
 
 
 @dataclass
-class _Draft:
+class _AsfSections:
     """What the sections of a file said, before it is checked as a whole."""
 
     length_unit: float = 0.0
     degrees: bool = True
     root_order: tuple[str, ...] = ()
-    bones: dict[str, _Bone] = field(default_factory=dict)
+    bones: dict[str, _BoneData] = field(default_factory=dict)
     parent_of: dict[str, str] = field(default_factory=dict)
 
 
@@ -75,30 +75,30 @@ def read_asf_file(path: Path | str, *, unit_m: float | None = None) -> AsfFile:
     with two parents, none, or among its own ancestors.
     """
     path = Path(path)
-    draft = _Draft()
+    draft = _AsfSections()
     section, bone = "", None
-    for line, text in enumerate(read_lines(path, _WHAT, LIMIT_BYTES), start=1):
+    for line, text in enumerate(read_lines(path, _FORMAT, LIMIT_BYTES), start=1):
         words = text.split("#", 1)[0].split()
         if not words:
             continue
         if words[0].startswith(":"):
             section, bone = words[0].lower(), None
         elif section == ":units":
-            _units(path, draft, words, line)
+            _parse_units(path, draft, words, line)
         elif section == ":root":
-            _root(path, draft, words, line)
+            _parse_root(path, draft, words, line)
         elif section == ":bonedata":
-            bone = _bone(path, draft, bone, words, line)
+            bone = _parse_bone(path, draft, bone, words, line)
         elif section == ":hierarchy":
-            _hierarchy(path, draft, words, line)
+            _parse_hierarchy(path, draft, words, line)
         elif not section:
-            raise BadFile(path, f"{text.strip()[:40]!r}", "a section such as :version", f"Is it {_WHAT}?", line)
-    return _build(path, draft, unit_m)
+            raise BadFile(path, f"{text.strip()[:40]!r}", "a section such as :version", f"Is it {_FORMAT}?", line)
+    return _build_file(path, draft, unit_m)
 
 
-def _units(path: Path, draft: _Draft, words: list[str], line: int) -> None:
+def _parse_units(path: Path, draft: _AsfSections, words: list[str], line: int) -> None:
     if words[0] == "length":
-        (draft.length_unit,) = numbers(path, words[1:], 1, "the unit of length", line)
+        (draft.length_unit,) = parse_numbers(path, words[1:], 1, "the unit of length", line)
         if draft.length_unit <= 0.0:
             raise BadFile(path, f"a unit of length {words[1]}", "above 0", "CMU's files say 0.45.", line)
     elif words[0] == "angle":
@@ -107,7 +107,7 @@ def _units(path: Path, draft: _Draft, words: list[str], line: int) -> None:
         draft.degrees = words[1] == "deg"
 
 
-def _root(path: Path, draft: _Draft, words: list[str], line: int) -> None:
+def _parse_root(path: Path, draft: _AsfSections, words: list[str], line: int) -> None:
     key, values = words[0].lower(), words[1:]
     if key == "order":
         draft.root_order = tuple(word.upper() for word in values)
@@ -115,33 +115,35 @@ def _root(path: Path, draft: _Draft, words: list[str], line: int) -> None:
             raise BadFile(path, f"root order {' '.join(values)}", " ".join(ROOT_ORDER), "Export it so.", line)
     elif key == "axis" and [word.upper() for word in values] != ["XYZ"]:
         raise BadFile(path, f"root axis {' '.join(values)}", "XYZ", "Export it so.", line)
-    elif key in ("position", "orientation") and any(numbers(path, values, 3, f"the root's {key}", line)):
+    elif key in ("position", "orientation") and any(parse_numbers(path, values, 3, f"the root's {key}", line)):
         raise BadFile(path, f"root {key} {' '.join(values)}", "0 0 0, as in CMU's files", "Export it so.", line)
 
 
-def _bone(path: Path, draft: _Draft, bone: _Bone | None, words: list[str], line: int) -> _Bone | None:
+def _parse_bone(
+    path: Path, draft: _AsfSections, bone: _BoneData | None, words: list[str], line: int
+) -> _BoneData | None:
     key, values = words[0].lower(), words[1:]
     if key == "begin":
         if bone is not None:
             raise BadFile(path, "a bone inside a bone", "end before begin", "Is a line missing?", line)
-        return _Bone(line)
+        return _BoneData(line)
     if bone is None:
         raise BadFile(path, f"{words[0][:40]!r} outside a bone", "begin", "Is a line missing?", line)
     if key == "end":
-        _finish(path, draft, bone, line)
+        _add_bone(path, draft, bone, line)
         return None
     what = f"the {key} of bone {bone.name or '?'}"
     if key == "name" and len(values) == 1:
         bone.name = values[0]
     elif key == "direction":
-        bone.direction = numbers(path, values, 3, what, line)
+        bone.direction = parse_numbers(path, values, 3, what, line)
     elif key == "length":
-        (bone.length,) = numbers(path, values, 1, what, line)
+        (bone.length,) = parse_numbers(path, values, 1, what, line)
     elif key == "axis":
         bone.axis_order = values[-1].upper() if len(values) == 4 else ""
         if sorted(bone.axis_order) != ["X", "Y", "Z"]:
             raise BadFile(path, f"axis {' '.join(values)}", "three angles and an order such as XYZ", "Fix it.", line)
-        bone.axis_deg = numbers(path, values[:3], 3, what, line)
+        bone.axis_deg = parse_numbers(path, values[:3], 3, what, line)
     elif key == "dof":
         bone.dof = tuple(word.lower() for word in values)
         if len(set(bone.dof)) < len(bone.dof) or not set(bone.dof) <= {"rx", "ry", "rz"}:
@@ -152,7 +154,7 @@ def _bone(path: Path, draft: _Draft, bone: _Bone | None, words: list[str], line:
     return bone
 
 
-def _finish(path: Path, draft: _Draft, bone: _Bone, line: int) -> None:
+def _add_bone(path: Path, draft: _AsfSections, bone: _BoneData, line: int) -> None:
     """A bone has been read: whole, new, and of a length that its direction can carry."""
     lacking = [
         key
@@ -174,7 +176,7 @@ def _finish(path: Path, draft: _Draft, bone: _Bone, line: int) -> None:
     draft.bones[bone.name] = bone
 
 
-def _hierarchy(path: Path, draft: _Draft, words: list[str], line: int) -> None:
+def _parse_hierarchy(path: Path, draft: _AsfSections, words: list[str], line: int) -> None:
     if words in (["begin"], ["end"]):
         return
     for name in words:
@@ -187,7 +189,7 @@ def _hierarchy(path: Path, draft: _Draft, words: list[str], line: int) -> None:
         draft.parent_of[child] = words[0]
 
 
-def _build(path: Path, draft: _Draft, unit_m: float | None) -> AsfFile:
+def _build_file(path: Path, draft: _AsfSections, unit_m: float | None) -> AsfFile:
     for missing, what in (
         (not draft.length_unit, ":units with a length"),
         (not draft.root_order, ":root with an order"),
@@ -195,7 +197,7 @@ def _build(path: Path, draft: _Draft, unit_m: float | None) -> AsfFile:
         (not draft.parent_of, ":hierarchy with bones"),
     ):
         if missing:
-            raise BadFile(path, f"no {what}", f"{_WHAT} with one", "Is the file whole?")
+            raise BadFile(path, f"no {what}", f"{_FORMAT} with one", "Is the file whole?")
     names = _depth_first(draft.parent_of)
     lost = [name for name in draft.bones if name not in names]
     if lost:
@@ -226,13 +228,13 @@ def _depth_first(parent_of: dict[str, str]) -> tuple[str, ...]:
     return tuple(order)
 
 
-def _hinge_axes(bone: _Bone, degrees: bool) -> list[Floats]:
+def _hinge_axes(bone: _BoneData, degrees: bool) -> list[Floats]:
     """World axes of a bone's hinges: the axes of its own frame, the angles of `axis` applied first to last."""
     angles = np.deg2rad(bone.axis_deg) if degrees else np.asarray(bone.axis_deg)
     turn = np.eye(3)
     for angle, letter in zip(angles, bone.axis_order, strict=True):
-        turn = rotations.to_matrix(rotations.exp(angle * np.eye(3)[_AXIS[letter]])) @ turn
-    return [WORLD_FROM_ASF @ turn[:, _AXIS[channel[1].upper()]] for channel in bone.dof]
+        turn = rotations.to_matrix(rotations.exp(angle * np.eye(3)[_AXIS_INDEX[letter]])) @ turn
+    return [WORLD_FROM_ASF @ turn[:, _AXIS_INDEX[channel[1].upper()]] for channel in bone.dof]
 
 
 def _check_longest(path: Path, skeleton: Skeleton) -> None:

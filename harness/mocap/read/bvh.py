@@ -18,33 +18,33 @@ from harness.core.motion import Clip
 from harness.errors import BadFile
 from harness.mocap.read.asf import INCH_M, WORLD_FROM_ASF
 from harness.mocap.read.bvh_text import BvhText, parse_bvh
-from harness.mocap.read.joint_clip import Drive, JointClip, JointMap, to_clip
+from harness.mocap.read.joint_clip import BoneMapping, JointClip, JointMap, to_clip
 
 UNITS_M = {"metres": 1.0, "centimetres": 0.01, "millimetres": 0.001, "inches": INCH_M, "ASF units": INCH_M / 0.45}
 HEIGHT_M = (1.2, 2.2)
 """Rest poses of people lie in it [m]; no two of the units above can both be right."""
 
 
-def _cmu_map() -> dict[str, Drive]:
+def _cmu_map() -> dict[str, BoneMapping]:
     drives = {
-        "root": Drive("Hips"),
-        "lowerback": Drive("LowerBack", "Spine"),
-        "upperback": Drive("Spine", "Spine1"),
-        "thorax": Drive("Spine1", "Neck"),
-        "lowerneck": Drive("Neck", "Neck1"),
-        "upperneck": Drive("Neck1", "Head"),
-        "head": Drive("Head", "Head_end"),
+        "root": BoneMapping("Hips"),
+        "lowerback": BoneMapping("LowerBack", "Spine"),
+        "upperback": BoneMapping("Spine", "Spine1"),
+        "thorax": BoneMapping("Spine1", "Neck"),
+        "lowerneck": BoneMapping("Neck", "Neck1"),
+        "upperneck": BoneMapping("Neck1", "Head"),
+        "head": BoneMapping("Head", "Head_end"),
     }
     for side, s in (("Left", "l"), ("Right", "r")):
-        drives[f"{s}clavicle"] = Drive(f"{side}Shoulder", f"{side}Arm")
-        drives[f"{s}humerus"] = Drive(f"{side}Arm", f"{side}ForeArm")
-        drives[f"{s}radius"] = Drive(f"{side}ForeArm", f"{side}Hand")
-        drives[f"{s}wrist"] = Drive(f"{side}Hand", f"{side}FingerBase")
-        drives[f"{s}hand"] = Drive(f"{side}FingerBase", f"{side}HandIndex1")
-        drives[f"{s}hipjoint"] = Drive(f"{side[0]}HipJoint", f"{side}UpLeg")
-        drives[f"{s}femur"] = Drive(f"{side}UpLeg", f"{side}Leg")
-        drives[f"{s}tibia"] = Drive(f"{side}Leg", f"{side}Foot")
-        drives[f"{s}foot"] = Drive(f"{side}Foot", f"{side}ToeBase")
+        drives[f"{s}clavicle"] = BoneMapping(f"{side}Shoulder", f"{side}Arm")
+        drives[f"{s}humerus"] = BoneMapping(f"{side}Arm", f"{side}ForeArm")
+        drives[f"{s}radius"] = BoneMapping(f"{side}ForeArm", f"{side}Hand")
+        drives[f"{s}wrist"] = BoneMapping(f"{side}Hand", f"{side}FingerBase")
+        drives[f"{s}hand"] = BoneMapping(f"{side}FingerBase", f"{side}HandIndex1")
+        drives[f"{s}hipjoint"] = BoneMapping(f"{side[0]}HipJoint", f"{side}UpLeg")
+        drives[f"{s}femur"] = BoneMapping(f"{side}UpLeg", f"{side}Leg")
+        drives[f"{s}tibia"] = BoneMapping(f"{side}Leg", f"{side}Foot")
+        drives[f"{s}foot"] = BoneMapping(f"{side}Foot", f"{side}ToeBase")
     return drives
 
 
@@ -60,11 +60,11 @@ def read_bvh(path: Path | str, *, unit_m: float | None = None) -> JointClip:
     """
     path = Path(path)
     text = parse_bvh(path)
-    data = _through_pymotion(text)
+    data = _load_with_pymotion(text)
     rotation, position, *_ = data.get_data()
     turned = np.zeros((len(position), len(text.joints), 4))
     turned[..., 0] = 1.0
-    turned[:, [j for j, joint in enumerate(text.joints) if joint.channels]] = _in_world(rotation)
+    turned[:, [j for j, joint in enumerate(text.joints) if joint.channels]] = _rotate_to_world(rotation)
     offset = np.array([joint.offset for joint in text.joints])
     unit, evidence = (unit_m, "as given") if unit_m is not None else guess_unit(path, _rest_height(path, text))
     return JointClip(
@@ -83,7 +83,7 @@ def read_bvh(path: Path | str, *, unit_m: float | None = None) -> JointClip:
     )
 
 
-def read_clip(path: Path | str, *, unit_m: float | None = None) -> Clip:
+def read_bvh_clip(path: Path | str, *, unit_m: float | None = None) -> Clip:
     """A BVH file of CMU's conversion as a clip of the 24 bones, without the T-pose that it adds in front."""
     joint_clip = read_bvh(path, unit_m=unit_m)
     if not is_cmu(joint_clip):
@@ -138,7 +138,7 @@ def _rest_height(path: Path, text: BvhText) -> float:
     return float(size[1])
 
 
-def _through_pymotion(text: BvhText) -> Any:
+def _load_with_pymotion(text: BvhText) -> Any:
     """What pymotion makes of the file, which it gets in a form that it is known to read."""
     from pymotion.io.bvh import BVH
 
@@ -156,7 +156,7 @@ def _rate_hz(frame_time_s: float) -> float:
     return float(round(rate_hz)) if abs(round(rate_hz) - rate_hz) < 1e-4 * rate_hz else rate_hz
 
 
-def _in_world(rotation: Floats) -> Floats:
+def _rotate_to_world(rotation: Floats) -> Floats:
     """Quaternions (w, x, y, z) of the file's axes in the world's, which are a cyclic change of x, y and z."""
     out: Floats = np.concatenate([rotation[..., :1], rotation[..., 1:] @ WORLD_FROM_ASF.T], axis=-1)
     return out

@@ -4,13 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.errors import BadFile
-from harness.mocap.read.file_checks import check_last_line, number, numbers, read_lines
+from harness.mocap.read.file_checks import check_last_line, parse_number, parse_numbers, read_lines
 
 LIMIT_BYTES = 64 * 2**20
 """Largest BVH file that is read; about 80,000 frames of CMU's skeleton. Its words take ten times that in memory."""
-MOST_JOINTS = 1000
+MAX_JOINTS = 1000
 
-_WHAT = "a BVH motion"
+_FORMAT = "a BVH motion"
 _ROTATIONS = {"Xrotation", "Yrotation", "Zrotation"}
 _POSITIONS = {"Xposition", "Yposition", "Zposition"}
 
@@ -59,18 +59,20 @@ class BvhText:
 def parse_bvh(path: Path) -> BvhText:
     """Read and check a BVH file; BadFile with the line for anything amiss."""
     lines = [
-        (line, text.split()) for line, text in enumerate(read_lines(path, _WHAT, LIMIT_BYTES), start=1) if text.strip()
+        (line, text.split())
+        for line, text in enumerate(read_lines(path, _FORMAT, LIMIT_BYTES), start=1)
+        if text.strip()
     ]
     motion = next((k for k, (_, words) in enumerate(lines) if words == ["MOTION"]), None)
     if motion is None:
-        raise BadFile(path, "no line MOTION", _WHAT, "Is the file whole, and BVH?")
-    joints = _joints(_Words(path, lines[: motion + 1]))
-    frame_time_s, frames = _frames(path, lines[motion + 1 :], sum(len(joint.channels) for joint in joints))
+        raise BadFile(path, "no line MOTION", _FORMAT, "Is the file whole, and BVH?")
+    joints = _parse_joints(_TokenReader(path, lines[: motion + 1]))
+    frame_time_s, frames = _parse_frames(path, lines[motion + 1 :], sum(len(joint.channels) for joint in joints))
     check_last_line(path)
     return BvhText(joints, frame_time_s, frames)
 
 
-class _Words:
+class _TokenReader:
     """The words of the hierarchy one by one, braces standing alone; the last is MOTION."""
 
     def __init__(self, path: Path, lines: list[tuple[int, list[str]]]) -> None:
@@ -93,14 +95,14 @@ class _Words:
                 raise self.unlike(want)
 
     def triple(self, what: str) -> tuple[float, ...]:
-        return tuple(number(self.path, self.next(), what, self.line) for _ in range(3))
+        return tuple(parse_number(self.path, self.next(), what, self.line) for _ in range(3))
 
     def unlike(self, expected: str) -> BadFile:
         """The error that the word read last is not what was expected."""
         return BadFile(self.path, f"{self.word[:40]!r}", expected, "Is the file whole, and BVH?", self.line)
 
 
-def _joints(words: _Words) -> tuple[BvhJoint, ...]:
+def _parse_joints(words: _TokenReader) -> tuple[BvhJoint, ...]:
     joints: list[BvhJoint] = []
     names: set[str] = set()
     inside: list[int] = []
@@ -116,18 +118,18 @@ def _joints(words: _Words) -> tuple[BvhJoint, ...]:
         name = words.next() if kind != "End" else f"{joints[inside[-1]].name}_end"
         if kind == "End":
             words.expect("Site")
-        if name in names or name in ("{", "}", "MOTION") or len(joints) == MOST_JOINTS:
-            raise words.unlike(f"a new name, and at most {MOST_JOINTS} joints")
+        if name in names or name in ("{", "}", "MOTION") or len(joints) == MAX_JOINTS:
+            raise words.unlike(f"a new name, and at most {MAX_JOINTS} joints")
         names.add(name)
         words.expect("{", "OFFSET")
         offset = words.triple(f"the offset of {name}")
-        channels = () if kind == "End" else _channels(words, root)
+        channels = () if kind == "End" else _parse_channels(words, root)
         joints.append(BvhJoint(name, inside[-1] if inside else -1, offset, channels))
         inside.append(len(joints) - 1)
     return tuple(joints)
 
 
-def _channels(words: _Words, root: bool) -> tuple[str, ...]:
+def _parse_channels(words: _TokenReader, root: bool) -> tuple[str, ...]:
     """Three rotations, for the root after three positions."""
     count = 6 if root else 3
     words.expect("CHANNELS", str(count))
@@ -138,13 +140,13 @@ def _channels(words: _Words, root: bool) -> tuple[str, ...]:
     return channels
 
 
-def _frames(path: Path, lines: list[tuple[int, list[str]]], width: int) -> tuple[float, tuple[str, ...]]:
+def _parse_frames(path: Path, lines: list[tuple[int, list[str]]], width: int) -> tuple[float, tuple[str, ...]]:
     """Frame time [s] and the frames' lines: as many as announced, of `width` numbers each."""
     last = lines[-1][0] if lines else None
     if len(lines) < 2 or lines[0][1][0] != "Frames:" or lines[1][1][:2] != ["Frame", "Time:"]:
         raise BadFile(path, "no frame count and time", "Frames: and Frame Time: after MOTION", "Is it whole?", last)
-    (count,) = numbers(path, lines[0][1][1:], 1, "the frame count", lines[0][0])
-    (frame_time_s,) = numbers(path, lines[1][1][2:], 1, "the frame time", lines[1][0])
+    (count,) = parse_numbers(path, lines[0][1][1:], 1, "the frame count", lines[0][0])
+    (frame_time_s,) = parse_numbers(path, lines[1][1][2:], 1, "the frame time", lines[1][0])
     if not 1e-5 < frame_time_s < 10.0:
         raise BadFile(path, f"a frame time of {frame_time_s:g} s", "1e-5 to 10 s", "Correct it.", lines[1][0])
     frames = lines[2:]
@@ -152,5 +154,5 @@ def _frames(path: Path, lines: list[tuple[int, list[str]]], width: int) -> tuple
         advice = "The file is cut; fetch it again." if len(frames) < count else "Correct the frame count."
         raise BadFile(path, f"{len(frames)} frames", f"the {count:g} announced, at least 1", advice, last)
     for line, words in frames:
-        numbers(path, words, width, "a frame", line)
+        parse_numbers(path, words, width, "a frame", line)
     return frame_time_s, tuple(" ".join(words) for _, words in frames)

@@ -18,20 +18,20 @@ from numpy.typing import NDArray
 
 from harness.core.arrays import Floats, freeze
 from harness.core.motion import Clip
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, MissingExtra
 from harness.mocap.read import ezc3d_process
 from harness.mocap.read.c3d_header import check_header
-from harness.mocap.read.file_checks import LARGEST, check_size
+from harness.mocap.read.file_checks import MAX_VALUE, check_size
 
 UNITS_M = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 
-PATIENCE_S = 20.0
-BYTES_A_SECOND = 2e6
+TIMEOUT_S = 20.0
+BYTES_PER_SECOND = 2e6
 """ezc3d gets so long, and longer for large files; it needs 0.1 s for CMU's."""
 
-_WHAT = "a C3D marker file"
-_AGAIN = "Fetch or export it again."
+_FORMAT = "a C3D marker file"
+_FETCH_AGAIN = "Fetch or export it again."
 _WORLD_FROM_FILE = {
     ("+X", "+Z"): np.eye(3),
     ("+Y", "+Z"): np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
@@ -67,22 +67,22 @@ class MarkerClip:
 def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
     """The markers of a C3D file; BadFile for what is none, or has no unit or axes; MissingExtra without ezc3d."""
     path = Path(path)
-    check_size(path, _WHAT)
+    check_size(path, _FORMAT)
     check_header(path)
-    content = _through_ezc3d(path)
-    unit, unit_evidence = _unit(path, _texts(content["UNITS"]), unit_m)
-    screen = tuple((_texts(content[key]) or [""])[0] for key in ("X_SCREEN", "Y_SCREEN"))
+    content = _load_with_ezc3d(path)
+    unit, unit_evidence = _length_unit(path, _stripped_strings(content["UNITS"]), unit_m)
+    screen = tuple((_stripped_strings(content[key]) or [""])[0] for key in ("X_SCREEN", "Y_SCREEN"))
     if screen not in _WORLD_FROM_FILE:
         found = f"POINT:X_SCREEN {screen[0]!r} and Y_SCREEN {screen[1]!r}"
         known = " or ".join(f"{across} and {up}" for across, up in _WORLD_FROM_FILE)
         raise BadFile(path, found, f"{known}, which say where up is", "Set them in the program that wrote it.")
     points = content["points"]
-    seen = (content["residuals"] >= 0.0) & np.all(np.abs(points) < LARGEST, axis=0)
-    labels = _texts(content["labels"])
+    seen = (content["residuals"] >= 0.0) & np.all(np.abs(points) < MAX_VALUE, axis=0)
+    labels = _stripped_strings(content["labels"])
     rate_hz = float(content["rate_hz"])
     if points.shape[1] != len(labels) or points.shape[2] == 0 or not 0.0 < rate_hz < 1e5:
         found = f"{points.shape[1]} markers, {len(labels)} labels, {points.shape[2]} frames, {rate_hz:g} Hz"
-        raise BadFile(path, found, "a label for each marker, frames and a rate", _AGAIN)
+        raise BadFile(path, found, "a label for each marker, frames and a rate", _FETCH_AGAIN)
     position: Floats = np.moveaxis(np.where(seen, points, np.nan), 0, -1)
     return MarkerClip(
         name=path.stem,
@@ -96,22 +96,24 @@ def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
     )
 
 
-def _through_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
+def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
     """The arrays that `ezc3d_process` writes; BadFile if ezc3d refuses the file, crashes on it or does not finish."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
-        patience_s = PATIENCE_S + path.stat().st_size / BYTES_A_SECOND
+        patience_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
         command = [sys.executable, "-m", ezc3d_process.__name__, str(path), str(out)]
         try:
             done = subprocess.run(command, capture_output=True, text=True, timeout=patience_s)
         except subprocess.TimeoutExpired as error:
-            raise BadFile(path, f"a file that keeps ezc3d busy over {patience_s:.0f} s", _WHAT, _AGAIN) from error
+            raise BadFile(
+                path, f"a file that keeps ezc3d busy over {patience_s:.0f} s", _FORMAT, _FETCH_AGAIN
+            ) from error
         if done.returncode == ezc3d_process.NO_EZC3D:
             raise MissingExtra("Reading C3D files", "ezc3d", "c3d")
         if done.returncode != 0:
-            refused = done.returncode == ezc3d_process.REFUSED
+            refused = done.returncode == ezc3d_process.UNREADABLE
             why = done.stderr.strip().splitlines()[-1:] if refused else ["it crashes"]
-            raise BadFile(path, f"a file that ezc3d cannot read ({' '.join(why)})", _WHAT, _AGAIN)
+            raise BadFile(path, f"a file that ezc3d cannot read ({' '.join(why)})", _FORMAT, _FETCH_AGAIN)
         with np.load(out, allow_pickle=False) as arrays:
             return dict(arrays)
 
@@ -126,13 +128,15 @@ class MarkerSpread:
     """Standard deviation of its place in the bone's frame, over all three axes [m]."""
 
 
-def marker_spreads(markers: MarkerClip, clip: Clip) -> tuple[MarkerSpread, ...]:
+def measure_marker_spreads(markers: MarkerClip, clip: Clip) -> tuple[MarkerSpread, ...]:
     """Each marker's bone, found by the least spread, in a clip of the same take (frame by frame).
 
     Markers seen in fewer than two frames are left out.
     """
     frames = min(len(markers), len(clip))
-    pose = forward(clip.skeleton, clip.root_m[:frames], clip.world_from_root[:frames], clip.angles_rad[:frames])
+    pose = forward_kinematics(
+        clip.skeleton, clip.root_m[:frames], clip.world_from_root[:frames], clip.angles_rad[:frames]
+    )
     spreads = []
     for m, label in enumerate(markers.labels):
         seen = np.isfinite(markers.position_m[:frames, m, 0])
@@ -146,7 +150,7 @@ def marker_spreads(markers: MarkerClip, clip: Clip) -> tuple[MarkerSpread, ...]:
     return tuple(spreads)
 
 
-def _unit(path: Path, units: list[str], given_m: float | None) -> tuple[float, str]:
+def _length_unit(path: Path, units: list[str], given_m: float | None) -> tuple[float, str]:
     """The unit of length [m] and its evidence; BadFile if the file names none and none is given."""
     if given_m is not None:
         return given_m, "unit as given"
@@ -156,5 +160,5 @@ def _unit(path: Path, units: list[str], given_m: float | None) -> tuple[float, s
     return UNITS_M[units[0].lower()], f"{units[0]}, from POINT:UNITS"
 
 
-def _texts(values: NDArray[Any]) -> list[str]:
+def _stripped_strings(values: NDArray[Any]) -> list[str]:
     return [str(value).strip() for value in values]

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-MEMORY_BYTES = 4 * 2**30
-NO_EZC3D, REFUSED = 3, 4
-TEXTS = ("UNITS", "X_SCREEN", "Y_SCREEN")
+MEMORY_LIMIT_BYTES = 4 * 2**30
+NO_EZC3D, UNREADABLE = 3, 4
+TEXT_PARAMETERS = ("UNITS", "X_SCREEN", "Y_SCREEN")
 
 
 def main(file: str, out: str) -> int:
@@ -23,13 +23,13 @@ def main(file: str, out: str) -> int:
     if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_AS, (MEMORY_LIMIT_BYTES, MEMORY_LIMIT_BYTES))
     try:
         content = ezc3d.c3d(file)
         point = content["parameters"]["POINT"]
         keys = [key for key in sorted(point, key=_label_order) if key.startswith("LABELS")]
         arrays: dict[str, Any] = {
-            key: np.array(point[key]["value"] if key in point else [], dtype=str) for key in TEXTS
+            key: np.array(point[key]["value"] if key in point else [], dtype=str) for key in TEXT_PARAMETERS
         }
         arrays |= {
             "points": content["data"]["points"][:3],
@@ -40,7 +40,7 @@ def main(file: str, out: str) -> int:
         np.savez(out, **arrays)
     except (OSError, RuntimeError, ValueError, IndexError, KeyError, TypeError, MemoryError) as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
-        return REFUSED
+        return UNREADABLE
     return 0
 
 

@@ -7,7 +7,7 @@ from harness.errors import BadFile
 
 LIMIT_BYTES = 256 * 2**20
 """Largest motion file that is read; about 330,000 AMC frames, or 46 minutes at 120 a second."""
-LARGEST = 1e6
+MAX_VALUE = 1e6
 """Numbers beyond this size [the file's own unit] are taken for damage."""
 
 
@@ -47,20 +47,20 @@ def read_lines(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> lis
     return data.decode("latin-1").replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
-def numbers(path: Path, words: Sequence[str], count: int, what: str, line: int) -> list[float]:
+def parse_numbers(path: Path, words: Sequence[str], count: int, what: str, line: int) -> list[float]:
     """`count` numbers of sensible size out of the words of a line; BadFile names the one that is not."""
     if len(words) != count:
         plural = "" if len(words) == 1 else "s"
         raise BadFile(path, f"{len(words)} number{plural} for {what}", str(count), "Is the line whole?", line)
-    return [number(path, word, what, line) for word in words]
+    return [parse_number(path, word, what, line) for word in words]
 
 
-def number(path: Path, word: str, what: str, line: int) -> float:
+def parse_number(path: Path, word: str, what: str, line: int) -> float:
     """One number between -1e6 and 1e6; BadFile otherwise."""
     try:
         value = float(word)
     except ValueError:
         value = float("nan")
-    if not abs(value) < LARGEST:
+    if not abs(value) < MAX_VALUE:
         raise BadFile(path, f"{word[:40]!r} for {what}", "a finite number", "Fetch or export the file again.", line)
     return value

@@ -15,10 +15,10 @@ from harness.core.arrays import Floats, freeze
 from harness.core.hinges import hinge_angles, hinge_rotation
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip
-from harness.core.skeleton import Skeleton, unwrapped
+from harness.core.skeleton import Skeleton, unwrap_angles
 from harness.errors import BadInput
 
-LEG = ("lfemur", "ltibia", "rfemur", "rtibia")
+LEG_BONES = ("lfemur", "ltibia", "rfemur", "rtibia")
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class JointClip:
 
 
 @dataclass(frozen=True)
-class Drive:
+class BoneMapping:
     """What drives a bone of the 24: a joint, and the joint at the bone's far end."""
 
     joint: str
@@ -89,7 +89,7 @@ class Drive:
     """Where the file's rest pose differs from the skeleton's: the bone's frame in the joint's, in rest."""
 
 
-JointMap = Mapping[str, Drive]
+JointMap = Mapping[str, BoneMapping]
 """Every one of the 24 bones, and "root"."""
 
 
@@ -118,9 +118,9 @@ def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> HingeFit:
     A bone of which the file does not know the length (or leaves it out: zero) has that of the mean skeleton, scaled
     by the legs; the notes name it.
     """
-    skeleton, notes = _skeleton(joint_clip, joint_map)
+    skeleton, notes = _build_skeleton(joint_clip, joint_map)
     _, turned = joint_clip.world()
-    wanted = {bone: _wanted(joint_clip, turned, drive) for bone, drive in joint_map.items()}
+    wanted = {bone: _target_orientation(joint_clip, turned, drive) for bone, drive in joint_map.items()}
     fitted: dict[int, Floats] = {-1: wanted["root"]}
     angles = np.zeros((len(joint_clip), len(skeleton.axes)))
     residual = np.empty((len(joint_clip), skeleton.bone_count))
@@ -140,19 +140,19 @@ def fit_hinges(joint_clip: JointClip, joint_map: JointMap) -> HingeFit:
         rate_hz=joint_clip.rate_hz,
         root_m=joint_clip.root_m,
         world_from_root=rotations.continuous(wanted["root"]),
-        angles_rad=unwrapped(skeleton, angles),
+        angles_rad=unwrap_angles(skeleton, angles),
         notes=(*joint_clip.notes, *notes),
     )
     return HingeFit(clip, residual)
 
 
-def _wanted(joint_clip: JointClip, turned: Floats, drive: Drive) -> Floats:
+def _target_orientation(joint_clip: JointClip, turned: Floats, drive: BoneMapping) -> Floats:
     """World orientation (T, 4) that the joint asks of its bone."""
     joint = joint_clip.names.index(drive.joint)
     return rotations.multiply(turned[:, joint], np.array(drive.joint_from_bone))
 
 
-def _skeleton(joint_clip: JointClip, joint_map: JointMap) -> tuple[Skeleton, list[str]]:
+def _build_skeleton(joint_clip: JointClip, joint_map: JointMap) -> tuple[Skeleton, list[str]]:
     """The 24 bones with the file's lengths, and what was filled in."""
     _check_map(joint_clip, joint_map)
     mean = standard_skeleton()
@@ -164,7 +164,7 @@ def _skeleton(joint_clip: JointClip, joint_map: JointMap) -> tuple[Skeleton, lis
             bone_m[b] = rotations.rotate(rotations.inverse(np.array(drive.joint_from_bone)), offset)
     length = np.sqrt(np.sum(bone_m**2, axis=1))
     lacking = length < 1e-6
-    legs = [mean.index(bone) for bone in LEG]
+    legs = [mean.index(bone) for bone in LEG_BONES]
     scale = 1.0 if lacking[legs].any() else float(length[legs].sum() / mean.length_m[legs].sum())
     bone_m[lacking] = mean.bone_m[lacking] * scale
     filled = [bone for bone, lacks in zip(mean.names, lacking, strict=True) if lacks]

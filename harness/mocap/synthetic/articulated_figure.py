@@ -8,27 +8,27 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.mocap.synthetic import limb_ik
-from harness.mocap.synthetic.curves import larger, smaller
-from harness.mocap.synthetic.limb_ik import about, turned, unit
-from harness.mocap.synthetic.posture_noise import Manner
+from harness.mocap.synthetic.curves import smooth_maximum, smooth_minimum
+from harness.mocap.synthetic.limb_ik import axis_rotation, normalize, rotate_vectors
+from harness.mocap.synthetic.posture_noise import PostureOffsets
 
-Hand = tuple[Floats, Floats]
+WristAngles = tuple[Floats, Floats]
 SIDES = ("l", "r")
-LEFT = {"l": 1.0, "r": -1.0}
+SIDE_SIGN = {"l": 1.0, "r": -1.0}
 """Sign of a side along the world's y."""
 
-_SPINE = {"lowerback": (0.40, 0.28, 0.40), "upperback": (0.33, 0.42, 0.32), "thorax": (0.27, 0.30, 0.28)}
+_SPINE_SHARES = {"lowerback": (0.40, 0.28, 0.40), "upperback": (0.33, 0.42, 0.32), "thorax": (0.27, 0.30, 0.28)}
 """Share of bend, twist and lean that each back bone takes; the low back bends most and twists least."""
-_NECK = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
+_NECK_SHARES = {"lowerneck": (0.40, 0.30, 0.40), "upperneck": (0.40, 0.45, 0.40), "head": (0.20, 0.25, 0.20)}
 _NECK_BIAS_RAD = {"lowerneck": -0.28, "upperneck": 0.20, "head": 0.08}
 """The neck's S-shape when looking straight ahead, about the medians of real clips."""
 _CLAVICLE_RAD = 0.16
-_HANGING = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_HANGING_ARM_FRAME = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 """Frame of an upper arm that hangs with the elbow bending forward, in the chest's frame (either side)."""
 
 
 @dataclass(frozen=True, eq=False)
-class Foot:
+class FootTarget:
     """Where a foot's bone should be."""
 
     toe_m: Floats
@@ -39,7 +39,7 @@ class Foot:
     """(T, 3) direction the knee bends to."""
 
 
-class Figure:
+class ArticulatedFigure:
     """A moving body that is filled in from the trunk outwards; `angles_rad` (T, 48) is complete after legs and arms."""
 
     def __init__(
@@ -50,7 +50,7 @@ class Figure:
         spine: Floats,
         gaze: Floats,
         shoulders: Mapping[str, tuple[Floats, Floats]],
-        manner: Manner,
+        manner: PostureOffsets,
     ) -> None:
         """Pose the trunk of T frames.
 
@@ -60,17 +60,17 @@ class Figure:
         """
         self.skeleton, self.root_m, self._manner = skeleton, root_m, manner
         self.angles_rad = np.zeros((len(root_m), len(skeleton.axes)))
-        self.pelvis = about(2, pelvis[:, 0]) @ about(1, pelvis[:, 1]) @ about(0, pelvis[:, 2])
+        self.pelvis = axis_rotation(2, pelvis[:, 0]) @ axis_rotation(1, pelvis[:, 1]) @ axis_rotation(0, pelvis[:, 2])
         self._world: dict[str, Floats] = {}
         self._end: dict[str, Floats] = {}
         above, at = self.pelvis, root_m
-        for bone, share in _SPINE.items():
+        for bone, share in _SPINE_SHARES.items():
             above, at = self._put(bone, above, at, spine * share + manner[bone])
         self.chest, self.chest_m = above, at
         self._neck(gaze)
         for side in SIDES:
             lift, reach = (_CLAVICLE_RAD * np.tanh(x / _CLAVICLE_RAD) for x in shoulders[side])
-            sign = LEFT[side]
+            sign = SIDE_SIGN[side]
             self._put(f"{side}clavicle", self.chest, self.chest_m, np.stack([-sign * reach, sign * lift], axis=-1))
 
     def _put(self, bone: str, above: Floats, at: Floats, angles: Floats) -> tuple[Floats, Floats]:
@@ -80,16 +80,16 @@ class Figure:
         self.angles_rad[:, where] = angles
         for d in reversed(range(where.start, where.stop)):
             axis = self.skeleton.axes[d]
-            above = above @ about(int(np.argmax(axis)), self.angles_rad[:, d])
+            above = above @ axis_rotation(int(np.argmax(axis)), self.angles_rad[:, d])
         self._world[bone] = above
         self._end[bone] = at + above @ self.skeleton.bone_m[b]
         return self._world[bone], self._end[bone]
 
     def _neck(self, gaze: Floats) -> None:
-        head = about(2, gaze[:, 0]) @ about(1, gaze[:, 1]) @ about(0, gaze[:, 2])
+        head = axis_rotation(2, gaze[:, 0]) @ axis_rotation(1, gaze[:, 1]) @ axis_rotation(0, gaze[:, 2])
         rest = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # hinge axes y, z, x of the neck's bones
         wanted = limb_ik.euler_xyz(rest.T @ np.swapaxes(self.chest, -1, -2) @ head @ rest)
-        for bone, share in _NECK.items():
+        for bone, share in _NECK_SHARES.items():
             where = self.skeleton.dof_of_bone[self.skeleton.index(bone)]
             self.angles_rad[:, where] = wanted * share + self._manner[bone] + [_NECK_BIAS_RAD[bone], 0.0, 0.0]
 
@@ -119,36 +119,36 @@ class Figure:
     def _set(self, bone: str, *angles: Floats) -> None:
         self.angles_rad[:, self.skeleton.dof_of_bone[self.skeleton.index(bone)]] = np.stack(angles, axis=-1)
 
-    def leg(self, side: str, foot: Foot) -> None:
+    def leg(self, side: str, foot: FootTarget) -> None:
         """Reach the foot; the knee bends towards `foot.knee`."""
         thigh, shank = self.length_m(f"{side}femur"), self.length_m(f"{side}tibia")
         hip = self.hip_m(side)
         ankle = foot.toe_m - self.length_m(f"{side}foot") * foot.direction
         bend = foot.knee + 0.35 * self.pelvis[:, :, 0]  # a knee points between hip and foot
         knee = limb_ik.middle_joint(hip, ankle, bend, thigh, shank)
-        left = unit(np.cross(hip - ankle, bend))
-        rest = limb_ik.frame_of(self.skeleton, f"{side}femur")
-        femur, flexion = limb_ik.hinged(unit(knee - hip), unit(ankle - knee), left, rest)
+        left = normalize(np.cross(hip - ankle, bend))
+        rest = limb_ik.hinge_frame(self.skeleton, f"{side}femur")
+        femur, flexion = limb_ik.two_bone_angles(normalize(knee - hip), normalize(ankle - knee), left, rest)
         self._three(f"{side}femur", np.swapaxes(self.pelvis, -1, -2) @ femur, rest)
         self._set(f"{side}tibia", flexion)
-        tibia = femur @ rest @ about(0, flexion)
-        a, c = limb_ik.pointing(
+        tibia = femur @ rest @ axis_rotation(0, flexion)
+        a, c = limb_ik.universal_joint_angles(
             rest.T @ self.skeleton.bone_m[self.skeleton.index(f"{side}foot")],
-            turned(np.swapaxes(tibia, -1, -2), foot.direction),
+            rotate_vectors(np.swapaxes(tibia, -1, -2), foot.direction),
         )
         self._set(f"{side}foot", a, c)
 
     def _three(self, bone: str, relative: Floats, rest: Floats) -> None:
         self._set(bone, *np.unwrap(limb_ik.euler_xyz(rest.T @ relative @ rest), axis=0).T)
 
-    def arm(self, side: str, upper: Floats, elbow: Floats, turn: Floats, hand: Hand) -> None:
+    def arm(self, side: str, upper: Floats, elbow: Floats, turn: Floats, hand: WristAngles) -> None:
         """Set an arm from its upper bone's world rotation (T, 3, 3) and the elbow's flexion (T,) [rad].
 
         `turn` is the forearm's pronation; `hand` the wrist's flexion (towards the palm) and deviation (towards the
         thumb), all (T,) [rad].
         """
-        sign = LEFT[side]
-        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
+        sign = SIDE_SIGN[side]
+        rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
         above = self._world[f"{side}clavicle"]
         self._three(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
         self._set(f"{side}radius", elbow)
@@ -157,15 +157,15 @@ class Figure:
         self._set(f"{side}hand", hand[0] + loose[:, 0], -sign * hand[1] + loose[:, 1])
 
     def hang(
-        self, side: str, swing: Floats, spread: Floats, twist: Floats, elbow: Floats, turn: Floats, hand: Hand
+        self, side: str, swing: Floats, spread: Floats, twist: Floats, elbow: Floats, turn: Floats, hand: WristAngles
     ) -> None:
         """An arm that hangs from the chest: swung forward, spread sideways, twisted inward, elbow bent (T,) [rad]."""
-        sign = LEFT[side]
-        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
-        placed = about(1, -swing) @ about(0, sign * spread) @ about(2, -sign * twist)
-        self.arm(side, self.chest @ placed @ _HANGING @ rest.T, elbow, turn, hand)
+        sign = SIDE_SIGN[side]
+        rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
+        placed = axis_rotation(1, -swing) @ axis_rotation(0, sign * spread) @ axis_rotation(2, -sign * twist)
+        self.arm(side, self.chest @ placed @ _HANGING_ARM_FRAME @ rest.T, elbow, turn, hand)
 
-    def reach(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: Hand) -> None:
+    def reach(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: WristAngles) -> None:
         """An arm whose wrist is at `wrist_m` (T, 3) in the world, drawn in if too far; the elbow points `towards`."""
         self.arm(side, *self._bent(side, wrist_m, towards), turn, hand)
 
@@ -175,11 +175,11 @@ class Figure:
         Softly bounded to what a forearm can do.
         """
         upper, elbow = self._bent(side, wrist_m, towards)
-        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
-        facing = turned(np.swapaxes(upper @ rest @ about(0, elbow), -1, -2), palm)
+        rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
+        facing = rotate_vectors(np.swapaxes(upper @ rest @ axis_rotation(0, elbow), -1, -2), palm)
         down = -rest[2]
         angle = np.unwrap(np.arctan2(facing[:, 0], facing[:, 2]) - np.arctan2(down[0], down[2]))
-        angle = -LEFT[side] * (angle - 2.0 * np.pi * np.round(np.median(angle) / (2.0 * np.pi)))
+        angle = -SIDE_SIGN[side] * (angle - 2.0 * np.pi * np.round(np.median(angle) / (2.0 * np.pi)))
         out: Floats = -0.4 + 1.3 * np.tanh((angle + 0.4) / 1.3)
         return out
 
@@ -191,8 +191,10 @@ class Figure:
         line = wrist_m - shoulder
         distance = np.sqrt(np.sum(line**2, axis=-1, keepdims=True))
         longest, shortest = 0.985 * (first + second), 0.32 * (first + second)
-        near = larger(smaller(distance, np.array(longest), 0.02), np.array(shortest), 0.02)
+        near = smooth_maximum(smooth_minimum(distance, np.array(longest), 0.02), np.array(shortest), 0.02)
         wrist = shoulder + line * (near / distance)
         bent = limb_ik.middle_joint(shoulder, wrist, towards, first, second)
-        rest = limb_ik.frame_of(self.skeleton, f"{side}humerus")
-        return limb_ik.hinged(unit(bent - shoulder), unit(wrist - bent), unit(np.cross(towards, line)), rest)
+        rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
+        return limb_ik.two_bone_angles(
+            normalize(bent - shoulder), normalize(wrist - bent), normalize(np.cross(towards, line)), rest
+        )

@@ -9,21 +9,28 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic.articulated_figure import LEFT, Figure
-from harness.mocap.synthetic.curves import smaller, wander
-from harness.mocap.synthetic.foot_trajectory import foot
-from harness.mocap.synthetic.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
-from harness.mocap.synthetic.gestures import Gesture, Keys, play
-from harness.mocap.synthetic.limb_ik import columns, on_floor
+from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
+from harness.mocap.synthetic.curves import smooth_minimum, smooth_noise
+from harness.mocap.synthetic.foot_trajectory import plan_foot
+from harness.mocap.synthetic.footwork import (
+    FootPlacement,
+    StanceShift,
+    highest_root_m,
+    leg_length_m,
+    plan_body_path,
+    plan_steps,
+)
+from harness.mocap.synthetic.gestures import Gesture, Keyframes, sum_gestures
+from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
 from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import manner
+from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
 
-def _out_and_back(value: float, wind_up: float = 0.0, hit_s: float = 0.24, back_s: float = 0.58) -> Keys:
+def _out_and_back(value: float, wind_up: float = 0.0, hit_s: float = 0.24, back_s: float = 0.58) -> Keyframes:
     return [(0.0, 0.0), (0.3 * hit_s, -wind_up * value), (hit_s, value), (hit_s + 0.05, 0.97 * value), (back_s, 0.0)]
 
 
-_JAB: Mapping[str, Keys] = {
+_JAB: Mapping[str, Keyframes] = {
     "lead.ahead": _out_and_back(0.34, 0.06),
     "lead.in": _out_and_back(0.09),
     "lead.up": _out_and_back(0.07),
@@ -35,7 +42,7 @@ _JAB: Mapping[str, Keys] = {
     "ahead": _out_and_back(0.05, 0.1),
     "bend": _out_and_back(0.04),
 }
-_CROSS: Mapping[str, Keys] = {
+_CROSS: Mapping[str, Keyframes] = {
     "rear.ahead": _out_and_back(0.46, 0.06),
     "rear.in": _out_and_back(0.12),
     "rear.up": _out_and_back(0.03),
@@ -50,7 +57,7 @@ _CROSS: Mapping[str, Keys] = {
     "heel": _out_and_back(0.35),
     "pivot": _out_and_back(0.45),
 }
-_LEAD_HOOK: Mapping[str, Keys] = {
+_LEAD_HOOK: Mapping[str, Keyframes] = {
     "lead.ahead": [(0.0, 0.0), (0.14, -0.02), (0.28, 0.14), (0.36, 0.08), (0.64, 0.0)],
     "lead.in": [(0.0, 0.0), (0.14, -0.20), (0.28, 0.16), (0.36, 0.22), (0.64, 0.0)],
     "lead.up": [(0.0, 0.0), (0.14, -0.06), (0.28, 0.05), (0.36, 0.03), (0.64, 0.0)],
@@ -60,7 +67,7 @@ _LEAD_HOOK: Mapping[str, Keys] = {
     "pelvis": [(0.0, 0.0), (0.12, 0.15), (0.28, -0.32), (0.66, 0.0)],
     "side": [(0.0, 0.0), (0.13, 0.04), (0.32, -0.04), (0.66, 0.0)],
 }
-_UPPERCUT: Mapping[str, Keys] = {
+_UPPERCUT: Mapping[str, Keyframes] = {
     "rear.ahead": [(0.0, 0.0), (0.18, 0.04), (0.34, 0.26), (0.40, 0.24), (0.70, 0.0)],
     "rear.up": [(0.0, 0.0), (0.18, -0.30), (0.34, 0.02), (0.40, 0.07), (0.70, 0.0)],
     "rear.in": [(0.0, 0.0), (0.18, -0.05), (0.34, 0.12), (0.40, 0.12), (0.70, 0.0)],
@@ -72,25 +79,25 @@ _UPPERCUT: Mapping[str, Keys] = {
     "heel": [(0.0, 0.0), (0.34, 0.25), (0.72, 0.0)],
     "pivot": [(0.0, 0.0), (0.34, 0.30), (0.72, 0.0)],
 }
-_BODY_JAB: Mapping[str, Keys] = {
+_BODY_JAB: Mapping[str, Keyframes] = {
     **_JAB,
     "lead.up": _out_and_back(-0.16),
     "dip": _out_and_back(0.10),
     "bend": _out_and_back(0.16),
 }
-_SLIP: Mapping[str, Keys] = {
+_SLIP: Mapping[str, Keyframes] = {
     "lean": [(0.0, 0.0), (0.25, 0.26), (0.55, 0.0)],
     "side": [(0.0, 0.0), (0.25, -0.09), (0.55, 0.0)],
     "twist": [(0.0, 0.0), (0.25, 0.15), (0.55, 0.0)],
     "dip": [(0.0, 0.0), (0.25, 0.05), (0.55, 0.0)],
 }
-_ROLL: Mapping[str, Keys] = {
+_ROLL: Mapping[str, Keyframes] = {
     "side": [(0.0, 0.0), (0.22, -0.09), (0.62, 0.10), (0.95, 0.0)],
     "lean": [(0.0, 0.0), (0.22, 0.20), (0.62, -0.20), (0.95, 0.0)],
     "dip": [(0.0, 0.0), (0.38, 0.17), (0.52, 0.16), (0.95, 0.0)],
     "bend": [(0.0, 0.0), (0.40, 0.18), (0.95, 0.0)],
 }
-_COMBINATIONS: tuple[tuple[Mapping[str, Keys], ...], ...] = (
+_COMBINATIONS: tuple[tuple[Mapping[str, Keyframes], ...], ...] = (
     (_JAB,),
     (_JAB, _JAB),
     (_JAB, _CROSS),
@@ -105,7 +112,7 @@ _COMBINATIONS: tuple[tuple[Mapping[str, Keys], ...], ...] = (
 )
 
 
-_REST: Mapping[str, Keys] = {
+_GUARD_DOWN: Mapping[str, Keyframes] = {
     "drop": [(0.0, 0.0), (0.5, 1.0), (1.8, 0.95), (2.4, 0.0)],
     "pelvis": [(0.0, 0.0), (0.5, 0.25), (1.8, 0.22), (2.4, 0.0)],
     "dip": [(0.0, 0.0), (0.5, -0.04), (1.8, -0.04), (2.4, 0.0)],
@@ -114,67 +121,67 @@ _REST: Mapping[str, Keys] = {
 """Guard down, on the toes."""
 
 
-def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
+def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """One take; each favours some of the combinations."""
     rear = habits.hand
     lead = "l" if rear == "r" else "r"
-    s = LEFT[lead]
+    s = SIDE_SIGN[lead]
     size, slow = habits.size * float(rng.uniform(0.93, 1.08)), float(rng.uniform(0.80, 1.0)) / habits.pace
-    leg = leg_m(skeleton)
+    leg = leg_length_m(skeleton)
     bladed, crouch = float(rng.uniform(0.45, 0.80)), float(rng.uniform(0.04, 0.09))
 
     stance = {
-        lead: Stance(0.27 * leg, s * 0.15 * leg, -s * 0.30),
-        rear: Stance(-0.24 * leg, -s * 0.16 * leg, -s * 0.95),
+        lead: FootPlacement(0.27 * leg, s * 0.15 * leg, -s * 0.30),
+        rear: FootPlacement(-0.24 * leg, -s * 0.16 * leg, -s * 0.95),
     }
-    start, shifts = _dance(rng, t, slow)
-    place, facing = body_path(t, start, shifts)
-    plants = steps(rng, stance, start, shifts, float(t[-1]))
-    act = play(t, _rounds(rng, t, size, slow, take))
+    start, shifts = _plan_footwork(rng, t, slow)
+    place, facing = plan_body_path(t, start, shifts)
+    plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
+    act = sum_gestures(t, _plan_combinations(rng, t, size, slow, take))
 
-    bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.9 + wander(rng, t, 3.0, 0.15)))
-    ahead = act["ahead"] + 0.02 * np.sin(0.5 * bounce) + wander(rng, t, 1.8, 0.012)
-    place = place + on_floor(facing, ahead, s * (act["side"] + wander(rng, t, 1.6, 0.015)))
+    bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.9 + smooth_noise(rng, t, 3.0, 0.15)))
+    ahead = act["ahead"] + 0.02 * np.sin(0.5 * bounce) + smooth_noise(rng, t, 1.8, 0.012)
+    place = place + horizontal_vector(facing, ahead, s * (act["side"] + smooth_noise(rng, t, 1.6, 0.015)))
     heel = 0.32 + 0.04 * np.sin(bounce) + act["heel"]
     feet = {
-        lead: foot(t, skeleton, lead, plants[lead], 0.05, 0.03 + 0.03 * np.sin(bounce)),
-        rear: foot(t, skeleton, rear, plants[rear], 0.05, heel, s * act["pivot"]),
+        lead: plan_foot(t, skeleton, lead, plants[lead], 0.05, 0.03 + 0.03 * np.sin(bounce)),
+        rear: plan_foot(t, skeleton, rear, plants[rear], 0.05, heel, s * act["pivot"]),
     }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.4, 0.55) + rng.uniform(0.0, 6.0))
-    pelvis = columns(
-        facing - s * (bladed - act["pelvis"]) + wander(rng, t, 1.6, 0.05),
-        habits.pelvis_rad + 0.10 + 0.3 * act["bend"] + wander(rng, t, 2.0, 0.02),
-        s * 0.35 * act["lean"] + wander(rng, t, 2.0, 0.02),
+    pelvis = stack_columns(
+        facing - s * (bladed - act["pelvis"]) + smooth_noise(rng, t, 1.6, 0.05),
+        habits.pelvis_rad + 0.10 + 0.3 * act["bend"] + smooth_noise(rng, t, 2.0, 0.02),
+        s * 0.35 * act["lean"] + smooth_noise(rng, t, 2.0, 0.02),
     )
-    spine = columns(
-        habits.bend_rad + 0.12 + 1.2 * crouch + act["bend"] + 0.01 * breath + wander(rng, t, 2.0, 0.025),
-        s * (0.16 + act["twist"]) + wander(rng, t, 1.6, 0.03),
-        s * 0.65 * act["lean"] + wander(rng, t, 2.0, 0.025),
+    spine = stack_columns(
+        habits.bend_rad + 0.12 + 1.2 * crouch + act["bend"] + 0.01 * breath + smooth_noise(rng, t, 2.0, 0.025),
+        s * (0.16 + act["twist"]) + smooth_noise(rng, t, 1.6, 0.03),
+        s * 0.65 * act["lean"] + smooth_noise(rng, t, 2.0, 0.025),
     )
-    gaze = columns(
-        facing - s * (0.06 - 0.15 * act["twist"]) + wander(rng, t, 2.0, 0.05),
-        0.18 + wander(rng, t, 2.0, 0.03),
-        s * 0.4 * act["lean"] + wander(rng, t, 2.0, 0.03),
+    gaze = stack_columns(
+        facing - s * (0.06 - 0.15 * act["twist"]) + smooth_noise(rng, t, 2.0, 0.05),
+        0.18 + smooth_noise(rng, t, 2.0, 0.03),
+        s * 0.4 * act["lean"] + smooth_noise(rng, t, 2.0, 0.03),
     )
     top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
-    height = np.median(top) - crouch * leg + 0.010 * np.sin(bounce) - act["dip"] + wander(rng, t, 2.0, 0.008)
-    root = columns(*place.T, smaller(top, height, 0.03))
+    height = np.median(top) - crouch * leg + 0.010 * np.sin(bounce) - act["dip"] + smooth_noise(rng, t, 2.0, 0.008)
+    root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
     shoulders = {
-        side: (0.06 + 0.02 * breath, act[f"{who}.reach"] + wander(rng, t, 1.5, 0.015))
+        side: (0.06 + 0.02 * breath, act[f"{who}.reach"] + smooth_noise(rng, t, 1.5, 0.015))
         for who, side in (("lead", lead), ("rear", rear))
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for who, side, guard in (("lead", lead, (0.36, 0.16, 0.04)), ("rear", rear, (0.20, 0.14, 0.06))):
         figure.leg(side, feet[side])
-        _fist(figure, side, rng, t, facing, np.array(guard), {k: act[f"{who}.{k}"] for k in _CHANNELS}, act["drop"])
+        _pose_arm(figure, side, rng, t, facing, np.array(guard), {k: act[f"{who}.{k}"] for k in _CHANNELS}, act["drop"])
     return figure
 
 
 _CHANNELS = ("ahead", "in", "up", "elbow", "pronate")
 
 
-def _fist(
-    figure: Figure,
+def _pose_arm(
+    figure: ArticulatedFigure,
     side: str,
     rng: np.random.Generator,
     t: Floats,
@@ -184,41 +191,41 @@ def _fist(
     drop: Floats,
 ) -> None:
     """One arm from its guard: ahead, out and up of the chest for an arm of 0.58 m [m]."""
-    sign, reach = LEFT[side], figure.arm_m(side) / 0.58
+    sign, reach = SIDE_SIGN[side], figure.arm_m(side) / 0.58
     x, y, z = guard + rng.normal(0.0, 0.025, 3)
     wrist = figure.around_m(
         facing,
-        reach * (x + act["ahead"] - 0.10 * drop + wander(rng, t, 1.3, 0.018)),
-        sign * reach * (y - act["in"] + 0.08 * drop + wander(rng, t, 1.3, 0.014)),
-        reach * (z + act["up"] - 0.30 * drop + wander(rng, t, 1.3, 0.016)),
+        reach * (x + act["ahead"] - 0.10 * drop + smooth_noise(rng, t, 1.3, 0.018)),
+        sign * reach * (y - act["in"] + 0.08 * drop + smooth_noise(rng, t, 1.3, 0.014)),
+        reach * (z + act["up"] - 0.30 * drop + smooth_noise(rng, t, 1.3, 0.016)),
     )
-    raised = act["elbow"] + 0.30 + float(rng.normal(0.0, 0.08)) + wander(rng, t, 1.6, 0.05)
+    raised = act["elbow"] + 0.30 + float(rng.normal(0.0, 0.08)) + smooth_noise(rng, t, 1.6, 0.05)
     figure.reach(
         side,
         wrist,
-        columns(*on_floor(facing, -0.25, sign * np.sin(raised)).T, -np.cos(raised)),
-        -0.35 + act["pronate"] + wander(rng, t, 1.4, 0.05),
+        stack_columns(*horizontal_vector(facing, -0.25, sign * np.sin(raised)).T, -np.cos(raised)),
+        -0.35 + act["pronate"] + smooth_noise(rng, t, 1.4, 0.05),
         (-0.08 + 0.06 * act["pronate"], np.full(len(t), 0.05)),
     )
 
 
-def _dance(rng: np.random.Generator, t: Floats, slow: float) -> tuple[Shift, list[Shift]]:
+def _plan_footwork(rng: np.random.Generator, t: Floats, slow: float) -> tuple[StanceShift, list[StanceShift]]:
     """Steps in and out and round the opponent, within a metre or so of the middle."""
     yaw = float(rng.uniform(-np.pi, np.pi))
-    start = Shift(0.0, (float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.1))), yaw)
-    shifts: list[Shift] = []
+    start = StanceShift(0.0, (float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.1))), yaw)
+    shifts: list[StanceShift] = []
     now, place = float(t[0]) + rng.uniform(0.2, 0.8), np.array(start.place_m)
     while now < t[-1]:
         yaw += rng.normal(0.0, 0.16)
         home = -0.25 * place
-        place = place + on_floor(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.08, 0.20), 0.0) + home
+        place = place + horizontal_vector(rng.uniform(0.0, 2.0 * np.pi), rng.uniform(0.08, 0.20), 0.0) + home
         step_s = rng.uniform(0.22, 0.28) * slow
-        shifts.append(Shift(now, (float(place[0]), float(place[1])), yaw, step_s, rng.uniform(0.02, 0.08), 0.022))
+        shifts.append(StanceShift(now, (float(place[0]), float(place[1])), yaw, step_s, rng.uniform(0.02, 0.08), 0.022))
         now += 2.0 * step_s + 0.1 + rng.uniform(0.05, 0.9)
     return start, shifts
 
 
-def _rounds(rng: np.random.Generator, t: Floats, size: float, slow: float, take: int) -> list[Gesture]:
+def _plan_combinations(rng: np.random.Generator, t: Floats, size: float, slow: float, take: int) -> list[Gesture]:
     gestures: list[Gesture] = []
     favour = rng.dirichlet(np.full(len(_COMBINATIONS), 1.5))
     favour[(take * 3) % len(_COMBINATIONS)] += 0.15
@@ -234,6 +241,6 @@ def _rounds(rng: np.random.Generator, t: Floats, size: float, slow: float, take:
             now += (0.62 if parts is _ROLL else rng.uniform(0.34, 0.46)) * slow
         now += rng.uniform(0.15, 0.8) * slow
         if rng.random() < 0.16:
-            gestures.append(Gesture(now, _REST).varied(rng, 1.0, slow))
+            gestures.append(Gesture(now, _GUARD_DOWN).varied(rng, 1.0, slow))
             now += 2.1 * slow
     return gestures

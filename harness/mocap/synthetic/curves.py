@@ -12,22 +12,24 @@ from harness.core.arrays import Floats
 GRAVITY_M_S2 = 9.81
 
 
-def ease(share: Floats) -> Floats:
+def minimum_jerk(share: Floats) -> Floats:
     """0 to 1 as `share` goes from 0 to 1, constant outside: the minimum-jerk step of Flash and Hogan (1985)."""
     x = np.clip(share, 0.0, 1.0)
     out: Floats = x**3 * (10.0 + x * (6.0 * x - 15.0))
     return out
 
 
-def travel(share: Floats, ramp: float = 0.35) -> Floats:
+def smooth_trapezoid(share: Floats, ramp: float = 0.35) -> Floats:
     """0 to 1 with eased ends and an even middle: speed peaks at 1 / (1 - ramp) of its mean, as a swinging foot's."""
     x = np.clip(share, 0.0, 1.0)
-    out: Floats = (_ramp_area(x / ramp) - _ramp_area((x - 1.0 + ramp) / ramp)) * ramp / (1.0 - ramp)
+    out: Floats = (
+        (_minimum_jerk_integral(x / ramp) - _minimum_jerk_integral((x - 1.0 + ramp) / ramp)) * ramp / (1.0 - ramp)
+    )
     return out
 
 
-def _ramp_area(x: Floats) -> Floats:
-    """Integral of `ease` from minus infinity."""
+def _minimum_jerk_integral(x: Floats) -> Floats:
+    """Integral of `minimum_jerk` from minus infinity."""
     inside = np.clip(x, 0.0, 1.0)
     out: Floats = inside**4 * (2.5 + inside * (inside - 3.0)) + np.maximum(x - 1.0, 0.0)
     return out
@@ -41,7 +43,7 @@ def pulse(share: Floats, peak: float = 0.5) -> Floats:
     return out
 
 
-def through(t: Floats, key_s: Sequence[float] | Floats, key: Sequence[float] | Floats) -> Floats:
+def interpolate_keys(t: Floats, key_s: Sequence[float] | Floats, key: Sequence[float] | Floats) -> Floats:
     """A curve through keys at rising times that never overshoots them; constant before the first and after the last.
 
     Quintic between keys, at rest at every extreme, with the slopes of Fritsch and Butland (1984) elsewhere.
@@ -54,10 +56,10 @@ def through(t: Floats, key_s: Sequence[float] | Floats, key: Sequence[float] | F
     w1, w2 = (2.0 * gap[1:] + gap[:-1])[same], (gap[1:] + 2.0 * gap[:-1])[same]
     slope[1:-1][same] = (w1 + w2) / (w1 / left + w2 / right)
     zero = np.zeros(len(at))
-    return quintics(t, at, value, slope, zero)
+    return quintic_spline(t, at, value, slope, zero)
 
 
-def quintics(t: Floats, at: Floats, value: Floats, slope: Floats, bend: Floats) -> Floats:
+def quintic_spline(t: Floats, at: Floats, value: Floats, slope: Floats, bend: Floats) -> Floats:
     """The curve with these values, first and second derivatives at the times `at`; held outside them."""
     inside = np.clip(t, at[0], at[-1])
     k = np.clip(np.searchsorted(at, inside, side="right") - 1, 0, len(at) - 2)
@@ -76,7 +78,7 @@ def quintics(t: Floats, at: Floats, value: Floats, slope: Floats, bend: Floats) 
     return out
 
 
-def wander(rng: np.random.Generator, t: Floats, period_s: float, rms: float) -> Floats:
+def smooth_noise(rng: np.random.Generator, t: Floats, period_s: float, rms: float) -> Floats:
     """Smooth aimless drift of the given root mean square: waves with periods from half to three times `period_s`."""
     waves = 6
     turns = 1.0 / (period_s * np.geomspace(0.5, 3.0, waves) * rng.uniform(0.9, 1.1, waves))
@@ -87,18 +89,18 @@ def wander(rng: np.random.Generator, t: Floats, period_s: float, rms: float) -> 
     return out
 
 
-def smaller(a: Floats, b: Floats, softness: float) -> Floats:
+def smooth_minimum(a: Floats, b: Floats, softness: float) -> Floats:
     """A smooth lower envelope: below both everywhere, by at most half of `softness` where they meet."""
     out: Floats = 0.5 * (a + b - np.sqrt((a - b) ** 2 + softness**2))
     return out
 
 
-def larger(a: Floats, b: Floats, softness: float) -> Floats:
+def smooth_maximum(a: Floats, b: Floats, softness: float) -> Floats:
     """A smooth upper envelope."""
-    return -smaller(-a, -b, softness)
+    return -smooth_minimum(-a, -b, softness)
 
 
-def smoothed(curve: Floats, frames: float) -> Floats:
+def gaussian_smooth(curve: Floats, frames: float) -> Floats:
     """The curve (T,) under a bell of the given standard deviation; ends are held."""
     half = int(3.0 * frames)
     bell = np.exp(-0.5 * (np.arange(-half, half + 1) / frames) ** 2)

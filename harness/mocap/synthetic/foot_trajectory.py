@@ -12,8 +12,8 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic.articulated_figure import Foot
-from harness.mocap.synthetic.curves import ease, pulse, through, travel
+from harness.mocap.synthetic.articulated_figure import FootTarget
+from harness.mocap.synthetic.curves import interpolate_keys, minimum_jerk, pulse, smooth_trapezoid
 
 ANKLE_M = 0.080
 """Height of the ankle of a flat foot [m]; the ankles of real clips in stance are at 0.07 to 0.09 ..."""
@@ -27,7 +27,7 @@ _CLEARANCE_M = 0.022
 
 
 @dataclass(frozen=True)
-class Plant:
+class FootContact:
     """A foot on the floor."""
 
     on_s: float
@@ -50,15 +50,15 @@ def flat_pitch_rad(skeleton: Skeleton, side: str) -> float:
     return float(np.arcsin((ANKLE_M - BALL_M) / skeleton.length_m[skeleton.index(f"{side}foot")]))
 
 
-def foot(
+def plan_foot(
     t: Floats,
     skeleton: Skeleton,
     side: str,
-    plants: Sequence[Plant],
+    plants: Sequence[FootContact],
     knee_out_rad: float | Floats = 0.0,
     heel_up: Floats | float = 0.0,
     pivot: Floats | float = 0.0,
-) -> Foot:
+) -> FootTarget:
     """The foot's movement (T,) through its plants, in order of time; it rests on the first before and the last after.
 
     `heel_up` adds to the pitch and `pivot` to the heading, both about the ball: a boxer's or golfer's rear foot.
@@ -66,7 +66,7 @@ def foot(
     """
     ball = np.empty((len(t), 3))
     yaw = np.full(len(t), plants[0].yaw_rad)
-    pitch = through(t, *_pitch_keys(plants)) + heel_up
+    pitch = interpolate_keys(t, *_pitch_keyframes(plants)) + heel_up
     heel_first = np.zeros(len(t))
     ball[:] = (*plants[0].ball_m, BALL_M)
     for a, b in pairwise(plants):
@@ -76,17 +76,17 @@ def foot(
         way = np.append(np.subtract(b.ball_m, a.ball_m), 0.0)
         # a flat foot is lifted before it moves on and set down after; a heel clears the floor until it lands
         first, last = (0.03, 0.92) if b.land_rad else (0.12, 0.88)
-        ball[moving] = (*a.ball_m, BALL_M) + travel((now - first) / (last - first))[:, None] * way
+        ball[moving] = (*a.ball_m, BALL_M) + smooth_trapezoid((now - first) / (last - first))[:, None] * way
         ball[moving, 2] += a.lift_m * pulse(now, a.lift_peak)
         if b.land_rad:
-            ball[moving, 2] += _CLEARANCE_M * ease(now / 0.35) * ease((1.0 - now) / 0.35)
-        yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * ease((now - first) / (0.85 - first))
-        heel_first[moving] = ease(now / 0.7) if b.land_rad else 0.0
+            ball[moving, 2] += _CLEARANCE_M * minimum_jerk(now / 0.35) * minimum_jerk((1.0 - now) / 0.35)
+        yaw[moving] = a.yaw_rad + (b.yaw_rad - a.yaw_rad) * minimum_jerk((now - first) / (0.85 - first))
+        heel_first[moving] = minimum_jerk(now / 0.7) if b.land_rad else 0.0
         heel_first[t > 0.5 * (b.on_s + b.off_s)] = 0.0  # it lies flat there
-    return placed(skeleton, side, ball, yaw + pivot, pitch, heel_first, knee_out_rad)
+    return pose_foot(skeleton, side, ball, yaw + pivot, pitch, heel_first, knee_out_rad)
 
 
-def placed(
+def pose_foot(
     skeleton: Skeleton,
     side: str,
     ball: Floats,
@@ -94,7 +94,7 @@ def placed(
     pitch: Floats,
     heel_first: Floats | float,
     knee_out_rad: float | Floats = 0.0,
-) -> Foot:
+) -> FootTarget:
     """A foot of heel-up `pitch` about the ball (T, 3), or about the heel as far as `heel_first` says."""
     ahead = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=-1)
     up = np.array([0.0, 0.0, 1.0])
@@ -105,10 +105,10 @@ def placed(
     toe = toe + (heel_first * ((c - 1.0) * BALL_M - s * x))[:, None] * up
     direction = np.cos(steep + pitch)[:, None] * ahead - np.sin(steep + pitch)[:, None] * up
     out = yaw + knee_out_rad * (1.0 if side == "l" else -1.0)
-    return Foot(toe, direction, np.stack([np.cos(out), np.sin(out), np.zeros_like(out)], axis=-1))
+    return FootTarget(toe, direction, np.stack([np.cos(out), np.sin(out), np.zeros_like(out)], axis=-1))
 
 
-def _pitch_keys(plants: Sequence[Plant]) -> tuple[list[float], list[float]]:
+def _pitch_keyframes(plants: Sequence[FootContact]) -> tuple[list[float], list[float]]:
     at: list[float] = []
     value: list[float] = []
     for k, plant in enumerate(plants):

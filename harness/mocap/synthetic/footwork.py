@@ -8,13 +8,13 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.mocap.synthetic import limb_ik
-from harness.mocap.synthetic.articulated_figure import SIDES, Foot
-from harness.mocap.synthetic.curves import ease, larger, smaller
-from harness.mocap.synthetic.foot_trajectory import Plant
+from harness.mocap.synthetic.articulated_figure import SIDES, FootTarget
+from harness.mocap.synthetic.curves import minimum_jerk, smooth_maximum, smooth_minimum
+from harness.mocap.synthetic.foot_trajectory import FootContact
 
 
 @dataclass(frozen=True)
-class Stance:
+class FootPlacement:
     """Where a foot stands relative to the place its owner stands at, facing forward."""
 
     ahead_m: float
@@ -23,7 +23,7 @@ class Stance:
 
 
 @dataclass(frozen=True)
-class Shift:
+class StanceShift:
     """A move to another place and heading, one foot after the other."""
 
     at_s: float
@@ -34,14 +34,18 @@ class Shift:
     lift_m: float = 0.035
 
 
-def steps(
-    rng: np.random.Generator, stance: Mapping[str, Stance], start: Shift, shifts: Sequence[Shift], end_s: float
-) -> dict[str, list[Plant]]:
+def plan_steps(
+    rng: np.random.Generator,
+    stance: Mapping[str, FootPlacement],
+    start: StanceShift,
+    shifts: Sequence[StanceShift],
+    end_s: float,
+) -> dict[str, list[FootContact]]:
     """Plants of both feet; the foot on the side of the move goes first. Shifts must not overlap."""
     where: dict[str, tuple[float, tuple[float, float], float]] = {}
-    plants: dict[str, list[Plant]] = {side: [] for side in SIDES}
+    plants: dict[str, list[FootContact]] = {side: [] for side in SIDES}
     for side in SIDES:
-        where[side] = (start.at_s - 10.0, *_foothold(rng, stance[side], start))
+        where[side] = (start.at_s - 10.0, *_place_foot(rng, stance[side], start))
     before = start
     for shift in shifts:
         move = np.subtract(shift.place_m, before.place_m)
@@ -51,59 +55,63 @@ def steps(
         for n, side in enumerate(order):
             on_s, ball, yaw = where[side]
             off_s = shift.at_s + n * (shift.step_s + shift.gap_s)
-            plants[side].append(Plant(on_s, off_s, ball, yaw, 0.0, 0.30, shift.lift_m * rng.uniform(0.8, 1.2)))
-            where[side] = (off_s + shift.step_s, *_foothold(rng, stance[side], shift))
+            plants[side].append(FootContact(on_s, off_s, ball, yaw, 0.0, 0.30, shift.lift_m * rng.uniform(0.8, 1.2)))
+            where[side] = (off_s + shift.step_s, *_place_foot(rng, stance[side], shift))
         before = shift
     for side in SIDES:
         on_s, ball, yaw = where[side]
-        plants[side].append(Plant(on_s, max(end_s, on_s) + 10.0, ball, yaw))
+        plants[side].append(FootContact(on_s, max(end_s, on_s) + 10.0, ball, yaw))
     return plants
 
 
-def _foothold(rng: np.random.Generator, stance: Stance, at: Shift) -> tuple[tuple[float, float], float]:
+def _place_foot(rng: np.random.Generator, stance: FootPlacement, at: StanceShift) -> tuple[tuple[float, float], float]:
     c, s = np.cos(at.yaw_rad), np.sin(at.yaw_rad)
     ahead, left = stance.ahead_m + rng.normal(0.0, 0.015), stance.left_m + rng.normal(0.0, 0.015)
     ball = (at.place_m[0] + c * ahead - s * left, at.place_m[1] + s * ahead + c * left)
     return ball, at.yaw_rad + stance.yaw_rad + rng.normal(0.0, 0.03)
 
 
-def body_path(t: Floats, start: Shift, shifts: Sequence[Shift]) -> tuple[Floats, Floats]:
+def plan_body_path(t: Floats, start: StanceShift, shifts: Sequence[StanceShift]) -> tuple[Floats, Floats]:
     """Place (T, 2) [m] and heading (T,) [rad] of the body, which drifts over as the feet step."""
     place = np.tile(np.array(start.place_m), (len(t), 1))
     yaw = np.full(len(t), start.yaw_rad)
     before = start
     for shift in shifts:
         lasts = 2.0 * shift.step_s + shift.gap_s
-        share = ease((t - shift.at_s + 0.08) / (lasts + 0.12))
+        share = minimum_jerk((t - shift.at_s + 0.08) / (lasts + 0.12))
         place += share[:, None] * np.subtract(shift.place_m, before.place_m)
         yaw += share * (shift.yaw_rad - before.yaw_rad)
         before = shift
     return place, yaw
 
 
-def pelvis_matrix(pelvis: Floats) -> Floats:
+def pelvis_rotation(pelvis: Floats) -> Floats:
     """(T, 3, 3) of yaw, pitch, roll (T, 3) [rad]."""
-    out: Floats = limb_ik.about(2, pelvis[:, 0]) @ limb_ik.about(1, pelvis[:, 1]) @ limb_ik.about(0, pelvis[:, 2])
+    out: Floats = (
+        limb_ik.axis_rotation(2, pelvis[:, 0])
+        @ limb_ik.axis_rotation(1, pelvis[:, 1])
+        @ limb_ik.axis_rotation(0, pelvis[:, 2])
+    )
     return out
 
 
-def leg_m(skeleton: Skeleton) -> float:
+def leg_length_m(skeleton: Skeleton) -> float:
     """Length of thigh and shank together [m]."""
     return float(sum(skeleton.length_m[skeleton.index(bone)] for bone in ("lfemur", "ltibia")))
 
 
 def highest_root_m(
-    skeleton: Skeleton, place_m: Floats, pelvis: Floats, feet: Mapping[str, Foot], straightest: float
+    skeleton: Skeleton, place_m: Floats, pelvis: Floats, feet: Mapping[str, FootTarget], straightest: float
 ) -> Floats:
     """(T,) how high the root may be over `place_m` (T, 2) before a leg is stretched beyond that share of its length."""
-    turned = pelvis_matrix(pelvis)
+    turned = pelvis_rotation(pelvis)
     height = np.full(len(place_m), np.inf)
-    long = straightest * leg_m(skeleton)
+    long = straightest * leg_length_m(skeleton)
     for side in SIDES:
         hip = turned @ skeleton.bone_m[skeleton.index(f"{side}hipjoint")]
         ankle = feet[side].toe_m - float(skeleton.length_m[skeleton.index(f"{side}foot")]) * feet[side].direction
         flat = np.sum((place_m + hip[:, :2] - ankle[:, :2]) ** 2, axis=1)
         # beyond reach the leg hangs low rather than nowhere; plans keep clear of it
-        top = ankle[:, 2] + np.sqrt(larger(long**2 - flat, np.array(0.15), 0.05)) - hip[:, 2]
-        height = top if np.isinf(height[0]) else smaller(height, top, 0.02)
+        top = ankle[:, 2] + np.sqrt(smooth_maximum(long**2 - flat, np.array(0.15), 0.05)) - hip[:, 2]
+        height = top if np.isinf(height[0]) else smooth_minimum(height, top, 0.02)
     return height

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.mocap.synthetic.curves import through
+from harness.mocap.synthetic.curves import interpolate_keys
 
-Keys = Sequence[tuple[float, float]]
+Keyframes = Sequence[tuple[float, float]]
 """(time after the start [s], value); values rest on the first before and the last after."""
 
 
@@ -18,7 +18,7 @@ class Gesture:
     """What one movement adds to each channel."""
 
     at_s: float
-    parts: Mapping[str, Keys]
+    parts: Mapping[str, Keyframes]
 
     @property
     def end_s(self) -> float:
@@ -37,19 +37,21 @@ class Gesture:
         )
 
 
-def timed(moments: Mapping[str, float], lag_s: float = 0.0, **values: float) -> Keys:
+def keyframes_at(moments: Mapping[str, float], lag_s: float = 0.0, **values: float) -> Keyframes:
     """Keys at named moments [s], at rest (0) at the first and last of them; `lag_s` delays those in between."""
     names = list(moments)
     keys = [(moments[name] + lag_s, value) for name, value in values.items()]
     return sorted([(moments[names[0]], 0.0), *keys, (moments[names[-1]], 0.0)])
 
 
-def play(t: Floats, gestures: Iterable[Gesture]) -> Mapping[str, Floats]:
+def sum_gestures(t: Floats, gestures: Iterable[Gesture]) -> Mapping[str, Floats]:
     """Every channel (T,) as the sum of the gestures on it; a channel that nothing moves is 0."""
     out: defaultdict[str, Floats] = defaultdict(lambda: np.zeros(len(t)))
     for gesture in gestures:
         for name, keys in gesture.parts.items():
             first = int(np.searchsorted(t, gesture.at_s + keys[0][0]))
             last = len(t) if keys[-1][1] else int(np.searchsorted(t, gesture.at_s + keys[-1][0]))
-            out[name][first:last] += through(t[first:last], [gesture.at_s + k[0] for k in keys], [k[1] for k in keys])
+            out[name][first:last] += interpolate_keys(
+                t[first:last], [gesture.at_s + k[0] for k in keys], [k[1] for k in keys]
+            )
     return out

@@ -11,74 +11,83 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic.articulated_figure import LEFT, Figure
-from harness.mocap.synthetic.curves import larger, smaller, wander
-from harness.mocap.synthetic.foot_trajectory import foot
-from harness.mocap.synthetic.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
-from harness.mocap.synthetic.gestures import Gesture, Keys, play, timed
-from harness.mocap.synthetic.limb_ik import columns, on_floor, unit
+from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
+from harness.mocap.synthetic.curves import smooth_maximum, smooth_minimum, smooth_noise
+from harness.mocap.synthetic.foot_trajectory import plan_foot
+from harness.mocap.synthetic.footwork import (
+    FootPlacement,
+    StanceShift,
+    highest_root_m,
+    leg_length_m,
+    plan_body_path,
+    plan_steps,
+)
+from harness.mocap.synthetic.gestures import Gesture, Keyframes, keyframes_at, sum_gestures
+from harness.mocap.synthetic.limb_ik import horizontal_vector, normalize, stack_columns
 from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import manner
+from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
-_APART_M = 0.075
+_WRIST_SEPARATION_M = 0.075
 """Between the two wrists along the grip."""
 
 
-def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
+def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """One take: a swing every eight seconds or so, full or three quarters."""
     trail = habits.hand
     lead = "l" if trail == "r" else "r"
-    s = LEFT[lead]
-    leg = leg_m(skeleton)
+    s = SIDE_SIGN[lead]
+    leg = leg_length_m(skeleton)
     full = (1.0, 0.88, 0.95, 0.80)[(take - 1) % 4] * float(rng.uniform(0.97, 1.03))
-    swings, begins = _swings(rng, t, habits, full)
-    act = play(t, swings)
+    swings, begins = _plan_swings(rng, t, habits, full)
+    act = sum_gestures(t, swings)
 
     half = leg * float(rng.uniform(0.22, 0.30))
     stance = {
-        lead: Stance(0.06, s * half, s * float(rng.uniform(0.20, 0.40))),
-        trail: Stance(0.06, -s * half, -s * float(rng.uniform(0.05, 0.20))),
+        lead: FootPlacement(0.06, s * half, s * float(rng.uniform(0.20, 0.40))),
+        trail: FootPlacement(0.06, -s * half, -s * float(rng.uniform(0.05, 0.20))),
     }
-    start = Shift(0.0, (0.0, 0.0), float(rng.uniform(-np.pi, np.pi)))
-    shifts = _next_ball(rng, start, begins)
-    place, facing = body_path(t, start, shifts)
-    plants = steps(rng, stance, start, shifts, float(t[-1]))
+    start = StanceShift(0.0, (0.0, 0.0), float(rng.uniform(-np.pi, np.pi)))
+    shifts = _plan_footwork(rng, start, begins)
+    place, facing = plan_body_path(t, start, shifts)
+    plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
     feet = {
-        lead: foot(t, skeleton, lead, plants[lead], 0.02, act["lead heel"]),
-        trail: foot(t, skeleton, trail, plants[trail], 0.02, act["trail heel"], s * act["pivot"]),
+        lead: plan_foot(t, skeleton, lead, plants[lead], 0.02, act["lead heel"]),
+        trail: plan_foot(t, skeleton, trail, plants[trail], 0.02, act["trail heel"], s * act["pivot"]),
     }
-    tilt = float(rng.uniform(0.26, 0.40)) + act["tilt"] + wander(rng, t, 2.5, 0.01)
-    bend = habits.bend_rad + float(rng.uniform(0.26, 0.38)) + act["bend"] + wander(rng, t, 2.5, 0.015)
-    turn = s * (act["pelvis"] + wander(rng, t, 2.5, 0.015))
-    twist = s * (0.10 + act["twist"] + wander(rng, t, 2.5, 0.02))
+    tilt = float(rng.uniform(0.26, 0.40)) + act["tilt"] + smooth_noise(rng, t, 2.5, 0.01)
+    bend = habits.bend_rad + float(rng.uniform(0.26, 0.38)) + act["bend"] + smooth_noise(rng, t, 2.5, 0.015)
+    turn = s * (act["pelvis"] + smooth_noise(rng, t, 2.5, 0.015))
+    twist = s * (0.10 + act["twist"] + smooth_noise(rng, t, 2.5, 0.02))
     # bends are towards the ball whichever way hips and chest have turned
-    pelvis = columns(facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"])
+    pelvis = stack_columns(facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"])
     over = turn + 0.5 * twist
     breath = 0.01 * np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
-    spine = columns(bend * np.cos(over) + breath, twist, bend * np.sin(over) + s * (0.10 - act["side bend"]))
-    gaze = columns(
-        facing + s * (act["look"] + 0.03) + wander(rng, t, 2.5, 0.03),
-        0.80 + act["nod"] + wander(rng, t, 2.5, 0.02),
-        s * act["cant"] + wander(rng, t, 3.0, 0.015),
+    spine = stack_columns(bend * np.cos(over) + breath, twist, bend * np.sin(over) + s * (0.10 - act["side bend"]))
+    gaze = stack_columns(
+        facing + s * (act["look"] + 0.03) + smooth_noise(rng, t, 2.5, 0.03),
+        0.80 + act["nod"] + smooth_noise(rng, t, 2.5, 0.02),
+        s * act["cant"] + smooth_noise(rng, t, 3.0, 0.015),
     )
-    ahead = -0.13 * leg - 0.03 + act["ahead"] + wander(rng, t, 2.5, 0.006)
-    place = place + on_floor(facing, ahead, s * act["side"] + wander(rng, t, 2.5, 0.006))
+    ahead = -0.13 * leg - 0.03 + act["ahead"] + smooth_noise(rng, t, 2.5, 0.006)
+    place = place + horizontal_vector(facing, ahead, s * act["side"] + smooth_noise(rng, t, 2.5, 0.006))
     top = highest_root_m(skeleton, place, pelvis, feet, 0.985)
-    height = np.median(top) - float(rng.uniform(0.025, 0.05)) * leg + act["up"] + wander(rng, t, 2.5, 0.004)
-    root = columns(*place.T, smaller(top, height, 0.03))
+    height = np.median(top) - float(rng.uniform(0.025, 0.05)) * leg + act["up"] + smooth_noise(rng, t, 2.5, 0.004)
+    root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
     shoulders = {
         lead: (act["lead lift"] + breath, 0.05 + act["lead reach"]),
         trail: (-0.05 + act["trail lift"] + breath, 0.13 + act["trail reach"]),
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits, 1.4))
+    figure = ArticulatedFigure(
+        skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits, 1.4)
+    )
     for side in (lead, trail):
         figure.leg(side, feet[side])
-    _grip(figure, rng, t, facing, act, lead, trail)
+    _pose_arms(figure, rng, t, facing, act, lead, trail)
     return figure
 
 
-def _grip(
-    figure: Figure,
+def _pose_arms(
+    figure: ArticulatedFigure,
     rng: np.random.Generator,
     t: Floats,
     facing: Floats,
@@ -87,37 +96,37 @@ def _grip(
     trail: str,
 ) -> None:
     """Both hands on the club: `swing` is the angle of the arms on their plane, `cock` what the wrists add."""
-    s = LEFT[lead]
+    s = SIDE_SIGN[lead]
     arm = figure.arm_m(lead) / 0.58
-    swing = act["swing"] + wander(rng, t, 2.5, 0.015)
+    swing = act["swing"] + smooth_noise(rng, t, 2.5, 0.015)
     plane = float(rng.uniform(0.88, 1.02)) + act["plane"]
-    target = columns(*on_floor(facing, 0.0, s).T, 0.0)
-    away = columns(*on_floor(facing, np.cos(plane), 0.0).T, -np.sin(plane))
-    out = 0.52 + act["radius"] + wander(rng, t, 2.5, 0.006)
+    target = stack_columns(*horizontal_vector(facing, 0.0, s).T, 0.0)
+    away = stack_columns(*horizontal_vector(facing, np.cos(plane), 0.0).T, -np.sin(plane))
+    out = 0.52 + act["radius"] + smooth_noise(rng, t, 2.5, 0.006)
     cos, sin = np.cos(swing)[:, None], np.sin(swing)[:, None]
     grip = figure.chest_m + arm * out[:, None] * (cos * away + sin * target)
-    grip += columns(*on_floor(facing, arm * (0.02 + act["in"]), 0.0).T, arm * act["raise"])
+    grip += stack_columns(*horizontal_vector(facing, arm * (0.02 + act["in"]), 0.0).T, arm * act["raise"])
     cocked = swing + act["cock"] + 0.02
     shaft = np.cos(cocked)[:, None] * away + np.sin(cocked)[:, None] * target
     strike = cos * target - sin * away
-    ends = {lead: -0.5 * _APART_M * shaft, trail: 0.5 * _APART_M * shaft}
+    ends = {lead: -0.5 * _WRIST_SEPARATION_M * shaft, trail: 0.5 * _WRIST_SEPARATION_M * shaft}
     for side in (trail, lead, trail, lead):  # draw the grip in until both hands are on it
         line = grip + ends[side] - figure.shoulder_m(side)
         distance = np.sqrt(np.sum(line**2, axis=1))
-        over = larger(distance - 0.965 * figure.arm_m(side), np.array(0.0), 0.01) / distance
+        over = smooth_maximum(distance - 0.965 * figure.arm_m(side), np.array(0.0), 0.01) / distance
         grip = grip - over[:, None] * line
     for side in (lead, trail):
         wrist = grip + ends[side]
         chest = figure.chest
         forward = (act["lead elbow"] if side == lead else act["trail elbow"]) - 0.35
-        elbow = forward[:, None] * chest[:, :, 0] + 0.35 * LEFT[side] * chest[:, :, 1] - 0.8 * chest[:, :, 2]
+        elbow = forward[:, None] * chest[:, :, 0] + 0.35 * SIDE_SIGN[side] * chest[:, :, 1] - 0.8 * chest[:, :, 2]
         palm = (1.0 if side == trail else -1.0) * strike - [0.0, 0.0, 0.2]
         back = 0.10 + (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"])
         up = 0.05 + 0.45 * np.tanh(0.6 * act["load"])
-        figure.reach(side, wrist, elbow, figure.palm_turn(side, wrist, elbow, unit(palm)), (-back, up))
+        figure.reach(side, wrist, elbow, figure.palm_turn(side, wrist, elbow, normalize(palm)), (-back, up))
 
 
-def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) -> tuple[list[Gesture], list[float]]:
+def _plan_swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) -> tuple[list[Gesture], list[float]]:
     """The swings, and when each return to the ball begins [s]."""
     gestures: list[Gesture] = []
     begins: list[float] = []
@@ -135,53 +144,53 @@ def _swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) ->
         at["end"] = at["hold"] + home
         size = full * float(rng.normal(1.0, 0.02))
         gestures += [
-            Gesture(now, _swing(at, size)).varied(rng, 1.0, 1.0, 0.02),
-            _relax(rng, now + at["hold"] + 0.5 * home, relax),
-            Gesture(now, {"swing": _waggle(rng, waggle), "cock": _waggle(rng, waggle, 1.6)}),
+            Gesture(now, _swing_channels(at, size)).varied(rng, 1.0, 1.0, 0.02),
+            _relax_gesture(rng, now + at["hold"] + 0.5 * home, relax),
+            Gesture(now, {"swing": _waggle_keyframes(rng, waggle), "cock": _waggle_keyframes(rng, waggle, 1.6)}),
         ]
         begins.append(now + at["hold"] + 0.25)
         now += at["end"] + relax + 0.6 * home
     return gestures, begins
 
 
-def _swing(at: Mapping[str, float], size: float) -> Mapping[str, Keys]:
+def _swing_channels(at: Mapping[str, float], size: float) -> Mapping[str, Keyframes]:
     """One swing between its moments [s]; angles [rad] and lengths [m] as a right-hander's, for `size` 1."""
     return {
-        "swing": timed(at, 0.02, top=-2.22 * size, hit=0.04, finish=2.30 * size, hold=2.25 * size),
-        "cock": timed(at, 0.03, top=-1.45, late=-1.15, hit=0.0, finish=1.30, hold=1.25),
-        "load": timed(at, 0.0, top=1.0, late=0.9, hit=0.0, finish=0.9, hold=0.85),
-        "radius": timed(at, 0.0, top=-0.06, hit=0.015, finish=-0.15, hold=-0.15),
-        "in": timed(at, 0.0, top=0.08, hit=0.0, finish=0.10, hold=0.10),
-        "plane": timed(at, 0.0, top=0.02, hit=0.0, finish=0.05, hold=0.05),
-        "raise": timed(at, 0.0, top=0.06, hit=0.0, finish=0.04, hold=0.04),
+        "swing": keyframes_at(at, 0.02, top=-2.22 * size, hit=0.04, finish=2.30 * size, hold=2.25 * size),
+        "cock": keyframes_at(at, 0.03, top=-1.45, late=-1.15, hit=0.0, finish=1.30, hold=1.25),
+        "load": keyframes_at(at, 0.0, top=1.0, late=0.9, hit=0.0, finish=0.9, hold=0.85),
+        "radius": keyframes_at(at, 0.0, top=-0.06, hit=0.015, finish=-0.15, hold=-0.15),
+        "in": keyframes_at(at, 0.0, top=0.08, hit=0.0, finish=0.10, hold=0.10),
+        "plane": keyframes_at(at, 0.0, top=0.02, hit=0.0, finish=0.05, hold=0.05),
+        "raise": keyframes_at(at, 0.0, top=0.06, hit=0.0, finish=0.04, hold=0.04),
         # the hips turn back before the chest has come to the top
-        "pelvis": timed(at, -0.04, top=-0.74 * size, hit=0.60, finish=1.15 * size, hold=1.10 * size),
-        "twist": timed(at, 0.04, top=-0.78 * size, hit=-0.22, finish=0.38 * size, hold=0.34 * size),
-        "tilt": timed(at, 0.0, top=0.0, hit=0.02, finish=-0.26 * size, hold=-0.28),
-        "bend": timed(at, 0.0, top=0.0, hit=-0.05, finish=-0.34 * size, hold=-0.32),
-        "side bend": timed(at, 0.0, top=0.10, hit=-0.08, finish=0.04),
-        "drop": timed(at, 0.0, top=0.05, hit=-0.06, finish=-0.02),
+        "pelvis": keyframes_at(at, -0.04, top=-0.74 * size, hit=0.60, finish=1.15 * size, hold=1.10 * size),
+        "twist": keyframes_at(at, 0.04, top=-0.78 * size, hit=-0.22, finish=0.38 * size, hold=0.34 * size),
+        "tilt": keyframes_at(at, 0.0, top=0.0, hit=0.02, finish=-0.26 * size, hold=-0.28),
+        "bend": keyframes_at(at, 0.0, top=0.0, hit=-0.05, finish=-0.34 * size, hold=-0.32),
+        "side bend": keyframes_at(at, 0.0, top=0.10, hit=-0.08, finish=0.04),
+        "drop": keyframes_at(at, 0.0, top=0.05, hit=-0.06, finish=-0.02),
         # the eyes stay on the ball
-        "look": timed(at, 0.06, top=-0.32, hit=0.0, finish=1.25, hold=1.30),
-        "nod": timed(at, 0.06, top=0.0, hit=0.0, finish=-0.68, hold=-0.70),
-        "cant": timed(at, 0.0, top=0.10, hit=0.16, finish=0.05),
-        "side": timed(at, 0.0, top=-0.045, hit=0.09, finish=0.15, hold=0.15),
-        "ahead": timed(at, 0.0, hit=0.02, finish=0.06, hold=0.06),
-        "up": timed(at, 0.0, top=0.0, late=-0.03, hit=0.01, finish=0.03, hold=0.03),
+        "look": keyframes_at(at, 0.06, top=-0.32, hit=0.0, finish=1.25, hold=1.30),
+        "nod": keyframes_at(at, 0.06, top=0.0, hit=0.0, finish=-0.68, hold=-0.70),
+        "cant": keyframes_at(at, 0.0, top=0.10, hit=0.16, finish=0.05),
+        "side": keyframes_at(at, 0.0, top=-0.045, hit=0.09, finish=0.15, hold=0.15),
+        "ahead": keyframes_at(at, 0.0, hit=0.02, finish=0.06, hold=0.06),
+        "up": keyframes_at(at, 0.0, top=0.0, late=-0.03, hit=0.01, finish=0.03, hold=0.03),
         # the elbow of the arm that crosses the chest points ahead
-        "lead elbow": timed(at, 0.0, top=0.8, hit=0.0),
-        "trail elbow": timed(at, 0.0, top=0.0, hit=0.0, finish=1.3, hold=1.3),
-        "lead heel": timed(at, 0.0, top=0.10, hit=0.0),
-        "trail heel": timed(at, 0.0, late=0.0, hit=0.35, finish=0.74 * size, hold=0.72 * size),
-        "pivot": timed(at, 0.0, late=0.0, hit=0.15, finish=1.0, hold=0.95),
-        "lead reach": timed(at, 0.0, top=0.12, hit=0.0, finish=-0.08),
-        "trail reach": timed(at, 0.0, top=-0.08, hit=0.03, finish=0.12),
-        "lead lift": timed(at, 0.0, top=0.10, hit=0.03, finish=0.12),
-        "trail lift": timed(at, 0.0, top=0.14, hit=-0.03, finish=0.08),
+        "lead elbow": keyframes_at(at, 0.0, top=0.8, hit=0.0),
+        "trail elbow": keyframes_at(at, 0.0, top=0.0, hit=0.0, finish=1.3, hold=1.3),
+        "lead heel": keyframes_at(at, 0.0, top=0.10, hit=0.0),
+        "trail heel": keyframes_at(at, 0.0, late=0.0, hit=0.35, finish=0.74 * size, hold=0.72 * size),
+        "pivot": keyframes_at(at, 0.0, late=0.0, hit=0.15, finish=1.0, hold=0.95),
+        "lead reach": keyframes_at(at, 0.0, top=0.12, hit=0.0, finish=-0.08),
+        "trail reach": keyframes_at(at, 0.0, top=-0.08, hit=0.03, finish=0.12),
+        "lead lift": keyframes_at(at, 0.0, top=0.10, hit=0.03, finish=0.12),
+        "trail lift": keyframes_at(at, 0.0, top=0.14, hit=-0.03, finish=0.08),
     }
 
 
-def _relax(rng: np.random.Generator, at_s: float, lasts_s: float) -> Gesture:
+def _relax_gesture(rng: np.random.Generator, at_s: float, lasts_s: float) -> Gesture:
     """Upright, club down, a look to where the ball went."""
 
     def hold(value: float) -> list[tuple[float, float]]:
@@ -192,19 +201,19 @@ def _relax(rng: np.random.Generator, at_s: float, lasts_s: float) -> Gesture:
     return Gesture(at_s, {name: hold(value * rng.uniform(0.6, 1.1)) for name, value in parts.items()})
 
 
-def _waggle(rng: np.random.Generator, lasts_s: float, size: float = 1.0) -> list[tuple[float, float]]:
+def _waggle_keyframes(rng: np.random.Generator, lasts_s: float, size: float = 1.0) -> list[tuple[float, float]]:
     times = np.linspace(0.0, 0.9 * lasts_s, 6)
     swing = np.array([0.0, -0.10, 0.02, -0.12, 0.01, 0.0]) * rng.uniform(0.6, 1.3, 6) * size
     return [(float(a), float(b)) for a, b in zip(times, swing, strict=True)]
 
 
-def _next_ball(rng: np.random.Generator, start: Shift, begins: list[float]) -> list[Shift]:
+def _plan_footwork(rng: np.random.Generator, start: StanceShift, begins: list[float]) -> list[StanceShift]:
     """Small steps to the next ball after each swing."""
-    shifts: list[Shift] = []
+    shifts: list[StanceShift] = []
     place, yaw = np.array(start.place_m), start.yaw_rad
     for at_s in begins:
         place = 0.5 * place + rng.normal(0.0, 0.05, 2)
         yaw += rng.normal(0.0, 0.08)
         if at_s > 0.0:
-            shifts.append(Shift(at_s, (float(place[0]), float(place[1])), yaw, 0.42, 0.10, 0.025))
+            shifts.append(StanceShift(at_s, (float(place[0]), float(place[1])), yaw, 0.42, 0.10, 0.025))
     return shifts

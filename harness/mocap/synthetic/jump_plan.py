@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.mocap.synthetic.limb_ik import on_floor, wrapped
+from harness.mocap.synthetic.limb_ik import horizontal_vector, wrap_angle
 from harness.mocap.synthetic.performers import Habits
 
-KINDS = ("up", "forward", "side", "turning", "series")
+JUMP_KINDS = ("up", "forward", "side", "turning", "series")
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Jump:
         return self.land_s - self.leave_s
 
 
-def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tuple[list[Jump], float]:
+def plan_jumps(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tuple[list[Jump], float]:
     """The jumps of a take, most of one kind, and the first heading [rad]; far from the middle it turns back."""
     yaw0 = yaw = float(rng.uniform(-np.pi, np.pi))
     jumps: list[Jump] = []
@@ -47,7 +47,7 @@ def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tupl
     slow = rng.uniform(0.95, 1.1) / habits.pace
     usual = rng.uniform(0.36, 0.50) * habits.size**0.5
     while not jumps or now < t[-1] - 0.5:
-        this = kind if rng.random() < 0.7 or left_in_series else str(rng.choice(KINDS))
+        this = kind if rng.random() < 0.7 or left_in_series else str(rng.choice(JUMP_KINDS))
         if this == "series" and not left_in_series:
             left_in_series = int(rng.integers(3, 7))
         flight_s = float(np.clip(usual * rng.uniform(0.9, 1.1), 0.30, 0.56))
@@ -62,7 +62,7 @@ def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tupl
             along = rng.uniform(0.0, 0.12)
         if np.hypot(*place) > 1.2 and along > 0.3:
             home = np.arctan2(-place[1], -place[0])
-            turn = float(np.clip(wrapped(home - yaw), -1.5, 1.5))
+            turn = float(np.clip(wrap_angle(home - yaw), -1.5, 1.5))
             along = 0.15
         bottom_s = now if rebound else now + rng.uniform(0.45, 0.65) * slow
         leave_s = bottom_s + rng.uniform(0.29, 0.36) * slow
@@ -73,7 +73,7 @@ def plan(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -> tupl
         up_s = deep_s if again else deep_s + rng.uniform(0.5, 0.75) * slow
         give = rng.uniform(0.18, 0.26) if again else rng.uniform(0.14, 0.28)
         dip = jumps[-1].give if rebound else rng.uniform(0.26, 0.38)
-        way_m = on_floor(yaw, along, aside)
+        way_m = horizontal_vector(yaw, along, aside)
         down_s = bottom_s if rebound else now
         way = (float(way_m[0]), float(way_m[1]))
         jumps.append(Jump(down_s, bottom_s, leave_s, land_s, deep_s, up_s, dip, give, way, turn, again))

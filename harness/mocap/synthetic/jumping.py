@@ -8,22 +8,31 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic.articulated_figure import LEFT, SIDES, Figure, Foot
-from harness.mocap.synthetic.curves import GRAVITY_M_S2, ease, larger, pulse, quintics, smaller, through, wander
-from harness.mocap.synthetic.foot_trajectory import BALL_M, placed
-from harness.mocap.synthetic.footwork import highest_root_m, leg_m
-from harness.mocap.synthetic.gestures import Gesture, play, timed
-from harness.mocap.synthetic.jump_plan import KINDS, Jump, plan
-from harness.mocap.synthetic.limb_ik import columns, on_floor
+from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, SIDES, ArticulatedFigure, FootTarget
+from harness.mocap.synthetic.curves import (
+    GRAVITY_M_S2,
+    interpolate_keys,
+    minimum_jerk,
+    pulse,
+    quintic_spline,
+    smooth_maximum,
+    smooth_minimum,
+    smooth_noise,
+)
+from harness.mocap.synthetic.foot_trajectory import BALL_M, pose_foot
+from harness.mocap.synthetic.footwork import highest_root_m, leg_length_m
+from harness.mocap.synthetic.gestures import Gesture, keyframes_at, sum_gestures
+from harness.mocap.synthetic.jump_plan import JUMP_KINDS, Jump, plan_jumps
+from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
 from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import manner
+from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
 
-def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
+def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """One take; each favours one kind of jump."""
-    jumps, yaw0 = plan(rng, t, habits, KINDS[take % len(KINDS)])
-    leg = leg_m(skeleton)
-    act = play(t, [_gesture(rng, jump, habits) for jump in jumps])
+    jumps, yaw0 = plan_jumps(rng, t, habits, JUMP_KINDS[take % len(JUMP_KINDS)])
+    leg = leg_length_m(skeleton)
+    act = sum_gestures(t, [_jump_gesture(rng, jump, habits) for jump in jumps])
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.35, 0.5) + rng.uniform(0.0, 6.0))
 
     yaw, foot_yaw = np.full(len(t), yaw0), np.full(len(t), yaw0)
@@ -31,78 +40,80 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     tuck, pitch = np.zeros(len(t)), np.zeros(len(t))
     for jump in jumps:
         share = (t - jump.leave_s) / jump.flight_s
-        aloft = ease((share - 0.1) / 0.8)
+        aloft = minimum_jerk((share - 0.1) / 0.8)
         foot_place += aloft[:, None] * jump.way_m
         foot_yaw += jump.turn_rad * aloft
-        yaw += jump.turn_rad * ease((t - jump.leave_s + 0.12) / (jump.flight_s + 0.2))
-        place += _glide(t, jump)[:, None] * jump.way_m
+        yaw += jump.turn_rad * minimum_jerk((t - jump.leave_s + 0.12) / (jump.flight_s + 0.2))
+        place += _ground_travel(t, jump)[:, None] * jump.way_m
         tuck += 0.95 * GRAVITY_M_S2 * jump.flight_s**2 / 8.0 * pulse(share)
         leave, land = jump.leave_s, jump.land_s
         heels_up = [0.45 * leave + 0.55 * jump.bottom_s, leave, leave + 0.09, land - 0.08, land, land + 0.09]
-        pitch += through(t, heels_up, [0.0, 0.60, 0.88, 0.42, 0.32, 0.0])
+        pitch += interpolate_keys(t, heels_up, [0.0, 0.60, 0.88, 0.42, 0.32, 0.0])
     middle = 0.5 * (foot_place.min(axis=0) + foot_place.max(axis=0))
-    pelvis = columns(
-        yaw + wander(rng, t, 2.5, 0.02),
-        habits.pelvis_rad + 0.02 + act["pelvis"] + wander(rng, t, 2.5, 0.012),
-        wander(rng, t, 3.0, 0.012),
+    pelvis = stack_columns(
+        yaw + smooth_noise(rng, t, 2.5, 0.02),
+        habits.pelvis_rad + 0.02 + act["pelvis"] + smooth_noise(rng, t, 2.5, 0.012),
+        smooth_noise(rng, t, 3.0, 0.012),
     )
-    back = act["back"] * leg - 0.045 + wander(rng, t, 2.0, 0.006)
-    place += on_floor(yaw, back, wander(rng, t, 2.0, 0.008)) - middle
-    foot_place += on_floor(foot_yaw, 0.06, 0.0) - middle
+    back = act["back"] * leg - 0.045 + smooth_noise(rng, t, 2.0, 0.006)
+    place += horizontal_vector(yaw, back, smooth_noise(rng, t, 2.0, 0.008)) - middle
+    foot_place += horizontal_vector(foot_yaw, 0.06, 0.0) - middle
 
     half, out = leg * float(rng.uniform(0.12, 0.20)), habits.toes_out_rad + 0.03
 
-    def feet_at(lift: float | Floats) -> dict[str, Foot]:
-        feet: dict[str, Foot] = {}
+    def feet_at(lift: float | Floats) -> dict[str, FootTarget]:
+        feet: dict[str, FootTarget] = {}
         for side in SIDES:
-            ball = columns(*(foot_place + on_floor(foot_yaw, 0.0, LEFT[side] * half)).T, BALL_M + lift)
-            feet[side] = placed(skeleton, side, ball, foot_yaw + LEFT[side] * out, pitch, 0.0, 0.06)
+            ball = stack_columns(
+                *(foot_place + horizontal_vector(foot_yaw, 0.0, SIDE_SIGN[side] * half)).T, BALL_M + lift
+            )
+            feet[side] = pose_foot(skeleton, side, ball, foot_yaw + SIDE_SIGN[side] * out, pitch, 0.0, 0.06)
         return feet
 
     top = highest_root_m(skeleton, place, pelvis, feet_at(0.0), 0.99)
     stand = float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012 if np.any(pitch < 0.01) else float(np.min(top))
-    air = _airborne(t, jumps)
-    root = columns(*place.T, smaller(_height(t, jumps, stand, leg), top + 0.5 * air, 0.02))
+    air = _flight_weight(t, jumps)
+    root = stack_columns(*place.T, smooth_minimum(_root_height(t, jumps, stand, leg), top + 0.5 * air, 0.02))
     # the legs follow the body up, tucked a little
-    feet = feet_at(air * larger(tuck, root[:, 2] - top, 0.015))
-    spine = columns(
-        habits.bend_rad + 0.03 + act["bend"] + 0.012 * breath + wander(rng, t, 2.5, 0.018),
-        wander(rng, t, 2.5, 0.025),
-        wander(rng, t, 2.5, 0.018),
+    feet = feet_at(air * smooth_maximum(tuck, root[:, 2] - top, 0.015))
+    spine = stack_columns(
+        habits.bend_rad + 0.03 + act["bend"] + 0.012 * breath + smooth_noise(rng, t, 2.5, 0.018),
+        smooth_noise(rng, t, 2.5, 0.025),
+        smooth_noise(rng, t, 2.5, 0.018),
     )
-    gaze = columns(
-        yaw + act["look"] + wander(rng, t, 2.0, 0.05),
-        0.12 + act["nod"] + wander(rng, t, 2.0, 0.03),
-        wander(rng, t, 2.0, 0.02),
+    gaze = stack_columns(
+        yaw + act["look"] + smooth_noise(rng, t, 2.0, 0.05),
+        0.12 + act["nod"] + smooth_noise(rng, t, 2.0, 0.03),
+        smooth_noise(rng, t, 2.0, 0.02),
     )
     up = np.tanh(act["swing"])
-    shoulders = {side: (0.02 * breath + 0.06 * up, 0.05 * up + wander(rng, t, 2.0, 0.01)) for side in SIDES}
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    shoulders = {side: (0.02 * breath + 0.06 * up, 0.05 * up + smooth_noise(rng, t, 2.0, 0.01)) for side in SIDES}
+    figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
         figure.leg(side, feet[side])
         own = float(rng.uniform(0.95, 1.05))
         figure.hang(
             side,
-            0.06 + own * act["swing"] + wander(rng, t, 1.8, 0.04),
-            habits.spread_rad + 0.05 + act["spread"] + wander(rng, t, 1.8, 0.03),
-            0.20 + wander(rng, t, 1.8, 0.04),
-            habits.elbow_rad + own * act["elbow"] + wander(rng, t, 1.8, 0.04),
-            0.08 + 0.15 * act["swing"] + wander(rng, t, 1.6, 0.04),
+            0.06 + own * act["swing"] + smooth_noise(rng, t, 1.8, 0.04),
+            habits.spread_rad + 0.05 + act["spread"] + smooth_noise(rng, t, 1.8, 0.03),
+            0.20 + smooth_noise(rng, t, 1.8, 0.04),
+            habits.elbow_rad + own * act["elbow"] + smooth_noise(rng, t, 1.8, 0.04),
+            0.08 + 0.15 * act["swing"] + smooth_noise(rng, t, 1.6, 0.04),
             (-0.20 + 0.06 * act["swing"], np.zeros(len(t))),
         )
     return figure
 
 
-def _glide(t: Floats, jump: Jump) -> Floats:
+def _ground_travel(t: Floats, jump: Jump) -> Floats:
     """0 to 1: the root's way over the ground, at an even speed in flight."""
     push, slow = 0.8 * (jump.leave_s - jump.bottom_s), 1.1 * (jump.deep_s - jump.land_s)
     speed = 1.0 / (jump.flight_s + 0.4 * push + 0.4 * slow)
     at = np.array([jump.leave_s - push, jump.leave_s, jump.land_s, jump.land_s + slow])
     value = np.array([0.0, 0.4 * push * speed, 1.0 - 0.4 * slow * speed, 1.0])
-    return quintics(t, at, value, np.array([0.0, speed, speed, 0.0]), np.zeros(4))
+    return quintic_spline(t, at, value, np.array([0.0, speed, speed, 0.0]), np.zeros(4))
 
 
-def _height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floats:
+def _root_height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floats:
     """(T,) the root's height: parabolas in flight, quintics that join them."""
     at, value, slope, bend = [t[0] - 10.0], [stand], [0.0], [0.0]
     rebound = False
@@ -128,18 +139,18 @@ def _height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floats:
             slope.append(0.0)
             bend.append(0.0)
         rebound = jump.rebound
-    return quintics(t, *(np.array(x) for x in (at, value, slope, bend)))
+    return quintic_spline(t, *(np.array(x) for x in (at, value, slope, bend)))
 
 
-def _airborne(t: Floats, jumps: list[Jump]) -> Floats:
+def _flight_weight(t: Floats, jumps: list[Jump]) -> Floats:
     """(T,) 1 in flight, 0 on the floor, easing in the 80 ms around."""
     out = np.zeros(len(t))
     for jump in jumps:
-        out += ease((t - jump.leave_s + 0.08) / 0.08) * ease((jump.land_s + 0.08 - t) / 0.08)
+        out += minimum_jerk((t - jump.leave_s + 0.08) / 0.08) * minimum_jerk((jump.land_s + 0.08 - t) / 0.08)
     return out
 
 
-def _gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
+def _jump_gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
     """What trunk and arms do in a jump."""
     start_s = jump.down_s - (0.3 if jump.bottom_s == jump.down_s else 0.0)
     at = {
@@ -156,13 +167,13 @@ def _gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
     high = min(float(rng.uniform(1.2, 1.9)) * habits.size, 2.0) * (0.55 if jump.rebound else 1.0)
     dip, give, far = jump.dip, jump.give, float(np.hypot(*jump.way_m))
     parts = {
-        "pelvis": timed(at, bottom=1.5 * dip, leave=0.05, top=-0.03, land=0.04, deep=1.4 * give),
-        "bend": timed(at, bottom=0.9 * dip, leave=-0.05, top=0.02, land=0.0, deep=0.8 * give),
-        "back": timed(at, bottom=-0.34 * dip, leave=0.02, land=-0.03 - 0.1 * far, deep=-0.36 * give),
-        "swing": timed(at, back=-0.70, leave=high, land=0.5 * high, deep=0.15),
-        "elbow": timed(at, bottom=-0.05, drive=0.7, leave=0.35, land=0.75, deep=0.55),
-        "spread": timed(at, bottom=0.15, leave=0.12, land=0.42, deep=0.35),
-        "nod": timed(at, bottom=0.10, leave=-0.16, land=0.20, deep=0.16),
-        "look": timed(at, bottom=0.25 * jump.turn_rad, land=0.0),
+        "pelvis": keyframes_at(at, bottom=1.5 * dip, leave=0.05, top=-0.03, land=0.04, deep=1.4 * give),
+        "bend": keyframes_at(at, bottom=0.9 * dip, leave=-0.05, top=0.02, land=0.0, deep=0.8 * give),
+        "back": keyframes_at(at, bottom=-0.34 * dip, leave=0.02, land=-0.03 - 0.1 * far, deep=-0.36 * give),
+        "swing": keyframes_at(at, back=-0.70, leave=high, land=0.5 * high, deep=0.15),
+        "elbow": keyframes_at(at, bottom=-0.05, drive=0.7, leave=0.35, land=0.75, deep=0.55),
+        "spread": keyframes_at(at, bottom=0.15, leave=0.12, land=0.42, deep=0.35),
+        "nod": keyframes_at(at, bottom=0.10, leave=-0.16, land=0.20, deep=0.16),
+        "look": keyframes_at(at, bottom=0.25 * jump.turn_rad, land=0.0),
     }
     return Gesture(start_s, parts).varied(rng, 1.0, 1.0, 0.04)

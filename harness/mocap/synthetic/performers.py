@@ -16,9 +16,9 @@ from harness.core.skeleton import Skeleton
 from harness.errors import UnknownName
 
 _NAMES = ("p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8")
-_STATURE = 0.035
+_STATURE_STD = 0.035
 """Relative standard deviation of what all bones share."""
-_SPREAD_M = {
+_BONE_LENGTH_STD_M = {
     "humerus": 0.014,
     "radius": 0.017,
     "femur": 0.027,
@@ -36,7 +36,7 @@ _SPREAD_M = {
     "head": 0.006,
 }
 """Standard deviation of bone lengths among CMU's skeletons [m]; half of a leg's or arm's is shared with the stature."""
-_DIRECTION_RAD = {"hipjoint": 0.06, "clavicle": 0.05, "lowerback": 0.02, "upperback": 0.02, "thorax": 0.02}
+_BONE_DIRECTION_STD_RAD = {"hipjoint": 0.06, "clavicle": 0.05, "lowerback": 0.02, "upperback": 0.02, "thorax": 0.02}
 """Standard deviation of bone directions, in the plane of the body's symmetry or mirrored [rad]."""
 
 
@@ -63,33 +63,33 @@ class Habits:
     """Standing offsets of the hinges of back, neck and hands, by bone."""
 
 
-def performers() -> tuple[str, ...]:
+def performer_names() -> tuple[str, ...]:
     """Names of the performers; a take's name carries its performer's."""
     return _NAMES
 
 
 @cache
-def skeleton(performer: str) -> Skeleton:
+def performer_skeleton(performer: str) -> Skeleton:
     """The performer's skeleton; UnknownName."""
-    return _skeleton(_rng(performer, "skeleton"))
+    return _sample_skeleton(_performer_rng(performer, "skeleton"))
 
 
-def population(count: int, seed: int) -> tuple[Skeleton, ...]:
+def sample_skeletons(count: int, seed: int) -> tuple[Skeleton, ...]:
     """Skeletons of so many other people of the same spread; none is a performer's, and more leave the first as are."""
-    return tuple(_skeleton(generator(seed, "population", which)) for which in range(count))
+    return tuple(_sample_skeleton(generator(seed, "population", which)) for which in range(count))
 
 
-def _skeleton(rng: np.random.Generator) -> Skeleton:
+def _sample_skeleton(rng: np.random.Generator) -> Skeleton:
     """A draw from the spread."""
     standard = humanoid24.standard_skeleton()
-    stature = 1.0 + _STATURE * float(np.clip(rng.normal(), -1.5, 1.5))
+    stature = 1.0 + _STATURE_STD * float(np.clip(rng.normal(), -1.5, 1.5))
     scale, tilt = {}, {}
-    for part, spread_m in _SPREAD_M.items():
+    for part, spread_m in _BONE_LENGTH_STD_M.items():
         scale[part] = 0.7 * spread_m * float(np.clip(rng.normal(), -1.8, 1.8))
-        tilt[part] = _DIRECTION_RAD.get(part, 0.0) * float(np.clip(rng.normal(), -1.8, 1.8))
+        tilt[part] = _BONE_DIRECTION_STD_RAD.get(part, 0.0) * float(np.clip(rng.normal(), -1.8, 1.8))
     bones = np.array(standard.bone_m)
     for b, name in enumerate(standard.names):
-        part = name if name in _SPREAD_M else name[1:]
+        part = name if name in _BONE_LENGTH_STD_M else name[1:]
         length = float(standard.length_m[b])
         bones[b] *= (stature * length + scale[part]) / length
         sine, cosine = np.sin(tilt[part]), np.cos(tilt[part])
@@ -102,9 +102,9 @@ def _skeleton(rng: np.random.Generator) -> Skeleton:
     return standard.with_bones(bones)
 
 
-def habits(performer: str) -> Habits:
+def performer_habits(performer: str) -> Habits:
     """The performer's ways; UnknownName."""
-    rng = _rng(performer, "habits")
+    rng = _performer_rng(performer, "habits")
     return Habits(
         hand="l" if performer in ("p3", "p6") else "r",
         pace=1.0 + 0.06 * float(np.clip(rng.normal(), -1.5, 1.5)),
@@ -114,11 +114,11 @@ def habits(performer: str) -> Habits:
         toes_out_rad=float(rng.uniform(0.05, 0.17)),
         pelvis_rad=float(rng.uniform(-0.03, 0.08)),
         elbow_rad=float(rng.uniform(0.28, 0.60)),
-        posture_rad=_posture(rng),
+        posture_rad=_sample_posture(rng),
     )
 
 
-def _posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
+def _sample_posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
     """Offsets that leave the carriage of chest and head about as it is: what one bone adds, the next takes away."""
     back, neck = np.deg2rad(rng.normal(0.0, (2.5, 0.5, 0.8))), np.deg2rad(rng.normal(0.0, (4.0, 1.0, 1.5)))
     low = float(rng.uniform(0.3, 0.7))
@@ -136,7 +136,7 @@ def _posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
     return {bone: tuple(float(x) for x in angles) for bone, angles in out.items()}
 
 
-def _rng(performer: str, what: str) -> np.random.Generator:
+def _performer_rng(performer: str, what: str) -> np.random.Generator:
     if performer not in _NAMES:
         raise UnknownName("performer", performer, _NAMES)
     return generator(0, "performer", performer, what)

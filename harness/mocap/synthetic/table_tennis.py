@@ -10,16 +10,23 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic.articulated_figure import LEFT, Figure
-from harness.mocap.synthetic.curves import smaller, wander
-from harness.mocap.synthetic.foot_trajectory import foot
-from harness.mocap.synthetic.footwork import Shift, Stance, body_path, highest_root_m, leg_m, steps
-from harness.mocap.synthetic.gestures import Gesture, Keys, play
-from harness.mocap.synthetic.limb_ik import columns, on_floor
+from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, ArticulatedFigure
+from harness.mocap.synthetic.curves import smooth_minimum, smooth_noise
+from harness.mocap.synthetic.foot_trajectory import plan_foot
+from harness.mocap.synthetic.footwork import (
+    FootPlacement,
+    StanceShift,
+    highest_root_m,
+    leg_length_m,
+    plan_body_path,
+    plan_steps,
+)
+from harness.mocap.synthetic.gestures import Gesture, Keyframes, sum_gestures
+from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
 from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import manner
+from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
-_FOREHAND: Mapping[str, Keys] = {
+_FOREHAND: Mapping[str, Keyframes] = {
     "ahead": [(0.0, 0.0), (0.34, -0.30), (0.52, 0.14), (0.64, 0.16), (1.05, 0.0)],
     "in": [(0.0, 0.0), (0.34, -0.22), (0.52, 0.08), (0.66, 0.30), (1.05, 0.0)],
     "up": [(0.0, 0.0), (0.34, -0.12), (0.52, 0.10), (0.66, 0.26), (1.05, 0.0)],
@@ -35,7 +42,7 @@ _FOREHAND: Mapping[str, Keys] = {
     "free ahead": [(0.0, 0.0), (0.32, 0.06), (0.58, -0.10), (1.05, 0.0)],
     "free out": [(0.0, 0.0), (0.32, 0.05), (0.58, 0.10), (1.05, 0.0)],
 }
-_BACKHAND: Mapping[str, Keys] = {
+_BACKHAND: Mapping[str, Keyframes] = {
     "ahead": [(0.0, 0.0), (0.30, -0.10), (0.46, 0.20), (0.54, 0.20), (0.92, 0.0)],
     "in": [(0.0, 0.0), (0.30, 0.24), (0.46, 0.10), (0.58, -0.10), (0.92, 0.0)],
     "up": [(0.0, 0.0), (0.30, -0.08), (0.46, 0.08), (0.58, 0.16), (0.92, 0.0)],
@@ -49,14 +56,14 @@ _BACKHAND: Mapping[str, Keys] = {
     "reach": [(0.0, 0.0), (0.30, 0.06), (0.48, 0.10), (0.92, 0.0)],
     "free out": [(0.0, 0.0), (0.30, -0.03), (0.50, 0.06), (0.92, 0.0)],
 }
-_SMASH: Mapping[str, Keys] = {
+_SMASH: Mapping[str, Keyframes] = {
     **_FOREHAND,
     "ahead": [(0.0, 0.0), (0.38, -0.28), (0.54, 0.24), (0.66, 0.20), (1.1, 0.0)],
     "up": [(0.0, 0.0), (0.38, 0.28), (0.54, 0.14), (0.70, -0.10), (1.1, 0.0)],
     "elbow": [(0.0, 0.0), (0.36, 0.95), (0.6, 0.6), (1.1, 0.0)],
     "dip": [(0.0, 0.0), (0.36, -0.05), (0.60, 0.05), (1.1, 0.0)],
 }
-_PUSH: Mapping[str, Keys] = {
+_PUSH: Mapping[str, Keyframes] = {
     "ahead": [(0.0, 0.0), (0.28, -0.07), (0.52, 0.26), (0.9, 0.0)],
     "in": [(0.0, 0.0), (0.28, 0.14), (0.52, 0.10), (0.9, 0.0)],
     "up": [(0.0, 0.0), (0.28, 0.08), (0.52, -0.08), (0.9, 0.0)],
@@ -68,7 +75,7 @@ _PUSH: Mapping[str, Keys] = {
     "reach": [(0.0, 0.0), (0.5, 0.12), (0.9, 0.0)],
 }
 _STROKES = (_FOREHAND, _BACKHAND, _SMASH, _PUSH)
-_STYLES = (
+_STROKE_FREQUENCIES = (
     (0.6, 0.3, 0.0, 0.1),
     (0.2, 0.6, 0.0, 0.2),
     (0.45, 0.4, 0.1, 0.05),
@@ -78,13 +85,13 @@ _STYLES = (
 """How often each stroke is played, by kind of take."""
 
 
-_REST: Mapping[str, Keys] = {
+_BETWEEN_RALLIES: Mapping[str, Keyframes] = {
     "rest": [(0.0, 0.0), (0.6, 1.0), (1.5, 0.95), (2.2, 0.0)],
     "bend": [(0.0, 0.0), (0.6, -0.26), (1.5, -0.24), (2.2, 0.0)],
     "dip": [(0.0, 0.0), (0.6, -0.09), (1.5, -0.09), (2.2, 0.0)],
 }
 """Upright between rallies, hands low."""
-_SERVE: Mapping[str, Keys] = {
+_SERVE: Mapping[str, Keyframes] = {
     "free ahead": [(0.0, 0.0), (0.5, 0.05), (0.9, 0.08), (1.5, 0.0)],
     "free up": [(0.0, 0.0), (0.5, -0.06), (0.85, 0.30), (1.05, 0.24), (1.5, 0.0)],
     "ahead": [(0.0, 0.0), (0.5, -0.02), (0.85, -0.26), (1.08, 0.16), (1.5, 0.0)],
@@ -99,51 +106,53 @@ _SERVE: Mapping[str, Keys] = {
 }
 
 
-def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
+def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """One take: rallies of some strokes, each begun with a serve."""
     bat = habits.hand
     free = "l" if bat == "r" else "r"
-    s = LEFT[free]  # the bat's side is -s
-    leg = leg_m(skeleton)
+    s = SIDE_SIGN[free]  # the bat's side is -s
+    leg = leg_length_m(skeleton)
     size, slow = habits.size * float(rng.uniform(0.95, 1.15)), float(rng.uniform(0.92, 1.12)) / habits.pace
     crouch = float(rng.uniform(0.06, 0.13))
 
-    start, shifts, strokes = _match(rng, t, size, slow, _STYLES[take % len(_STYLES)], -s)
+    start, shifts, strokes = _plan_rallies(rng, t, size, slow, _STROKE_FREQUENCIES[take % len(_STROKE_FREQUENCIES)], -s)
     stance = {
-        bat: Stance(-0.06 * leg, -s * 0.34 * leg, -s * 0.30),
-        free: Stance(0.12 * leg, s * 0.34 * leg, s * 0.18),
+        bat: FootPlacement(-0.06 * leg, -s * 0.34 * leg, -s * 0.30),
+        free: FootPlacement(0.12 * leg, s * 0.34 * leg, s * 0.18),
     }
-    place, facing = body_path(t, start, shifts)
-    plants = steps(rng, stance, start, shifts, float(t[-1]))
-    act = play(t, strokes)
-    bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.5 + wander(rng, t, 3.0, 0.12)))
-    feet = {side: foot(t, skeleton, side, plants[side], 0.10, 0.10 + 0.03 * np.sin(bounce)) for side in (bat, free)}
+    place, facing = plan_body_path(t, start, shifts)
+    plants = plan_steps(rng, stance, start, shifts, float(t[-1]))
+    act = sum_gestures(t, strokes)
+    bounce = 2.0 * np.pi * np.cumsum((t[1] - t[0]) * (1.5 + smooth_noise(rng, t, 3.0, 0.12)))
+    feet = {
+        side: plan_foot(t, skeleton, side, plants[side], 0.10, 0.10 + 0.03 * np.sin(bounce)) for side in (bat, free)
+    }
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.35, 0.5) + rng.uniform(0.0, 6.0))
-    pelvis = columns(
-        facing + s * (act["pelvis"] - 0.12) + wander(rng, t, 1.8, 0.03),
-        habits.pelvis_rad + 0.14 + crouch + 0.5 * act["bend"] + wander(rng, t, 2.0, 0.02),
-        s * 0.3 * act["lean"] + wander(rng, t, 2.0, 0.02),
+    pelvis = stack_columns(
+        facing + s * (act["pelvis"] - 0.12) + smooth_noise(rng, t, 1.8, 0.03),
+        habits.pelvis_rad + 0.14 + crouch + 0.5 * act["bend"] + smooth_noise(rng, t, 2.0, 0.02),
+        s * 0.3 * act["lean"] + smooth_noise(rng, t, 2.0, 0.02),
     )
-    spine = columns(
-        habits.bend_rad + 0.20 + 1.2 * crouch + act["bend"] + 0.01 * breath + wander(rng, t, 2.0, 0.02),
-        s * (act["twist"] - 0.05) + wander(rng, t, 1.8, 0.03),
-        -s * 0.7 * act["lean"] + wander(rng, t, 2.0, 0.02),
+    spine = stack_columns(
+        habits.bend_rad + 0.20 + 1.2 * crouch + act["bend"] + 0.01 * breath + smooth_noise(rng, t, 2.0, 0.02),
+        s * (act["twist"] - 0.05) + smooth_noise(rng, t, 1.8, 0.03),
+        -s * 0.7 * act["lean"] + smooth_noise(rng, t, 2.0, 0.02),
     )
-    gaze = columns(
-        facing + s * 0.25 * act["twist"] + wander(rng, t, 1.2, 0.09),
-        0.24 + 0.2 * act["bend"] + act["look"] + wander(rng, t, 1.2, 0.04),
-        wander(rng, t, 2.0, 0.03),
+    gaze = stack_columns(
+        facing + s * 0.25 * act["twist"] + smooth_noise(rng, t, 1.2, 0.09),
+        0.24 + 0.2 * act["bend"] + act["look"] + smooth_noise(rng, t, 1.2, 0.04),
+        smooth_noise(rng, t, 2.0, 0.03),
     )
-    ahead = -0.06 * leg - 0.05 + act["forward"] + 0.012 * np.sin(bounce) + wander(rng, t, 1.8, 0.01)
-    place = place + on_floor(facing, ahead, s * act["side"] + wander(rng, t, 1.8, 0.012))
+    ahead = -0.06 * leg - 0.05 + act["forward"] + 0.012 * np.sin(bounce) + smooth_noise(rng, t, 1.8, 0.01)
+    place = place + horizontal_vector(facing, ahead, s * act["side"] + smooth_noise(rng, t, 1.8, 0.012))
     top = highest_root_m(skeleton, place, pelvis, feet, 0.975)
-    height = np.median(top) - crouch * leg - act["dip"] + 0.010 * np.sin(bounce) + wander(rng, t, 2.0, 0.006)
-    root = columns(*place.T, smaller(top, height, 0.03))
+    height = np.median(top) - crouch * leg - act["dip"] + 0.010 * np.sin(bounce) + smooth_noise(rng, t, 2.0, 0.006)
+    root = stack_columns(*place.T, smooth_minimum(top, height, 0.03))
     shoulders = {
-        bat: (0.02 + 0.01 * breath, 0.06 + act["reach"] + wander(rng, t, 1.5, 0.012)),
-        free: (0.02 + 0.01 * breath, 0.05 + 0.3 * act["free ahead"] + wander(rng, t, 1.5, 0.012)),
+        bat: (0.02 + 0.01 * breath, 0.06 + act["reach"] + smooth_noise(rng, t, 1.5, 0.012)),
+        free: (0.02 + 0.01 * breath, 0.05 + 0.3 * act["free ahead"] + smooth_noise(rng, t, 1.5, 0.012)),
     }
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     low = act["rest"]
     wrists = {
         bat: (0.30 + act["ahead"] - 0.08 * low, 0.26 - act["in"] - 0.02 * low, -0.30 + act["up"] - 0.14 * low),
@@ -160,12 +169,12 @@ def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats
     turned = {bat: facing, free: facing + 0.75 * s * (act["pelvis"] + act["twist"])}
     for side in (bat, free):
         figure.leg(side, feet[side])
-        _arm(figure, side, rng, t, turned[side], wrists[side], forearm[side])
+        _pose_arm(figure, side, rng, t, turned[side], wrists[side], forearm[side])
     return figure
 
 
-def _arm(
-    figure: Figure,
+def _pose_arm(
+    figure: ArticulatedFigure,
     side: str,
     rng: np.random.Generator,
     t: Floats,
@@ -174,26 +183,26 @@ def _arm(
     forearm: tuple[Floats, Floats, Floats],
 ) -> None:
     """The wrist ahead, out and up of the chest for an arm of 0.58 m [m]; elbow raised, pronated, laid back [rad]."""
-    sign, reach = LEFT[side], figure.arm_m(side) / 0.58
-    ahead, out, up = (x + rng.normal(0.0, 0.02) + wander(rng, t, 1.4, 0.018) for x in wrist_m)
+    sign, reach = SIDE_SIGN[side], figure.arm_m(side) / 0.58
+    ahead, out, up = (x + rng.normal(0.0, 0.02) + smooth_noise(rng, t, 1.4, 0.018) for x in wrist_m)
     elbow, pronate, lay = forearm
-    raised = 0.35 + elbow + float(rng.normal(0.0, 0.08)) + wander(rng, t, 1.6, 0.05)
+    raised = 0.35 + elbow + float(rng.normal(0.0, 0.08)) + smooth_noise(rng, t, 1.6, 0.05)
     figure.reach(
         side,
         figure.around_m(facing, reach * ahead, sign * reach * out, reach * up),
-        columns(*on_floor(facing, -0.45, sign * np.sin(raised)).T, -np.cos(raised)),
-        -0.25 + pronate + wander(rng, t, 1.4, 0.05),
+        stack_columns(*horizontal_vector(facing, -0.45, sign * np.sin(raised)).T, -np.cos(raised)),
+        -0.25 + pronate + smooth_noise(rng, t, 1.4, 0.05),
         (-0.12 - lay, 0.05 + 0.4 * lay),
     )
 
 
-def _match(
+def _plan_rallies(
     rng: np.random.Generator, t: Floats, size: float, slow: float, style: tuple[float, ...], bat_side: float
-) -> tuple[Shift, list[Shift], list[Gesture]]:
+) -> tuple[StanceShift, list[StanceShift], list[Gesture]]:
     """Where the player goes and what is played there; the ball comes to the forehand or the backhand corner."""
     yaw = float(rng.uniform(-np.pi, np.pi))
-    start = Shift(0.0, (0.0, 0.0), yaw)
-    shifts: list[Shift] = []
+    start = StanceShift(0.0, (0.0, 0.0), yaw)
+    shifts: list[StanceShift] = []
     strokes: list[Gesture] = []
     left_in_rally = int(rng.integers(2, 7))
     now = float(t[0]) - rng.uniform(0.0, 0.8)
@@ -213,13 +222,13 @@ def _match(
             aside, ahead = aside + move, float(np.clip(0.5 * ahead + deep, -0.25, 0.25))
             step_s *= 0.75 + 1.3 * abs(move)
             spot = (float(c * ahead - d * aside), float(d * ahead + c * aside))
-            shifts.append(Shift(now - 0.15, spot, heading, step_s, rng.uniform(0.0, 0.05), 0.025))
+            shifts.append(StanceShift(now - 0.15, spot, heading, step_s, rng.uniform(0.0, 0.05), 0.025))
             busy_s = now - 0.15 + 2.0 * step_s + 0.15
         now += rng.uniform(0.95, 1.35) * slow
         left_in_rally -= 1
         if left_in_rally <= 0:
             strokes += [
-                Gesture(now, _REST).varied(rng, 1.0, slow),
+                Gesture(now, _BETWEEN_RALLIES).varied(rng, 1.0, slow),
                 Gesture(now + 2.0 * slow, _SERVE).varied(rng, size, slow),
             ]
             now += 3.3 * slow

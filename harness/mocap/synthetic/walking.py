@@ -11,19 +11,19 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
-from harness.mocap.synthetic.articulated_figure import LEFT, SIDES, Figure
-from harness.mocap.synthetic.curves import GRAVITY_M_S2, smaller, smoothed, wander
-from harness.mocap.synthetic.foot_trajectory import Plant, foot
-from harness.mocap.synthetic.footwork import highest_root_m, leg_m
-from harness.mocap.synthetic.gestures import Gesture, play
-from harness.mocap.synthetic.limb_ik import columns, on_floor
+from harness.mocap.synthetic.articulated_figure import SIDE_SIGN, SIDES, ArticulatedFigure
+from harness.mocap.synthetic.curves import GRAVITY_M_S2, gaussian_smooth, smooth_minimum, smooth_noise
+from harness.mocap.synthetic.foot_trajectory import FootContact, plan_foot
+from harness.mocap.synthetic.footwork import highest_root_m, leg_length_m
+from harness.mocap.synthetic.gestures import Gesture, sum_gestures
+from harness.mocap.synthetic.limb_ik import horizontal_vector, stack_columns
 from harness.mocap.synthetic.performers import Habits
-from harness.mocap.synthetic.posture_noise import manner
-from harness.mocap.synthetic.walking_path import Course, course
+from harness.mocap.synthetic.posture_noise import sample_posture_offsets
+from harness.mocap.synthetic.walking_path import WalkingPath, sample_walking_path
 
-STANCE = 0.59
+STANCE_SHARE = 0.59
 """Share of the gait cycle after which the ball of the foot starts to leave; it is away for good at 0.62."""
-_PASSING = 0.53
+_PASSING_SHARE = 0.53
 """The pelvis passes the ankle so many steps after the heel came down."""
 _PAD_S = 3.0
 
@@ -46,63 +46,66 @@ class Gait:
     half_width_m: float
 
 
-def move(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> Figure:
+def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
     """One take along one of six kinds of path."""
     step_s = float(t[1] - t[0])
     pad = int(_PAD_S / step_s)
     long = (np.arange(len(t) + 2 * pad) - pad) * step_s + t[0]
-    way = course(rng, long, take)
-    gait = _gait(rng, habits, float(way.speed_m_s.mean()), take)
+    way = sample_walking_path(rng, long, take)
+    gait = _sample_gait(rng, habits, float(way.speed_m_s.mean()), take)
     # cadence: step length grows as speed to the power 0.55
     rhythm = 1.88 * habits.pace * rng.uniform(0.97, 1.03) * (way.speed_m_s / 1.3) ** 0.45
-    rhythm *= 1.0 + wander(rng, long, 1.5, 0.012)
+    rhythm *= 1.0 + smooth_noise(rng, long, 1.5, 0.012)
     steps = np.concatenate([[0.0], np.cumsum(0.5 * (rhythm[1:] + rhythm[:-1]) * step_s)]) + rng.uniform(0.0, 2.0)
-    plants = _plants(rng, skeleton, habits, gait, long, way, steps)
-    feet = {side: foot(t, skeleton, side, plants[side], 0.03) for side in SIDES}
+    plants = _plan_footsteps(rng, skeleton, habits, gait, long, way, steps)
+    feet = {side: plan_foot(t, skeleton, side, plants[side], 0.03) for side in SIDES}
 
     inside = slice(pad, pad + len(t))
     stride = np.pi * steps[inside]
     """Phase [rad]: 0 when the left heel comes down, pi when the right one does."""
     yaw = way.yaw_rad[inside]
     lean = np.clip(np.gradient(yaw, step_s) * way.speed_m_s[inside] / GRAVITY_M_S2, -0.3, 0.3)
-    pelvis = columns(
-        yaw - 0.085 * gait.effort * np.cos(stride + 0.15) + wander(rng, t, 2.5, 0.012),
+    pelvis = stack_columns(
+        yaw - 0.085 * gait.effort * np.cos(stride + 0.15) + smooth_noise(rng, t, 2.5, 0.012),
         habits.pelvis_rad
         + 0.05
         + 0.3 * gait.stoop_rad
         + 0.012 * np.cos(2.0 * stride - 0.8)
-        + wander(rng, t, 3.0, 0.008),
-        0.055 * np.cos(stride - 0.4 * np.pi) - 0.5 * lean + wander(rng, t, 3.0, 0.008),
+        + smooth_noise(rng, t, 3.0, 0.008),
+        0.055 * np.cos(stride - 0.4 * np.pi) - 0.5 * lean + smooth_noise(rng, t, 3.0, 0.008),
     )
-    sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + wander(rng, t, 2.0, 0.004)
-    place = way.place_m[inside] + on_floor(yaw, -0.03, sway)
+    sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + smooth_noise(rng, t, 2.0, 0.004)
+    place = way.place_m[inside] + horizontal_vector(yaw, -0.03, sway)
     top = highest_root_m(skeleton, place, pelvis, feet, 0.994)
-    root = columns(*place.T, smaller(top, smoothed(top, 1.2 / step_s) + 0.004 - gait.crouch * leg_m(skeleton), 0.03))
+    root = stack_columns(
+        *place.T,
+        smooth_minimum(top, gaussian_smooth(top, 1.2 / step_s) + 0.004 - gait.crouch * leg_length_m(skeleton), 0.03),
+    )
 
     breath = np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
     bob = 0.02 * np.cos(2.0 * stride + 0.6) + 0.008 * breath
-    spine = columns(
-        habits.bend_rad + 0.7 * gait.stoop_rad + 0.02 * gait.effort + bob + wander(rng, t, 4.0, 0.012),
-        0.15 * gait.swing * gait.effort * np.cos(stride) + wander(rng, t, 3.0, 0.015),
-        -0.065 * np.cos(stride - 0.4 * np.pi) + 0.2 * lean + wander(rng, t, 3.0, 0.012),
+    spine = stack_columns(
+        habits.bend_rad + 0.7 * gait.stoop_rad + 0.02 * gait.effort + bob + smooth_noise(rng, t, 4.0, 0.012),
+        0.15 * gait.swing * gait.effort * np.cos(stride) + smooth_noise(rng, t, 3.0, 0.015),
+        -0.065 * np.cos(stride - 0.4 * np.pi) + 0.2 * lean + smooth_noise(rng, t, 3.0, 0.012),
     )
-    look = play(t, _glances(rng, t))
+    look = sum_gestures(t, _sample_glances(rng, t))
     bearing = np.clip(1.1 * (np.interp(t + 0.35, long, way.yaw_rad) - yaw), -0.7, 0.7)
-    gaze = columns(
-        yaw + np.tanh(bearing + look["yaw"]) + wander(rng, t, 2.5, 0.05),
-        0.06 + rng.uniform(-0.04, 0.12) + look["pitch"] + wander(rng, t, 2.5, 0.03),
-        -0.15 * lean + wander(rng, t, 3.0, 0.012),
+    gaze = stack_columns(
+        yaw + np.tanh(bearing + look["yaw"]) + smooth_noise(rng, t, 2.5, 0.05),
+        0.06 + rng.uniform(-0.04, 0.12) + look["pitch"] + smooth_noise(rng, t, 2.5, 0.03),
+        -0.15 * lean + smooth_noise(rng, t, 3.0, 0.012),
     )
     forward = {"l": -np.cos(stride - 0.1), "r": np.cos(stride - 0.1)}
-    shoulders = {s: (0.02 * breath + wander(rng, t, 3.0, 0.01), 0.04 * gait.swing * forward[s]) for s in SIDES}
-    figure = Figure(skeleton, root, pelvis, spine, gaze, shoulders, manner(rng, t, habits))
+    shoulders = {s: (0.02 * breath + smooth_noise(rng, t, 3.0, 0.01), 0.04 * gait.swing * forward[s]) for s in SIDES}
+    figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
         figure.leg(side, feet[side])
         _swing_arm(figure, side, rng, t, habits, gait, forward[side])
     return figure
 
 
-def _gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, take: int) -> Gait:
+def _sample_gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, take: int) -> Gait:
     """Takes go through an easy, a brisk, a tired and a marching walk."""
     effort = float(np.clip(speed_m_s / 1.3, 0.6, 1.4))
     style = ("easy", "brisk", "tired", "marching")[(take - 1) % 4]
@@ -125,27 +128,29 @@ def _gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, take: int)
     )
 
 
-def _plants(
-    rng: np.random.Generator, skeleton: Skeleton, habits: Habits, gait: Gait, t: Floats, way: Course, steps: Floats
-) -> Mapping[str, list[Plant]]:
+def _plan_footsteps(
+    rng: np.random.Generator, skeleton: Skeleton, habits: Habits, gait: Gait, t: Floats, way: WalkingPath, steps: Floats
+) -> Mapping[str, list[FootContact]]:
     """A plant for each whole number of `steps` (T,), the steps made by the time t."""
 
     def at(step: float, curve: Floats) -> float:
         return float(np.interp(step, steps, curve))
 
-    plants: dict[str, list[Plant]] = {side: [] for side in SIDES}
+    plants: dict[str, list[FootContact]] = {side: [] for side in SIDES}
     ahead_m = 0.92 * float(skeleton.length_m[skeleton.index("lfoot")])
-    for k in range(int(np.ceil(steps[0])), int(steps[-1] - 2.0 * STANCE)):
+    for k in range(int(np.ceil(steps[0])), int(steps[-1] - 2.0 * STANCE_SHARE)):
         side = SIDES[k % 2]
-        yaw = at(k + STANCE, way.yaw_rad)
-        toes = yaw + LEFT[side] * habits.toes_out_rad + float(rng.normal(0.0, 0.02))
-        ankle = np.array([at(k + _PASSING, way.place_m[:, 0]), at(k + _PASSING, way.place_m[:, 1])])
-        ankle += on_floor(yaw, rng.normal(0.0, 0.008), LEFT[side] * gait.half_width_m + rng.normal(0.0, 0.006))
-        ball = ankle + on_floor(toes, ahead_m, 0.0)
+        yaw = at(k + STANCE_SHARE, way.yaw_rad)
+        toes = yaw + SIDE_SIGN[side] * habits.toes_out_rad + float(rng.normal(0.0, 0.02))
+        ankle = np.array([at(k + _PASSING_SHARE, way.place_m[:, 0]), at(k + _PASSING_SHARE, way.place_m[:, 1])])
+        ankle += horizontal_vector(
+            yaw, rng.normal(0.0, 0.008), SIDE_SIGN[side] * gait.half_width_m + rng.normal(0.0, 0.006)
+        )
+        ball = ankle + horizontal_vector(toes, ahead_m, 0.0)
         plants[side].append(
-            Plant(
+            FootContact(
                 on_s=at(k, t),
-                off_s=at(k + 2.0 * STANCE, t),
+                off_s=at(k + 2.0 * STANCE_SHARE, t),
                 ball_m=(float(ball[0]), float(ball[1])),
                 yaw_rad=toes,
                 land_rad=gait.land_rad * float(rng.uniform(0.92, 1.08)),
@@ -157,7 +162,7 @@ def _plants(
     return plants
 
 
-def _glances(rng: np.random.Generator, t: Floats) -> list[Gesture]:
+def _sample_glances(rng: np.random.Generator, t: Floats) -> list[Gesture]:
     """Looks to the side or to the floor."""
     glances: list[Gesture] = []
     now = float(t[0]) - rng.uniform(0.0, 3.0)
@@ -171,17 +176,23 @@ def _glances(rng: np.random.Generator, t: Floats) -> list[Gesture]:
 
 
 def _swing_arm(
-    figure: Figure, side: str, rng: np.random.Generator, t: Floats, habits: Habits, gait: Gait, forward: Floats
+    figure: ArticulatedFigure,
+    side: str,
+    rng: np.random.Generator,
+    t: Floats,
+    habits: Habits,
+    gait: Gait,
+    forward: Floats,
 ) -> None:
     """`forward` (T,) is 1 when the arm is most forward, -1 when it is most back."""
     size = gait.swing * gait.effort * float(rng.uniform(0.9, 1.1))
     bent = gait.elbow_rad
     figure.hang(
         side,
-        0.26 * size * forward - 0.08 + 0.10 * bent + wander(rng, t, 2.5, 0.03),
-        habits.spread_rad + 0.02 * forward + wander(rng, t, 2.5, 0.02),
-        0.20 + 0.15 * bent + 0.08 * forward + wander(rng, t, 2.5, 0.03),
-        bent + 0.20 * size * forward + 0.05 * forward**2 + wander(rng, t, 2.0, 0.03),
-        0.05 + 0.08 * forward + wander(rng, t, 2.0, 0.04),
-        (-0.22 + 0.08 * forward + wander(rng, t, 1.5, 0.02), wander(rng, t, 1.5, 0.02)),
+        0.26 * size * forward - 0.08 + 0.10 * bent + smooth_noise(rng, t, 2.5, 0.03),
+        habits.spread_rad + 0.02 * forward + smooth_noise(rng, t, 2.5, 0.02),
+        0.20 + 0.15 * bent + 0.08 * forward + smooth_noise(rng, t, 2.5, 0.03),
+        bent + 0.20 * size * forward + 0.05 * forward**2 + smooth_noise(rng, t, 2.0, 0.03),
+        0.05 + 0.08 * forward + smooth_noise(rng, t, 2.0, 0.04),
+        (-0.22 + 0.08 * forward + smooth_noise(rng, t, 1.5, 0.02), smooth_noise(rng, t, 1.5, 0.02)),
     )

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.mocap.synthetic.curves import ease, wander
+from harness.mocap.synthetic.curves import minimum_jerk, smooth_noise
 
-KINDS = ("round the room", "to and fro", "square left", "square right", "figure of eight", "wandering")
-_SLOWEST_M_S = 0.92
+PATH_KINDS = ("round the room", "to and fro", "square left", "square right", "figure of eight", "wandering")
+_TURNING_SPEED_M_S = 0.92
 """Speed in a sharp turn."""
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class WalkingPath:
     """A path walked over time."""
 
     place_m: Floats
@@ -24,29 +24,31 @@ class Course:
     """(T,)"""
 
 
-def course(rng: np.random.Generator, t: Floats, take: int) -> Course:
+def sample_walking_path(rng: np.random.Generator, t: Floats, take: int) -> WalkingPath:
     """The course of a take, centred; takes go through the kinds."""
-    kind = KINDS[(take - 1 + int(rng.integers(2))) % len(KINDS)]
+    kind = PATH_KINDS[(take - 1 + int(rng.integers(2))) % len(PATH_KINDS)]
     usual = rng.uniform(0.95, 1.6)
-    yaw = rng.uniform(-np.pi, np.pi) + wander(rng, t, 4.0, 0.05)
+    yaw = rng.uniform(-np.pi, np.pi) + smooth_noise(rng, t, 4.0, 0.05)
     slow = np.zeros(len(t))
     start_s = float(t[0])
     side = 1.0 if rng.random() < 0.5 else -1.0
     while start_s < t[-1]:
-        angle, lasts_s, straight_s, side = _turn(rng, kind, side, usual)
+        angle, lasts_s, straight_s, side = _sample_turn(rng, kind, side, usual)
         share = (t - start_s - straight_s) / lasts_s
-        yaw += angle * ease(share)
+        yaw += angle * minimum_jerk(share)
         sharp = min(abs(angle) / lasts_s / 1.6, 1.0)
-        slow = 1.0 - (1.0 - slow) * (1.0 - sharp * ease((share + 0.4) / 0.7) * ease((1.4 - share) / 0.7))
+        slow = 1.0 - (1.0 - slow) * (
+            1.0 - sharp * minimum_jerk((share + 0.4) / 0.7) * minimum_jerk((1.4 - share) / 0.7)
+        )
         start_s += straight_s + lasts_s
-    speed = usual * (1.0 + wander(rng, t, 3.0, 0.02))
-    speed += (min(_SLOWEST_M_S, usual) - speed) * slow
+    speed = usual * (1.0 + smooth_noise(rng, t, 3.0, 0.02))
+    speed += (min(_TURNING_SPEED_M_S, usual) - speed) * slow
     velocity = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1) * speed[:, None]
     place = np.concatenate([np.zeros((1, 2)), np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * (t[1] - t[0]), axis=0)])
-    return Course(place - 0.5 * (place.min(axis=0) + place.max(axis=0)), yaw, speed)
+    return WalkingPath(place - 0.5 * (place.min(axis=0) + place.max(axis=0)), yaw, speed)
 
 
-def _turn(rng: np.random.Generator, kind: str, side: float, usual: float) -> tuple[float, float, float, float]:
+def _sample_turn(rng: np.random.Generator, kind: str, side: float, usual: float) -> tuple[float, float, float, float]:
     """Angle [rad] of a turn, the time it takes [s], the straight before it [s], and the side of the turn after it."""
     if kind == "round the room":
         return side * 2.0 * np.pi, 2.0 * np.pi * rng.uniform(1.5, 2.3) / usual, 0.01, side

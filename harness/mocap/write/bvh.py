@@ -12,15 +12,15 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.mocap.read.asf import WORLD_FROM_ASF
-from harness.mocap.write.posed_motion import Motion
+from harness.mocap.write.posed_motion import PosedMotion
 
 CENTIMETRES_PER_METRE = 100.0
 _ROTATION = "Zrotation Yrotation Xrotation"
 
 
-def bvh_files(motion: Motion) -> dict[str, str]:
+def bvh_files(motion: PosedMotion) -> dict[str, str]:
     """Ending -> text of the file."""
-    return {".bvh": "\n".join([*hierarchy(motion.skeleton), *_motion(motion)]) + "\n"}
+    return {".bvh": "\n".join([*hierarchy_lines(motion.skeleton), *_motion_lines(motion)]) + "\n"}
 
 
 def euler_zyx_deg(rotation: Floats) -> Floats:
@@ -35,7 +35,7 @@ def euler_zyx_deg(rotation: Floats) -> Floats:
     return out
 
 
-def hierarchy(skeleton: Skeleton) -> Iterator[str]:
+def hierarchy_lines(skeleton: Skeleton) -> Iterator[str]:
     """The first part of a file, line by line."""
     offset_cm = skeleton.bone_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
     children = {
@@ -45,14 +45,14 @@ def hierarchy(skeleton: Skeleton) -> Iterator[str]:
     def joint(bone: int, at_cm: Floats, tab: str) -> Iterator[str]:
         yield f"{tab}JOINT {skeleton.names[bone]}"
         yield f"{tab}{{"
-        yield f"{tab}\tOFFSET {row(at_cm)}"
+        yield f"{tab}\tOFFSET {format_row(at_cm)}"
         yield f"{tab}\tCHANNELS 3 {_ROTATION}"
         for child in children[bone]:
             yield from joint(child, offset_cm[bone], tab + "\t")
         if not children[bone]:
             yield f"{tab}\tEnd Site"
             yield f"{tab}\t{{"
-            yield f"{tab}\t\tOFFSET {row(offset_cm[bone])}"
+            yield f"{tab}\t\tOFFSET {format_row(offset_cm[bone])}"
             yield f"{tab}\t}}"
         yield f"{tab}}}"
 
@@ -63,18 +63,18 @@ def hierarchy(skeleton: Skeleton) -> Iterator[str]:
     yield "}"
 
 
-def _motion(motion: Motion) -> Iterator[str]:
+def _motion_lines(motion: PosedMotion) -> Iterator[str]:
     grid = np.arange(motion.frame_index[0], motion.frame_index[-1] + 1)
     shown = np.searchsorted(motion.frame_index, grid, side="right") - 1
-    table = channels(
+    table = channel_values(
         motion.skeleton, motion.joints_m[:, 0], rotations.to_matrix(motion.world_from_root), motion.world_from_bone
     )
     table[:, 3:] = np.unwrap(table[:, 3:], period=360.0, axis=0)
     yield from ("MOTION", f"Frames: {len(grid)}", f"Frame Time: {1.0 / motion.rate_hz:.9f}")
-    yield from map(row, table[shown])
+    yield from map(format_row, table[shown])
 
 
-def channels(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, world_from_bone: Floats) -> Floats:
+def channel_values(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, world_from_bone: Floats) -> Floats:
     """The numbers (F, 6 + 3 B) of frames: root (F, 3) [m], rotations (F, 3, 3), (F, B, 3, 3); angles within +-180."""
     local = [world_from_root]
     for bone, parent in enumerate(skeleton.parents):
@@ -98,6 +98,6 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
     return list(below(-1))
 
 
-def row(values: Floats) -> str:
+def format_row(values: Floats) -> str:
     """As it stands in the file."""
     return " ".join(f"{value:.6f}" for value in values)

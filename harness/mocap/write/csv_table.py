@@ -5,10 +5,10 @@ import io
 
 import numpy as np
 
-from harness.mocap.write.posed_motion import Motion
+from harness.mocap.write.posed_motion import PosedMotion
 
 
-def csv_files(motion: Motion) -> dict[str, str]:
+def csv_files(motion: PosedMotion) -> dict[str, str]:
     """Ending -> text of the file. World axes x forward, y left, z up; a value that is undefined is empty."""
     columns = ["frame", "time_s", *(f"root_q{c}" for c in "wxyz")]
     columns += [f"{name}_{axis}_m" for name in motion.joint_names for axis in "xyz"]

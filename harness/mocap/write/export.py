@@ -8,11 +8,11 @@ from pathlib import Path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.bvh import bvh_files
 from harness.mocap.write.csv_table import csv_files
-from harness.mocap.write.posed_motion import Exportable, Motion, truth_and_estimate
+from harness.mocap.write.posed_motion import ExportableCell, PosedMotion, pose_truth_and_estimate
 from harness.mocap.write.trc import trc_files
 from harness.mocap.write.tum import tum_files
 
-FORMATS: dict[str, Callable[[Motion], dict[str, str]]] = {
+FORMATS: dict[str, Callable[[PosedMotion], dict[str, str]]] = {
     "bvh": bvh_files,
     "trc": trc_files,
     "csv": csv_files,
@@ -21,7 +21,7 @@ FORMATS: dict[str, Callable[[Motion], dict[str, str]]] = {
 _UNFINISHED = ".unfinished-"
 
 
-def export(cells: Iterable[Exportable], fmt: str, folder: Path, *, force: bool = False) -> list[Path]:
+def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bool = False) -> list[Path]:
     """Write every cell in one of FORMATS, `CLIP-METHOD-INPUTS.truth.*` and `.estimate.*`; returns the files.
 
     The seconds of warm-up, which scores leave out, are written too. All files are written, or none. A cell without a
@@ -34,12 +34,12 @@ def export(cells: Iterable[Exportable], fmt: str, folder: Path, *, force: bool =
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for cell in cells:
-            stem = _stem(cell, {path.name for path in ready})
-            for kind, motion in truth_and_estimate(cell).items():
+            stem = _file_stem(cell, {path.name for path in ready})
+            for kind, motion in pose_truth_and_estimate(cell).items():
                 if len(motion):
                     for ending, text in FORMATS[fmt](motion).items():
                         path = folder / f"{stem}.{kind}{ending}"
-                        ready[path] = _prepared(path, text, force)
+                        ready[path] = _write_unfinished(path, text, force)
         for path, beside in ready.items():
             os.replace(beside, path)
     except OSError as error:
@@ -52,12 +52,12 @@ def export(cells: Iterable[Exportable], fmt: str, folder: Path, *, force: bool =
     return list(ready)
 
 
-def _stem(cell: Exportable, taken: set[str]) -> str:
+def _file_stem(cell: ExportableCell, taken: set[str]) -> str:
     stem = re.sub(r"[^\w.+@-]", "_", f"{cell.clip}-{cell.method}-{cell.inputs}")
     return f"{stem}-{cell.key[:8]}" if any(name.startswith(f"{stem}.") for name in taken) else stem
 
 
-def _prepared(path: Path, text: str, force: bool) -> Path:
+def _write_unfinished(path: Path, text: str, force: bool) -> Path:
     """The text under another name: all files take their own at once, or none does."""
     if path.exists() and not force:
         raise BadInput(f"{path} exists.", "Name another folder with --out, or write over it with --force.")

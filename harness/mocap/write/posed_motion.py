@@ -9,10 +9,10 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import standard_skeleton, unpack
-from harness.core.skeleton import Skeleton, forward
+from harness.core.skeleton import Skeleton, forward_kinematics
 
 
-class Exportable(Protocol):
+class ExportableCell(Protocol):
     """The part of a run's cell that is written: F frames (see `harness.results.cell.Cell`)."""
 
     @property
@@ -44,7 +44,7 @@ class Exportable(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class PosedMotion:
     """F posed frames; world axes x forward, y left, z up, metres and radians."""
 
     skeleton: Skeleton
@@ -73,19 +73,19 @@ class Motion:
         return ("root", *self.skeleton.names)
 
 
-def truth_and_estimate(cell: Exportable) -> dict[str, Motion]:
+def pose_truth_and_estimate(cell: ExportableCell) -> dict[str, PosedMotion]:
     """Both motions of a cell, each on its own skeleton, at the frames whose estimate is finite."""
     known = np.isfinite(cell.estimate_qpos).all(axis=1)
     extra = {"status": cell.status[known].astype(float)} | {name: e[known] for name, e in cell.errors.items()}
     time_s, frame_index = cell.time_s[known], cell.frame_index[known]
 
-    def motion(qpos: Floats, bone_m: Floats, extra: Mapping[str, Floats]) -> Motion:
+    def motion(qpos: Floats, bone_m: Floats, extra: Mapping[str, Floats]) -> PosedMotion:
         skeleton = standard_skeleton().with_bones(bone_m)
         root_m, quaternion, angles_rad = unpack(qpos[known])
         world_from_root = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
-        pose = forward(skeleton, root_m, world_from_root, angles_rad)
+        pose = forward_kinematics(skeleton, root_m, world_from_root, angles_rad)
         joints_m = np.concatenate([root_m[:, None], pose.end_m], axis=1)
-        return Motion(
+        return PosedMotion(
             skeleton, cell.rate_hz, frame_index, time_s, rotations.continuous(world_from_root),
             angles_rad, joints_m, pose.world_from_bone, extra,
         )  # fmt: skip

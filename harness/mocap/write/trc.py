@@ -3,17 +3,17 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.mocap.write.posed_motion import Motion
+from harness.mocap.write.posed_motion import PosedMotion
 
 OPENSIM_FROM_WORLD: Floats = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 
-def trc_files(motion: Motion) -> dict[str, str]:
+def trc_files(motion: PosedMotion) -> dict[str, str]:
     """Ending -> text of the file; times are the true ones, so gaps stay visible."""
-    return {".trc": _trc(motion), ".mot": _mot(motion)}
+    return {".trc": _trc_text(motion), ".mot": _mot_text(motion)}
 
 
-def _trc(motion: Motion) -> str:
+def _trc_text(motion: PosedMotion) -> str:
     names, rate, frames = motion.joint_names, f"{motion.rate_hz:g}", len(motion)
     places_mm = 1e3 * motion.joints_m @ OPENSIM_FROM_WORLD.T
     head = [
@@ -31,7 +31,7 @@ def _trc(motion: Motion) -> str:
     return "\n".join([*head, *rows]) + "\n"
 
 
-def _mot(motion: Motion) -> str:
+def _mot_text(motion: PosedMotion) -> str:
     names = [name.replace(".", "_") for name in motion.skeleton.dof_names]
     head = ["hinge angles", "version=1", f"nRows={len(motion)}", f"nColumns={1 + len(names)}", "inDegrees=yes"]
     table = np.column_stack([motion.time_s, np.rad2deg(motion.angles_rad)])

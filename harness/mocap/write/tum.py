@@ -3,18 +3,18 @@
 import numpy as np
 
 from harness.core import rotations
-from harness.mocap.write.posed_motion import Motion
+from harness.mocap.write.posed_motion import PosedMotion
 
 POINTS = ("root", "head", "lhand", "rhand", "lfoot", "rfoot")
 """The root, and far ends of bones with the bones' orientation."""
 
 
-def tum_files(motion: Motion) -> dict[str, str]:
+def tum_files(motion: PosedMotion) -> dict[str, str]:
     """Ending -> text of the file."""
-    return {f".{point}.tum": _trajectory(motion, point) for point in POINTS}
+    return {f".{point}.tum": _trajectory_text(motion, point) for point in POINTS}
 
 
-def _trajectory(motion: Motion, point: str) -> str:
+def _trajectory_text(motion: PosedMotion, point: str) -> str:
     place_m = motion.joints_m[:, motion.joint_names.index(point)]
     if point == "root":
         q = motion.world_from_root

@@ -7,30 +7,30 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Singles
-from harness.core.motion import Take
-from harness.core.workers import call_each
+from harness.core.motion import BodyMotion
+from harness.core.workers import run_in_workers
 from harness.errors import BadInput
-from harness.reconstruct.database.motion_database import MotionDatabase, Progress, Run
-from harness.reconstruct.database.storage import Kept, writing
-from harness.reconstruct.solver.ground_frame import ground_of, posture_of, seen_from
+from harness.reconstruct.database.motion_database import BuildProgress, MotionDatabase, TakeSegment
+from harness.reconstruct.database.storage import MemoryWriter, open_writer
+from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, relative_ground
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 
-Part = tuple[Run, float, Singles, Singles]
+BuiltSegment = tuple[TakeSegment, float, Singles, Singles]
 """A run on its own, its rate [Hz], postures and steps."""
 
 
-def build(
+def build_database(
     body: Body,
-    takes: Iterable[Take | Callable[[], Take]],
+    takes: Iterable[BodyMotion | Callable[[], BodyMotion]],
     *,
     workers: int,
-    progress: Progress | None,
+    progress: BuildProgress | None,
     folder: Path | None,
 ) -> MotionDatabase:
     """`MotionDatabase.build`."""
     planned = len(takes) if isinstance(takes, Sized) else 0
-    with Kept() if folder is None else writing(folder) as writer:
-        for done, (run, rate_hz, posture, step) in enumerate(_parts(body, takes, workers), start=1):
+    with MemoryWriter() if folder is None else open_writer(folder) as writer:
+        for done, (run, rate_hz, posture, step) in enumerate(_segments(body, takes, workers), start=1):
             writer.add(run, rate_hz, posture, step)
             if progress is not None:
                 progress(run.take, done, planned)
@@ -39,35 +39,37 @@ def build(
     return writer.result()
 
 
-def _parts(body: Body, takes: Iterable[Take | Callable[[], Take]], workers: int) -> Iterator[Part]:
+def _segments(
+    body: Body, takes: Iterable[BodyMotion | Callable[[], BodyMotion]], workers: int
+) -> Iterator[BuiltSegment]:
     if workers <= 1:
         limits = HingeLimits(body)
         for take in takes:
-            yield part_of(limits, take)
+            yield convert_take(limits, take)
         return
-    early: dict[int, Part] = {}
+    early: dict[int, BuiltSegment] = {}
     due = 0
-    for which, done in call_each(_made, [(body, take) for take in takes], workers):
+    for which, done in run_in_workers(_convert_in_worker, [(body, take) for take in takes], workers):
         early[which] = done.result()
         while due in early:
             yield early.pop(due)
             due += 1
 
 
-def _made(body: Body, take: Take | Callable[[], Take]) -> Part:
-    return part_of(HingeLimits(body), take)
+def _convert_in_worker(body: Body, take: BodyMotion | Callable[[], BodyMotion]) -> BuiltSegment:
+    return convert_take(HingeLimits(body), take)
 
 
-def part_of(limits: HingeLimits, take: Take | Callable[[], Take]) -> Part:
+def convert_take(limits: HingeLimits, take: BodyMotion | Callable[[], BodyMotion]) -> BuiltSegment:
     """One take in the database's form."""
-    if not isinstance(take, Take):
+    if not isinstance(take, BodyMotion):
         take = take()
     if not len(take):
         raise BadInput(f"{take.name} has no frames.", "Leave it out of the examples.")
     qpos = np.array(take.qpos)
     qpos[:, 7:] = limits.course(qpos[:, 7:])
-    ground = ground_of(qpos)
+    ground = ground_from_qpos(qpos)
     step = np.zeros((len(qpos), 3), np.float32)
-    step[1:] = seen_from(ground[:-1], ground[1:])
-    run = Run(take.name, take.subject, take.source, take.behaviour, 0, len(qpos))
-    return run, take.rate_hz, posture_of(qpos).astype(np.float32), step
+    step[1:] = relative_ground(ground[:-1], ground[1:])
+    run = TakeSegment(take.name, take.subject, take.source, take.behaviour, 0, len(qpos))
+    return run, take.rate_hz, posture_from_qpos(qpos).astype(np.float32), step

@@ -15,17 +15,17 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints, Singles
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database.windows import Windows
-from harness.reconstruct.solver.ground_frame import standing
+from harness.reconstruct.solver.ground_frame import qpos_from_postures
 
-Progress = Callable[[str, int, int], None]
+BuildProgress = Callable[[str, int, int], None]
 """Called with the take done last, how many are done and how many there are (0 when nobody knows)."""
 
 
 @dataclass(frozen=True)
-class Run:
+class TakeSegment:
     """Consecutive frames of one take, and where they come from."""
 
     take: str
@@ -52,27 +52,27 @@ class MotionDatabase:
     """(N, 52) height [m], tilt (rotation vector) [rad], 48 hinges in the order of `qpos[7:]` [rad]."""
     step: Singles
     """(N, 3) forward, left [m] and turn [rad] since the frame before, in its ground frame; 0 where a run begins."""
-    runs: tuple[Run, ...]
+    runs: tuple[TakeSegment, ...]
 
     @classmethod
     def build(
         cls,
         body: Body,
-        takes: Iterable[Take | Callable[[], Take]],
+        takes: Iterable[BodyMotion | Callable[[], BodyMotion]],
         *,
         workers: int = 1,
-        progress: Progress | None = None,
+        progress: BuildProgress | None = None,
         folder: Path | None = None,
     ) -> "MotionDatabase":
         """Of takes on this body, all at one rate; BadInput when there is none, or rates differ.
 
         A take may also be a function that makes it, picklable, which one of `workers` processes then calls. With a
         `folder` (which must not exist) frames are written there as they come and the result is memory-mapped, as
-        `save` and `open` would do.
+        `save_database` and `open` would do.
         """
-        from harness.reconstruct.database.builder import build
+        from harness.reconstruct.database.builder import build_database
 
-        return build(body, takes, workers=workers, progress=progress, folder=folder)
+        return build_database(body, takes, workers=workers, progress=progress, folder=folder)
 
     def __len__(self) -> int:
         return len(self.posture)
@@ -86,14 +86,14 @@ class MotionDatabase:
 
     def qpos(self, rows: Ints | slice, ground: Floats) -> Floats:
         """Configurations (K, 55) of some frames, stood on a ground frame (3,), or on one for each (K, 3)."""
-        return standing(self.posture[rows], ground)
+        return qpos_from_postures(self.posture[rows], ground)
 
     def without(self, take: str, frames: range | None = None) -> "MotionDatabase":
         """A copy that lacks a take, or those of its frames; what remains of it falls into runs of their own.
 
         BadInput when nothing would be left.
         """
-        kept: list[Run] = []
+        kept: list[TakeSegment] = []
         for run in self.runs:
             if run.take != take:
                 kept.append(run)
@@ -105,19 +105,20 @@ class MotionDatabase:
             for start, stop in cuts:
                 start, stop = max(start, run.start), min(stop, run.stop)
                 if start < stop:
-                    kept.append(_moved(run, start, stop, start - first))
+                    kept.append(_relocated(run, start, stop, start - first))
         if not kept:
             raise BadInput(f"The database has no frames but those of {take}.", "Add takes of other clips.")
         rows = [slice(run.start, run.stop) for run in kept]
         ends = np.cumsum([0, *map(len, kept)])
         runs = tuple(
-            _moved(run, int(a), int(b), run.first_frame) for run, a, b in zip(kept, ends[:-1], ends[1:], strict=True)
+            _relocated(run, int(a), int(b), run.first_frame)
+            for run, a, b in zip(kept, ends[:-1], ends[1:], strict=True)
         )
         step = np.concatenate([self.step[where] for where in rows])
         step[ends[:-1]] = 0.0
         return MotionDatabase(self.rate_hz, np.concatenate([self.posture[where] for where in rows]), step, runs)
 
-    def run_of(self, row: int) -> Run:
+    def run_of(self, row: int) -> TakeSegment:
         """Where a frame comes from."""
         starts: Sequence[int] = [run.start for run in self.runs]
         return self.runs[int(np.searchsorted(starts, row, side="right")) - 1]
@@ -131,17 +132,17 @@ class MotionDatabase:
 
     def save(self, folder: Path) -> None:
         """Write it to a folder that does not exist yet; BadFile when it does. Whole or not at all."""
-        from harness.reconstruct.database.storage import save
+        from harness.reconstruct.database.storage import save_database
 
-        save(self, folder)
+        save_database(self, folder)
 
     @staticmethod
     def open(folder: Path) -> "MotionDatabase":
-        """A folder that `save` wrote, memory-mapped; BadFile says what is wrong with any other."""
-        from harness.reconstruct.database.storage import open_folder
+        """A folder that `save_database` wrote, memory-mapped; BadFile says what is wrong with any other."""
+        from harness.reconstruct.database.storage import open_database
 
-        return open_folder(folder)
+        return open_database(folder)
 
 
-def _moved(run: Run, start: int, stop: int, first_frame: int) -> Run:
-    return Run(run.take, run.subject, run.source, run.behaviour, start, stop, first_frame)
+def _relocated(run: TakeSegment, start: int, stop: int, first_frame: int) -> TakeSegment:
+    return TakeSegment(run.take, run.subject, run.source, run.behaviour, start, stop, first_frame)

@@ -17,30 +17,30 @@ import numpy as np
 
 from harness.core.arrays import Singles
 from harness.errors import BadFile, BadInput
-from harness.reconstruct.database.motion_database import MotionDatabase, Run
-from harness.reconstruct.solver.ground_frame import POSTURE
+from harness.reconstruct.database.motion_database import MotionDatabase, TakeSegment
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 FORMAT, VERSION = "tracker-harness motion database", 1
-COLUMNS = {"posture": POSTURE, "step": 3}
-_CARD = "database.json"
-_ADVICE = "Build the database again."
+COLUMNS = {"posture": POSTURE_SIZE, "step": 3}
+_HEADER_FILE = "database.json"
+_REBUILD_ADVICE = "Build the database again."
 
 
-class Kept:
+class MemoryWriter:
     """Collects runs in memory."""
 
     def __init__(self) -> None:
-        self.runs: list[Run] = []
+        self.runs: list[TakeSegment] = []
         self.rate_hz = 0.0
         self._parts: dict[str, list[Singles]] = {name: [] for name in COLUMNS}
 
-    def __enter__(self) -> "Kept":
+    def __enter__(self) -> "MemoryWriter":
         return self
 
     def __exit__(self, *_: object) -> None:
         pass
 
-    def add(self, run: Run, rate_hz: float, posture: Singles, step: Singles) -> None:
+    def add(self, run: TakeSegment, rate_hz: float, posture: Singles, step: Singles) -> None:
         """Append a run; BadInput when its rate is another than the others'."""
         if self.runs and rate_hz != self.rate_hz:
             found = f"{run.take} has {rate_hz:g} frames a second, and {self.runs[0].take} {self.rate_hz:g}."
@@ -61,7 +61,7 @@ class Kept:
         return MotionDatabase(self.rate_hz, posture, step, tuple(self.runs))
 
 
-class Writer(Kept):
+class FolderWriter(MemoryWriter):
     """Appends runs to files."""
 
     def __init__(self, folder: Path, beside: Path) -> None:
@@ -88,7 +88,7 @@ class Writer(Kept):
             file.flush()
             os.fsync(file.fileno())
         card = {"format": FORMAT, "version": VERSION, "rate_hz": self.rate_hz, "runs": [asdict(r) for r in self.runs]}
-        with open(self._beside / _CARD, "w", encoding="utf-8") as text:
+        with open(self._beside / _HEADER_FILE, "w", encoding="utf-8") as text:
             json.dump(card, text, indent=0, allow_nan=False, ensure_ascii=False)
             text.flush()
             os.fsync(text.fileno())
@@ -98,11 +98,11 @@ class Writer(Kept):
             file.close()
 
     def result(self) -> MotionDatabase:
-        return open_folder(self._folder)
+        return open_database(self._folder)
 
 
 @contextmanager
-def writing(folder: Path) -> Iterator[Writer]:
+def open_writer(folder: Path) -> Iterator[FolderWriter]:
     """A writer whose folder appears when all went well; BadFile when something of that name is there already."""
     taken = BadFile(folder, "is there already", "a name for a new folder", "Nothing is overwritten: choose another.")
     if os.path.lexists(folder):
@@ -111,7 +111,7 @@ def writing(folder: Path) -> Iterator[Writer]:
     beside = folder.with_name(f".unfinished-{os.getpid()}-{folder.name}")
     beside.mkdir()
     try:
-        writer = Writer(folder, beside)
+        writer = FolderWriter(folder, beside)
         try:
             yield writer
             writer.finish()
@@ -125,67 +125,67 @@ def writing(folder: Path) -> Iterator[Writer]:
         shutil.rmtree(beside, ignore_errors=True)
 
 
-def save(database: MotionDatabase, folder: Path) -> None:
+def save_database(database: MotionDatabase, folder: Path) -> None:
     """`MotionDatabase.save`."""
-    with writing(folder) as writer:
+    with open_writer(folder) as writer:
         for run in database.runs:
             where = slice(run.start, run.stop)
             writer.add(run, database.rate_hz, database.posture[where], database.step[where])
 
 
-def open_folder(folder: Path) -> MotionDatabase:
+def open_database(folder: Path) -> MotionDatabase:
     """`MotionDatabase.open`."""
-    card = _card(folder / _CARD)
-    runs = _runs(folder / _CARD, card)
-    arrays = {name: _mapped(folder / f"{name}.npy", (runs[-1].stop, width)) for name, width in COLUMNS.items()}
+    card = _read_header(folder / _HEADER_FILE)
+    runs = _read_segments(folder / _HEADER_FILE, card)
+    arrays = {name: _map_array(folder / f"{name}.npy", (runs[-1].stop, width)) for name, width in COLUMNS.items()}
     return MotionDatabase(float(card["rate_hz"]), arrays["posture"], arrays["step"], runs)
 
 
-def _card(path: Path) -> dict[str, Any]:
+def _read_header(path: Path) -> dict[str, Any]:
     expected = f"the card of a motion database, version {VERSION}"
     try:
         card = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise BadFile(path, f"cannot be read ({error.strerror})", expected, "Is this a motion database?") from error
     except ValueError as error:
-        raise BadFile(path, f"not JSON: {error}", expected, _ADVICE) from error
+        raise BadFile(path, f"not JSON: {error}", expected, _REBUILD_ADVICE) from error
     if not isinstance(card, dict) or card.get("format") != FORMAT:
         raise BadFile(path, "of some other kind", expected, "Is this a motion database?")
     if card.get("version") != VERSION:
-        raise BadFile(path, f"version {card.get('version')!r}", expected, _ADVICE)
+        raise BadFile(path, f"version {card.get('version')!r}", expected, _REBUILD_ADVICE)
     rate_hz = card.get("rate_hz")
     if not isinstance(rate_hz, int | float) or isinstance(rate_hz, bool) or not 0.0 < rate_hz < np.inf:
-        raise BadFile(path, f"a rate of {rate_hz!r}", "rate_hz above 0", _ADVICE)
+        raise BadFile(path, f"a rate of {rate_hz!r}", "rate_hz above 0", _REBUILD_ADVICE)
     return card
 
 
-def _runs(path: Path, card: dict[str, Any]) -> tuple[Run, ...]:
+def _read_segments(path: Path, card: dict[str, Any]) -> tuple[TakeSegment, ...]:
     """Runs that follow each other from row 0 on, or BadFile."""
-    known = {field.name: field.type for field in fields(Run)}
-    runs: list[Run] = []
+    known = {field.name: field.type for field in fields(TakeSegment)}
+    runs: list[TakeSegment] = []
     entries = card.get("runs")
     for which, entry in enumerate(entries if isinstance(entries, list) else []):
         if not isinstance(entry, dict) or entry.keys() != known.keys():
-            raise BadFile(path, f"run {which} is {entry!r:.80}", f"an entry of {', '.join(known)}", _ADVICE)
+            raise BadFile(path, f"run {which} is {entry!r:.80}", f"an entry of {', '.join(known)}", _REBUILD_ADVICE)
         if any(type(entry[name]) is not kind for name, kind in known.items()):
-            raise BadFile(path, f"run {which} has fields of the wrong kind", "texts and whole numbers", _ADVICE)
-        run = Run(**entry)
+            raise BadFile(path, f"run {which} has fields of the wrong kind", "texts and whole numbers", _REBUILD_ADVICE)
+        run = TakeSegment(**entry)
         if run.start != (runs[-1].stop if runs else 0) or run.stop <= run.start or run.first_frame < 0:
-            raise BadFile(path, f"run {which} has rows {run.start} to {run.stop}", "runs that join", _ADVICE)
+            raise BadFile(path, f"run {which} has rows {run.start} to {run.stop}", "runs that join", _REBUILD_ADVICE)
         runs.append(run)
     if not runs:
-        raise BadFile(path, "no runs", "one or more", _ADVICE)
+        raise BadFile(path, "no runs", "one or more", _REBUILD_ADVICE)
     return tuple(runs)
 
 
-def _mapped(path: Path, shape: tuple[int, int]) -> Singles:
+def _map_array(path: Path, shape: tuple[int, int]) -> Singles:
     expected = f"an array of {shape[0]} x {shape[1]} float32"
     try:
         array: Singles = np.load(path, mmap_mode="r", allow_pickle=False)
     except OSError as error:
-        raise BadFile(path, f"cannot be read ({error.strerror or error})", expected, _ADVICE) from error
+        raise BadFile(path, f"cannot be read ({error.strerror or error})", expected, _REBUILD_ADVICE) from error
     except (ValueError, EOFError) as error:
-        raise BadFile(path, f"damaged: {error}", expected, _ADVICE) from error
+        raise BadFile(path, f"damaged: {error}", expected, _REBUILD_ADVICE) from error
     if array.dtype != np.dtype("<f4") or array.shape != shape or not array.flags.c_contiguous:
-        raise BadFile(path, f"{' x '.join(map(str, array.shape))} {array.dtype}", expected, _ADVICE)
+        raise BadFile(path, f"{' x '.join(map(str, array.shape))} {array.dtype}", expected, _REBUILD_ADVICE)
     return array

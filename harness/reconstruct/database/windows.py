@@ -18,7 +18,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.compiled import compiled
-from harness.reconstruct.solver.ground_frame import POSTURE
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 if TYPE_CHECKING:
     from harness.reconstruct.database.motion_database import MotionDatabase
@@ -42,13 +42,13 @@ class Windows:
     @property
     def size(self) -> int:
         """D, numbers in a vector."""
-        return (POSTURE + 3) * self.length - 3
+        return (POSTURE_SIZE + 3) * self.length - 3
 
     def gather(self, rows: Ints | slice) -> Singles:
         """Vectors (K, D) of some windows."""
         newest, database = self.frames[rows], self.database
         out = np.empty((len(newest), self.size), np.float32)
-        _gather(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest, out)
+        _fill_windows(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest, out)
         if self.scale is not None:
             out *= self.scale
         return out
@@ -67,12 +67,12 @@ class Windows:
         newest, database = self.frames[rows], self.database
         if len(newest) and newest.max() + 1 >= len(database):
             raise IndexError("the last window of the database has no successor: ask for windows that are followed")
-        return _after(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest)
+        return _gather_successors(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest)
 
     def query(self, qpos: Floats) -> Singles:
         """The vector (D,) of m configurations (m, 55), newest first, hinges in the database's representation."""
         out = np.empty(self.size, np.float32)
-        _query(np.ascontiguousarray(qpos[: self.length]), out)
+        _fill_query(np.ascontiguousarray(qpos[: self.length]), out)
         return out if self.scale is None else out * self.scale
 
     def scaled(self, scale: Floats) -> "Windows":
@@ -81,25 +81,25 @@ class Windows:
 
 
 @compiled
-def _gather(posture: Singles, step: Singles, newest: Ints, out: Singles) -> None:
+def _fill_windows(posture: Singles, step: Singles, newest: Ints, out: Singles) -> None:
     """Fill vectors (K, D) of windows that end with frames (K,)."""
     for k in range(len(newest)):
         frame = newest[k]
-        out[k, :POSTURE] = posture[frame]
+        out[k, :POSTURE_SIZE] = posture[frame]
         x, y, yaw = 0.0, 0.0, 0.0  # of the older frame's ground, seen from the newest's
-        for age in range(1, (out.shape[1] + 3) // (POSTURE + 3)):
+        for age in range(1, (out.shape[1] + 3) // (POSTURE_SIZE + 3)):
             forward, left, turn = step[frame - age + 1]
             yaw -= np.float64(turn)
             cosine, sine = math.cos(yaw), math.sin(yaw)
             x -= cosine * forward - sine * left
             y -= sine * forward + cosine * left
-            at = (POSTURE + 3) * age
+            at = (POSTURE_SIZE + 3) * age
             out[k, at - 3], out[k, at - 2], out[k, at - 1] = x, y, yaw
-            out[k, at : at + POSTURE] = posture[frame - age]
+            out[k, at : at + POSTURE_SIZE] = posture[frame - age]
 
 
 @compiled
-def _after(posture: Singles, step: Singles, newest: Ints) -> Singles:
+def _gather_successors(posture: Singles, step: Singles, newest: Ints) -> Singles:
     """(K, 55) posture and step of the frames after some (K,)."""
     width = posture.shape[1]
     out = np.empty((len(newest), width + 3), np.float32)
@@ -113,12 +113,12 @@ def _after(posture: Singles, step: Singles, newest: Ints) -> Singles:
 
 
 @compiled
-def _query(qpos: Floats, out: Singles) -> None:
+def _fill_query(qpos: Floats, out: Singles) -> None:
     """Fill the vector (D,) of configurations (m, 55): `posture_of`, and `seen_from` of their `ground_of`."""
     newest = 2.0 * math.atan2(qpos[0, 6], qpos[0, 3])
     cosine, sine = math.cos(newest), math.sin(newest)
-    for age in range((len(out) + 3) // (POSTURE + 3)):
-        at = (POSTURE + 3) * age
+    for age in range((len(out) + 3) // (POSTURE_SIZE + 3)):
+        at = (POSTURE_SIZE + 3) * age
         w, x, y, z = qpos[age, 3], qpos[age, 4], qpos[age, 5], qpos[age, 6]
         if age:
             turn = 2.0 * math.atan2(z, w) - newest
@@ -130,4 +130,4 @@ def _query(qpos: Floats, out: Singles) -> None:
         along = 2.0 * math.atan2(lean, level) / max(level * lean, 1e-30)
         out[at] = qpos[age, 2]
         out[at + 1], out[at + 2], out[at + 3] = along * (x * w + y * z), along * (y * w - x * z), 0.0
-        out[at + 4 : at + POSTURE] = qpos[age, 7:]
+        out[at + 4 : at + POSTURE_SIZE] = qpos[age, 7:]

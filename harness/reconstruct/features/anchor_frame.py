@@ -23,7 +23,7 @@ _LIMBS = ("femur", "tibia", "foot", "clavicle", "humerus", "radius", "wrist", "h
 judges, two hands and two ankles then err by 3.0, 3.0 and 1.9 deg in place of 3.6, 3.3 and 2.5; walking as before."""
 
 
-class View(NamedTuple):
+class AnchorFrame(NamedTuple):
     """A place on the floor [m] and a heading [rad]."""
 
     x_m: float
@@ -51,7 +51,7 @@ def twist_rad(turned: Floats) -> Floats:
     return out
 
 
-class Bearing(NamedTuple):
+class HeadingEstimator(NamedTuple):
     """Which way a performer faces, by where stations are about the anchor; it turns with them."""
 
     anchor: int
@@ -63,9 +63,9 @@ class Bearing(NamedTuple):
     """Share of the heading that it tells in the examples that it was learnt from, 0 to 1."""
 
     @classmethod
-    def learnt(cls, at_m: Floats, anchor: int, asked: Bools) -> "Bearing":
+    def learnt(cls, at_m: Floats, anchor: int, asked: Bools) -> "HeadingEstimator":
         """From stations (N, S, 3) of performers who all face along x, least squares over those `asked` (S,)."""
-        over = _over_ground(at_m, anchor)[:, asked]
+        over = _horizontal_offsets(at_m, anchor)[:, asked]
         product, towards = over.conj().T @ over, over.conj().sum(axis=0)
         weight = np.zeros(len(asked), complex)
         least = 1e-6 * np.trace(product).real + 1e-12  # the anchor is at 0 from itself
@@ -74,11 +74,11 @@ class Bearing(NamedTuple):
 
     def heading_rad(self, at_m: Floats) -> Floats:
         """(...,) of stations (..., S, 3)."""
-        out: Floats = np.angle(_over_ground(at_m, self.anchor) @ self.weight)
+        out: Floats = np.angle(_horizontal_offsets(at_m, self.anchor) @ self.weight)
         return out
 
 
-def _over_ground(at_m: Floats, anchor: int) -> Complexes:
+def _horizontal_offsets(at_m: Floats, anchor: int) -> Complexes:
     """(..., S) x + i y from the anchor to every station (..., S, 3)."""
     away = at_m[..., :2] - at_m[..., anchor, None, :2]
     out: Complexes = away[..., 0] + 1j * away[..., 1]

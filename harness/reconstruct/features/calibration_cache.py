@@ -8,7 +8,7 @@ from harness.core.calibration import Calibration
 T = TypeVar("T")
 
 
-class WhileWorn(Generic[T]):
+class CalibrationCache(Generic[T]):
     """Something made for the last calibration: sessions of one performer share it."""
 
     def __init__(self) -> None:

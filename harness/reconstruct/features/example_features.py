@@ -17,21 +17,21 @@ from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.anchor_frame import anchor_of, twist_rad
-from harness.reconstruct.features.virtual_trackers import Worn
-from harness.reconstruct.index import choose
-from harness.reconstruct.index.partial_search import nearest_known
-from harness.reconstruct.index.selection import AUTO, FEW
-from harness.reconstruct.solver.ground_frame import seen_from
+from harness.reconstruct.features.virtual_trackers import VirtualTrackers
+from harness.reconstruct.index import make_index
+from harness.reconstruct.index.partial_search import nearest_partial
+from harness.reconstruct.index.selection import AUTO, KD_TREE_MAX_NEIGHBOURS
+from harness.reconstruct.solver.ground_frame import relative_ground
 
 Codes = NDArray[np.int16]
-_POSITION_M, _QUATERNION, _VELOCITY_M_S, _MOST = 2e-4, 1.0 / 32_000, 1e-3, 32_767
+_POSITION_STEP_M, _QUATERNION_STEP, _VELOCITY_STEP_M_S, _MAX_CODE = 2e-4, 1.0 / 32_000, 1e-3, 32_767
 """Features are kept as whole steps of so much, which is finer than trackers are: up to 6.5 m and 32 m/s."""
 _CHUNK = 512
 """Frames whose kinematics are worked out at a time: double precision and rotations take fifty times their features."""
 
 
 @dataclass(frozen=True)
-class Weights:
+class FeatureWeights:
     """Of eq. 2, for metres, metres per second and unit quaternions."""
 
     position: float = 0.6
@@ -39,11 +39,11 @@ class Weights:
     orientation: float = 0.2
 
 
-class LocalExamples:
+class ExampleFeatures:
     """N frames of examples with S stations worn as a calibration says."""
 
     def __init__(
-        self, body: Body, database: MotionDatabase, worn: Calibration, weights: Weights, index: str, wanted: int
+        self, body: Body, database: MotionDatabase, worn: Calibration, weights: FeatureWeights, index: str, wanted: int
     ) -> None:
         """For queries of so many `wanted` neighbours."""
         self.count, self.anchor = len(worn.stations), anchor_of(worn.bones)
@@ -51,7 +51,7 @@ class LocalExamples:
             np.repeat([weights.position, weights.orientation, weights.velocity], np.multiply([3, 4, 3], self.count))
         )
         """(10 S,)"""
-        units = np.repeat([_POSITION_M, _QUATERNION, _VELOCITY_M_S], np.multiply([3, 4, 3], self.count))
+        units = np.repeat([_POSITION_STEP_M, _QUATERNION_STEP, _VELOCITY_STEP_M_S], np.multiply([3, 4, 3], self.count))
         self._units: Singles = units.astype(np.float32)
         self._step: Singles = (units * self.scale).astype(np.float32)
         self._codes: Codes = np.empty((len(database), 10 * self.count), np.int16)
@@ -60,20 +60,20 @@ class LocalExamples:
         """(N, 3) the root's ground frame as seen from the anchor: forward, left [m], turn [rad]."""
         self.hemisphere: Floats = np.zeros((self.count, 4))
         """(S, 4) quaternions are taken with the sign that is nearer to it: to the first frame's."""
-        self._database, self._trackers = database, Worn(body, worn)
+        self._database, self._trackers = database, VirtualTrackers(body, worn)
         self._posture: Singles = np.asarray(database.posture)
         for run in database.runs:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
         database.let_go()
-        self._index = choose(_quickest(len(database)) if index == AUTO else index, self, wanted)
+        self._index = make_index(_default_index(len(database)) if index == AUTO else index, self, wanted)
 
     def nearest(self, query: Floats, trust: Floats, count: int) -> Ints:
         """Rows of the frames nearest to a query (10 S,) whose columns count as much as `trust` (10 S,), 0 to 1."""
         asked = query.astype(np.float32)
         if trust.min() == 1.0:
             return self._index.nearest(asked, count)[0]
-        return nearest_known(self._index, self, asked, trust.astype(np.float32), count)[0]
+        return nearest_partial(self._index, self, asked, trust.astype(np.float32), count)[0]
 
     def __len__(self) -> int:
         return len(self._codes)
@@ -95,7 +95,7 @@ class LocalExamples:
         the anchor (3).
         """
         weight = np.sqrt(trust[: 7 * self.count])
-        return _pairs(self._codes, self._step, self._posture, self.root, rows, others, query, weight)
+        return _regression_data(self._codes, self._step, self._posture, self.root, rows, others, query, weight)
 
     def _fill(self, first: int, start: int, stop: int) -> None:
         """Rows from start to stop; `first` is the frame before, or start where a run begins."""
@@ -103,7 +103,7 @@ class LocalExamples:
         begins = first == start
         at_m, turned = self._trackers.at(self._database.qpos(rows, np.zeros(3)))
         # where the stations were a frame before, seen from the ground frame of this one
-        back = seen_from(self._database.step[rows].astype(float)[1:], np.zeros(3))[:, None]
+        back = relative_ground(self._database.step[rows].astype(float)[1:], np.zeros(3))[:, None]
         before = rotations.rotate(rotations.about_z(back[..., 2]), at_m[:-1])
         before[..., :2] += back[..., :2]
         velocity = np.diff(at_m, axis=0, prepend=at_m[:1])
@@ -122,17 +122,17 @@ class LocalExamples:
         seen *= np.copysign(1.0, np.vecdot(seen, self.hemisphere))[..., None]
         out[:, 3 * count : 7 * count] = seen.reshape(len(out), -1)
         out[:, 7 * count :] = rotations.rotate(level, velocity).reshape(len(out), -1)
-        self._codes[start:stop] = np.clip(np.rint(out / self._units), -_MOST, _MOST)
-        self.root[start:stop] = seen_from(anchor, np.zeros(3))
+        self._codes[start:stop] = np.clip(np.rint(out / self._units), -_MAX_CODE, _MAX_CODE)
+        self.root[start:stop] = relative_ground(anchor, np.zeros(3))
 
 
-def _quickest(count: int) -> str:
+def _default_index(count: int) -> str:
     """Never the kd-tree of the paper, which in 10 S dimensions looks at most vectors when none is near."""
-    return "flat" if count <= FEW else "inverted_file"
+    return "flat" if count <= KD_TREE_MAX_NEIGHBOURS else "inverted_file"
 
 
 @compiled
-def _pairs(
+def _regression_data(
     codes: Codes,
     step: Singles,
     posture: Singles,
@@ -142,7 +142,7 @@ def _pairs(
     query: Floats,
     weight: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """`LocalExamples.pairs`, with the first n columns of inputs times a weight (n,)."""
+    """`ExampleFeatures.pairs`, with the first n columns of inputs times a weight (n,)."""
     every = np.empty(len(rows) + len(others), np.int64)
     count = 0
     for row in rows:

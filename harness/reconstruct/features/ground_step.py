@@ -7,7 +7,7 @@ from harness.core.compiled import compiled
 
 
 @compiled
-def moved(ground: Floats, step: Floats) -> Floats:
+def step_ground(ground: Floats, step: Floats) -> Floats:
     """The ground frame (3,) a step (3,) away from another."""
     cosine, sine = np.cos(ground[2]), np.sin(ground[2])
     forward, left, turn = step[0], step[1], step[2]
@@ -16,13 +16,13 @@ def moved(ground: Floats, step: Floats) -> Floats:
 
 
 @compiled
-def stepped(qpos: Floats, step: Floats) -> Floats:
+def ground_after_step(qpos: Floats, step: Floats) -> Floats:
     """The ground frame (3,) a step (3,) away from that of a configuration (55,)."""
-    return moved(np.array([qpos[0], qpos[1], 2.0 * np.arctan2(qpos[6], qpos[3])]), step)
+    return step_ground(np.array([qpos[0], qpos[1], 2.0 * np.arctan2(qpos[6], qpos[3])]), step)
 
 
 @compiled
-def readings(position_m: Floats, turned: Floats, ground: Floats, lever_m: float) -> Singles:
+def features_from_readings(position_m: Floats, turned: Floats, ground: Floats, lever_m: float) -> Singles:
     """(9 S,) the columns of `controls` for positions (S, 3) and orientations (S, 4), from a ground frame (3,)."""
     cosine, sine = np.cos(ground[2]), np.sin(ground[2])
     out = np.empty((len(position_m), 9), np.float32)

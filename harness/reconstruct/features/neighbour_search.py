@@ -11,16 +11,16 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.reconstruct.database import Windows
-from harness.reconstruct.features.anchor_frame import View, twist_rad
-from harness.reconstruct.features.reduced_rank_regression import Evidence, Expectation
-from harness.reconstruct.index import Found, Index
+from harness.reconstruct.features.anchor_frame import AnchorFrame, twist_rad
+from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression, ReducedRankSearch
+from harness.reconstruct.index import Index, Neighbours
 from harness.reconstruct.solver.residuals import Residuals
 
 
-class Precedents(Protocol):
+class NeighbourSearch(Protocol):
     """A session's search."""
 
-    def nearest(self, past: Floats, count: int) -> Found:
+    def nearest(self, past: Floats, count: int) -> Neighbours:
         """For the last answers (m, 55), newest first, and the readings at hand."""
         ...
 
@@ -29,34 +29,34 @@ class Precedents(Protocol):
         ...
 
 
-class ByWindow:
+class PoseHistorySearch:
     """Liu et al. 2011: the windows nearest to the last m answers, D_w = 1."""
 
     def __init__(self, windows: Windows, index: Index) -> None:
         self._windows, self._index = windows, index
 
-    def nearest(self, past: Floats, count: int) -> Found:
+    def nearest(self, past: Floats, count: int) -> Neighbours:
         query = self._windows.query(past)
         rows, squared = self._index.nearest(query, count)
         away = self._windows.gather(rows)
         away -= query
-        return Found(rows, squared, away)
+        return Neighbours(rows, squared, away)
 
     def read(self) -> None:
         pass
 
 
-class ByEvidence:
+class FeatureSearch:
     """The windows and readings that lead to expect a posture like this one (`expectation`)."""
 
-    def __init__(self, windows: Windows, evidence: Evidence, residuals: Residuals, index: str) -> None:
+    def __init__(self, windows: Windows, evidence: ReducedRankRegression, residuals: Residuals, index: str) -> None:
         self._windows, self._evidence, self._residuals, self._kind = windows, evidence, residuals, index
         self._ever: Bools = np.zeros(2 * evidence.count, bool)
         """Rows of readings that this session has had; a station that comes later only takes part in the solving."""
-        self._expectation: Expectation | None = None
+        self._expectation: ReducedRankSearch | None = None
         self._no_turn = np.tile(rotations.IDENTITY, (evidence.count, 1))
 
-    def nearest(self, past: Floats, count: int) -> Found:
+    def nearest(self, past: Floats, count: int) -> Neighbours:
         residuals = self._residuals
         if self._expectation is None:
             usual = self._ever | residuals.measured
@@ -69,7 +69,7 @@ class ByEvidence:
     def read(self) -> None:
         self._ever |= self._residuals.measured
 
-    def _view(self, last: Floats) -> View:
+    def _view(self, last: Floats) -> AnchorFrame:
         """From above the anchor, along its heading or the positions'; the last answer (55,) lends what was not read."""
         residuals, anchor, bearing = self._residuals, self._evidence.anchor, self._evidence.bearing
         here, facing = residuals.measured[: len(residuals.bones)], residuals.measured[len(residuals.bones) + anchor]
@@ -79,4 +79,4 @@ class ByEvidence:
             lent_m, lent = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
             at_m, turned = np.where(here[:, None], at_m, lent_m), (turned if facing else lent[anchor])
         yaw = twist_rad(turned) if bearing is None else bearing.heading_rad(at_m)
-        return View(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))
+        return AnchorFrame(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))

@@ -12,31 +12,33 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
-from harness.reconstruct.features.anchor_frame import View
-from harness.reconstruct.features.example_features import LocalExamples
+from harness.reconstruct.features.anchor_frame import AnchorFrame
+from harness.reconstruct.features.example_features import ExampleFeatures
 from harness.reconstruct.solver.residuals import Residuals
-from harness.reconstruct.solver.root_placement import nearest_placed
+from harness.reconstruct.solver.root_placement import place_root
 from harness.stream.frame import TrackerFrame
 
 
-class Outlook:
+class QueryFeatures:
     """On one performer through one session."""
 
-    def __init__(self, residuals: Residuals, worn: Calibration, examples: LocalExamples, longest_gap_s: float) -> None:
+    def __init__(
+        self, residuals: Residuals, worn: Calibration, examples: ExampleFeatures, longest_gap_s: float
+    ) -> None:
         count = len(worn.stations)
         self._residuals, self._examples, self._longest_gap_s = residuals, examples, longest_gap_s
         self._no_turn = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
 
-    def seen(self, frame: TrackerFrame, answer: Floats) -> tuple[View, Floats, Floats]:
+    def seen(self, frame: TrackerFrame, answer: Floats) -> tuple[AnchorFrame, Floats, Floats]:
         """The view, the features (10 S,) and their trust (10 S,), 0 where not measured to 1.
 
         `answer` (55,) is the last one.
         """
         residuals, examples = self._residuals, self._examples
         velocity_m_s, moving = np.empty_like(self._before_m), np.empty_like(self._before_valid)
-        whole = _moved(
+        whole = _estimate_velocities(
             *(residuals.target_m, frame.measured_s, residuals.measured),
             *(self._before_m, self._before_s, self._before_valid),
             *(self._longest_gap_s, velocity_m_s, moving),
@@ -47,8 +49,8 @@ class Outlook:
             position_m, turned, facing = self._filled(answer)
         w, _, _, z = facing.tolist()
         x_m, y_m, _ = position_m[examples.anchor].tolist()
-        view = View(x_m, y_m, 2.0 * math.atan2(z, w))
-        query, trust = _features(
+        view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
+        query, trust = _compute_features(
             *(position_m, turned, velocity_m_s, x_m, y_m, view.yaw_rad, examples.hemisphere, examples.scale),
             *(residuals.trust, moving),
         )
@@ -58,14 +60,14 @@ class Outlook:
         """Positions (S, 3), orientations (S, 4), and the anchor's (4,), from the last answer where nothing was read."""
         residuals, count = self._residuals, self._examples.count
         here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(nearest_placed(residuals, answer))
+        residuals.kinematics.set(place_root(residuals, answer))
         at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
         turned = np.where(facing, residuals.world_from_target, turned)
         return np.where(here, residuals.target_m, at_m), turned, turned[self._examples.anchor]
 
 
 @compiled
-def _moved(
+def _estimate_velocities(
     target_m: Floats,
     measured_s: Floats,
     measured: Bools,
@@ -91,7 +93,7 @@ def _moved(
 
 
 @compiled
-def _features(
+def _compute_features(
     position_m: Floats,
     turned: Floats,
     velocity_m_s: Floats,

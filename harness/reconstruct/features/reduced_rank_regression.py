@@ -22,26 +22,26 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import Windows
-from harness.reconstruct.features.anchor_frame import Bearing, View, anchor_of, twist_rad
-from harness.reconstruct.features.ground_step import readings
-from harness.reconstruct.features.virtual_trackers import Worn
-from harness.reconstruct.index import Found, Index, choose
-from harness.reconstruct.solver.ground_frame import POSTURE
+from harness.reconstruct.features.anchor_frame import AnchorFrame, HeadingEstimator, anchor_of, twist_rad
+from harness.reconstruct.features.ground_step import features_from_readings
+from harness.reconstruct.features.virtual_trackers import VirtualTrackers
+from harness.reconstruct.index import Index, Neighbours, make_index
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 _CHUNK = 256
 """Windows worked on at a time."""
-_HERE: Floats = np.zeros(3)
+_ORIGIN: Floats = np.zeros(3)
 """A ground frame to stand on."""
-_MAPS = 64
+_CACHED_MAPS = 64
 """Combinations of silent stations whose maps are kept."""
-_LEARNT_FROM = 20_000
+_TRAINING_WINDOWS = 20_000
 """Windows, evenly spread, that the map is learnt from."""
-_TOLD = 0.8
+_MIN_HEADING_EXPLAINED = 0.8
 """Share of the heading that positions must tell to be asked for it: six stations told 0.94 or more, two below 0.78."""
 
 
 @dataclass(frozen=True)
-class Terms:
+class ReducedRankOptions:
     """In which terms postures are expected."""
 
     window_weight: float = 0.3
@@ -54,29 +54,34 @@ class Terms:
     """Of the map, as a share of the evidence's variance."""
 
 
-class Evidence:
+class ReducedRankRegression:
     """What is known before each frame of a database, for stations worn as a calibration says.
 
     A row is the window before the frame (D), then each station's place (3) and two axes of its bone (6).
     """
 
     def __init__(
-        self, body: Body, windows: Windows, worn: Calibration, terms: Terms, bearing: Bearing | None = None
+        self,
+        body: Body,
+        windows: Windows,
+        worn: Calibration,
+        terms: ReducedRankOptions,
+        bearing: HeadingEstimator | None = None,
     ) -> None:
         """Seen along a `bearing`; None for along the anchor's own heading."""
         self.terms, self.count, self.anchor, self.bearing = terms, len(worn.stations), anchor_of(worn.bones), bearing
-        self.windows, self._trackers = windows, Worn(body, worn)
+        self.windows, self._trackers = windows, VirtualTrackers(body, worn)
         self.size = windows.size + 9 * self.count
-        self._body, self._worn, self._by_positions = body, worn, dict[bytes, Evidence]()
-        self._expectations: dict[bytes, Expectation] = {}
+        self._body, self._worn, self._by_positions = body, worn, dict[bytes, ReducedRankRegression]()
+        self._expectations: dict[bytes, ReducedRankSearch] = {}
         rows = self._learnt_from()
-        self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE)
+        self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE_SIZE)
         for known, after in self.parts(windows, rows):
             self.mean += known.sum(axis=0) / len(rows)
             self._mean_after += after.sum(axis=0) / len(rows)
         self.scatter: Floats = np.zeros((self.size, self.size))
         """(D + 9 S, D + 9 S) covariance of the evidence."""
-        self._shared = np.zeros((self.size, POSTURE))
+        self._shared = np.zeros((self.size, POSTURE_SIZE))
         for known, after in self.parts(windows, rows):
             away = known - self.mean
             self.scatter += away.T @ away / len(rows)
@@ -86,9 +91,13 @@ class Evidence:
 
     def _learnt_from(self) -> Ints:
         every = np.arange(len(self.windows))
-        return every if len(every) <= _LEARNT_FROM else np.linspace(0, len(every) - 1, _LEARNT_FROM).astype(np.int64)
+        return (
+            every
+            if len(every) <= _TRAINING_WINDOWS
+            else np.linspace(0, len(every) - 1, _TRAINING_WINDOWS).astype(np.int64)
+        )
 
-    def facing(self, usual: Bools) -> "Evidence":
+    def facing(self, usual: Bools) -> "ReducedRankRegression":
         """The same seen as a session sees it that has the `usual` readings (2 S,) of positions, then orientations."""
         places = usual[: self.count]
         if usual[self.count + self.anchor] or not places[self.anchor]:
@@ -96,23 +105,23 @@ class Evidence:
         key = places.tobytes()
         if key not in self._by_positions:
             at_m = [at_m for _, at_m, _ in self._stood(self.windows, self._learnt_from())]
-            bearing = Bearing.learnt(np.concatenate(at_m), self.anchor, places)
-            told = bearing.told > _TOLD
-            seen = Evidence(self._body, self.windows, self._worn, self.terms, bearing) if told else self
+            bearing = HeadingEstimator.learnt(np.concatenate(at_m), self.anchor, places)
+            told = bearing.told > _MIN_HEADING_EXPLAINED
+            seen = ReducedRankRegression(self._body, self.windows, self._worn, self.terms, bearing) if told else self
             self._by_positions[key] = seen
         return self._by_positions[key]
 
-    def expectation(self, usual: Bools, index: str, wanted: int) -> "Expectation":
+    def expectation(self, usual: Bools, index: str, wanted: int) -> "ReducedRankSearch":
         """The search for sessions that know the `usual` columns; made once."""
         key = usual.tobytes()
         if key not in self._expectations:
-            self._expectations[key] = Expectation(self, usual, index, wanted)
+            self._expectations[key] = ReducedRankSearch(self, usual, index, wanted)
         return self._expectations[key]
 
     def parts(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
         """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
         for some, at_m, turned in self._stood(windows, rows):
-            after = windows.successors(some)[:, :POSTURE].astype(float)
+            after = windows.successors(some)[:, :POSTURE_SIZE].astype(float)
             facing = twist_rad(turned[:, self.anchor]) if self.bearing is None else self.bearing.heading_rad(at_m)
             level = rotations.about_z(-facing)[:, None]
             place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
@@ -125,11 +134,11 @@ class Evidence:
         """Rows (K,), station positions (K, S, 3) and orientations (K, S, 4), roots heading along x, chunk by chunk."""
         for start in range(0, len(rows), _CHUNK):
             some = rows[start : start + _CHUNK]
-            yield some, *self._trackers.at(windows.database.qpos(windows.frames[some] + 1, _HERE))
+            yield some, *self._trackers.at(windows.database.qpos(windows.frames[some] + 1, _ORIGIN))
 
-    def known(self, window: Singles, position_m: Floats, turned: Floats, view: View) -> Floats:
+    def known(self, window: Singles, position_m: Floats, turned: Floats, view: AnchorFrame) -> Floats:
         """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""
-        read = readings(position_m, turned, np.array(view), self.terms.lever_m)
+        read = features_from_readings(position_m, turned, np.array(view), self.terms.lever_m)
         return np.concatenate([self.terms.window_weight * window, read])
 
     def columns(self, measured: Bools) -> Bools:
@@ -156,10 +165,10 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
-class Expected:
+class ReducedRankVectors:
     """`Vectors`: z of windows, worked out anew whenever it is asked for."""
 
-    evidence: Evidence
+    evidence: ReducedRankRegression
     windows: Windows
     usual: Bools
     """(D + 9 S,) columns of the evidence that are known."""
@@ -183,16 +192,16 @@ class Expected:
         return out
 
 
-class Expectation:
+class ReducedRankSearch:
     """The search among N windows, in terms of the postures that certain readings lead to expect."""
 
-    def __init__(self, evidence: Evidence, usual: Bools, index: str, wanted: int) -> None:
+    def __init__(self, evidence: ReducedRankRegression, usual: Bools, index: str, wanted: int) -> None:
         """For sessions that know the `usual` columns (D + 9 S,) as a rule and ask for so many neighbours."""
-        self.vectors = Expected(evidence, evidence.windows, usual, evidence.directions(usual))
-        self.index: Index = choose(index, self.vectors, wanted)
+        self.vectors = ReducedRankVectors(evidence, evidence.windows, usual, evidence.directions(usual))
+        self.index: Index = make_index(index, self.vectors, wanted)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
 
-    def around(self, known: Floats, measured: Bools, count: int) -> Found:
+    def around(self, known: Floats, measured: Bools, count: int) -> Neighbours:
         """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.
 
         What they differ by are z, or as much of it along other axes.
@@ -200,7 +209,7 @@ class Expectation:
         key = measured.tobytes()
         found = self._maps.get(key)
         if found is None:
-            if len(self._maps) >= _MAPS:
+            if len(self._maps) >= _CACHED_MAPS:
                 self._maps.clear()
             found = self._maps[key] = self._map(self.vectors.evidence.columns(measured))
         to_z, mean = found

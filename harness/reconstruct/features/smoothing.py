@@ -16,23 +16,23 @@ def slerp(start: Floats, stop: Floats, share: float) -> Floats:
     return rotations.multiply(start, rotations.exp(share * turn))
 
 
-def smoothed_rotation(now: Floats, before: Floats, earlier: Floats, alpha: float, beta: float) -> Floats:
+def smooth_rotation(now: Floats, before: Floats, earlier: Floats, alpha: float, beta: float) -> Floats:
     """Eq. 6 of quaternions (..., 4) at t, t-1 and t-2."""
     return slerp(now, slerp(before, earlier, alpha), beta)
 
 
-def smoothed(now: Floats, before: Floats, earlier: Floats, alpha: float, beta: float) -> Floats:
+def smooth(now: Floats, before: Floats, earlier: Floats, alpha: float, beta: float) -> Floats:
     """Eq. 6 of vectors (n,) at t, t-1 and t-2."""
-    return _sum(now, before, earlier, *shares(alpha, beta))
+    return _weighted_sum(now, before, earlier, *smoothing_weights(alpha, beta))
 
 
-def shares(alpha: float, beta: float) -> tuple[float, float, float]:
+def smoothing_weights(alpha: float, beta: float) -> tuple[float, float, float]:
     """What t, t-1 and t-2 count in eq. 6 of a vector: angles of hinges, coordinates of a point."""
     return 1.0 - beta, beta * (1.0 - alpha), beta * alpha
 
 
 @compiled
-def _sum(
+def _weighted_sum(
     now: Floats, before: Floats, earlier: Floats, share: float, share_before: float, share_earlier: float
 ) -> Floats:
     return share * now + share_before * before + share_earlier * earlier

@@ -11,14 +11,14 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import Windows
-from harness.reconstruct.features.ground_step import readings
-from harness.reconstruct.features.virtual_trackers import Worn
+from harness.reconstruct.features.ground_step import features_from_readings
+from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 
 _CHUNK = 2048
 """Frames whose kinematics are worked out at a time."""
 
 
-class Controls:
+class StationFeatures:
     """Of the frame after each window of a database, had the trackers been worn as a calibration says."""
 
     def __init__(self, body: Body, followed: Windows, worn: Calibration, lever_m: float) -> None:
@@ -27,7 +27,7 @@ class Controls:
         self._no_turn = np.tile(rotations.IDENTITY, (len(self._bones), 1))
         self.values: Singles = np.empty((len(followed), 9 * len(self._bones)), np.float32)
         """(W, 9 S)"""
-        database, trackers = followed.database, Worn(body, worn)
+        database, trackers = followed.database, VirtualTrackers(body, worn)
         for start in range(0, len(followed), _CHUNK):
             after = followed.frames[start : start + _CHUNK] + 1
             qpos = database.qpos(after, database.step[after].astype(float))
@@ -39,7 +39,7 @@ class Controls:
 
     def query(self, position_m: Floats, turned: Floats, ground: Floats) -> Singles:
         """(9 S,) of positions (S, 3) and bone orientations (S, 4) in the world, from a ground frame (3,)."""
-        out: Singles = readings(position_m, turned, ground, self._lever_m)
+        out: Singles = features_from_readings(position_m, turned, ground, self._lever_m)
         return out
 
     def columns(self, measured: Bools) -> Singles:

@@ -1,24 +1,24 @@
 """Nearest neighbours among many vectors: one protocol, several ways."""
 
-from harness.reconstruct.index.flat import Flat
+from harness.reconstruct.index.flat import FlatIndex
 from harness.reconstruct.index.inverted_file import InvertedFile
 from harness.reconstruct.index.kd_tree import KDTree
-from harness.reconstruct.index.neighbour_graph import Graph
-from harness.reconstruct.index.partial_search import nearest_known
-from harness.reconstruct.index.protocol import Found, Index, Lookup, Table, Vectors
-from harness.reconstruct.index.selection import INDEXES, choose
+from harness.reconstruct.index.neighbour_graph import NeighbourGraph
+from harness.reconstruct.index.partial_search import nearest_partial
+from harness.reconstruct.index.protocol import ArrayVectors, Index, Lookup, Neighbours, Vectors
+from harness.reconstruct.index.selection import INDEXES, make_index
 
 __all__ = [
     "INDEXES",
-    "Flat",
-    "Found",
-    "Graph",
+    "FlatIndex",
+    "Neighbours",
+    "NeighbourGraph",
     "Index",
     "InvertedFile",
     "KDTree",
     "Lookup",
-    "Table",
+    "ArrayVectors",
     "Vectors",
-    "choose",
-    "nearest_known",
+    "make_index",
+    "nearest_partial",
 ]

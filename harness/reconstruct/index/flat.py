@@ -3,13 +3,13 @@
 import numpy as np
 
 from harness.core.arrays import Ints, Singles
-from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
 
 _ROUNDING = 1e-6
 """Of the first pass, beside the largest of its terms."""
 
 
-class Flat:
+class FlatIndex:
     """An `Index`: |q - x|^2 = |q|^2 - 2 q x + |x|^2 for all x at once, then exactly for the few that are left.
 
     Vectors are kept about their mean, so that little is lost to rounding in the first pass.
@@ -33,7 +33,7 @@ class Flat:
         rows, squared, _ = self.around(query, count)
         return rows, squared
 
-    def around(self, query: Singles, count: int) -> Found:
+    def around(self, query: Singles, count: int) -> Neighbours:
         """As `Index`."""
         asked = np.asarray(query, np.float32) - self._mean
         score = self._half_squares - self._values @ asked
@@ -41,11 +41,11 @@ class Flat:
         last = np.partition(score, count - 1)[count - 1]
         rounding = _ROUNDING * float(self._largest + asked @ asked)
         rows = np.flatnonzero(score <= last + rounding)
-        return ranked(rows, self._values[rows] - asked, count)
+        return rank_neighbours(rows, self._values[rows] - asked, count)
 
 
-def ranked(rows: Ints, away: Singles, count: int) -> Found:
+def rank_neighbours(rows: Ints, away: Singles, count: int) -> Neighbours:
     """The nearest of candidates (M,) whose differences from the query are (M, D), nearest first."""
     squared = np.vecdot(away, away)
     order = np.lexsort((rows, squared))[:count]
-    return Found(rows[order], squared[order], away[order])
+    return Neighbours(rows[order], squared[order], away[order])

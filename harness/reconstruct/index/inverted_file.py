@@ -19,23 +19,23 @@ from numpy.typing import NDArray
 from harness.core.arrays import Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
-from harness.reconstruct.index.principal_axes import Principal, chunks
-from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
+from harness.reconstruct.index.principal_axes import PrincipalAxes, chunks
+from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
 
 Codes = NDArray[np.int16]
 Places = NDArray[np.int32]
-PROBES, PER_ROOT = 4.0, 0.4
+PROBES, PROBES_PER_ROOT = 4.0, 0.4
 """Cells looked into: so many, and for each square root of the number of neighbours that are wanted so many more."""
-KEPT = 0.9995
+VARIANCE_SHARE = 0.9995
 """Share of the variance that the axes keep."""
-_ENOUGH = 3.0
+_MIN_CANDIDATES_PER_NEIGHBOUR = 3.0
 """Vectors looked into for each neighbour that is wanted, at least."""
-_PER_CELL, _ROUNDS = 39, 6
+_VECTORS_PER_CELL, _CLUSTERING_ROUNDS = 39, 6
 """Of the clustering: vectors that each centroid is found from, and rounds."""
-_MOST, _FAR = 32_000, 1e9
+_MAX_CODE, _MAX_QUERY = 32_000, 1e9
 """Steps to the farthest number from the middle; and of queries, whose squares must not overflow."""
 _ROW_BITS = 32
-_ROW = (1 << _ROW_BITS) - 1
+_ROW_MASK = (1 << _ROW_BITS) - 1
 """Candidates are sorted as whole numbers: the bits of a distance, which rise with it, then those of the row."""
 
 
@@ -46,17 +46,17 @@ class InvertedFile:
         """For queries of so many neighbours."""
         count = len(vectors)
         rng = generator(0, "inverted file", count)
-        self._principal = Principal(vectors, rng, KEPT)
+        self._principal = PrincipalAxes(vectors, rng, VARIANCE_SHARE)
         width, cells = self._principal.width, cells_for(count)
-        sample = np.sort(rng.choice(count, min(count, _PER_CELL * cells), replace=False))
+        sample = np.sort(rng.choice(count, min(count, _VECTORS_PER_CELL * cells), replace=False))
         seen = np.empty((len(sample), width), np.float32)
         for rows in chunks(np.arange(len(sample))):
             seen[rows] = self._principal.seen(vectors.gather(sample[rows]))
         with _faiss() as faiss:
             flat = faiss.IndexFlatL2(width)
             clustering = faiss.Clustering(width, cells)
-            clustering.seed, clustering.niter = 1, _ROUNDS
-            clustering.min_points_per_centroid, clustering.max_points_per_centroid = 1, _PER_CELL
+            clustering.seed, clustering.niter = 1, _CLUSTERING_ROUNDS
+            clustering.min_points_per_centroid, clustering.max_points_per_centroid = 1, _VECTORS_PER_CELL
             clustering.train(seen, flat)
             cell_of = np.empty(count, np.int32)
             farthest = 0.0
@@ -70,7 +70,7 @@ class InvertedFile:
         """(N,) cell after cell."""
         self._starts: Ints = np.searchsorted(cell_of[self._rows], np.arange(cells + 1))
         """(C + 1,) where each cell begins among them."""
-        self._step = np.float32(max(farthest, 1e-6) / _MOST)
+        self._step = np.float32(max(farthest, 1e-6) / _MAX_CODE)
         self._centroids: Singles = np.ascontiguousarray(centroids.T / self._step)
         """(d, C) in steps."""
         self._codes: Codes = np.empty(count * width, np.int16)
@@ -83,7 +83,7 @@ class InvertedFile:
         for start in range(0, count, CHUNK):
             some = slice(start, start + CHUNK)
             seen = np.rint(self._principal.seen(vectors.gather(some)) / self._step)
-            _store(seen.astype(np.int16), where[some], cell_of[some], self._starts, self._codes)
+            _store_codes(seen.astype(np.int16), where[some], cell_of[some], self._starts, self._codes)
 
     def __len__(self) -> int:
         return len(self._rows)
@@ -93,11 +93,11 @@ class InvertedFile:
         rows, squared, _ = self._searched(query, count)
         return rows, squared
 
-    def around(self, query: Singles, count: int) -> Found:
+    def around(self, query: Singles, count: int) -> Neighbours:
         """As `Index`, along the axes that were kept."""
         rows, squared, asked = self._searched(query, count)
-        away = _differences(self._codes, self._starts, self._cell_of, self._where, rows, asked, self._step)
-        return Found(rows, squared, away)
+        away = _gather_offsets(self._codes, self._starts, self._cell_of, self._where, rows, asked, self._step)
+        return Neighbours(rows, squared, away)
 
     def _searched(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles]:
         """Rows (K,), squared distances (K,), and the query in steps (d,)."""
@@ -107,20 +107,20 @@ class InvertedFile:
             raise ArithmeticError(
                 "a query for neighbours holds something that is not a number: is a reading not finite?"
             )
-        np.clip(asked, -_FAR, _FAR, out=asked)
-        found = _looked_into(self._centroids, self._starts, self._codes, self._rows, asked, probes)
+        np.clip(asked, -_MAX_QUERY, _MAX_QUERY, out=asked)
+        found = _scan_cells(self._centroids, self._starts, self._codes, self._rows, asked, probes)
         while len(found) < count:  # the cells looked into hold fewer
             probes = min(4 * probes, len(self._starts) - 1)
-            found = _looked_into(self._centroids, self._starts, self._codes, self._rows, asked, probes)
+            found = _scan_cells(self._centroids, self._starts, self._codes, self._rows, asked, probes)
         found.partition(count - 1)
         best = np.sort(found[:count])
         squared = (best >> _ROW_BITS).astype(np.int32).view(np.float32)
-        return best & _ROW, squared * self._step**2, asked
+        return best & _ROW_MASK, squared * self._step**2, asked
 
 
 def cells_for(count: int) -> int:
     """Cells for so many vectors."""
-    return max(1, min(round(2.0 * math.sqrt(count)), count // _PER_CELL))
+    return max(1, min(round(2.0 * math.sqrt(count)), count // _VECTORS_PER_CELL))
 
 
 def probes_for(wanted: int, count: int) -> int:
@@ -128,12 +128,12 @@ def probes_for(wanted: int, count: int) -> int:
 
     A recall of 0.96 and more at 66,000 and at 1,000,000 frames: `harness bench index`, `harness bench methods --large`.
     """
-    enough = _ENOUGH * wanted * cells_for(count) / max(count, 1)
-    return math.ceil(max(PROBES + PER_ROOT * math.sqrt(wanted), enough))
+    enough = _MIN_CANDIDATES_PER_NEIGHBOUR * wanted * cells_for(count) / max(count, 1)
+    return math.ceil(max(PROBES + PROBES_PER_ROOT * math.sqrt(wanted), enough))
 
 
 @compiled
-def _store(seen: Codes, where: Places, cell_of: Places, starts: Ints, codes: Codes) -> None:
+def _store_codes(seen: Codes, where: Places, cell_of: Places, starts: Ints, codes: Codes) -> None:
     """Put vectors (M, d) where they belong among the codes."""
     width = seen.shape[1]
     for k in range(len(seen)):
@@ -144,7 +144,7 @@ def _store(seen: Codes, where: Places, cell_of: Places, starts: Ints, codes: Cod
 
 
 @compiled
-def _looked_into(centroids: Singles, starts: Ints, codes: Codes, rows: Places, asked: Singles, probes: int) -> Ints:
+def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, asked: Singles, probes: int) -> Ints:
     """(M,) squared distances and rows of all vectors in the nearest cells, as whole numbers."""
     width, cells = centroids.shape
     far = np.zeros(cells, np.float32)
@@ -178,7 +178,7 @@ def _looked_into(centroids: Singles, starts: Ints, codes: Codes, rows: Places, a
 
 
 @compiled
-def _differences(
+def _gather_offsets(
     codes: Codes, starts: Ints, cell_of: Places, where: Places, rows: Ints, asked: Singles, step: np.float32
 ) -> Singles:
     """(K, d) the vectors of some rows, minus the query in steps (d,)."""

@@ -9,11 +9,11 @@ from scipy.spatial import cKDTree
 
 from harness.core.arrays import Floats, Ints, Singles
 from harness.core.seeds import generator
-from harness.reconstruct.index.flat import ranked
-from harness.reconstruct.index.principal_axes import Principal
-from harness.reconstruct.index.protocol import CHUNK, Found, Vectors
+from harness.reconstruct.index.flat import rank_neighbours
+from harness.reconstruct.index.principal_axes import PrincipalAxes
+from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
 
-_SPARE = 4
+_EXTRA_CANDIDATES = 4
 """Looked up beyond the answer, for rounding may have swapped those about the last place."""
 
 
@@ -25,7 +25,7 @@ class KDTree:
 
     def __init__(self, vectors: Vectors) -> None:
         count = len(vectors)
-        self._vectors, self._principal = vectors, Principal(vectors, generator(0, "kd-tree", count), kept=1.0)
+        self._vectors, self._principal = vectors, PrincipalAxes(vectors, generator(0, "kd-tree", count), kept=1.0)
         seen: Floats = np.empty((count, self._principal.width))
         for start in range(0, count, CHUNK):
             seen[start : start + CHUNK] = self._principal.seen(vectors.gather(slice(start, start + CHUNK)))
@@ -39,10 +39,10 @@ class KDTree:
         rows, squared, _ = self.around(query, count)
         return rows, squared
 
-    def around(self, query: Singles, count: int) -> Found:
+    def around(self, query: Singles, count: int) -> Neighbours:
         """As `Index`."""
         query = np.asarray(query, np.float32)
         count = min(count, len(self))
-        _, found = self._tree.query(self._principal.seen(query), min(count + _SPARE, len(self)))
+        _, found = self._tree.query(self._principal.seen(query), min(count + _EXTRA_CANDIDATES, len(self)))
         rows: Ints = np.asarray(found, np.int64).reshape(-1)
-        return ranked(rows, self._vectors.gather(rows) - query, count)
+        return rank_neighbours(rows, self._vectors.gather(rows) - query, count)

@@ -11,25 +11,25 @@ from numpy.typing import NDArray
 
 from harness.core.arrays import Bools, Ints, Singles
 from harness.core.seeds import generator
-from harness.reconstruct.index.principal_axes import Principal
+from harness.reconstruct.index.principal_axes import PrincipalAxes
 from harness.reconstruct.index.protocol import CHUNK, Index, Vectors
 
 Links = NDArray[np.int32]
-LINKS, EVERY, REACH = 8, 10, float(np.deg2rad(3.0))
+LINKS_PER_VECTOR, FULL_SEARCH_PERIOD, LINK_DISTANCE = 8, 10, float(np.deg2rad(3.0))
 """Moments that each is joined to; frames from one full search to the next; C2's epsilon [rad, m]."""
-_SIDE = 4
+_TEMPORAL_EXCLUSION = 4
 """Moments so near in time are reached by following, not by links."""
-_KEPT = 0.9995
+_VARIANCE_SHARE = 0.9995
 
 
-class Graph:
+class NeighbourGraph:
     """Immutable; `follow` begins a search that remembers its last answer."""
 
     def __init__(self, vectors: Vectors, follows: Bools, index: Index) -> None:
         """`follows` (N,): whether the next row is the moment after this one; `index` makes links and full searches."""
         count = len(vectors)
         self.index, self.follows = index, follows
-        self._principal = Principal(vectors, generator(0, "graph", count), _KEPT)
+        self._principal = PrincipalAxes(vectors, generator(0, "graph", count), _VARIANCE_SHARE)
         self._seen = np.empty((count, self._principal.width), np.float16)
         step = 0.0
         for start in range(0, count, CHUNK):
@@ -37,21 +37,21 @@ class Graph:
             self._seen[start : start + CHUNK] = self._principal.seen(values)
             steps = np.abs(np.diff(values, axis=0)).mean(axis=1)[follows[start : start + len(values) - 1]]
             step = max(step, float(steps.max(initial=0.0)))
-        self.links: Links = self._joined(vectors, max(step, REACH))
+        self.links: Links = self._joined(vectors, max(step, LINK_DISTANCE))
         """(N, 8) rows that each is joined to, or itself where there are fewer."""
 
     def _joined(self, vectors: Vectors, reach: float) -> Links:
-        links = np.repeat(np.arange(len(vectors), dtype=np.int32)[:, None], LINKS, axis=1)
+        links = np.repeat(np.arange(len(vectors), dtype=np.int32)[:, None], LINKS_PER_VECTOR, axis=1)
         for row in range(len(vectors)):
             here = vectors.gather(np.array([row]))[0]
-            near, _ = self.index.nearest(here, LINKS + 2 * _SIDE + 1)
-            near = near[np.abs(near - row) > _SIDE][:LINKS]
+            near, _ = self.index.nearest(here, LINKS_PER_VECTOR + 2 * _TEMPORAL_EXCLUSION + 1)
+            near = near[np.abs(near - row) > _TEMPORAL_EXCLUSION][:LINKS_PER_VECTOR]
             near = near[np.abs(vectors.gather(near) - here).mean(axis=1) <= reach]
             links[row, : len(near)] = near
         return links
 
-    def follow(self) -> "Following":
-        return Following(self)
+    def follow(self) -> "GraphSearch":
+        return GraphSearch(self)
 
     def among(self, rows: Ints, query: Singles, count: int) -> tuple[Ints, Singles]:
         """The nearest of some rows, in the leading principal axes."""
@@ -65,16 +65,16 @@ class Graph:
         return rows[order], squared[order]
 
 
-class Following:
+class GraphSearch:
     """One session's search: a `Lookup` whose answers depend on the queries before."""
 
-    def __init__(self, graph: Graph) -> None:
-        self._graph, self._rows, self._age = graph, np.zeros(0, np.int64), EVERY
+    def __init__(self, graph: NeighbourGraph) -> None:
+        self._graph, self._rows, self._age = graph, np.zeros(0, np.int64), FULL_SEARCH_PERIOD
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """As `Index`; most of the nearest, as long as queries follow each other."""
         graph, self._age = self._graph, self._age + 1
-        if self._age < EVERY:
+        if self._age < FULL_SEARCH_PERIOD:
             ahead = self._rows + graph.follows[self._rows]
             near = np.unique(np.concatenate([self._rows, ahead, graph.links[ahead].reshape(-1)]))
             if len(near) >= count:

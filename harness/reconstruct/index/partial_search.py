@@ -11,12 +11,12 @@ import numpy as np
 from harness.core.arrays import Ints, Singles
 from harness.reconstruct.index.protocol import Index, Vectors
 
-WIDER = 8
+CANDIDATE_FACTOR = 8
 """Vectors proposed for each that is asked for."""
 
 
-def nearest_known(
-    index: Index, vectors: Vectors, query: Singles, weight: Singles, count: int, wider: int = WIDER
+def nearest_partial(
+    index: Index, vectors: Vectors, query: Singles, weight: Singles, count: int, wider: int = CANDIDATE_FACTOR
 ) -> tuple[Ints, Singles]:
     """Of the vectors proposed for a filled query (D,), the nearest with squares times `weight` (D,), 0 where unknown.
 

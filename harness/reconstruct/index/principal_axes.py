@@ -8,11 +8,11 @@ from harness.core.arrays import Floats, Ints, Singles
 from harness.reconstruct.index.protocol import CHUNK, Vectors
 
 _SAMPLE = 20_000
-_LANES = 8
+_AXES_MULTIPLE = 8
 """Processors are quickest when the number of axes is a multiple of it."""
 
 
-class Principal:
+class PrincipalAxes:
     """Turns vectors about their mean onto orthonormal axes, strongest first; distances never grow."""
 
     def __init__(self, vectors: Vectors, rng: np.random.Generator, kept: float) -> None:
@@ -29,7 +29,7 @@ class Principal:
         variance, axes = np.linalg.eigh(products / len(rows) - np.outer(middle, middle))
         share = np.cumsum(variance[::-1]) / max(float(variance.sum()), 1e-30)
         needed = size if kept >= 1.0 else min(int(np.searchsorted(share, kept)) + 1, size)
-        self.width = _LANES * -(-needed // _LANES)
+        self.width = _AXES_MULTIPLE * -(-needed // _AXES_MULTIPLE)
         """d, the number of axes."""
         self._middle: Singles = middle.astype(np.float32)
         self._axes: Singles = np.zeros((size, self.width), np.float32)

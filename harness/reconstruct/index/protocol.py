@@ -10,7 +10,7 @@ CHUNK = 1024
 
 
 class Vectors(Protocol):
-    """N vectors of D numbers, made on demand (`Windows`, `StationFeatures`) or in memory (`Table`)."""
+    """N vectors of D numbers, made on demand (`Windows`, `StationFeatures`) or in memory (`ArrayVectors`)."""
 
     def __len__(self) -> int: ...
 
@@ -24,7 +24,7 @@ class Vectors(Protocol):
         ...
 
 
-class Found(NamedTuple):
+class Neighbours(NamedTuple):
     """K vectors, nearest first."""
 
     rows: Ints
@@ -49,13 +49,13 @@ class Lookup(Protocol):
 class Index(Lookup, Protocol):
     """A search among N vectors: immutable, deterministic, shared by sessions."""
 
-    def around(self, query: Singles, count: int) -> Found:
+    def around(self, query: Singles, count: int) -> Neighbours:
         """The same, and how the vectors differ from the query."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class ArrayVectors:
     """`Vectors` that are all in memory."""
 
     values: Singles

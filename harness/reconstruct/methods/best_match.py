@@ -17,12 +17,12 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.solver.outlier_gate import Gate
+from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.status_monitor import Coverage
+from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 
 Complexes = NDArray[np.complex128]
@@ -45,7 +45,7 @@ class BestMatch:
     longest_gap_s: float = 0.2
     """A velocity is taken between readings no farther apart [s]."""
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedBestMatch":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedBestMatch":
         """BadInput without examples of two frames or more."""
         takes = tuple(take for take in examples if len(take) > 1)
         if not takes:
@@ -59,7 +59,7 @@ class FittedBestMatch:
 
     options: BestMatch
     body: Body
-    takes: tuple[Take, ...]
+    takes: tuple[BodyMotion, ...]
 
     def begin(self, calibration: Calibration) -> "BestMatchSession":
         return BestMatchSession(self, calibration)
@@ -71,12 +71,12 @@ class BestMatchSession:
     def __init__(self, fitted: FittedBestMatch, calibration: Calibration) -> None:
         self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), _JUMP_M)
+        self._coverage, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), _JUMP_M)
         self._qpos = np.concatenate([take.qpos for take in fitted.takes])
         read = [station_poses(fitted.body, take, calibration) for take in fitted.takes]
-        velocity = [_since_last(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]
-        self._position = _Vectors(np.concatenate([m for m, _ in read]))
-        self._velocity = _Vectors(np.concatenate(velocity))
+        velocity = [_backward_difference(m) * take.rate_hz for (m, _), take in zip(read, fitted.takes, strict=True)]
+        self._position = _StationVectors(np.concatenate([m for m, _ in read]))
+        self._velocity = _StationVectors(np.concatenate(velocity))
         self._turned = np.ascontiguousarray(np.concatenate([q for _, q in read]).transpose(1, 2, 0))
         """(S, 4, N) orientations of the bones that carry the stations."""
         self._before: tuple[Floats, Floats, Bools] | None = None
@@ -152,7 +152,7 @@ class BestMatchSession:
         return out
 
 
-class _Vectors:
+class _StationVectors:
     """N frames of one vector for each of S stations, compared with a reading up to a turn about the vertical."""
 
     def __init__(self, vectors: Floats) -> None:
@@ -174,7 +174,7 @@ class _Vectors:
         return far, pull
 
 
-def _since_last(points_m: Floats) -> Floats:
+def _backward_difference(points_m: Floats) -> Floats:
     """(T, ...) steps up to each frame; the first is taken to be like the second."""
     steps = np.diff(points_m, axis=0)
     return np.concatenate([steps[:1], steps])

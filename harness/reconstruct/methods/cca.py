@@ -14,25 +14,25 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 
-_TINY = 1e-12
+_EIGENVALUE_FLOOR = 1e-12
 """Added to eigenvalues from 0 to 1, so that outputs may lie in fewer dimensions."""
 _ROUNDING = 1e-15
-_NOTHING = 1e-290
+_UNDERFLOW = 1e-290
 """A square so small is rounding, and would underflow."""
 
 
-def correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
+def canonical_correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
     """The largest canonical correlations (l,) of two Gram matrices (m, m), falling."""
-    squared, _, _ = _solution(_centred(inputs), _centred(outputs), bases, kappa)
+    squared, _, _ = _canonical_bases(_centre(inputs), _centre(outputs), bases, kappa)
     out: Floats = np.sqrt(np.maximum(squared[::-1], 0.0))
     return out
 
 
 @compiled
-def regressed(
+def regression_weights(
     inputs: Floats, query: Floats, outputs: Floats, width: float, bases: int, kappa: float, held: bool
 ) -> Floats:
-    """`weights` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d).
+    """`weights_from_kernels` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d).
 
     Kernels are `width` root mean square distances of two examples wide. When inputs or outputs are all the same, they
     count the same.
@@ -40,15 +40,18 @@ def regressed(
     between, across = squared_distances(inputs), squared_distances(outputs)
     if between.sum() <= 0.0 or across.sum() <= 0.0:
         return np.full(len(inputs), 1.0 / len(inputs))
-    sharpness = _sharpness(between, width)
+    sharpness = _kernel_precision(between, width)
     near = np.empty(len(inputs))
     for i in range(len(inputs)):
         far = 0.0
         for k in range(len(query)):
             far += (inputs[i, k] - query[k]) ** 2
         near[i] = np.exp(-sharpness * far)
-    kernel_x, kernel_y = _gaussian(between, sharpness), _gaussian(across, _sharpness(across, width))
-    return weights(kernel_x, kernel_y, near, bases, kappa, held)
+    kernel_x, kernel_y = (
+        _gaussian_kernel(between, sharpness),
+        _gaussian_kernel(across, _kernel_precision(across, width)),
+    )
+    return weights_from_kernels(kernel_x, kernel_y, near, bases, kappa, held)
 
 
 @compiled
@@ -64,14 +67,14 @@ def squared_distances(points: Floats) -> Floats:
 
 
 @compiled
-def _sharpness(squared: Floats, width: float) -> float:
+def _kernel_precision(squared: Floats, width: float) -> float:
     """1 / 2 s^2 of a Gaussian exp(-d^2 / 2 s^2) that is `width` RMS distances wide, from squared distances (m, m)."""
     count = len(squared)
     return float(0.5 * count * (count - 1) / (width * width * squared.sum()))
 
 
 @compiled
-def _gaussian(squared: Floats, sharpness: float) -> Floats:
+def _gaussian_kernel(squared: Floats, sharpness: float) -> Floats:
     """(m, m) from squared distances (m, m)."""
     out: Floats = np.ones_like(squared)
     for i in range(len(out)):
@@ -81,26 +84,28 @@ def _gaussian(squared: Floats, sharpness: float) -> Floats:
 
 
 @compiled
-def weights(inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, held: bool) -> Floats:
+def weights_from_kernels(
+    inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, held: bool
+) -> Floats:
     """(m,) what each of m >= 2 outputs counts, from Gram matrices (m, m) of both sides and the query's kernel (m,).
 
     With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
     """
     count = len(query)
-    squared, y, root = _solution(_centred(inputs), _centred(outputs), bases, kappa)
-    new = _contrasts((query - inputs.sum(axis=1) / count).reshape(-1, 1)).reshape(-1)
+    squared, y, root = _canonical_bases(_centre(inputs), _centre(outputs), bases, kappa)
+    new = _helmert_contrasts((query - inputs.sum(axis=1) / count).reshape(-1, 1)).reshape(-1)
     if held:  # H (H + kH I) and F y make the same diagonal of squares: eq. 4 and 5 project onto the F y
-        found = _projected(root.T @ (root @ new), y)
+        found = _project(root.T @ (root @ new), y)
     else:
         seen = y @ root.T
-        x = y - _ridge(_centred(inputs), kappa) * (seen @ root)
+        x = y - _ridge(_centre(inputs), kappa) * (seen @ root)
         reduced = squared * np.linalg.solve(x @ x.T, seen @ (root @ new))  # eq. 4
         found = y.T @ np.linalg.solve(y @ y.T, reduced)  # eq. 5
-    return _from_contrasts(found) + 1.0 / count
+    return _from_helmert_contrasts(found) + 1.0 / count
 
 
 @compiled
-def _solution(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tuple[Floats, Floats, Floats]:
+def _canonical_bases(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tuple[Floats, Floats, Floats]:
     """The l best pairs of bases of centred Gram matrices of n = m - 1 dimensions.
 
     With R = H (H + kH I)^-1 and the Cholesky factor L of F (F + kF I)^-1, the matrix L^T R L is symmetric, and its
@@ -114,23 +119,23 @@ def _solution(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tupl
     root_x, root_y = _inverse_root(inputs, ridge_x), _inverse_root(outputs, ridge_y)
     upper = (root_y.T @ root_y) * -ridge_y
     for i in range(count):
-        upper[i, i] += 1.0 + _TINY
-    _factor(upper)
+        upper[i, i] += 1.0 + _EIGENVALUE_FLOOR
+    _cholesky(upper)
     left_out = root_x @ upper.T
-    squared, vectors = eigen(upper @ upper.T - ridge_x * (left_out.T @ left_out))
+    squared, vectors = symmetric_eigen(upper @ upper.T - ridge_x * (left_out.T @ left_out))
     best = np.argsort(squared)[max(count - bases, 0) :]
     return squared[best], vectors[best] @ upper, root_x
 
 
 @compiled
-def _factor(gram: Floats) -> None:
+def _cholesky(gram: Floats) -> None:
     """A positive definite matrix (n, n) becomes the upper triangle U of U^T U."""
     for k in range(len(gram)):
         share = 1.0 / np.sqrt(gram[k, k])
         for j in range(len(gram)):
             gram[k, j] = gram[k, j] * share if j >= k else 0.0
         for i in range(k + 1, len(gram)):
-            _add(gram[i], -gram[k, i], gram[k])
+            _add_scaled(gram[i], -gram[k, i], gram[k])
 
 
 @compiled
@@ -139,16 +144,16 @@ def _inverse_root(gram: Floats, ridge: float) -> Floats:
     upper, out = gram.copy(), np.eye(len(gram))
     for i in range(len(gram)):
         upper[i, i] += ridge
-    _factor(upper)
+    _cholesky(upper)
     for i in range(len(gram)):
         for k in range(i):
-            _add(out[i], -upper[k, i], out[k])
+            _add_scaled(out[i], -upper[k, i], out[k])
         out[i] /= upper[i, i]
     return out
 
 
 @compiled
-def eigen(matrix: Floats) -> tuple[Floats, Floats]:
+def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
     """Eigenvalues (n,) and eigenvectors, in rows (n, n), of a symmetric matrix, which is spoilt; in no order.
 
     Householder's reflections to a tridiagonal one, then QL steps with implicit shifts (Golub & Van Loan 1996, 8.3). On
@@ -161,7 +166,7 @@ def eigen(matrix: Floats) -> tuple[Floats, Floats]:
         mirror[:] = matrix[k]
         mirror[: k + 1] = 0.0
         squared = _dot(mirror, mirror)
-        if squared < _NOTHING:
+        if squared < _UNDERFLOW:
             continue
         beside[k] = -np.copysign(np.sqrt(squared), mirror[k + 1])
         mirror[k + 1] -= beside[k]
@@ -174,7 +179,7 @@ def eigen(matrix: Floats) -> tuple[Floats, Floats]:
             for j in range(size):
                 along[j] += share * row[j]
                 turned[j] += share * other[j]
-        _add(along, -0.5 * _dot(along, mirror), mirror)
+        _add_scaled(along, -0.5 * _dot(along, mirror), mirror)
         for i in range(k + 1, size):
             row, other, share, more = matrix[i], rows[i], mirror[i], along[i]
             for j in range(size):
@@ -221,19 +226,19 @@ def _ql_step(values: Floats, beside: Floats, rows: Floats, low: int, high: int) 
 
 
 @compiled
-def _projected(vector: Floats, across: Floats) -> Floats:
+def _project(vector: Floats, across: Floats) -> Floats:
     """Of a vector (n,), what lies in the span of l others (l, n), which become orthonormal."""
     out = np.zeros_like(vector)
     for i in range(len(across)):
         for j in range(i):
-            _add(across[i], -_dot(across[i], across[j]), across[j])
+            _add_scaled(across[i], -_dot(across[i], across[j]), across[j])
         across[i] /= np.sqrt(_dot(across[i], across[i]))
-        _add(out, _dot(across[i], vector), across[i])
+        _add_scaled(out, _dot(across[i], vector), across[i])
     return out
 
 
 @compiled
-def _add(to: Floats, share: float, other: Floats) -> None:
+def _add_scaled(to: Floats, share: float, other: Floats) -> None:
     """To a vector (n,) a share of another."""
     for k in range(len(to)):
         to[k] += share * other[k]
@@ -253,13 +258,13 @@ def _ridge(gram: Floats, kappa: float) -> float:
 
 
 @compiled
-def _centred(gram: Floats) -> Floats:
+def _centre(gram: Floats) -> Floats:
     """(n, n) Gram matrix (m, m) about the mean of its m vectors."""
-    return _contrasts(np.ascontiguousarray(_contrasts(gram).T))
+    return _helmert_contrasts(np.ascontiguousarray(_helmert_contrasts(gram).T))
 
 
 @compiled
-def _contrasts(values: Floats) -> Floats:
+def _helmert_contrasts(values: Floats) -> Floats:
     """(m - 1, k) of values (m, k), in Helmert's orthonormal basis of what sums to 0."""
     out, total = np.empty((len(values) - 1, values.shape[1])), values[0].copy()
     for rank in range(1, len(values)):
@@ -271,7 +276,7 @@ def _contrasts(values: Floats) -> Floats:
 
 
 @compiled
-def _from_contrasts(values: Floats) -> Floats:
+def _from_helmert_contrasts(values: Floats) -> Floats:
     """(m,) of sum 0 whose contrasts these are (m - 1,)."""
     out = np.zeros(len(values) + 1)
     for rank in range(1, len(out)):

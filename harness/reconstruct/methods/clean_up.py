@@ -12,11 +12,11 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.reconstruct.contract import Method, Reconstructor, Session
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
-from harness.reconstruct.solver.outlier_gate import Gate
+from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
+from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
@@ -45,7 +45,7 @@ class CleanUp:
     def needs_examples(self) -> bool:
         return self.method.needs_examples
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedCleanUp":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedCleanUp":
         return FittedCleanUp(self, body, self.method.fit(body, examples, rng))
 
 
@@ -67,9 +67,9 @@ class CleanUpSession:
     def __init__(self, fitted: FittedCleanUp, calibration: Calibration, inner: Session) -> None:
         self._inner = inner
         self._residuals = Residuals(fitted.body, calibration, fitted.options.loss)
-        self._gate = Gate(len(calibration.stations))
+        self._gate = OutlierGate(len(calibration.stations))
         self._limits = HingeLimits(fitted.body)
-        self._solver = Solver(self._residuals, self._limits, fitted.options.stopping)
+        self._solver = IKSolver(self._residuals, self._limits, fitted.options.stopping)
         self._precision = np.zeros(self._residuals.kinematics.nv)
         self._precision[6:] = fitted.options.prior_sigma_rad**-2
 

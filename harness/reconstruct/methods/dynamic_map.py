@@ -17,27 +17,27 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.descent import stood
-from harness.reconstruct.features.calibration_cache import WhileWorn
-from harness.reconstruct.features.ground_step import stepped
-from harness.reconstruct.features.neighbour_search import ByEvidence, ByWindow, Precedents
-from harness.reconstruct.features.reduced_rank_regression import Evidence, Terms
-from harness.reconstruct.index import Index, choose
-from harness.reconstruct.methods.local_dynamic_model import closeness, forecast
+from harness.reconstruct.descent import qpos_from_posture
+from harness.reconstruct.features.calibration_cache import CalibrationCache
+from harness.reconstruct.features.ground_step import ground_after_step
+from harness.reconstruct.features.neighbour_search import FeatureSearch, NeighbourSearch, PoseHistorySearch
+from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
+from harness.reconstruct.index import Index, make_index
+from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
 from harness.reconstruct.methods.mean_pose import mean_posture
-from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE, TILT
-from harness.reconstruct.solver.history_session import Remembering
-from harness.reconstruct.solver.ik_session import LEANING_RAD, Leaning, Manner
-from harness.reconstruct.solver.ik_solver import Prior, Solution, Stopping
+from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE_SIZE, TILT
+from harness.reconstruct.solver.history_session import HistorySession
+from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
+from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.stream.frame import TrackerFrame
 
-_NEAREST = 1e-6
+_MIN_WEIGHT_VARIANCE = 1e-6
 """Smallest variance of the examples' weights; a performer who repeats an example exactly has distances of 0."""
 
 
@@ -52,7 +52,7 @@ class DynamicMap:
     needs_examples: bool = True
     like: Literal["evidence", "window"] = "evidence"
     """What examples must be like: the last answers and the readings, or the last answers alone as in the paper."""
-    terms: Terms = field(default_factory=Terms)
+    terms: ReducedRankOptions = field(default_factory=ReducedRankOptions)
     """Of that evidence."""
     poses: int = 3
     """m, answers that the next is predicted from."""
@@ -91,7 +91,7 @@ class DynamicMap:
     lost_after_s: float = LOST_AFTER_S
     stopping: Stopping = field(default_factory=Stopping)
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedDynamicMap":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedDynamicMap":
         """BadInput without examples that are long enough."""
         if not any(len(take) > self.poses for take in examples):
             found = f"A dynamic map is learnt from examples of more than {self.poses} frames, and there are none."
@@ -101,7 +101,7 @@ class DynamicMap:
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
         """From a database that may lie on disk."""
         windows = database.windows(self.poses, followed=True)
-        index = choose(self.index, windows, self.neighbours) if self.like == "window" else None
+        index = make_index(self.index, windows, self.neighbours) if self.like == "window" else None
         return FittedDynamicMap(self, body, windows, index, mean_posture(body, database))
 
 
@@ -153,42 +153,44 @@ class FittedDynamicMap:
     """Of the windows, where they are searched."""
     mean_qpos: Floats
     """(55,) for starts without a past."""
-    _evidence: WhileWorn[Evidence] = field(default_factory=WhileWorn)
+    _evidence: CalibrationCache[ReducedRankRegression] = field(default_factory=CalibrationCache)
 
-    def evidence(self, worn: Calibration) -> Evidence:
+    def evidence(self, worn: Calibration) -> ReducedRankRegression:
         """Of the database, for stations worn like this; made once."""
-        return self._evidence.get(worn, lambda: Evidence(self.body, self.windows, worn, self.options.terms))
+        return self._evidence.get(
+            worn, lambda: ReducedRankRegression(self.body, self.windows, worn, self.options.terms)
+        )
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
         return DynamicMapSession(self, calibration)
 
 
-class DynamicMapSession(Remembering):
+class DynamicMapSession(HistorySession):
     """Makes a model for every frame and throws it away."""
 
     def __init__(self, fitted: FittedDynamicMap, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
-        manner = Manner(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
-        leaning = Leaning(fitted.mean_qpos, np.full(48, LEANING_RAD))
+        manner = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        leaning = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
         super().__init__(fitted.body, calibration, manner, leaning, options.poses, windows.database.rate_hz)
         self._options, self._windows = options, windows
-        self._precedents: Precedents
+        self._precedents: NeighbourSearch
         if fitted.index is None:
             evidence = fitted.evidence(calibration)
-            self._precedents = ByEvidence(windows, evidence, self.residuals, options.index)
+            self._precedents = FeatureSearch(windows, evidence, self.residuals, options.index)
         else:
-            self._precedents = ByWindow(windows, fitted.index)
-        sigma = np.zeros(POSTURE + 3)
+            self._precedents = PoseHistorySearch(windows, fitted.index)
+        sigma = np.zeros(POSTURE_SIZE + 3)
         sigma[HINGES], sigma[TILT], sigma[HEIGHT] = (
             options.least_sigma_rad,
             options.tilt_sigma_rad,
             options.height_sigma_m,
         )
-        sigma[POSTURE:] = options.step_sigma_m, options.step_sigma_m, options.turn_sigma_rad
+        sigma[POSTURE_SIZE:] = options.step_sigma_m, options.step_sigma_m, options.turn_sigma_rad
         self._least_variance = sigma**2
-        self._closest: Floats = np.zeros(POSTURE + 3)
+        self._closest: Floats = np.zeros(POSTURE_SIZE + 3)
 
-    def continued(self) -> Solution:
+    def continued(self) -> IKSolution:
         """Eq. 9 and 10: the most likely pose of the frame, by the readings and by what went before."""
         prior = self.predicted()
         forward = self._options.start == "prediction"
@@ -202,7 +204,9 @@ class DynamicMapSession(Remembering):
 
     def _stood(self, following: Floats) -> Floats:
         """The configuration (55,) of a posture and of the step to it (55,)."""
-        out: Floats = stood(following[:POSTURE], stepped(self.past[0], following[POSTURE:]))
+        out: Floats = qpos_from_posture(
+            following[:POSTURE_SIZE], ground_after_step(self.past[0], following[POSTURE_SIZE:])
+        )
         return out
 
     def noted(self, frame: TrackerFrame, anew: bool) -> None:
@@ -217,7 +221,7 @@ class DynamicMapSession(Remembering):
         options, windows = self._options, self._windows
         rows, squared, away = self._precedents.nearest(self.past, options.neighbours)
         variance = 1.0 if options.width == 0.0 else options.width * float(squared[len(squared) // 2])
-        weight = closeness(squared, max(variance, _NEAREST))
+        weight = neighbour_weights(squared, max(variance, _MIN_WEIGHT_VARIANCE))
         after = windows.successors(rows)
         next_mean, left = forecast(away, after, weight, options.kept, options.ridge)
         self._closest = after[0].astype(float)
@@ -225,10 +229,12 @@ class DynamicMapSession(Remembering):
         mean[7:] = self.limits.clipped(mean[7:])
         variance_of = options.spread**2 * left + self._least_variance
         variance_of += options.novelty**2 * float(squared[0]) / away.shape[1]
-        precision = 1.0 / variance_of[_TANGENT]
+        precision = 1.0 / variance_of[_TANGENT_INDICES]
         precision[:2] = precision[:2].min()  # forward and left are not the world's x and y
         return Prior(mean, precision)
 
 
-_TANGENT = np.array([POSTURE, POSTURE + 1, HEIGHT, 1, 2, POSTURE + 2, *range(HINGES.start, HINGES.stop)])
+_TANGENT_INDICES = np.array(
+    [POSTURE_SIZE, POSTURE_SIZE + 1, HEIGHT, 1, 2, POSTURE_SIZE + 2, *range(HINGES.start, HINGES.stop)]
+)
 """(54,) which number of posture and step each direction of the solver is; tilts are small, so turns are the root's."""

@@ -14,16 +14,16 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.methods.mean_pose import mean_posture, spread_rad
-from harness.reconstruct.solver.ik_session import Leaning, Manner, Pursuit
+from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 
-_LEAST_SPREAD_RAD = math.radians(2.0)
+_MIN_SPREAD_RAD = math.radians(2.0)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Ik:
     def needs_examples(self) -> bool:
         return self.towards_mean > 0.0 or self.spread
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedIk":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedIk":
         """BadInput when the prior needs examples and there are none."""
         return self._fitted(body, examples)
 
@@ -58,13 +58,13 @@ class Ik:
         """From a database that may lie on disk."""
         return self._fitted(body, database)
 
-    def _fitted(self, body: Body, examples: Sequence[Take] | MotionDatabase) -> "FittedIk":
+    def _fitted(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> "FittedIk":
         sigma_rad = np.full(48, self.prior_sigma_rad)
         if not self.needs_examples:
             return FittedIk(self, body, None, sigma_rad)
         mean_qpos = mean_posture(body, examples)
         if self.spread:
-            own = np.maximum(spread_rad(body, examples, mean_qpos), _LEAST_SPREAD_RAD)
+            own = np.maximum(spread_rad(body, examples, mean_qpos), _MIN_SPREAD_RAD)
             sigma_rad *= own / np.sqrt(np.mean(own**2))
         return FittedIk(self, body, mean_qpos, sigma_rad)
 
@@ -97,7 +97,9 @@ class FittedIk:
     sigma_rad: Floats
     """(48,) the prior's standard deviations."""
 
-    def begin(self, calibration: Calibration) -> Pursuit:
+    def begin(self, calibration: Calibration) -> IKSession:
         options = self.options
-        manner = Manner(options.loss, options.limits, options.jump_m, options.lost_after_s, options.stopping)
-        return Pursuit(self.body, calibration, manner, Leaning(self.mean_qpos, self.sigma_rad, options.towards_mean))
+        manner = SolverOptions(options.loss, options.limits, options.jump_m, options.lost_after_s, options.stopping)
+        return IKSession(
+            self.body, calibration, manner, PosturePrior(self.mean_qpos, self.sigma_rad, options.towards_mean)
+        )

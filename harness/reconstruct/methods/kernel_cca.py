@@ -24,4 +24,4 @@ class KernelCca(LocalRegression):
     """sigma of the kernels, in root mean square distances of two examples."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        return cca.regressed(inputs, query, outputs, self.width, self.bases, self.kappa, self.held)
+        return cca.regression_weights(inputs, query, outputs, self.width, self.bases, self.kappa, self.held)

@@ -16,15 +16,15 @@ from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.features.anchor_frame import anchor_of
 from harness.reconstruct.features.virtual_trackers import station_poses
 from harness.reconstruct.methods.mean_pose import mean_posture
-from harness.reconstruct.solver.outlier_gate import Gate
+from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.root_placement import nearest_placed
-from harness.reconstruct.solver.status_monitor import Coverage
+from harness.reconstruct.solver.root_placement import place_root
+from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 
 _JUMP_M = 0.3
@@ -49,7 +49,7 @@ class KernelRidge:
     orientation_noise_rad: float = 0.01
     """Added to the examples' readings (docs/methods.md G1)."""
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedKernelRidge":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedKernelRidge":
         """BadInput without examples."""
         frames = sum(len(take) for take in examples)
         if frames < 2:
@@ -64,7 +64,7 @@ class FittedKernelRidge:
 
     options: KernelRidge
     body: Body
-    takes: tuple[Take, ...]
+    takes: tuple[BodyMotion, ...]
     kept: Ints
     """(N,) which frames of all."""
     noise: Floats
@@ -81,7 +81,7 @@ class KernelRidgeSession:
         options, body, count = fitted.options, fitted.body, len(calibration.stations)
         self._lever_m = options.lever_m
         self._residuals = Residuals(body, calibration, Loss())
-        self._coverage, self._gate = Coverage(), Gate(count, _JUMP_M)
+        self._coverage, self._gate = StatusMonitor(), OutlierGate(count, _JUMP_M)
         self._anchor = anchor_of(calibration.bones)
         self._mean_qpos = self._answer = mean_posture(body, fitted.takes)
 
@@ -107,7 +107,7 @@ class KernelRidgeSession:
             near = self._kernel(self._features(*self._filled()) - self._middle)
             qpos[7:] += (near @ self._weights)[0]
             qpos[:7] = self._answer[:7]
-            self._answer = nearest_placed(self._residuals, qpos)
+            self._answer = place_root(self._residuals, qpos)
             self._gate.answered(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
@@ -117,8 +117,10 @@ class KernelRidgeSession:
         if residuals.measured.all():
             return residuals.target_m[None], residuals.world_from_target[None]
         here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(nearest_placed(residuals, self._answer))
-        at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, _no_turn(count))
+        residuals.kinematics.set(place_root(residuals, self._answer))
+        at_m, turned = residuals.kinematics.station_poses(
+            residuals.bones, residuals.mount_m, _identity_orientations(count)
+        )
         position_m = np.where(here, residuals.target_m, at_m)
         return position_m[None], np.where(facing, residuals.world_from_target, turned)[None]
 
@@ -137,5 +139,5 @@ class KernelRidgeSession:
         return out
 
 
-def _no_turn(count: int) -> Floats:
+def _identity_orientations(count: int) -> Floats:
     return np.tile(rotations.IDENTITY, (count, 1))

@@ -26,7 +26,7 @@ class Forecast(NamedTuple):
     """(D,) of what the regression leaves unexplained."""
 
 
-def closeness(squared: Floats | Singles, variance: float) -> Floats:
+def neighbour_weights(squared: Floats | Singles, variance: float) -> Floats:
     """Eq. 6 with D_w = 1 / variance for squared distances (K,), ascending; of sum 1.
 
     The smallest distance is taken out, which changes no ratio and keeps the weights above 0.
@@ -43,7 +43,7 @@ def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float)
     1, with a `ridge` (a share of that variance, too) added to their eigenvalues.
     """
     if kept >= 1.0 and away.shape[0] > away.shape[1]:
-        return _of_many(away, after, weight.astype(away.dtype), ridge)
+        return _primal_ridge_regression(away, after, weight.astype(away.dtype), ridge)
     share: Real = weight.astype(away.dtype)
     root: Real = np.sqrt(share)[:, None]
     middle, after_middle = share @ away, share @ after
@@ -52,13 +52,15 @@ def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float)
     inner: Real = x @ x.T
     whole = float(inner.trace())
     asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
-    solve = _ridged if kept >= 1.0 else _truncated
+    solve = _dual_ridge_regression if kept >= 1.0 else _principal_component_regression
     shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
     variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
     return Forecast((after_middle - shift).astype(float), variance.astype(float))
 
 
-def _truncated(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float) -> tuple[Real, Real]:
+def _principal_component_regression(
+    inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float
+) -> tuple[Real, Real]:
     """Eq. 5 and 7: (D,) what to take off the mean, and (K, D) residuals."""
     eigenvalue, vector = np.linalg.eigh(inner)
     eigenvalue, vector = eigenvalue[::-1], vector[:, ::-1]
@@ -70,7 +72,9 @@ def _truncated(inner: Real, asked: Real, y: Real, kept: float, ridge: float, who
     return ((vector.T @ asked) / damped) @ along, left
 
 
-def _ridged(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float) -> tuple[Real, Real]:
+def _dual_ridge_regression(
+    inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float
+) -> tuple[Real, Real]:
     """The same with all directions: Lambda^-1 becomes (Lambda + ridge)^-1, and no eigenvectors are needed."""
     single = inner.dtype == np.float32
     factorise, invert = (lapack.spotrf, lapack.strtri) if single else (lapack.dpotrf, lapack.dtrtri)
@@ -83,19 +87,19 @@ def _ridged(inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole:
     return shift, ridge * (inverse.T @ turned)
 
 
-def _of_many(away: Real, after: Real, share: Real, ridge: float) -> Forecast:
+def _primal_ridge_regression(away: Real, after: Real, share: Real, ridge: float) -> Forecast:
     """Eq. 4 with a ridge, in the space of the N numbers: cheaper when examples outnumber them.
 
     The product of W X (K, N) with all that is known, X, y and 1 (K, N + D + 1), holds X^T W X, X^T W y and the mean.
     """
-    weighed, known, after_middle, squares = _weighed(away, after, share)
+    weighed, known, after_middle, squares = _weighted_moments(away, after, share)
     least = max(ridge, 1e-6 if away.dtype == np.float32 else 1e-9)
-    shift, variance = _regressed(known.T @ weighed, after_middle, squares, away[0], least)
+    shift, variance = _solve_primal(known.T @ weighed, after_middle, squares, away[0], least)
     return Forecast(after[0] + shift, variance)
 
 
 @compiled
-def _weighed(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Real]:
+def _weighted_moments(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Real]:
     """W X (K, N); X, y and 1 (K, N + D + 1); weighted mean (D,) of y and of its squares (D,).
 
     Both are taken about the nearest example's, so that single precision loses little however far off the query is.
@@ -118,7 +122,7 @@ def _weighed(away: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Re
 
 
 @compiled
-def _regressed(product: Real, after_middle: Real, squares: Real, first: Real, ridge: float) -> tuple[Floats, Floats]:
+def _solve_primal(product: Real, after_middle: Real, squares: Real, first: Real, ridge: float) -> tuple[Floats, Floats]:
     """Eq. 8's mean (D,), about the nearest example's y, and variance (D,); x is about the nearest's `first` (N,)."""
     size, following = product.shape[1], len(squares)
     middle = product[size + following].astype(np.float64)
@@ -131,7 +135,7 @@ def _regressed(product: Real, after_middle: Real, squares: Real, first: Real, ri
     mixed, least = slope.copy(), ridge * np.trace(outer) + 1e-30
     for i in range(size):
         outer[i, i] += least
-    _solve(outer, slope)
+    _cholesky_solve(outer, slope)
     mean, variance = np.empty(following), np.empty(following)
     for j in range(following):
         mean[j], variance[j] = after_middle[j], squares[j] - np.float64(after_middle[j]) ** 2
@@ -143,7 +147,7 @@ def _regressed(product: Real, after_middle: Real, squares: Real, first: Real, ri
 
 
 @compiled
-def _solve(matrix: Floats, rows: Floats) -> None:
+def _cholesky_solve(matrix: Floats, rows: Floats) -> None:
     """Puts A^-1 B in the place of B (N, D), and Cholesky's factor in that of A (N, N), positive definite."""
     count, width = rows.shape
     for i in range(count):

@@ -13,24 +13,24 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints, Singles
 from harness.core.calibration import Calibration
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.features.calibration_cache import WhileWorn
-from harness.reconstruct.features.ground_step import stepped
-from harness.reconstruct.features.station_features import Controls
-from harness.reconstruct.index import Index, Vectors, choose, nearest_known
+from harness.reconstruct.features.calibration_cache import CalibrationCache
+from harness.reconstruct.features.ground_step import ground_after_step
+from harness.reconstruct.features.station_features import StationFeatures
+from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
 from harness.reconstruct.methods.mean_pose import mean_posture
-from harness.reconstruct.solver.ground_frame import POSTURE
-from harness.reconstruct.solver.history_session import Remembering
-from harness.reconstruct.solver.ik_session import LEANING_RAD, Leaning, Manner
-from harness.reconstruct.solver.ik_solver import Solution, Stopping
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
+from harness.reconstruct.solver.history_session import HistorySession
+from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
+from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
-from harness.reconstruct.solver.subspace import Confined, spanned
+from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 
-_PAST = 2
+_HISTORY = 2
 """Poses of the query, C2."""
 
 
@@ -64,16 +64,16 @@ class LocalPca:
     stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2))
     """Sooner than for a pose without a model: on validation clips errors stay the same to 0.001 deg."""
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedLocalPca":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalPca":
         """BadInput without examples that are long enough."""
-        if not any(len(take) > _PAST for take in examples):
-            found = f"Local PCA is learnt from examples of more than {_PAST} frames, and there are none."
+        if not any(len(take) > _HISTORY for take in examples):
+            found = f"Local PCA is learnt from examples of more than {_HISTORY} frames, and there are none."
             raise BadInput(found, "Name some in the scenario.")
         return self.fit_database(body, MotionDatabase.build(body, examples), rng)
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalPca":
         """From a database that may lie on disk."""
-        return FittedLocalPca(self, body, database.windows(_PAST, followed=True), mean_posture(body, database))
+        return FittedLocalPca(self, body, database.windows(_HISTORY, followed=True), mean_posture(body, database))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,44 +86,48 @@ class FittedLocalPca:
     mean_qpos: Floats
     """(55,) for starts without a past."""
 
-    worn: "WhileWorn[tuple[Controls, Vectors, Index]]" = field(default_factory=WhileWorn, repr=False)
+    worn: "CalibrationCache[tuple[StationFeatures, Vectors, Index]]" = field(
+        default_factory=CalibrationCache, repr=False
+    )
     """What the last calibration has the trackers read, and the search in it: sessions of one performer share it."""
 
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
         return LocalPcaSession(self, calibration)
 
-    def seen_through(self, calibration: Calibration) -> "tuple[Controls, Vectors, Index]":
+    def seen_through(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
         """What trackers worn so would have read after every window; both together, and an index of them."""
         return self.worn.get(calibration, lambda: self._seen_through(calibration))
 
-    def _seen_through(self, calibration: Calibration) -> "tuple[Controls, Vectors, Index]":
-        controls = Controls(self.body, self.windows, calibration, self.options.lever_m)
-        examples = _Examples(self.windows, controls.values, np.sqrt(self.options.control_weight))
-        return controls, examples, choose(self.options.index, examples, self.options.neighbours)
+    def _seen_through(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
+        controls = StationFeatures(self.body, self.windows, calibration, self.options.lever_m)
+        examples = _WindowsWithFeatures(self.windows, controls.values, np.sqrt(self.options.control_weight))
+        return controls, examples, make_index(self.options.index, examples, self.options.neighbours)
 
 
-class LocalPcaSession(Remembering):
+class LocalPcaSession(HistorySession):
     """Makes a model for every frame and throws it away."""
 
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
-        manner = Manner(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
-        leaning = Leaning(fitted.mean_qpos, np.full(48, LEANING_RAD))
-        super().__init__(fitted.body, calibration, manner, leaning, _PAST, windows.database.rate_hz)
+        manner = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        leaning = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
+        super().__init__(fitted.body, calibration, manner, leaning, _HISTORY, windows.database.rate_hz)
         self._options, self._windows = options, windows
-        self._confined = Confined(self.residuals, self.limits, options.stopping)
+        self._confined = SubspaceSolver(self.residuals, self.limits, options.stopping)
         self._controls, self._examples, self._index = fitted.seen_through(calibration)
 
-    def continued(self) -> Solution:
+    def continued(self) -> IKSolution:
         options = self._options
         before = self._windows.query(self.past)
         rows = self._nearest(before)
         poses = self._windows.successors(rows)
-        postures, closest = poses[:, :POSTURE], poses[0].astype(float)
-        steady = 2.0 * before[:POSTURE].astype(float) - before[-POSTURE:]
+        postures, closest = poses[:, :POSTURE_SIZE], poses[0].astype(float)
+        steady = 2.0 * before[:POSTURE_SIZE].astype(float) - before[-POSTURE_SIZE:]
         beta = options.smooth_weight / options.smooth_sigma_rad**2
-        space = spanned(postures, options.components, options.prior_weight, steady, beta)
-        return self._confined.solve(space, stepped(self.past[0], closest[POSTURE:]), closest[:POSTURE])
+        space = fit_subspace(postures, options.components, options.prior_weight, steady, beta)
+        return self._confined.solve(
+            space, ground_after_step(self.past[0], closest[POSTURE_SIZE:]), closest[:POSTURE_SIZE]
+        )
 
     def bridged(self) -> Floats:
         """Nothing was read, and there are no dynamics: as it was."""
@@ -135,7 +139,7 @@ class LocalPcaSession(Remembering):
         residuals, controls, options = self.residuals, self._controls, self._options
         scale = np.float32(np.sqrt(options.control_weight))
         position_m, turned = residuals.target_m, residuals.world_from_target
-        ground = stepped(self.past[0], np.zeros(3))
+        ground = ground_after_step(self.past[0], np.zeros(3))
         if residuals.measured.all():
             query = np.concatenate([past, scale * controls.query(position_m, turned, ground)])
             rows, _ = self._index.nearest(query, options.neighbours)
@@ -146,12 +150,12 @@ class LocalPcaSession(Remembering):
         control = controls.query(np.where(here, position_m, at_m), np.where(facing, turned, at_turned), ground)
         weight = np.concatenate([np.ones(len(past)), controls.columns(residuals.measured)])
         query = np.concatenate([past, scale * control])
-        rows, _ = nearest_known(self._index, self._examples, query, weight, options.neighbours)
+        rows, _ = nearest_partial(self._index, self._examples, query, weight, options.neighbours)
         return rows
 
 
 @dataclass(frozen=True, eq=False)
-class _Examples:
+class _WindowsWithFeatures:
     """`Vectors`: two poses, and what trackers would have read in the frame after them."""
 
     windows: Windows

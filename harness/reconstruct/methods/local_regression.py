@@ -17,32 +17,32 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import stood
-from harness.reconstruct.features.calibration_cache import WhileWorn
-from harness.reconstruct.features.example_features import LocalExamples, Weights
-from harness.reconstruct.features.ground_step import moved
-from harness.reconstruct.features.query_features import Outlook
-from harness.reconstruct.features.smoothing import smoothed
+from harness.reconstruct.descent import qpos_from_posture
+from harness.reconstruct.features.calibration_cache import CalibrationCache
+from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
+from harness.reconstruct.features.ground_step import step_ground
+from harness.reconstruct.features.query_features import QueryFeatures
+from harness.reconstruct.features.smoothing import smooth
 from harness.reconstruct.methods.mean_pose import mean_posture, spread_rad
-from harness.reconstruct.solver.ground_frame import POSTURE
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
-from harness.reconstruct.solver.limb_solver import Limbs
-from harness.reconstruct.solver.outlier_gate import JUMP_M, Gate
+from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
+from harness.reconstruct.solver.limb_solver import LimbSolver
+from harness.reconstruct.solver.outlier_gate import JUMP_M, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.root_placement import nearest_placed
-from harness.reconstruct.solver.status_monitor import Coverage
+from harness.reconstruct.solver.root_placement import place_root
+from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 
-_LEAST_SPREAD_RAD = math.radians(1.0)
+_MIN_SPREAD_RAD = math.radians(1.0)
 """A hinge that rests in all examples may still give way a little."""
-_BARE_JUMP_M = 0.3
+_JUMP_WITHOUT_IK_M = 0.3
 """The gate without inverse kinematics, as for the best match: a learnt pose is never as near as a fitted one."""
 
-_NONE: Ints = np.zeros(0, np.int64)
+_NO_ROWS: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class LocalRegression(ABC):
     needs_examples: bool = True
     neighbours: int = 8
     """k of eq. 2, for this frame; those of the frame before are kept as well."""
-    weights: Weights = field(default_factory=Weights)
+    weights: FeatureWeights = field(default_factory=FeatureWeights)
     """Of eq. 2."""
     index: str = "auto"
     """What neighbours are sought in (`index.choose`)."""
@@ -78,19 +78,19 @@ class LocalRegression(ABC):
     most_steps: int = 4
     """Of that on the whole body."""
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedLocal":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalRegression":
         """BadInput without examples."""
         if not any(len(take) for take in examples):
             raise BadInput("A local regression learns from examples, and there are none.", "Name some in the scenario.")
         return self.fit_database(body, MotionDatabase.build(body, examples), rng)
 
-    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocal":
+    def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalRegression":
         """From a database that may lie on disk."""
         sigma_rad = np.full(48, self.hinge_sigma_rad)
         if self.spread:
-            own = np.maximum(spread_rad(body, database, mean_posture(body, database)), _LEAST_SPREAD_RAD)
+            own = np.maximum(spread_rad(body, database, mean_posture(body, database)), _MIN_SPREAD_RAD)
             sigma_rad *= own / np.sqrt(np.mean(own**2))
-        return FittedLocal(self, body, database, sigma_rad)
+        return FittedLocalRegression(self, body, database, sigma_rad)
 
     @abstractmethod
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
@@ -98,7 +98,7 @@ class LocalRegression(ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class FittedLocal:
+class FittedLocalRegression:
     """The examples."""
 
     options: LocalRegression
@@ -106,58 +106,60 @@ class FittedLocal:
     database: MotionDatabase
     hinge_sigma_rad: Floats
     """(48,)"""
-    worn: WhileWorn[LocalExamples] = field(default_factory=WhileWorn, repr=False)
+    worn: CalibrationCache[ExampleFeatures] = field(default_factory=CalibrationCache, repr=False)
 
-    def begin(self, calibration: Calibration) -> "LocalSession":
+    def begin(self, calibration: Calibration) -> "LocalRegressionSession":
         self.database.let_go()  # what the sessions before have read
-        return LocalSession(self, calibration)
+        return LocalRegressionSession(self, calibration)
 
-    def seen_through(self, calibration: Calibration) -> LocalExamples:
+    def seen_through(self, calibration: Calibration) -> ExampleFeatures:
         """What trackers worn so would have read in the examples."""
         options, weights = self.options, self.options.weights
         if self.database.rate_hz * options.longest_gap_s < 1.0:
             weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
         return self.worn.get(
             calibration,
-            lambda: LocalExamples(self.body, self.database, calibration, weights, options.index, options.neighbours),
+            lambda: ExampleFeatures(self.body, self.database, calibration, weights, options.index, options.neighbours),
         )
 
 
-class LocalSession:
+class LocalRegressionSession:
     """Follows one performer."""
 
-    def __init__(self, fitted: FittedLocal, calibration: Calibration) -> None:
+    def __init__(self, fitted: FittedLocalRegression, calibration: Calibration) -> None:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        jump_m = options.jump_m if options.final_ik else max(options.jump_m, _BARE_JUMP_M)
-        self._coverage, self._gate = Coverage(), Gate(len(calibration.stations), jump_m)
+        jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
+        self._coverage, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
         self._examples = fitted.seen_through(calibration)
-        self._outlook = Outlook(self._residuals, calibration, self._examples, options.longest_gap_s)
+        self._outlook = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
-        self._solver = Solver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
-        self._limbs = Limbs(fitted.body, calibration.bones, self._residuals, self._limits)
+        self._solver = IKSolver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
+        self._limbs = LimbSolver(fitted.body, calibration.bones, self._residuals, self._limits)
         self._precision = np.repeat([options.root_sigma_m**-2, options.root_sigma_rad**-2], 3)
         self._precision = np.concatenate([self._precision, fitted.hinge_sigma_rad**-2])
         self._answer = fitted.database.qpos(np.array([0]), np.zeros(3))[0]
-        self._rows_before = _NONE
+        self._rows_before = _NO_ROWS
         self._poses_before: list[Floats] = []
 
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
         if not any_seen:
-            self._rows_before, self._poses_before = _NONE, []
+            self._rows_before, self._poses_before = _NO_ROWS, []
             return Estimate(self._answer, status)
         self._gate.read(frame, self._residuals)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._answer, status)
         view, query, trust = self._outlook.seen(frame, self._answer)
         pose = self._smoothed(self._regressed(query, trust))
-        self._answer = self._fitted_to_trackers(stood(pose[:POSTURE], moved(np.array(view), pose[POSTURE:])))
+        self._answer = self._fitted_to_trackers(
+            qpos_from_posture(pose[:POSTURE_SIZE], step_ground(np.array(view), pose[POSTURE_SIZE:]))
+        )
         self._gate.answered(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _regressed(self, query: Floats, trust: Floats) -> Floats:
-        """(55,) what is learnt (`LocalExamples.pairs`), from the neighbours of this frame and the last."""
+        """(55,) what is learnt (`ExampleFeatures.pairs`), from the neighbours of this frame and the last."""
         rows = self._examples.nearest(query, trust, self._options.neighbours)
         inputs, asked, outputs = self._examples.pairs(rows, self._rows_before, query, trust)
         self._rows_before = rows
@@ -170,7 +172,7 @@ class LocalSession:
         """Eq. 6, on hinge angles and on the root as seen from the anchor, so that walking itself is not delayed."""
         if len(self._poses_before) == 2:
             earlier, before = self._poses_before
-            pose = smoothed(pose, before, earlier, self._options.alpha, self._options.beta)
+            pose = smooth(pose, before, earlier, self._options.alpha, self._options.beta)
         self._poses_before = [*self._poses_before[-1:], pose]
         return pose
 
@@ -182,4 +184,4 @@ class LocalSession:
             return self._limbs.reach(qpos)
         if self._options.final_ik:
             return self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
-        return nearest_placed(self._residuals, qpos)
+        return place_root(self._residuals, qpos)

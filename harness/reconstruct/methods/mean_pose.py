@@ -9,24 +9,24 @@ from harness.body.humanoid import Body, tpose
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.solver.ground_frame import HINGES
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.root_placement import nearest_placed
-from harness.reconstruct.solver.status_monitor import Coverage
+from harness.reconstruct.solver.root_placement import place_root
+from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 
 
-def mean_posture(body: Body, examples: Sequence[Take] | MotionDatabase) -> Floats:
+def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Floats:
     """(55,) the mean of the examples' hinge angles, rooted like the T-pose; BadInput without examples.
 
     The mean of directions, in principal form and within the limits.
     """
     limits, total, count = HingeLimits(body), np.zeros((2, 48)), 0
-    for angles in _angles(limits, examples):
+    for angles in _principal_angles(limits, examples):
         total += [np.sum(np.sin(angles), axis=0), np.sum(np.cos(angles), axis=0)]
         count += len(angles)
     if not count:
@@ -36,17 +36,17 @@ def mean_posture(body: Body, examples: Sequence[Take] | MotionDatabase) -> Float
     return out
 
 
-def spread_rad(body: Body, examples: Sequence[Take] | MotionDatabase, about: Floats) -> Floats:
+def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, about: Floats) -> Floats:
     """(48,) root mean square of the examples' hinge angles about those of a configuration (55,)."""
     limits, total, count = HingeLimits(body), np.zeros(48), 0
-    for angles in _angles(limits, examples):
+    for angles in _principal_angles(limits, examples):
         away = np.remainder(angles - about[7:] + np.pi, 2.0 * np.pi) - np.pi
         total += np.sum(away**2, axis=0)
         count += len(angles)
     return np.sqrt(total / count)
 
 
-def _angles(limits: HingeLimits, examples: Sequence[Take] | MotionDatabase) -> Iterator[Floats]:
+def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
     """Principal hinge angles (T, 48), some at a time, for a database may be larger than memory."""
     if isinstance(examples, MotionDatabase):
         for run in examples.runs:
@@ -65,7 +65,7 @@ class MeanPose:
     summary: str = "the examples' mean posture, stood where the trackers are: the null that learns"
     needs_examples: bool = True
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "FittedMeanPose":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedMeanPose":
         """BadInput without examples."""
         return FittedMeanPose(body, mean_posture(body, examples))
 
@@ -87,12 +87,12 @@ class MeanPoseSession:
 
     def __init__(self, fitted: FittedMeanPose, calibration: Calibration) -> None:
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._coverage = Coverage()
+        self._coverage = StatusMonitor()
         self._qpos = fitted.qpos
 
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_seen = self._coverage.seen(frame)
         if any_seen:
             self._residuals.read(frame)
-            self._qpos = nearest_placed(self._residuals, self._qpos)
+            self._qpos = place_root(self._residuals, self._qpos)
         return Estimate(self._qpos, status)

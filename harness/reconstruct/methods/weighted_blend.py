@@ -20,11 +20,11 @@ class WeightedBlend(LocalRegression):
     """Weights fall with this power of the distance."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        return _closeness(inputs, query, self.power)
+        return _inverse_distance_weights(inputs, query, self.power)
 
 
 @compiled
-def _closeness(inputs: Floats, query: Floats, power: float) -> Floats:
+def _inverse_distance_weights(inputs: Floats, query: Floats, power: float) -> Floats:
     """`WeightedBlend.weigh`."""
     out: Floats = np.empty(len(inputs))
     for i in range(len(inputs)):

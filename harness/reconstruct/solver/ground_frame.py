@@ -14,19 +14,19 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats, Singles
 
-POSTURE = 52
+POSTURE_SIZE = 52
 HEIGHT, TILT, HINGES = 0, slice(1, 4), slice(4, 52)
 """Where a posture has what."""
 
 
-def ground_of(qpos: Floats) -> Floats:
+def ground_from_qpos(qpos: Floats) -> Floats:
     """Ground frames (..., 3) of configurations (..., 55)."""
     return np.stack([qpos[..., 0], qpos[..., 1], 2.0 * np.arctan2(qpos[..., 6], qpos[..., 3])], axis=-1)
 
 
-def posture_of(qpos: Floats) -> Floats:
+def posture_from_qpos(qpos: Floats) -> Floats:
     """Postures (..., 52) of configurations (..., 55); hinge angles as they are."""
-    out = np.empty((*qpos.shape[:-1], POSTURE))
+    out = np.empty((*qpos.shape[:-1], POSTURE_SIZE))
     w, x, y, z = np.moveaxis(qpos[..., 3:7], -1, 0)
     level, lean = np.hypot(w, z), np.hypot(x, y)
     # about_z(-yaw) q = (level, (x w + y z) / level, (y w - x z) / level, 0)
@@ -39,8 +39,8 @@ def posture_of(qpos: Floats) -> Floats:
     return out
 
 
-def standing(posture: Floats | Singles, ground: Floats) -> Floats:
-    """Configurations (..., 55) of postures (..., 52) on ground frames (..., 3): undoes `posture_of` and `ground_of`."""
+def qpos_from_postures(posture: Floats | Singles, ground: Floats) -> Floats:
+    """Configurations (..., 55) of postures (..., 52) on ground frames (..., 3): undoes `posture_from_qpos` and `ground_from_qpos`."""
     tilt = np.asarray(posture[..., TILT], dtype=float)
     out = np.empty((*np.broadcast_shapes(posture.shape[:-1], ground.shape[:-1]), 55))
     out[..., :2] = ground[..., :2]
@@ -50,7 +50,7 @@ def standing(posture: Floats | Singles, ground: Floats) -> Floats:
     return out
 
 
-def seen_from(ground: Floats, other: Floats) -> Floats:
+def relative_ground(ground: Floats, other: Floats) -> Floats:
     """Ground frames `other` (..., 3) in the axes of `ground` (..., 3): forward, left [m], turn within +-pi [rad]."""
     cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
     x, y = other[..., 0] - ground[..., 0], other[..., 1] - ground[..., 1]
@@ -59,8 +59,8 @@ def seen_from(ground: Floats, other: Floats) -> Floats:
     return np.stack([cosine * x + sine * y, cosine * y - sine * x, turn], axis=-1)
 
 
-def moved(ground: Floats, step: Floats) -> Floats:
-    """The ground frame (..., 3) a step (..., 3) away: undoes `seen_from` up to whole turns."""
+def step_grounds(ground: Floats, step: Floats) -> Floats:
+    """The ground frame (..., 3) a step (..., 3) away: undoes `relative_ground` up to whole turns."""
     cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
     forward, left = step[..., 0], step[..., 1]
     x, y = ground[..., 0] + cosine * forward - sine * left, ground[..., 1] + sine * forward + cosine * left

@@ -9,11 +9,11 @@ import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
-from harness.core.hinges import are_gimbal, twin
+from harness.core.hinges import are_gimbal, equivalent_euler_angles
 from harness.core.humanoid24 import QPOS_OF_DOF
 
-_ALL_ROUND_RAD = np.deg2rad(350.0)
-_TURN = 2.0 * np.pi
+_UNLIMITED_RANGE_RAD = np.deg2rad(350.0)
+_FULL_TURN_RAD = 2.0 * np.pi
 
 
 class HingeLimits:
@@ -22,7 +22,7 @@ class HingeLimits:
     def __init__(self, body: Body, keep: bool = True) -> None:
         """With `keep` off no hinge has limits."""
         low, high = body.limits_rad[QPOS_OF_DOF].T
-        free = (high - low >= _ALL_ROUND_RAD) | (not keep)
+        free = (high - low >= _UNLIMITED_RANGE_RAD) | (not keep)
         self.low_rad: Floats = np.where(free, -np.inf, low)
         """(48,) lowest angle; -inf for a hinge that may turn all the way round."""
         self.high_rad: Floats = np.where(free, np.inf, high)
@@ -52,7 +52,7 @@ class HingeLimits:
         """
         plain = self._wrapped(angles_rad)
         other = np.array(plain)
-        other[..., self._gimbals] = twin(plain[..., self._gimbals])
+        other[..., self._gimbals] = equivalent_euler_angles(plain[..., self._gimbals])
         other = self._wrapped(other)
         beyond = np.abs(plain[..., self._gimbals[:, 1]]) > 0.5 * np.pi
         outside, outside_twin = (
@@ -69,16 +69,16 @@ class HingeLimits:
         """
         out, principal = np.array(angles_rad, dtype=float), self.principal(angles_rad)
         for gimbal in self._gimbals:
-            plain, other, lawful = out[:, gimbal], twin(out[:, gimbal]), principal[:, gimbal]
-            if 2 * np.count_nonzero(_turn(lawful - other) < _turn(lawful - plain)) > len(out):
+            plain, other, lawful = out[:, gimbal], equivalent_euler_angles(out[:, gimbal]), principal[:, gimbal]
+            if 2 * np.count_nonzero(_angular_distance(lawful - other) < _angular_distance(lawful - plain)) > len(out):
                 out[:, gimbal] = other
-        out += _TURN * np.round(np.median(principal - out, axis=0) / _TURN)
+        out += _FULL_TURN_RAD * np.round(np.median(principal - out, axis=0) / _FULL_TURN_RAD)
         return out
 
     def near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
         """`angles_rad` with every hinge that has no limits turned as near to the other as whole turns bring it."""
-        turns = np.where(np.isinf(self.high_rad), np.round((other_rad - angles_rad) / _TURN), 0.0)
-        out: Floats = angles_rad + _TURN * turns
+        turns = np.where(np.isinf(self.high_rad), np.round((other_rad - angles_rad) / _FULL_TURN_RAD), 0.0)
+        out: Floats = angles_rad + _FULL_TURN_RAD * turns
         return out
 
     def mean(self, angles_rad: Floats) -> Floats:
@@ -89,11 +89,11 @@ class HingeLimits:
 
     def _wrapped(self, angles_rad: Floats) -> Floats:
         """Whole turns added until every angle is within pi of the middle of its limits."""
-        out: Floats = angles_rad - _TURN * np.round((angles_rad - self._middle_rad) / _TURN)
+        out: Floats = angles_rad - _FULL_TURN_RAD * np.round((angles_rad - self._middle_rad) / _FULL_TURN_RAD)
         return out
 
 
-def _turn(difference_rad: Floats) -> Floats:
+def _angular_distance(difference_rad: Floats) -> Floats:
     """Size (T,) of differences (T, 3) of angles, each taken the short way round."""
-    out: Floats = np.sum(np.abs(difference_rad - _TURN * np.round(difference_rad / _TURN)), axis=-1)
+    out: Floats = np.sum(np.abs(difference_rad - _FULL_TURN_RAD * np.round(difference_rad / _FULL_TURN_RAD)), axis=-1)
     return out

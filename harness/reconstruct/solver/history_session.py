@@ -8,12 +8,12 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.reconstruct.solver.ik_session import Leaning, Manner, Pursuit
-from harness.reconstruct.solver.ik_solver import Solution
+from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
+from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.stream.frame import TrackerFrame
 
 
-class Remembering(Pursuit, ABC):
+class HistorySession(IKSession, ABC):
     """A `Session` that answers by `continued` as soon as it has enough of a past, and by inverse kinematics before.
 
     Examples advance by one period from row to row, so the past must, too: over a short gap it is filled by what
@@ -24,7 +24,13 @@ class Remembering(Pursuit, ABC):
     """Periods that a gap may last: 0.2 s at 40 Hz, over which a stride or a punch is still the same."""
 
     def __init__(
-        self, body: Body, calibration: Calibration, manner: Manner, leaning: Leaning, poses: int, rate_hz: float
+        self,
+        body: Body,
+        calibration: Calibration,
+        manner: SolverOptions,
+        leaning: PosturePrior,
+        poses: int,
+        rate_hz: float,
     ) -> None:
         super().__init__(body, calibration, manner, leaning)
         self.past: Floats = np.tile(self.qpos, (poses, 1))
@@ -34,14 +40,14 @@ class Remembering(Pursuit, ABC):
         self._replaced = np.array(self.past[-1])
 
     @abstractmethod
-    def continued(self) -> Solution:
+    def continued(self) -> IKSolution:
         """The pose that follows `past`."""
 
     @abstractmethod
     def bridged(self) -> Floats:
         """The configuration (55,) that follows `past` when nothing was read."""
 
-    def followed(self, frame: TrackerFrame) -> Solution:
+    def followed(self, frame: TrackerFrame) -> IKSolution:
         if self._known >= len(self.past):
             periods = round((self.now_s - self._noted_s) * self._rate_hz)
             if periods == 0:

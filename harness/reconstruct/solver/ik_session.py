@@ -15,30 +15,30 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.reconstruct.features.device_time import DeviceTime
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Prior, Solution, Solver, Stopping
-from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, Gate
+from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, Stopping
+from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.root_placement import placed, postures
-from harness.reconstruct.solver.status_monitor import LOST_AFTER_S, Coverage
+from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
+from harness.reconstruct.solver.status_monitor import LOST_AFTER_S, StatusMonitor
 from harness.stream.frame import TrackerFrame
 
-LEANING_RAD = float(np.deg2rad(30.0))
+POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
 """Of hinges about the examples' mean posture, while there is no past to go by [rad]."""
-_FAR = 2.0
+_OUTLIER_SCALES = 2.0
 """A reading contradicts the pose when it is off by more than so many times the Lorentzian's scale: 6 cm, 16 deg."""
-_MANY = 0.25
+_OUTLIER_SHARE = 0.25
 """When this share of the readings does so, the pose is sought anew at once; else once it has lasted `PATIENCE_S`."""
-_WIDENINGS = (10.0, 3.0, 1.0)
-_FIRST_LOOK, _HOPE = 6, 3.0
+_LOSS_SCALE_FACTORS = (10.0, 3.0, 1.0)
+_PROBE_STEPS, _PROBE_COST_RATIO = 6, 3.0
 """A start is looked at for so many steps, and left when it is so many times as dear as the best one by then: most
 have all but arrived, and those that stand upside down never do."""
-_ALIKE = 1e-3
+_DUPLICATE_TOLERANCE = 1e-3
 """Configurations that differ nowhere by more are one [m, rad]."""
 """How much farther the Lorentzian reaches while a cold start closes in."""
 
 
 @dataclass(frozen=True, eq=False)
-class Leaning:
+class PosturePrior:
     """The weak prior that fills in what trackers leave open when nothing better is known. The root has none."""
 
     mean_qpos: Floats | None
@@ -60,7 +60,7 @@ class Leaning:
 
 
 @dataclass(frozen=True)
-class Manner:
+class SolverOptions:
     """How a performer is followed."""
 
     loss: Loss = field(default_factory=Loss)
@@ -72,40 +72,40 @@ class Manner:
     stopping: Stopping = field(default_factory=Stopping)
 
 
-class Pursuit:
+class IKSession:
     """A `Session`. What differs from method to method is `followed`, and `noted` for those that remember."""
 
-    def __init__(self, body: Body, calibration: Calibration, manner: Manner, leaning: Leaning) -> None:
+    def __init__(self, body: Body, calibration: Calibration, manner: SolverOptions, leaning: PosturePrior) -> None:
         self.residuals = Residuals(body, calibration, manner.loss)
         self.limits = HingeLimits(body, keep=manner.limits)
-        self.solver = Solver(self.residuals, self.limits, manner.stopping)
-        few = min(_FIRST_LOOK, manner.stopping.most_steps)
-        self._first_look = Solver(self.residuals, self.limits, replace(manner.stopping, most_steps=few))
-        self.qpos = postures(body)[0]
+        self.solver = IKSolver(self.residuals, self.limits, manner.stopping)
+        few = min(_PROBE_STEPS, manner.stopping.most_steps)
+        self._first_look = IKSolver(self.residuals, self.limits, replace(manner.stopping, most_steps=few))
+        self.qpos = starting_postures(body)[0]
         """(55,) the last answer."""
         self._leaning = leaning
-        self._coverage = Coverage(manner.lost_after_s)
-        self._gate = Gate(len(calibration.stations), manner.jump_m)
+        self._coverage = StatusMonitor(manner.lost_after_s)
+        self._gate = OutlierGate(len(calibration.stations), manner.jump_m)
         self._time, self.now_s = DeviceTime(), 0.0
         """The moment of this frame [s]."""
-        self._starts = [*postures(body), *([] if leaning.mean_qpos is None else [leaning.mean_qpos])]
+        self._starts = [*starting_postures(body), *([] if leaning.mean_qpos is None else [leaning.mean_qpos])]
         self._started, self._following = False, False
         self._contradicted_since_s: float | None = None
 
-    def followed(self, frame: TrackerFrame) -> Solution:
+    def followed(self, frame: TrackerFrame) -> IKSolution:
         """The pose of a frame that continues what went before; its readings are in `residuals`."""
         return self.leaning(self.qpos, self.qpos)
 
     def noted(self, frame: TrackerFrame, anew: bool) -> None:
         """`qpos` is the answer to this frame; `anew` when it rests on nothing that went before."""
 
-    def leaning(self, start: Floats, previous: Floats) -> Solution:
+    def leaning(self, start: Floats, previous: Floats) -> IKSolution:
         """Inverse kinematics with the weak prior alone."""
         return self.solver.solve(start, self._leaning.prior(self.limits, previous))
 
     def contradiction(self) -> float:
         """The share of readings that lie far from the pose."""
-        far = (self.residuals.distance > _FAR * self.residuals.scale) & self.residuals.measured
+        far = (self.residuals.distance > _OUTLIER_SCALES * self.residuals.scale) & self.residuals.measured
         return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
 
     def step(self, frame: TrackerFrame) -> Estimate:
@@ -125,7 +125,7 @@ class Pursuit:
         self._following = status is Status.SOLVED or (self._following and status is not Status.LOST)
         return Estimate(self.qpos, status)
 
-    def _checked(self, warm: Solution) -> tuple[Solution, bool]:
+    def _checked(self, warm: IKSolution) -> tuple[IKSolution, bool]:
         """The pose as it was followed, or one sought anew when the readings contradict it; and whether so."""
         contradicted = self.contradiction()
         if contradicted == 0.0 and not self._gate.left_out:
@@ -133,26 +133,30 @@ class Pursuit:
             return warm, False
         if self._contradicted_since_s is None:
             self._contradicted_since_s = self.now_s
-        if contradicted < _MANY and (self._gate.left_out or self.now_s - self._contradicted_since_s < PATIENCE_S):
+        if contradicted < _OUTLIER_SHARE and (
+            self._gate.left_out or self.now_s - self._contradicted_since_s < PATIENCE_S
+        ):
             return warm, False
         self._contradicted_since_s = self.now_s
         cold = self._sought()
         return (cold, True) if cold.cost < 0.8 * warm.cost else (warm, False)
 
-    def _sought(self) -> Solution:
+    def _sought(self) -> IKSolution:
         """The cheapest pose found from the last one and from the starting postures, stood where the readings are."""
         postures_here = (self.qpos, *self._starts)
-        starts = _different([start for posture in postures_here for start in placed(self.residuals, posture)])
-        self.residuals.widen(_WIDENINGS[0])
+        starts = _unique(
+            [start for posture in postures_here for start in candidate_placements(self.residuals, posture)]
+        )
+        self.residuals.widen(_LOSS_SCALE_FACTORS[0])
         looked = [self._first_look.solve(start, self._leaning.prior(self.limits, start)) for start in starts]
-        dearest = _HOPE * min(solution.cost for solution in looked)
-        found: list[Solution] = []
+        dearest = _PROBE_COST_RATIO * min(solution.cost for solution in looked)
+        found: list[IKSolution] = []
         arrived: list[Floats] = []
         for start, solution in zip(starts, looked, strict=True):
             if solution.cost > dearest or not _is_new(solution.qpos, arrived):
                 continue
             arrived.append(solution.qpos)
-            for factor in _WIDENINGS:
+            for factor in _LOSS_SCALE_FACTORS:
                 self.residuals.widen(factor)
                 solution = self.leaning(solution.qpos, start)
             found.append(solution)
@@ -165,7 +169,7 @@ class Pursuit:
         return qpos
 
 
-def _different(poses: list[Floats]) -> list[Floats]:
+def _unique(poses: list[Floats]) -> list[Floats]:
     """Those configurations (55,) that none before them is all but equal to."""
     out: list[Floats] = []
     for qpos in poses:
@@ -175,4 +179,4 @@ def _different(poses: list[Floats]) -> list[Floats]:
 
 
 def _is_new(qpos: Floats, known: list[Floats]) -> bool:
-    return all(np.abs(qpos - other).max() > _ALIKE for other in known)
+    return all(np.abs(qpos - other).max() > _DUPLICATE_TOLERANCE for other in known)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.compiled import bound
+from harness.core.compiled import specialise
 from harness.reconstruct import descent
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.residuals import Residuals
@@ -40,7 +40,7 @@ class Stopping:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Solution:
+class IKSolution:
     """Where a solve ended."""
 
     qpos: Floats
@@ -51,14 +51,14 @@ class Solution:
     converged: bool
 
 
-class Solver:
+class IKSolver:
     """Solves for whatever frame its residuals have read; deterministic, each call by itself."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
         nv = residuals.kinematics.nv
-        self._model = descent.unsolved(residuals.chain)
-        self._trust = descent.Trust(
+        self._model = descent.new_quadratic_model(residuals.chain)
+        self._trust = descent.PriorAndLimits(
             mean=np.zeros(nv + 1),
             precision=np.zeros(nv),
             low_rad=np.array(limits.low_rad),
@@ -68,9 +68,9 @@ class Solver:
             most_steps=stopping.most_steps,
         )
         self._arrays = (residuals.chain, residuals.readings, residuals.placed, self._model, self._trust)
-        self._descend = bound(descent.descend, *self._arrays, np.zeros(nv + 1))
+        self._descend = specialise(descent.minimise, *self._arrays, np.zeros(nv + 1))
 
-    def solve(self, start: Floats, prior: Prior) -> Solution:
+    def solve(self, start: Floats, prior: Prior) -> IKSolution:
         """From a configuration (55,), clipped to the limits, downhill to a minimum."""
         trust = self._trust
         trust.mean[:] = prior.qpos
@@ -79,4 +79,4 @@ class Solver:
         cost, steps, converged = self._descend(*self._arrays, qpos)
         if steps < 0:
             raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
-        return Solution(qpos, cost, steps, converged)
+        return IKSolution(qpos, cost, steps, converged)

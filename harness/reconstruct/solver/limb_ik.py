@@ -41,7 +41,7 @@ class Limb(NamedTuple):
     high_rad: Floats
 
 
-class Hung(NamedTuple):
+class LimbBase(NamedTuple):
     """Where a limb hangs."""
 
     parent: Floats
@@ -50,7 +50,7 @@ class Hung(NamedTuple):
     """(3,) shoulder or hip."""
 
 
-class Aim(NamedTuple):
+class LimbTarget(NamedTuple):
     """A station on a limb, and where it was measured."""
 
     level: int
@@ -66,52 +66,52 @@ class Aim(NamedTuple):
 
 
 @compiled
-def reach(limb: Limb, angles: Floats, hung: Hung, aim: Aim) -> None:
+def solve_limb(limb: Limb, angles: Floats, hung: LimbBase, aim: LimbTarget) -> None:
     """Changes angles (7,) so that the station comes to where it was measured."""
     parent, bone = _matrix(hung.parent), _matrix(aim.turned)
     if aim.level == UPPER:
         if aim.facing:
-            _set_ball(limb, angles, _inverse_times(parent, bone))
+            _set_ball(limb, angles, _transposed_multiply(parent, bone))
         return
     if aim.here:
         _reach_point(limb, angles, parent, aim.point_m - hung.joint_m, aim, bone)
     if aim.facing:
-        lower = _times(_times(parent, _ball(limb, angles)), _turn(limb.hinge, angles[3]))
-        _turn_end(limb, angles, aim.level, _inverse_times(lower, bone))
+        lower = _multiply(_multiply(parent, _ball_rotation(limb, angles)), _axis_rotation(limb.hinge, angles[3]))
+        _turn_end(limb, angles, aim.level, _transposed_multiply(lower, bone))
 
 
 @compiled
-def _reach_point(limb: Limb, angles: Floats, parent: Floats, goal: Floats, aim: Aim, turned: Floats) -> None:
+def _reach_point(limb: Limb, angles: Floats, parent: Floats, goal: Floats, aim: LimbTarget, turned: Floats) -> None:
     """To a goal (3,) seen from the joint, with orientations (3, 3) of the bones that carry limb and station."""
-    twist = _turn(limb.twist, angles[4])
+    twist = _axis_rotation(limb.twist, angles[4])
     if aim.level == LOWER:
         beyond = aim.mount_m
     elif aim.level == TWIST and aim.facing:  # where the forearm starts turning, which its turning does not move
-        goal = goal - _rotated(turned, aim.mount_m)
+        goal = goal - _rotate(turned, aim.mount_m)
         beyond = limb.lower_m
     elif aim.level == TWIST:
-        beyond = limb.lower_m + _rotated(twist, aim.mount_m)
+        beyond = limb.lower_m + _rotate(twist, aim.mount_m)
     elif aim.facing:  # the end is where its own orientation puts it
-        goal = goal - _rotated(turned, aim.mount_m)
-        beyond = limb.lower_m + _rotated(twist, limb.twist_m)
+        goal = goal - _rotate(turned, aim.mount_m)
+        beyond = limb.lower_m + _rotate(twist, limb.twist_m)
     else:
-        end = _times(_turn(limb.end[1], angles[6]), _turn(limb.end[0], angles[5]))
-        beyond = limb.lower_m + _rotated(twist, limb.twist_m + _rotated(end, aim.mount_m))
+        end = _multiply(_axis_rotation(limb.end[1], angles[6]), _axis_rotation(limb.end[0], angles[5]))
+        beyond = limb.lower_m + _rotate(twist, limb.twist_m + _rotate(end, aim.mount_m))
     far = np.sqrt(_dot(goal, goal))
     if far < 1e-9:
         return
-    angles[3] = bent(limb, beyond, far, angles[3])
-    bend = _turn(limb.hinge, angles[3])
-    world = _times(parent, _ball(limb, angles))
+    angles[3] = hinge_angle_rad(limb, beyond, far, angles[3])
+    bend = _axis_rotation(limb.hinge, angles[3])
+    world = _multiply(parent, _ball_rotation(limb, angles))
     way = goal / far
-    world = _times(_shortest(_rotated(world, limb.upper_m + _rotated(bend, beyond)), way), world)
+    world = _multiply(_shortest_rotation(_rotate(world, limb.upper_m + _rotate(bend, beyond)), way), world)
     if aim.facing:
-        world = _times(_turn(way, _swivel(limb, aim.level, way, _times(world, bend), turned)), world)
-    _set_ball(limb, angles, _inverse_times(parent, world))
+        world = _multiply(_axis_rotation(way, _swivel(limb, aim.level, way, _multiply(world, bend), turned)), world)
+    _set_ball(limb, angles, _transposed_multiply(parent, world))
 
 
 @compiled
-def bent(limb: Limb, beyond_m: Floats, far_m: float, before_rad: float) -> float:
+def hinge_angle_rad(limb: Limb, beyond_m: Floats, far_m: float, before_rad: float) -> float:
     """The angle of elbow or knee at which a point beyond it is `far_m` from the joint: the law of cosines.
 
     Of its two solutions the lawful one nearest to the angle before; as near as the limits and the lengths allow.
@@ -129,7 +129,7 @@ def bent(limb: Limb, beyond_m: Floats, far_m: float, before_rad: float) -> float
     low, high = limb.low_rad[3], limb.high_rad[3]
     best, least = before_rad, np.inf
     for angle in (middle + half, middle - half):
-        near = _near(angle, before_rad)
+        near = _nearest_equivalent_angle(angle, before_rad)
         lawful = min(max(near, low), high)
         cost = 100.0 * abs(near - lawful) + abs(lawful - before_rad)
         if cost < least:
@@ -141,25 +141,25 @@ def bent(limb: Limb, beyond_m: Floats, far_m: float, before_rad: float) -> float
 def _swivel(limb: Limb, level: int, way: Floats, lower: Floats, turned: Floats) -> float:
     """The turn about `way` (3,) of forearm or shin (3, 3) that suits the measured orientation best."""
     if level == LOWER:  # the largest trace of turned^T R(way, angle) lower
-        product = _times_inverse(lower, turned)
+        product = _multiply_transposed(lower, turned)
         skew = np.array([product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]])
         trace = product[0, 0] + product[1, 1] + product[2, 2]
-        return -float(np.arctan2(_dot(way, skew), trace - _dot(way, _rotated(product, way))))
+        return -float(np.arctan2(_dot(way, skew), trace - _dot(way, _rotate(product, way))))
     if level == TWIST:
-        have, want = _rotated(lower, limb.twist), _rotated(turned, limb.twist)
+        have, want = _rotate(lower, limb.twist), _rotate(turned, limb.twist)
         across = _dot(have, want) - _dot(way, have) * _dot(way, want)
         return float(np.arctan2(_dot(way, _cross(have, want)), across))
     if _dot(limb.twist, limb.twist) > 0.0:  # a hand's three hinges reach any orientation
         return 0.0
     # a foot's inner axis must stay square to its outer one
-    inner, outer = _rotated(turned, limb.end[0]), _rotated(lower, limb.end[1])
+    inner, outer = _rotate(turned, limb.end[0]), _rotate(lower, limb.end[1])
     still = _dot(inner, way) * _dot(way, outer)
     cosine, sine = _dot(inner, outer) - still, _dot(inner, _cross(way, outer))
     swing = np.hypot(cosine, sine)
     if swing < 1e-12:
         return 0.0
     middle, half = np.arctan2(sine, cosine), np.arccos(min(max(-still / swing, -1.0), 1.0))
-    one, other = _near(middle + half, 0.0), _near(middle - half, 0.0)
+    one, other = _nearest_equivalent_angle(middle + half, 0.0), _nearest_equivalent_angle(middle - half, 0.0)
     return one if abs(one) < abs(other) else other
 
 
@@ -167,7 +167,7 @@ def _swivel(limb: Limb, level: int, way: Floats, lower: Floats, turned: Floats) 
 def _turn_end(limb: Limb, angles: Floats, level: int, lower_from_bone: Floats) -> None:
     """Twist and end hinges for an orientation (3, 3) relative to the lower bone."""
     if level == TWIST:
-        angles[4] = _clipped(limb, 4, _near(_angle_about(limb.twist, lower_from_bone), angles[4]))
+        angles[4] = _clipped(limb, 4, _nearest_equivalent_angle(_angle_about(limb.twist, lower_from_bone), angles[4]))
     elif level == END:
         inner, outer = limb.end[0], limb.end[1]
         third = _cross(inner, outer)
@@ -191,9 +191,9 @@ def _set_ball(limb: Limb, angles: Floats, parent_from_upper: Floats) -> None:
 
 
 @compiled
-def _ball(limb: Limb, angles: Floats) -> Floats:
-    inner = _times(_turn(limb.ball[1], angles[1]), _turn(limb.ball[0], angles[0]))
-    return _times(_turn(limb.ball[2], angles[2]), inner)
+def _ball_rotation(limb: Limb, angles: Floats) -> Floats:
+    inner = _multiply(_axis_rotation(limb.ball[1], angles[1]), _axis_rotation(limb.ball[0], angles[0]))
+    return _multiply(_axis_rotation(limb.ball[2], angles[2]), inner)
 
 
 @compiled
@@ -201,7 +201,7 @@ def _euler(axes: Floats, turn: Floats) -> Floats:
     """Angles (3,) about right-handed axes (3, 3), innermost first (`core.hinges`)."""
     m = np.empty((3, 3))
     for j in range(3):
-        column = _rotated(turn, axes[j])
+        column = _rotate(turn, axes[j])
         for i in range(3):
             m[i, j] = _dot(axes[i], column)
     out = np.empty(3)
@@ -219,13 +219,13 @@ def _nearer_twin(angles: Floats, before: Floats) -> Floats:
     """The representation of three hinges' rotation that is nearest to angles (3,) before."""
     one, other = np.empty(3), np.empty(3)
     for k in range(3):
-        one[k] = _near(angles[k], before[k])
-        other[k] = _near(np.pi - angles[k] if k == 1 else np.pi + angles[k], before[k])
+        one[k] = _nearest_equivalent_angle(angles[k], before[k])
+        other[k] = _nearest_equivalent_angle(np.pi - angles[k] if k == 1 else np.pi + angles[k], before[k])
     return one if _dot(one - before, one - before) <= _dot(other - before, other - before) else other
 
 
 @compiled
-def _near(angle: float, other: float) -> float:
+def _nearest_equivalent_angle(angle: float, other: float) -> float:
     return float(angle - 2.0 * np.pi * np.round((angle - other) / (2.0 * np.pi)))
 
 
@@ -239,11 +239,11 @@ def _angle_about(axis: Floats, turn: Floats) -> float:
     """The turn about an axis that comes nearest to a rotation (3, 3)."""
     skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
-    return float(np.arctan2(_dot(axis, skew), trace - _dot(axis, _rotated(turn, axis))))
+    return float(np.arctan2(_dot(axis, skew), trace - _dot(axis, _rotate(turn, axis))))
 
 
 @compiled
-def _shortest(start: Floats, way: Floats) -> Floats:
+def _shortest_rotation(start: Floats, way: Floats) -> Floats:
     """(3, 3) the shortest turn of a vector (3,) into a direction (3,)."""
     length = np.sqrt(_dot(start, start))
     axis, cosine = _cross(start, way) / length, _dot(start, way) / length
@@ -254,12 +254,12 @@ def _shortest(start: Floats, way: Floats) -> Floats:
         least = np.zeros(3)
         least[np.argmin(np.abs(way))] = 1.0
         axis = _cross(way, least)
-        return _turn(axis / np.sqrt(_dot(axis, axis)), np.pi)
-    return _turn(axis / sine, np.arctan2(sine, cosine))
+        return _axis_rotation(axis / np.sqrt(_dot(axis, axis)), np.pi)
+    return _axis_rotation(axis / sine, np.arctan2(sine, cosine))
 
 
 @compiled
-def _turn(axis: Floats, angle: float) -> Floats:
+def _axis_rotation(axis: Floats, angle: float) -> Floats:
     """(3, 3) about a unit axis; nothing about a zero one."""
     c, s = np.cos(angle), np.sin(angle)
     x, y, z = axis[0], axis[1], axis[2]
@@ -299,12 +299,12 @@ def _cross(a: Floats, b: Floats) -> Floats:
 
 
 @compiled
-def _rotated(turn: Floats, v: Floats) -> Floats:
+def _rotate(turn: Floats, v: Floats) -> Floats:
     return np.array([_dot(turn[0], v), _dot(turn[1], v), _dot(turn[2], v)])
 
 
 @compiled
-def _times(a: Floats, b: Floats) -> Floats:
+def _multiply(a: Floats, b: Floats) -> Floats:
     out = np.zeros((3, 3))
     for i in range(3):
         for j in range(3):
@@ -313,12 +313,12 @@ def _times(a: Floats, b: Floats) -> Floats:
 
 
 @compiled
-def _times_inverse(a: Floats, b: Floats) -> Floats:
+def _multiply_transposed(a: Floats, b: Floats) -> Floats:
     """a b^T."""
-    return _times(a, np.ascontiguousarray(b.T))
+    return _multiply(a, np.ascontiguousarray(b.T))
 
 
 @compiled
-def _inverse_times(a: Floats, b: Floats) -> Floats:
+def _transposed_multiply(a: Floats, b: Floats) -> Floats:
     """a^T b."""
-    return _times(np.ascontiguousarray(a.T), b)
+    return _multiply(np.ascontiguousarray(a.T), b)

@@ -15,14 +15,14 @@ from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import QPOS_OF_DOF
 from harness.reconstruct.features.anchor_frame import anchor_of, on_trunk
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.limb_ik import END, LOWER, TWIST, UPPER, Aim, Hung, Limb, reach
+from harness.reconstruct.solver.limb_ik import END, LOWER, TWIST, UPPER, Limb, LimbBase, LimbTarget, solve_limb
 from harness.reconstruct.solver.residuals import Residuals
 
 _ARM = {"humerus": UPPER, "radius": LOWER, "wrist": TWIST, "hand": END}
 _LEG = {"femur": UPPER, "tibia": LOWER, "foot": END}
 
 
-class Limbs:
+class LimbSolver:
     """The four limbs of a body and the stations that they carry."""
 
     def __init__(self, body: Body, bones: Sequence[str], residuals: Residuals, limits: HingeLimits) -> None:
@@ -33,7 +33,7 @@ class Limbs:
             for levels in (_ARM, _LEG):
                 worn = [(levels[bone[1:]], s) for s, bone in enumerate(bones) if bone[0] == side and bone[1:] in levels]
                 if worn:
-                    self._parts.append(_Part(body, side, levels, sorted(worn, reverse=True), limits))
+                    self._parts.append(_LimbStations(body, side, levels, sorted(worn, reverse=True), limits))
 
     def reach(self, qpos: Floats) -> Floats:
         """The configuration (55,) moved from one that lies within the limits."""
@@ -61,7 +61,7 @@ class Limbs:
             qpos[:3] += residuals.target_m[station] - residuals.station_m[station]
 
 
-class _Part:
+class _LimbStations:
     """One limb with its stations, outermost first."""
 
     def __init__(
@@ -105,7 +105,7 @@ class _Part:
             if not (here[station] or facing[station]):
                 continue
             angles = np.where(self._known, qpos[self._qpos], 0.0)
-            aim = Aim(
+            aim = LimbTarget(
                 level,
                 residuals.mount_m[station],
                 residuals.target_m[station],
@@ -113,6 +113,6 @@ class _Part:
                 bool(here[station]),
                 bool(facing[station]),
             )
-            reach(self._limb, angles, Hung(turned[self._parent], at_m[self._body]), aim)
+            solve_limb(self._limb, angles, LimbBase(turned[self._parent], at_m[self._body]), aim)
             qpos[self._qpos[self._known]] = angles[self._known]
             return

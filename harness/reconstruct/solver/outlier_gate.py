@@ -15,11 +15,11 @@ from harness.stream.frame import TrackerFrame
 
 JUMP_M, PATIENCE_S = 0.15, 0.25
 """Farther than motion strays within a period; longer than a burst of echoes (8 records at 40 Hz)."""
-_LONGEST_PERIOD_S = 0.1
+_MAX_PERIOD_S = 0.1
 """After a longer gap nothing can be said about where stations should be."""
 
 
-class Gate:
+class OutlierGate:
     """Watches the positions of S stations through one session."""
 
     def __init__(self, stations: int, jump_m: float = JUMP_M, patience_s: float = PATIENCE_S) -> None:
@@ -52,9 +52,9 @@ class Gate:
         """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""
         out, self.all_moved = np.zeros(len(measured), bool), False
         period_s = now_s - self._known_at_s
-        if self._moving and 0.0 < period_s <= _LONGEST_PERIOD_S:
+        if self._moving and 0.0 < period_s <= _MAX_PERIOD_S:
             expected_m = self._station_m + period_s * self._velocity_m_s
-            self.all_moved = _jumps(
+            self.all_moved = _find_jumps(
                 *(target_m, measured, expected_m, self._jump_m),
                 *(now_s, self._patience_s, self._believed_at_s, out),
             )
@@ -65,14 +65,14 @@ class Gate:
     def settled(self, now_s: float, station_m: Floats) -> None:
         """Where the answer to this frame puts the stations (S, 3) [m]."""
         period_s = now_s - self._known_at_s
-        self._moving = 0.0 < period_s <= _LONGEST_PERIOD_S
+        self._moving = 0.0 < period_s <= _MAX_PERIOD_S
         if self._moving:
             self._velocity_m_s = (station_m - self._station_m) / period_s
         self._station_m, self._known_at_s = station_m.copy(), now_s
 
 
 @compiled
-def _jumps(
+def _find_jumps(
     target_m: Floats,
     measured: Bools,
     expected_m: Floats,

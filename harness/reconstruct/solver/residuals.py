@@ -16,7 +16,7 @@ from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
-from harness.core.compiled import bound
+from harness.core.compiled import specialise
 from harness.errors import ShapeError
 from harness.reconstruct import descent
 from harness.stream.frame import TrackerFrame
@@ -62,19 +62,20 @@ class Residuals:
         """(S, 4) measured orientation of the bones that carry the stations; identity where not measured."""
         self.scale: Floats = np.repeat([loss.position_scale_m, loss.orientation_scale_rad], count)
         """(2S,) where each row's Lorentzian starts to let go [m; rad]."""
-        self.chain = descent.chain(body, self.bones, self.mount_m)
-        self.readings = descent.Readings(self.target_m, self.world_from_target, *np.zeros((2, 2 * count)))
-        self.placed = descent.unplaced(self.chain)
+        self.chain = descent.build_tree(body, self.bones, self.mount_m)
+        self.readings = descent.StationTargets(self.target_m, self.world_from_target, *np.zeros((2, 2 * count)))
+        self.placed = descent.new_state(self.chain)
         self.error: Floats = self.placed.error
         """(2S, 3) measured minus modelled [m; rad]; means nothing in rows that were not measured."""
         self.station_m: Floats = self.placed.station_m
         """(S, 3) modelled station positions in the world [m]."""
 
         self._qpos = np.zeros(body.model.nq)
-        self._tracker = descent.Tracker(
+        self._tracker = descent.MeasurementModel(
             turn=rotations.to_matrix(calibration.world_from_tracker),
             origin_m=np.array(calibration.tracker_origin_m),
-            to_bone=_left(calibration.world_from_tracker) @ _right(rotations.inverse(calibration.bone_from_station)),
+            to_bone=_left_multiplication(calibration.world_from_tracker)
+            @ _right_multiplication(rotations.inverse(calibration.bone_from_station)),
             precision=np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count),
             twice_scale_squared=2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf),
             by_quality=loss.quality,
@@ -82,8 +83,10 @@ class Residuals:
         )
         silent, never = np.zeros(count), np.zeros(count, bool)
         nothing = TrackerFrame(0.0, silent, np.zeros((count, 3)), np.zeros((count, 4)), never, never, silent, never)
-        self._read = bound(descent.read, self._tracker, self.readings, *_told(nothing), self.measured, self.trust)
-        self._place = bound(descent.place, self.chain, self.readings, self.placed, self._qpos)
+        self._read = specialise(
+            descent.update_targets, self._tracker, self.readings, *_frame_arguments(nothing), self.measured, self.trust
+        )
+        self._place = specialise(descent.evaluate, self.chain, self.readings, self.placed, self._qpos)
 
     @property
     def distance(self) -> Floats:
@@ -98,7 +101,7 @@ class Residuals:
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
             )
         self.measured = np.empty(2 * len(self.bones), bool)
-        self._read(self._tracker, self.readings, *_told(frame), self.measured, self.trust)
+        self._read(self._tracker, self.readings, *_frame_arguments(frame), self.measured, self.trust)
 
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
@@ -126,17 +129,17 @@ class Residuals:
         return found
 
 
-def _told(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:
-    """What `descent.read` is told of a frame."""
+def _frame_arguments(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:
+    """What `descent.update_targets` is told of a frame."""
     valid = frame.position_valid, frame.orientation_valid
     return frame.position_m, frame.tracker_from_station, *valid, frame.quality, frame.suspect
 
 
-def _left(q: Floats) -> Floats:
+def _left_multiplication(q: Floats) -> Floats:
     """(..., 4, 4) matrix of p -> q p."""
     return np.stack([rotations.multiply(q, unit) for unit in np.eye(4)], axis=-1)
 
 
-def _right(q: Floats) -> Floats:
+def _right_multiplication(q: Floats) -> Floats:
     """(..., 4, 4) matrix of p -> p q."""
     return np.stack([rotations.multiply(unit, q) for unit in np.eye(4)], axis=-1)

@@ -16,7 +16,7 @@ _LEVER_M = 0.3
 """An orientation that is off by an angle counts like a position that is off by the angle times this [m]."""
 
 
-def placed(residuals: Residuals, qpos: Floats) -> tuple[Floats, Floats]:
+def candidate_placements(residuals: Residuals, qpos: Floats) -> tuple[Floats, Floats]:
     """The configuration (55,) moved as a whole to the readings: turned about the vertical only, and freely.
 
     Least squares over positions and orientations (Kabsch 1976), each counting as it is trusted. Without positions it
@@ -26,7 +26,7 @@ def placed(residuals: Residuals, qpos: Floats) -> tuple[Floats, Floats]:
     residuals.kinematics.set(qpos)
     at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, residuals.bone_from_station)
     positions, orientations = residuals.trust[:count], residuals.trust[count:]
-    middle_m, target_middle_m, moment = _moment(
+    middle_m, target_middle_m, moment = _cross_covariance(
         *(at_m, turned, residuals.target_m, residuals.world_from_target, residuals.bone_from_station),
         *(positions, orientations, qpos[:3]),
     )
@@ -35,16 +35,16 @@ def placed(residuals: Residuals, qpos: Floats) -> tuple[Floats, Floats]:
     flip = np.array([1.0, 1.0, np.linalg.det(left @ right)])
     upright = np.array([np.cos(0.5 * yaw_rad), 0.0, 0.0, np.sin(0.5 * yaw_rad)])
     tilted = _quaternion((left * flip) @ right)
-    return _moved(qpos, upright, middle_m, target_middle_m), _moved(qpos, tilted, middle_m, target_middle_m)
+    return _transform(qpos, upright, middle_m, target_middle_m), _transform(qpos, tilted, middle_m, target_middle_m)
 
 
-def nearest_placed(residuals: Residuals, qpos: Floats) -> Floats:
+def place_root(residuals: Residuals, qpos: Floats) -> Floats:
     """The cheaper of the two; the upright one unless tilting pays."""
-    upright, tilted = placed(residuals, qpos)
+    upright, tilted = candidate_placements(residuals, qpos)
     return tilted if residuals.place(tilted) < 0.9 * residuals.place(upright) else upright
 
 
-def postures(body: Body) -> tuple[Floats, ...]:
+def starting_postures(body: Body) -> tuple[Floats, ...]:
     """Configurations (55,) from which a solver finds most poses: T-pose, arms hanging, forearms raised."""
     start = tpose(body.skeleton)
     return start, *(_with_arms(body.skeleton, start, *degrees) for degrees in ((75.0, 15.0), (60.0, 90.0)))
@@ -60,7 +60,7 @@ def _with_arms(skeleton: Skeleton, qpos: Floats, lowered_deg: float, bent_deg: f
 
 
 @compiled
-def _moment(
+def _cross_covariance(
     at_m: Floats,
     turned: Floats,
     target_m: Floats,
@@ -82,23 +82,23 @@ def _moment(
             moment += np.outer(positions[s] * (target_m[s] - target_middle_m), at_m[s] - middle_m)
     for s in range(len(orientations)):
         if orientations[s] > 0.0:
-            target = _product(world_from_target[s], bone_from_station[s])
-            turn = _product(target, turned[s] * np.array([1.0, -1.0, -1.0, -1.0]))
+            target = _quaternion_product(world_from_target[s], bone_from_station[s])
+            turn = _quaternion_product(target, turned[s] * np.array([1.0, -1.0, -1.0, -1.0]))
             moment += _LEVER_M**2 * orientations[s] * _matrix(turn)
     return middle_m, target_middle_m, moment
 
 
 @compiled
-def _moved(qpos: Floats, turn: Floats, from_m: Floats, to_m: Floats) -> Floats:
+def _transform(qpos: Floats, turn: Floats, from_m: Floats, to_m: Floats) -> Floats:
     """The configuration (55,) turned about a point that goes elsewhere."""
     out = qpos.copy()
     out[:3] = to_m + _matrix(turn) @ (qpos[:3] - from_m)
-    out[3:7] = _product(turn, qpos[3:7])
+    out[3:7] = _quaternion_product(turn, qpos[3:7])
     return out
 
 
 @compiled
-def _product(p: Floats, q: Floats) -> Floats:
+def _quaternion_product(p: Floats, q: Floats) -> Floats:
     """Of two quaternions (4,)."""
     return np.array(
         [

@@ -9,7 +9,7 @@ from harness.stream.frame import TrackerFrame
 LOST_AFTER_S = 0.5
 
 
-class Coverage:
+class StatusMonitor:
     """Watches one session's frames; a station reports when its position or its orientation is valid."""
 
     def __init__(self, lost_after_s: float = LOST_AFTER_S) -> None:

@@ -8,33 +8,35 @@ space, and every step is projected onto it (`descent.descend_within`).
 import numpy as np
 
 from harness.core.arrays import Floats, Singles
-from harness.core.compiled import bound, compiled
-from harness.reconstruct.descent import Space, descend_within
-from harness.reconstruct.solver.ground_frame import POSTURE
+from harness.core.compiled import compiled, specialise
+from harness.reconstruct.descent import Subspace, minimise_in_subspace
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Solution, Stopping
+from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
 from harness.reconstruct.solver.residuals import Residuals
 
-_FLOOR = 1e-9
+_VARIANCE_FLOOR = 1e-9
 """Added to all variances [m^2, rad^2]."""
-_STIFF = 1e9
+_SPRING_STIFFNESS = 1e9
 """Of the spring across the space, far above what trackers say of a pose [1/m^2, 1/rad^2]."""
-_FEW, _ROUNDS = 16, 4
+_INVERSE_ITERATION_MAX, _INVERSE_ITERATION_ROUNDS = 16, 4
 """Up to so many directions left out are found by so many rounds of inverse iteration, in an eighth of the time."""
 
 
-class Confined:
+class SubspaceSolver:
     """Solves for whatever frame its residuals have read, among the postures of a space."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self._residuals, self._limits = residuals, limits
         self._arrays = residuals.chain, residuals.readings, residuals.placed
         self._stop = stopping.step, stopping.decrease, stopping.most_steps
-        any_space = spanned(np.zeros((1, POSTURE), np.float32), POSTURE, 1.0, np.zeros(POSTURE), 0.0)
-        start = np.zeros(3 + POSTURE)
-        self._descend = bound(descend_within, *self._arrays, any_space, self._stop, start)
+        any_space = fit_subspace(
+            np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, np.zeros(POSTURE_SIZE), 0.0
+        )
+        start = np.zeros(3 + POSTURE_SIZE)
+        self._descend = specialise(minimise_in_subspace, *self._arrays, any_space, self._stop, start)
 
-    def solve(self, space: Space, ground: Floats, posture: Floats) -> Solution:
+    def solve(self, space: Subspace, ground: Floats, posture: Floats) -> IKSolution:
         """From a ground frame (3,) and a posture (P,). What leaves the hinges' limits is clipped at the end."""
         start = np.concatenate([ground, posture])
         qpos, cost, steps, converged = self._descend(*self._arrays, space, self._stop, start)
@@ -42,11 +44,11 @@ class Confined:
             raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
         qpos[7:] = self._limits.clipped(qpos[7:])
         self._residuals.place(qpos)
-        return Solution(qpos, cost, steps, converged)
+        return IKSolution(qpos, cost, steps, converged)
 
 
 @compiled
-def spanned(postures: Singles, components: int, alpha: float, expected: Floats, beta: float) -> Space:
+def fit_subspace(postures: Singles, components: int, alpha: float, expected: Floats, beta: float) -> Subspace:
     """By the leading directions of K postures (K, P); `expected` (P,) is q'."""
     count, size = postures.shape
     values = postures.astype(np.float64)
@@ -55,35 +57,35 @@ def spanned(postures: Singles, components: int, alpha: float, expected: Floats, 
     for i in range(size):
         for j in range(size):
             scatter[i, j] = scatter[i, j] / count - mean[i] * mean[j]
-        scatter[i, i] += _FLOOR
-    inverse, left_out = inverted(scatter), max(size - components, 0)
-    if left_out <= _FEW:
-        across = least(inverse, left_out, _ROUNDS)
+        scatter[i, i] += _VARIANCE_FLOOR
+    inverse, left_out = invert_positive_definite(scatter), max(size - components, 0)
+    if left_out <= _INVERSE_ITERATION_MAX:
+        across = least_variance_directions(inverse, left_out, _INVERSE_ITERATION_ROUNDS)
     else:
         across = np.ascontiguousarray(np.linalg.eigh(scatter)[1][:, :left_out].T)
-    curvature = _confined(inverse, across, alpha)
+    curvature = _constrained_curvature(inverse, across, alpha)
     spring = np.zeros(size)
     for i in range(size):
         curvature[i, i] += beta
         for k in range(left_out):
-            spring[i] += _STIFF * across[k, i] ** 2
-    return Space(mean, across, curvature, beta * (expected - mean), spring)
+            spring[i] += _SPRING_STIFFNESS * across[k, i] ** 2
+    return Subspace(mean, across, curvature, beta * (expected - mean), spring)
 
 
 @compiled
-def _confined(inverse: Floats, across: Floats, alpha: float) -> Floats:
+def _constrained_curvature(inverse: Floats, across: Floats, alpha: float) -> Floats:
     """(P, P) alpha times the inverse within the space, and the spring across it."""
     share = alpha * np.dot(across, inverse)
     within = np.dot(share, across.T)
     for k in range(len(across)):
-        within[k, k] += _STIFF
+        within[k, k] += _SPRING_STIFFNESS
     half = np.dot(across.T, share - 0.5 * np.dot(within, across))
     out: Floats = alpha * inverse - half - half.T
     return out
 
 
 @compiled
-def inverted(matrix: Floats) -> Floats:
+def invert_positive_definite(matrix: Floats) -> Floats:
     """The inverse of a positive definite matrix (N, N), by Gauss and Jordan's elimination of its lower triangle."""
     out, pivot, count = matrix.copy(), np.empty(len(matrix)), len(matrix)
     for k in range(count):
@@ -106,7 +108,7 @@ def inverted(matrix: Floats) -> Floats:
 
 
 @compiled
-def least(inverse: Floats, count: int, rounds: int) -> Floats:
+def least_variance_directions(inverse: Floats, count: int, rounds: int) -> Floats:
     """(D, N) orthonormal rows: the D = `count` directions of least variance, from the inverse (N, N) of the scatter.
 
     Inverse iteration of all at once, from the coordinates that the others leave the least room. Two directions whose

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from harness.compare.comparison import Comparison, Difference, Verdict
-from harness.report.comparison.wording import groups_vary, percent, share
+from harness.report.comparison.wording import format_percent, groups_vary, percent_of_a
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart
-from harness.report.run.charts import drawn
+from harness.report.run.charts import draw_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
 _WIDTH_IN, _ROW_IN, _FRAME_IN = 4.2, 0.34, 0.62
 _LETTERS, _MOST_ROWS = 18, 3
 """Before a row, in so many rows of text at most."""
-_LOOKS: Mapping[Verdict, dict[str, Any]] = {
+_MARKER_STYLES: Mapping[Verdict, dict[str, Any]] = {
     "worse": {"color": COLOURS[0]},
     "better": {"color": COLOURS[1]},
     "same": {"color": INK, "marker": "o"},
     "cannot tell": {"color": FAINT, "marker": "o", "markerfacecolor": PAPER},
 }
 """What is worse or better has a triangle that points to where it went: by shape as well as by colour."""
-_WIDE = 40.0
+_SYMLOG_RATIO = 40.0
 """So many times the median reach of a row, the longest row makes the axis symmetrically logarithmic."""
 
 
-def intervals(comparison: Comparison, gated: bool) -> list[Chart]:
+def interval_charts(comparison: Comparison, gated: bool) -> list[Chart]:
     """A chart for each metric of the lines that are gated, or that are not; those that are no share are left out."""
     chosen = [line for line in comparison.differences if line.gated == gated and line.mean_a]
     metrics = dict.fromkeys(line.metric for line in chosen)
@@ -42,9 +42,9 @@ def intervals(comparison: Comparison, gated: bool) -> list[Chart]:
 
 def _chart(name: str, metric: str, lines: Sequence[Difference], varied: bool) -> Chart:
     names = [_label(line, varied) for line in lines]
-    told = [f"{line.method} {percent(share(line, line.difference))} {line.verdict}" for line in lines]
+    told = [f"{line.method} {format_percent(percent_of_a(line, line.difference))} {line.verdict}" for line in lines]
     height_in = _FRAME_IN + sum(max(_ROW_IN, 0.17 * (1 + name.count("\n"))) for name in names)
-    return drawn(
+    return draw_chart(
         name,
         metric,
         "",
@@ -58,14 +58,14 @@ def _chart(name: str, metric: str, lines: Sequence[Difference], varied: bool) ->
 def _draw(figure: "Figure", lines: Sequence[Difference], names: Sequence[str]) -> None:
     axes = figure.subplots()
     for row, line in enumerate(lines):
-        margin = share(line, line.margin)
+        margin = percent_of_a(line, line.margin)
         axes.barh(row, 2.0 * margin, left=-margin, height=0.8, color=GRID, alpha=0.75)
-        look = {"marker": ">" if line.difference > 0.0 else "<", **_LOOKS[line.verdict]}
+        look = {"marker": ">" if line.difference > 0.0 else "<", **_MARKER_STYLES[line.verdict]}
         if line.low is not None and line.high is not None:
-            ends = [share(line, line.low), share(line, line.high)]
+            ends = [percent_of_a(line, line.low), percent_of_a(line, line.high)]
             axes.plot(ends, [row, row], color=look["color"], linewidth=2.2, solid_capstyle="butt")
-        axes.plot(share(line, line.difference), row, markersize=6.5, linestyle="none", **look)
-        said = f"{percent(share(line, line.difference))} {line.verdict}"
+        axes.plot(percent_of_a(line, line.difference), row, markersize=6.5, linestyle="none", **look)
+        said = f"{format_percent(percent_of_a(line, line.difference))} {line.verdict}"
         axes.annotate(said, (1.02, row), xycoords=axes.get_yaxis_transform(), va="center", fontsize=9.5)
     axes.axvline(0.0, color=FAINT, linewidth=0.9)
     axes.set_yticks(range(len(lines)), names)
@@ -80,10 +80,10 @@ def _scale(axes: "Axes", lines: Sequence[Difference]) -> None:
     """The same to both sides; logarithmic beyond the middle where one line would flatten all others."""
     from matplotlib.ticker import FixedLocator, MaxNLocator
 
-    reaches = sorted(_reach(line) for line in lines)
+    reaches = sorted(_extent(line) for line in lines)
     middle, furthest = reaches[len(reaches) // 2], reaches[-1]
     end = 1.08 * furthest if furthest > 0.0 else 1.0
-    if furthest > _WIDE * middle > 0.0:
+    if furthest > _SYMLOG_RATIO * middle > 0.0:
         axes.set_xscale("symlog", linthresh=2.0 * middle, linscale=1.5)
         axes.xaxis.set_major_locator(FixedLocator(_ticks(2.0 * middle, end)))
     else:
@@ -99,8 +99,8 @@ def _ticks(linear: float, end: float) -> list[float]:
     return [*(-tick for tick in reversed(kept)), 0.0, *kept]
 
 
-def _reach(line: Difference) -> float:
-    ends = (share(line, value) for value in (line.low, line.high, line.difference, line.margin))
+def _extent(line: Difference) -> float:
+    ends = (percent_of_a(line, value) for value in (line.low, line.high, line.difference, line.margin))
     return max(abs(value) for value in ends if not math.isnan(value))
 
 

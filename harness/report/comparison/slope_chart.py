@@ -12,54 +12,61 @@ from harness.compare.comparison import Difference
 from harness.core.arrays import Floats
 from harness.report.comparison.wording import (
     clip_steps,
-    direction,
-    interval,
-    mean,
-    percent,
+    count_directions,
+    format_interval,
+    format_mean,
+    format_percent,
+    format_signed,
+    line_title,
+    percent_of_a,
     rise_is_worse,
-    share,
-    signed,
-    title,
 )
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart
-from harness.report.run.charts import drawn
+from harness.report.run.charts import draw_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SIZE_IN = (3.3, 2.5)
-WORSE, BETTER = COLOURS[0], COLOURS[1]
-_SLOPES, _DIFFERENCES = (0.145, 0.17, 0.42, 0.72), (0.725, 0.17, 0.26, 0.72)
+WORSE_COLOUR, BETTER_COLOUR = COLOURS[0], COLOURS[1]
+_SLOPE_AXES, _DIFFERENCE_AXES = (0.145, 0.17, 0.42, 0.72), (0.725, 0.17, 0.26, 0.72)
 """Where the two axes are on the picture: left, bottom, width, height."""
 _FAINT_FROM = 20
 """Clips from which lines are so many that each is faint."""
 
 
-def slopes(line: Difference, number: int) -> Chart:
+def slope_chart(line: Difference, number: int) -> Chart:
     """The picture of one line; `number` tells the files of a page apart."""
-    up, down, level = direction(line)
+    up, down, level = count_directions(line)
     counts = ", ".join(f"{n} {what}" for n, what in ((up, "higher in B"), (down, "lower"), (level, "unchanged")) if n)
-    caption = f"{len(line.clips)} clips: {counts}. {_furthest(line)}"
+    caption = f"{len(line.clips)} clips: {counts}. {_largest_change(line)}"
     alt = (
-        f"{title(line)}: mean {mean(line, line.mean_a)} in A, {mean(line, line.mean_b)} in B [{line.unit}]; "
-        f"difference {signed(line, line.difference)} ({interval(line)}), {percent(share(line, line.difference))} of A, "
-        f"margin {mean(line, line.margin)}: {line.verdict}. {caption}"
+        f"{line_title(line)}: mean {format_mean(line, line.mean_a)} in A, {format_mean(line, line.mean_b)} in B [{line.unit}]; "
+        f"difference {format_signed(line, line.difference)} ({format_interval(line)}), {format_percent(percent_of_a(line, line.difference))} of A, "
+        f"margin {format_mean(line, line.margin)}: {line.verdict}. {caption}"
     )
     name, (width_in, height_in) = f"slopes_{number}", SIZE_IN
-    return drawn(
-        name, title(line), caption, alt, lambda figure: _draw(figure, line), height_in, width_in=width_in, layout=None
+    return draw_chart(
+        name,
+        line_title(line),
+        caption,
+        alt,
+        lambda figure: _draw(figure, line),
+        height_in,
+        width_in=width_in,
+        layout=None,
     )
 
 
 def _draw(figure: "Figure", line: Difference) -> None:
-    left, right = (figure.add_axes(place) for place in (_SLOPES, _DIFFERENCES))
+    left, right = (figure.add_axes(place) for place in (_SLOPE_AXES, _DIFFERENCE_AXES))
     a, b = np.array(line.a), np.array(line.b)
-    _slopes(left, line, a, b)
-    _differences(right, line, b - a)
+    _draw_slopes(left, line, a, b)
+    _draw_differences(right, line, b - a)
 
 
-def _slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
+def _draw_slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
     from matplotlib.collections import LineCollection
     from matplotlib.ticker import MaxNLocator
 
@@ -68,7 +75,7 @@ def _slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
     axes.add_collection(LineCollection(list(ends), colors=_colours(line), linewidths=0.7 if many else 1.1, alpha=0.65))
     axes.plot([0.0, 1.0], [line.mean_a, line.mean_b], "o-", color=INK, linewidth=2.6, markersize=5.5, zorder=4)
     axes.set_xlim(-0.12, 1.12)
-    means = (mean(line, value) for value in (line.mean_a, line.mean_b))
+    means = (format_mean(line, value) for value in (line.mean_a, line.mean_b))
     axes.set_xticks([0.0, 1.0], [f"{side}\n{value}" for side, value in zip("AB", means, strict=True)])
     axes.yaxis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=9, length=0)
@@ -78,18 +85,18 @@ def _slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
     axes.spines["left"].set_visible(False)
 
 
-def _differences(axes: "Axes", line: Difference, difference: Floats) -> None:
+def _draw_differences(axes: "Axes", line: Difference, difference: Floats) -> None:
     """Clips on the left, their mean and its interval on the right, over the band of the margin."""
     from matplotlib.ticker import MaxNLocator
 
     axes.axhspan(-line.margin, line.margin, color=GRID, linewidth=0, alpha=0.75)
     axes.axhline(0.0, color=FAINT, linewidth=0.9)
-    axes.scatter(_beside(difference), difference, s=9, color=_colours(line), linewidths=0, alpha=0.75)
+    axes.scatter(_beeswarm_offsets(difference), difference, s=9, color=_colours(line), linewidths=0, alpha=0.75)
     if line.low is not None and line.high is not None:
         axes.plot([1.0, 1.0], [line.low, line.high], color=INK, linewidth=2.0, solid_capstyle="butt")
     axes.plot([1.0], [line.difference], "D", color=PAPER, markeredgecolor=INK, markeredgewidth=1.6, markersize=5.5)
     axes.set_xlim(-0.6, 1.65)
-    axes.set_xticks([0.0, 1.0], ["clips", f"mean\n{signed(line, line.difference)}"])
+    axes.set_xticks([0.0, 1.0], ["clips", f"mean\n{format_signed(line, line.difference)}"])
     axes.set_title("B − A", fontsize=9, fontweight="normal", pad=3.0)
     axes.yaxis.set_major_locator(MaxNLocator(4))
     axes.tick_params(labelsize=9, length=0)
@@ -100,10 +107,10 @@ def _differences(axes: "Axes", line: Difference, difference: Floats) -> None:
 def _colours(line: Difference) -> list[str]:
     """Of clips that are worse in B, better or neither; up and down are seen besides."""
     worse = 1.0 if rise_is_worse(line.metric) else -1.0
-    return [WORSE if worse * step > 0.0 else BETTER if step else FAINT for _, step in clip_steps(line)]
+    return [WORSE_COLOUR if worse * step > 0.0 else BETTER_COLOUR if step else FAINT for _, step in clip_steps(line)]
 
 
-def _beside(values: Floats) -> Floats:
+def _beeswarm_offsets(values: Floats) -> Floats:
     """(n,) places across, so that points of like height stand beside each other, the first in the middle."""
     if not len(values) or np.ptp(values) == 0.0:
         return np.zeros(len(values))
@@ -117,9 +124,9 @@ def _beside(values: Floats) -> Floats:
     return found
 
 
-def _furthest(line: Difference) -> str:
+def _largest_change(line: Difference) -> str:
     """The clip that moved most."""
     if not line.clips:
         return ""
     clip, step = max(clip_steps(line), key=lambda one: abs(one[1]))
-    return f"Furthest: {clip}, {signed(line, step)}." if step else ""
+    return f"Furthest: {clip}, {format_signed(line, step)}." if step else ""

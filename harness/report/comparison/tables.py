@@ -7,25 +7,25 @@ from harness.compare.comparison import Comparison, Difference, Verdict
 from harness.report.comparison.wording import (
     MARKS,
     clips_of,
+    format_interval,
+    format_mean,
+    format_p_value,
+    format_percent,
+    format_signed,
     groups_vary,
-    interval,
-    lists,
-    mean,
-    p_value,
-    percent,
-    share,
-    signed,
+    listed_issues,
+    percent_of_a,
 )
-from harness.report.kit.markup import Markup, folded, joined, table, tag
-from harness.report.run.data import file_name
+from harness.report.kit.markup import Markup, details, join, table, tag
+from harness.report.run.data import to_file_name
 
 _MOST_CLIPS, _MOST_LISTED, _MOST_OPEN = 200, 200, 12
 
 
-def verdict(kind: Verdict) -> Markup:
+def verdict_badge(kind: Verdict) -> Markup:
     """As a mark and a word: never by colour alone."""
     mark = tag("span", MARKS[kind], aria_hidden="true", class_="mark")
-    return tag("span", mark, kind, class_=f"verdict {file_name(kind)}")
+    return tag("span", mark, kind, class_=f"verdict {to_file_name(kind)}")
 
 
 def lines_table(comparison: Comparison, lines: Sequence[Difference], label: str) -> Markup:
@@ -41,55 +41,53 @@ def lines_table(comparison: Comparison, lines: Sequence[Difference], label: str)
 
 
 def _row(line: Difference, varied: bool) -> list[Any]:
-    name = joined(
-        line.method, tag("small", f"{line.metric} [{line.unit}]"), tag("small", line.group) if varied else None
-    )
+    name = join(line.method, tag("small", f"{line.metric} [{line.unit}]"), tag("small", line.group) if varied else None)
     return [
         name,
-        _two(verdict(line.verdict), line.why, "why"),
-        mean(line, line.mean_a),
-        mean(line, line.mean_b),
-        _two(signed(line, line.difference), percent(share(line, line.difference))),
-        interval(line),
-        _two(p_value(line.p), p_value(line.p_holm)),
-        mean(line, line.margin),
+        _stacked(verdict_badge(line.verdict), line.why, "why"),
+        format_mean(line, line.mean_a),
+        format_mean(line, line.mean_b),
+        _stacked(format_signed(line, line.difference), format_percent(percent_of_a(line, line.difference))),
+        format_interval(line),
+        _stacked(format_p_value(line.p), format_p_value(line.p_holm)),
+        format_mean(line, line.margin),
         len(line.clips),
     ]
 
 
-def _two(first: Any, second: str, class_: str = "spread under") -> Markup:
+def _stacked(first: Any, second: str, class_: str = "spread under") -> Markup:
     """One under the other."""
-    return joined(first, tag("span", second, class_=class_) if second else None)
+    return join(first, tag("span", second, class_=class_) if second else None)
 
 
-def by_clip(lines: Sequence[Difference]) -> Markup:
+def clip_tables(lines: Sequence[Difference]) -> Markup:
     """For each metric a row for each clip, a column for each line: A, B and their difference."""
-    return joined(*(_metric(lines, metric) for metric in dict.fromkeys(line.metric for line in lines)))
+    return join(*(_clip_table(lines, metric) for metric in dict.fromkeys(line.metric for line in lines)))
 
 
-def _metric(lines: Sequence[Difference], metric: str) -> Markup:
+def _clip_table(lines: Sequence[Difference], metric: str) -> Markup:
     chosen = [line for line in lines if line.metric == metric]
     clips = clips_of(chosen)
     varied = len({line.group for line in chosen}) > 1
-    head = ["clip", *(joined(line.method, tag("small", line.group) if varied else None) for line in chosen)]
+    head = ["clip", *(join(line.method, tag("small", line.group) if varied else None) for line in chosen)]
     places = [{clip: n for n, clip in enumerate(line.clips)} for line in chosen]
     rows = [
-        [clip, *(_clip(line, at.get(clip)) for line, at in zip(chosen, places, strict=True))]
+        [clip, *(_clip_cell(line, at.get(clip)) for line, at in zip(chosen, places, strict=True))]
         for clip in clips[:_MOST_CLIPS]
     ]
     more = f" The first {_MOST_CLIPS} of {len(clips):,} clips." if len(clips) > _MOST_CLIPS else ""
-    caption = joined(tag("b", f"{metric} [{chosen[0].unit}]"), f": from A to B, and the difference.{more}")
+    caption = join(tag("b", f"{metric} [{chosen[0].unit}]"), f": from A to B, and the difference.{more}")
     return table(caption, list[Any](head), rows, label=f"{metric} by clip")
 
 
-def _clip(line: Difference, at: int | None) -> Any:
+def _clip_cell(line: Difference, at: int | None) -> Any:
     if at is None:
         return "–"
     a, b = line.a[at], line.b[at]
-    return _two(f"{mean(line, a)} → {mean(line, b)}", signed(line, b - a))
+    return _stacked(f"{format_mean(line, a)} → {format_mean(line, b)}", format_signed(line, b - a))
 
 
-def margins(comparison: Comparison) -> Markup:
+def margins_table(comparison: Comparison) -> Markup:
     """What each line's margin came to."""
     lines = [line for line in comparison.differences if line.gated]
     if not lines:
@@ -98,28 +96,30 @@ def margins(comparison: Comparison) -> Markup:
     for metric in dict.fromkeys(line.metric for line in lines):
         those = [line for line in lines if line.metric == metric]
         least, most = (pick(those, key=lambda line: line.margin) for pick in (min, max))
-        absolute = " to ".join(dict.fromkeys(mean(line, line.margin) for line in (least, most)))
-        of_a = " to ".join(dict.fromkeys(percent(share(line, line.margin)).lstrip("+") for line in (least, most)))
-        rows.append([metric, joined(absolute, tag("span", f" {those[0].unit}", class_="spread")), of_a])
+        absolute = " to ".join(dict.fromkeys(format_mean(line, line.margin) for line in (least, most)))
+        of_a = " to ".join(
+            dict.fromkeys(format_percent(percent_of_a(line, line.margin)).lstrip("+") for line in (least, most))
+        )
+        rows.append([metric, join(absolute, tag("span", f" {those[0].unit}", class_="spread")), of_a])
     caption = "Margins: the change that matters in practice, in proportion to A's mean, but no less than a floor."
     return table(caption, ["metric", "margin", "of A's mean"], rows, label="margins")
 
 
-def apart(comparison: Comparison) -> Markup:
+def differences_section(comparison: Comparison) -> Markup:
     """Circumstances that differ, and what hinders a comparison or was let pass."""
     parts: list[Any] = []
     if comparison.circumstances:
-        rows: list[list[Any]] = [[name, _value(a), _value(b)] for name, a, b in comparison.circumstances]
+        rows: list[list[Any]] = [[name, _text_cell(a), _text_cell(b)] for name, a, b in comparison.circumstances]
         caption = "Circumstances: what the comparison is about."
-        parts.append(table(caption, ["", _value("A"), _value("B")], rows, label="circumstances"))
-    for title, texts in lists(comparison).items():
+        parts.append(table(caption, ["", _text_cell("A"), _text_cell("B")], rows, label="circumstances"))
+    for title, texts in listed_issues(comparison).items():
         items = [tag("li", text) for text in texts[:_MOST_LISTED]]
         more = tag("li", f"and {len(texts) - _MOST_LISTED:,} more") if len(texts) > _MOST_LISTED else None
         content = tag("ul", *items, more, class_="notes")
         heading = f"{title}: {len(texts):,}"
-        parts.append(joined(tag("h3", heading), content) if len(texts) <= _MOST_OPEN else folded(heading, content))
-    return joined(*parts) if parts else tag("p", "Nothing: same inputs, same circumstances, the same cells.")
+        parts.append(join(tag("h3", heading), content) if len(texts) <= _MOST_OPEN else details(heading, content))
+    return join(*parts) if parts else tag("p", "Nothing: same inputs, same circumstances, the same cells.")
 
 
-def _value(text: str) -> Markup:
+def _text_cell(text: str) -> Markup:
     return tag("span", text, class_="words")

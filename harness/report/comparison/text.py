@@ -5,20 +5,20 @@ from collections.abc import Sequence
 from harness.compare.comparison import Comparison, Difference
 from harness.report.comparison.wording import (
     MARKS,
-    beside,
+    excerpt_pair,
+    format_interval,
+    format_mean,
+    format_p_value,
+    format_percent,
+    format_signed,
     groups_vary,
-    in_order,
-    interval,
-    listed,
-    lists,
-    mean,
-    p_value,
-    percent,
+    list_first,
+    listed_issues,
+    percent_of_a,
     sentence,
-    share,
-    signed,
+    sort_by_verdict,
 )
-from harness.report.run.text import aligned
+from harness.report.run.text import align_columns
 
 _MOST_LISTED, _LETTERS = 6, 60
 
@@ -31,22 +31,27 @@ def text(comparison: Comparison) -> str:
     for title, found in (("", gated), ("not gated", rest)):
         if found:
             lines += ["", *([title] if title else []), *_table(comparison, found)]
-    return "\n".join([*lines, *_reasons(gated), *_different(comparison)])
+    return "\n".join([*lines, *_reasons(gated), *_differences(comparison)])
 
 
 def _table(comparison: Comparison, lines: Sequence[Difference]) -> list[str]:
     varied = groups_vary(comparison)
     names = ["verdict", "method", *(["of"] if varied else []), "metric"]
     head = [*names, "clips", "A", "B", "B − A", "95 % interval", "of A", "p", "p (Holm)", "margin", "unit"]
-    rows = [_row(line, varied) for line in in_order(lines)]
-    return aligned([head, *rows], text_columns=len(names))
+    rows = [_row(line, varied) for line in sort_by_verdict(lines)]
+    return align_columns([head, *rows], text_columns=len(names))
 
 
 def _row(line: Difference, varied: bool) -> list[str]:
     names = [f"{MARKS[line.verdict]} {line.verdict}", line.method, *([line.group] if varied else []), line.metric]
-    means = [mean(line, line.mean_a), mean(line, line.mean_b), signed(line, line.difference), interval(line)]
-    chance = [percent(share(line, line.difference)), p_value(line.p), p_value(line.p_holm)]
-    return [*names, str(len(line.clips)), *means, *chance, mean(line, line.margin), line.unit]
+    means = [
+        format_mean(line, line.mean_a),
+        format_mean(line, line.mean_b),
+        format_signed(line, line.difference),
+        format_interval(line),
+    ]
+    chance = [format_percent(percent_of_a(line, line.difference)), format_p_value(line.p), format_p_value(line.p_holm)]
+    return [*names, str(len(line.clips)), *means, *chance, format_mean(line, line.margin), line.unit]
 
 
 def _reasons(lines: Sequence[Difference]) -> list[str]:
@@ -55,21 +60,21 @@ def _reasons(lines: Sequence[Difference]) -> list[str]:
     for line in lines:
         if line.verdict == "cannot tell":
             found.setdefault(line.why, []).append(f"{line.method} {line.metric}")
-    return [f"cannot tell, {why}: {listed(names)}" for why, names in found.items()]
+    return [f"cannot tell, {why}: {list_first(names)}" for why, names in found.items()]
 
 
-def _different(comparison: Comparison) -> list[str]:
+def _differences(comparison: Comparison) -> list[str]:
     """Cells without a partner, inputs and circumstances that differ, in a line each."""
     lines = [f"cells matched: {comparison.matched:,}"]
-    for title, found in lists(comparison).items():
-        lines.append(f"{title.lower()}: {len(found):,} ({listed([_short(text) for text in found])})")
+    for title, found in listed_issues(comparison).items():
+        lines.append(f"{title.lower()}: {len(found):,} ({list_first([_shorten(text) for text in found])})")
     for name, a, b in comparison.circumstances[:_MOST_LISTED]:
-        lines.append(f"differs: {name}: {' -> '.join(beside(a, b, _LETTERS))}")
+        lines.append(f"differs: {name}: {' -> '.join(excerpt_pair(a, b, _LETTERS))}")
     if (more := len(comparison.circumstances) - _MOST_LISTED) > 0:
         lines.append(f"differs: {more:,} more circumstances")
     return ["", *lines]
 
 
-def _short(value: str) -> str:
+def _shorten(value: str) -> str:
     value = " ".join(str(value).split())
     return value if len(value) <= _LETTERS else f"{value[: _LETTERS - 1]}…"

@@ -20,7 +20,7 @@ MEANINGS: Mapping[Verdict, str] = {
     "better": "as worse, the other way round",
     "same": "the whole 95 % interval lies within the margin",
 }
-BIG: Mapping[Outcome, str] = {
+OUTCOME_TITLES: Mapping[Outcome, str] = {
     Outcome.PASS: "Pass",
     Outcome.REGRESSED: "Regressed",
     Outcome.NOT_COMPARABLE: "Not comparable",
@@ -32,33 +32,35 @@ _MOST_NAMED, _MOST_DECIMALS = 3, 6
 def sentence(comparison: Comparison) -> str:
     """What a reader should know first."""
     gated = [line for line in comparison.differences if line.gated]
-    counts = tally(gated)
-    over = f"{_many(len(gated), 'gated line')} on {_many(len(clips_of(gated)), 'clip')}"
+    counts = count_verdicts(gated)
+    over = f"{_count_noun(len(gated), 'gated line')} on {_count_noun(len(clips_of(gated)), 'clip')}"
     match comparison.outcome:
         case Outcome.REGRESSED:
             worse = [
-                f"{title(line)} {percent(share(line, line.difference))}" for line in gated if line.verdict == "worse"
+                f"{line_title(line)} {format_percent(percent_of_a(line, line.difference))}"
+                for line in gated
+                if line.verdict == "worse"
             ]
-            return f"B is worse than A in {counts['worse']} of {over}: {listed(worse)}."
+            return f"B is worse than A in {counts['worse']} of {over}: {list_first(worse)}."
         case Outcome.PASS:
             return f"B is no worse than A: of {over} {counts['same']} are the same and {counts['better']} better."
         case _:
             return f"Whether B is worse than A cannot be told: {comparison.why.rstrip('.')}."
 
 
-def tally(lines: Sequence[Difference]) -> dict[Verdict, int]:
+def count_verdicts(lines: Sequence[Difference]) -> dict[Verdict, int]:
     """How many have each verdict, those that must be known first in front."""
     counts = Counter(line.verdict for line in lines)
     return {kind: counts[kind] for kind in MARKS}
 
 
-def in_order(lines: Sequence[Difference]) -> list[Difference]:
+def sort_by_verdict(lines: Sequence[Difference]) -> list[Difference]:
     """Worse ones first, then as they came."""
     places = list(MARKS)
     return sorted(lines, key=lambda line: places.index(line.verdict))
 
 
-def title(line: Difference) -> str:
+def line_title(line: Difference) -> str:
     return f"{line.method} {line.metric}"
 
 
@@ -72,7 +74,7 @@ def groups_vary(comparison: Comparison) -> bool:
     return len({line.group for line in comparison.differences}) > 1
 
 
-def lists(comparison: Comparison) -> dict[str, tuple[str, ...]]:
+def listed_issues(comparison: Comparison) -> dict[str, tuple[str, ...]]:
     """Title -> what hinders a comparison or was let pass; those that hold anything."""
     found = {
         "Inputs that differ": comparison.inputs_that_differ,
@@ -85,35 +87,35 @@ def lists(comparison: Comparison) -> dict[str, tuple[str, ...]]:
     return {title: texts for title, texts in found.items() if texts}
 
 
-def beside(a: str, b: str, letters: int) -> tuple[str, str]:
+def excerpt_pair(a: str, b: str, letters: int) -> tuple[str, str]:
     """Two long texts on a line each, cut to where they begin to differ."""
     a, b = (" ".join(text.split()) for text in (a, b))
     alike = next((n for n, (x, y) in enumerate(zip(a, b, strict=False)) if x != y), min(len(a), len(b)))
     start = max(0, alike - letters // 3) if max(len(a), len(b)) > letters else 0
-    return _cut(a, start, letters), _cut(b, start, letters)
+    return _excerpt(a, start, letters), _excerpt(b, start, letters)
 
 
-def _cut(text: str, start: int, letters: int) -> str:
+def _excerpt(text: str, start: int, letters: int) -> str:
     shown = text[start : start + letters]
     return ("…" if start else "") + shown + ("…" if start + letters < len(text) else "")
 
 
-def listed(names: Sequence[str], most: int = _MOST_NAMED) -> str:
+def list_first(names: Sequence[str], most: int = _MOST_NAMED) -> str:
     """The first few, and how many more."""
     more = f" and {len(names) - most:,} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
-def share(line: Difference, value: float | None) -> float:
+def percent_of_a(line: Difference, value: float | None) -> float:
     """In percent of A's mean; NaN where there is no value or A's mean is zero."""
     return math.nan if value is None or not line.mean_a else 100.0 * value / abs(line.mean_a)
 
 
-def mean(line: Difference, value: float) -> str:
+def format_mean(line: Difference, value: float) -> str:
     return f"{value:,.{_decimals(line)}f}".replace("-", MINUS)
 
 
-def signed(line: Difference, value: float | None) -> str:
+def format_signed(line: Difference, value: float | None) -> str:
     """A difference, with the decimals that its interval needs."""
     if value is None:
         return "–"
@@ -121,11 +123,11 @@ def signed(line: Difference, value: float | None) -> str:
     return (text if text.strip("+-0.,") else text.lstrip("+-")).replace("-", MINUS)
 
 
-def interval(line: Difference) -> str:
-    return "–" if line.low is None else f"{signed(line, line.low)} to {signed(line, line.high)}"
+def format_interval(line: Difference) -> str:
+    return "–" if line.low is None else f"{format_signed(line, line.low)} to {format_signed(line, line.high)}"
 
 
-def percent(value: float) -> str:
+def format_percent(value: float) -> str:
     """A share with two digits that count."""
     if math.isnan(value):
         return "–"
@@ -134,7 +136,7 @@ def percent(value: float) -> str:
     return (text if text.strip("+-0.% ") else "0 %").replace("-", MINUS)
 
 
-def p_value(value: float | None) -> str:
+def format_p_value(value: float | None) -> str:
     if value is None:
         return "–"
     return "< 0.001" if value < 0.0005 else f"{value:.3f}"
@@ -150,7 +152,7 @@ def rise_is_worse(metric: str) -> bool:
     return metric not in MARGINS or MARGINS[metric].rise_is_worse
 
 
-def direction(line: Difference) -> tuple[int, int, int]:
+def count_directions(line: Difference) -> tuple[int, int, int]:
     """Clips whose figure went up, down and nowhere from A to B."""
     steps = [step for _, step in clip_steps(line)]
     return sum(step > 0 for step in steps), sum(step < 0 for step in steps), sum(step == 0 for step in steps)
@@ -164,5 +166,5 @@ def _decimals(line: Difference) -> int:
     return min(_MOST_DECIMALS, max(0, 1 - math.floor(math.log10(finest))))
 
 
-def _many(count: int, what: str) -> str:
+def _count_noun(count: int, what: str) -> str:
     return f"{count:,} {what}{'s'[: count != 1]}"

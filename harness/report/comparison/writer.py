@@ -5,22 +5,25 @@ from pathlib import Path
 
 from harness.compare.comparison import Comparison
 from harness.core.files import write_text
-from harness.report.comparison.interval_chart import intervals
-from harness.report.comparison.page import Pictures, comparison_page
-from harness.report.comparison.slope_chart import slopes
+from harness.report.comparison.interval_chart import interval_charts
+from harness.report.comparison.page import ComparisonCharts, comparison_page
+from harness.report.comparison.slope_chart import slope_chart
 from harness.report.comparison.text import text
-from harness.report.comparison.wording import in_order
+from harness.report.comparison.wording import sort_by_verdict
 
-__all__ = ["text", "write_page"]
+__all__ = ["text", "write_comparison_page"]
 
 
-def write_page(comparison: Comparison, path: Path) -> Path:
+def write_comparison_page(comparison: Comparison, path: Path) -> Path:
     """Write the page to `path`, whose folder is made; returns it. Without matplotlib it has the tables alone."""
-    pictures, missing = Pictures(), ["Charts: matplotlib is not installed; their numbers are in the tables"]
+    pictures, missing = ComparisonCharts(), ["Charts: matplotlib is not installed; their numbers are in the tables"]
     if find_spec("matplotlib") is not None:
-        lines = in_order([line for line in comparison.differences if line.gated])
-        drawn = [slopes(line, number) for number, line in enumerate(lines, start=1) if line.clips]
-        pictures, missing = Pictures(drawn, intervals(comparison, True), intervals(comparison, False)), []
+        lines = sort_by_verdict([line for line in comparison.differences if line.gated])
+        drawn = [slope_chart(line, number) for number, line in enumerate(lines, start=1) if line.clips]
+        pictures, missing = (
+            ComparisonCharts(drawn, interval_charts(comparison, True), interval_charts(comparison, False)),
+            [],
+        )
     path.parent.mkdir(parents=True, exist_ok=True)
     write_text(path, comparison_page(comparison, pictures, missing))
     return path

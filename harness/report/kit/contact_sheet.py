@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.motion import Clip
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 from harness.errors import BadInput
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def contact_sheet(
     from matplotlib.figure import Figure
     from PIL import Image
 
-    pose = forward(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], clip.angles_rad[frames])
+    pose = forward_kinematics(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], clip.angles_rad[frames])
     facing = _facing(clip, faces)[frames]
     tall, wide = 2.40, 1.15
     picture = Figure(figsize=(1.15 * figures, 2 * rows * 1.15 * tall / wide * 0.92), dpi=100)
@@ -82,7 +82,7 @@ def contact_sheet(
 
 def _facing(clip: Clip, bone: str) -> Floats:
     """(T,) the heading of a bone, averaged over a second around each frame [rad]."""
-    pose = forward(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
+    pose = forward_kinematics(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
     ahead = pose.world_from_bone[:, clip.skeleton.index(bone), :, 0]
     yaw = np.arctan2(ahead[:, 1], ahead[:, 0])
     half = max(int(0.5 * clip.rate_hz), 1)

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.report.kit.markup import Markup, joined, scrolling, tag
+from harness.report.kit.markup import Markup, join, scroll_box, tag
 from harness.report.kit.style import Chart
 
-_POLICY = (
+_CONTENT_SECURITY_POLICY = (
     "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'"
 )
@@ -31,17 +31,17 @@ def document(
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
-        tag("meta", http_equiv="Content-Security-Policy", content=_POLICY),
+        tag("meta", http_equiv="Content-Security-Policy", content=_CONTENT_SECURITY_POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", title),
         tag("style", Markup(style)),
     )
     shown = [(title, name, content) for title, name, content in sections if content]
     links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in shown))
-    rows = [joined(tag("dt", title), tag("dd", text)) for title, text in facts.items()]
+    rows = [join(tag("dt", title), tag("dd", text)) for title, text in facts.items()]
     if missing:
         gaps = [tag("span", text, tag("br")) for text in missing]
-        rows.append(joined(tag("dt", "Missing here"), tag("dd", *gaps, class_="missing")))
+        rows.append(join(tag("dt", "Missing here"), tag("dd", *gaps, class_="missing")))
     body = tag(
         "body",
         tag(
@@ -57,14 +57,14 @@ def document(
     return f"<!doctype html>\n{tag('html', head, body, lang='en')}\n"
 
 
-def pictured(chart: Chart, level: int = 0) -> Markup:
+def chart_figure(chart: Chart, level: int = 0) -> Markup:
     """A chart under a heading of this level, or with its title in the caption."""
-    image = tag("img", src=embedded(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
+    image = tag("img", src=data_uri(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
     title = tag(f"h{level}", chart.title) if level else None
-    caption: Any = chart.caption if level else joined(tag("b", f"{chart.title}. "), chart.caption)
-    return joined(title, tag("figure", scrolling(image, chart.title), tag("figcaption", caption), class_="chart"))
+    caption: Any = chart.caption if level else join(tag("b", f"{chart.title}. "), chart.caption)
+    return join(title, tag("figure", scroll_box(image, chart.title), tag("figcaption", caption), class_="chart"))
 
 
-def embedded(content: bytes, kind: str) -> str:
+def data_uri(content: bytes, kind: str) -> str:
     """A file as an address that holds it."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"

@@ -10,7 +10,7 @@ class Markup(str):
     __slots__ = ()
 
 
-VOID = frozenset({"br", "col", "img", "input", "meta"})
+VOID_ELEMENTS = frozenset({"br", "col", "img", "input", "meta"})
 
 
 def tag(name: str, /, *children: Any, **attributes: Any) -> Markup:
@@ -25,10 +25,10 @@ def tag(name: str, /, *children: Any, **attributes: Any) -> Markup:
         elif value is not None and value is not False:
             words.append(f'{_attribute(key)}="{html.escape(str(value))}"')
     start = f"<{' '.join(words)}>"
-    return Markup(start if name in VOID else f"{start}{joined(*children)}</{name}>")
+    return Markup(start if name in VOID_ELEMENTS else f"{start}{join(*children)}</{name}>")
 
 
-def joined(*parts: Any) -> Markup:
+def join(*parts: Any) -> Markup:
     """Several pieces as one, each escaped unless it is Markup."""
     return Markup("".join(p if isinstance(p, Markup) else html.escape(str(p)) for p in parts if p is not None))
 
@@ -38,15 +38,15 @@ def table(caption: Any, head: list[Any], rows: list[list[Any]], *, label: str) -
     top = tag("tr", *(tag("th", cell, scope="col") for cell in head))
     body = [tag("tr", tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:])) for row in rows]
     content = tag("table", tag("thead", top), tag("tbody", *body), aria_label=label)
-    return joined(tag("p", caption, class_="caption"), scrolling(content, label))
+    return join(tag("p", caption, class_="caption"), scroll_box(content, label))
 
 
-def scrolling(content: Any, label: str) -> Markup:
+def scroll_box(content: Any, label: str) -> Markup:
     """Wider than a phone: scrolls sideways in its own box, by keyboard too."""
     return tag("div", content, class_="wide", tabindex="0", role="region", aria_label=label)
 
 
-def folded(title: Any, *content: Any, id_: str | None = None) -> Markup:
+def details(title: Any, *content: Any, id_: str | None = None) -> Markup:
     """Closed until asked for."""
     return tag("details", tag("summary", title), *content, id_=id_)
 

@@ -16,16 +16,16 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.errors import MissingExtra
 
-_START_S, _EACH_S = 60.0, 2.0
+_STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
 """Patience: until the first picture, and for every one [s]."""
-_TICK_S = 0.5
+_POLL_INTERVAL_S = 0.5
 
-Progress = Callable[[str, int, int], None]
+ProgressCallback = Callable[[str, int, int], None]
 """Called with what was done last, how many are finished and how many were planned."""
 
 
 @dataclass(frozen=True, eq=False)
-class Job:
+class RenderJob:
     """One strip of pictures, or one movie, of K frames."""
 
     output: Path
@@ -43,12 +43,12 @@ class Job:
     """Written into a movie."""
 
 
-class Rendering:
+class RenderProcess:
     """Jobs being rendered while the caller does something else; `finish` waits."""
 
-    def __init__(self, jobs: Sequence[Job]) -> None:
+    def __init__(self, jobs: Sequence[RenderJob]) -> None:
         self._jobs = jobs
-        self._reason = _missing(jobs)
+        self._reason = _missing_package(jobs)
         self._folder = TemporaryDirectory(prefix="harness-report-")
         self._process: subprocess.Popen[str] | None = None
         for job in jobs:
@@ -56,18 +56,18 @@ class Rendering:
         if jobs and not self._reason:
             self._process = self._started()
 
-    def finish(self, progress: Progress = lambda last, done, planned: None) -> str:
+    def finish(self, progress: ProgressCallback = lambda last, done, planned: None) -> str:
         """Wait for the pictures: those that could be made are there. Why others are missing, "" if none is.
 
         `progress` is told what was made last, how many are there and how many there shall be.
         """
         if self._process is not None:
             frames = sum(len(job.truth_qpos) for job in self._jobs)
-            until_s = time.monotonic() + _START_S + _EACH_S * frames
+            until_s = time.monotonic() + _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames
             said: str | None = None
             while said is None and time.monotonic() < until_s:
                 try:
-                    _, said = self._process.communicate(timeout=_TICK_S)
+                    _, said = self._process.communicate(timeout=_POLL_INTERVAL_S)
                 except subprocess.TimeoutExpired:
                     made = [job.output.name for job in self._jobs if job.output.exists()]
                     progress(made[-1] if made else "", len(made), len(self._jobs))
@@ -76,7 +76,7 @@ class Rendering:
                 self._process.communicate()
                 self._reason = "the renderer did not finish in time"
             else:
-                self._reason = "" if self._process.returncode == 0 else why_ended(self._process.returncode, said)
+                self._reason = "" if self._process.returncode == 0 else describe_exit(self._process.returncode, said)
         self.close()
         return self._reason
 
@@ -103,10 +103,10 @@ class Rendering:
                 title=np.array(job.title),
                 output=np.array(str(job.output.resolve())),
             )
-        return started("harness.report.kit.render_worker", files)
+        return start_renderer("harness.report.kit.render_worker", files)
 
 
-def started(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
+def start_renderer(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
     """A process that renders, where there is no screen too; what it says of its end goes to stderr."""
     environment = dict(os.environ)
     if sys.platform == "linux" and not environment.get("DISPLAY"):
@@ -115,7 +115,7 @@ def started(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
     return subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=subprocess.PIPE, text=True)
 
 
-def _missing(jobs: Sequence[Job]) -> str:
+def _missing_package(jobs: Sequence[RenderJob]) -> str:
     """Which package is not installed."""
     for package, needed in (("pyvista", bool(jobs)), ("imageio_ffmpeg", any(job.fps for job in jobs))):
         if needed and find_spec(package) is None:
@@ -123,7 +123,7 @@ def _missing(jobs: Sequence[Job]) -> str:
     return ""
 
 
-def why_ended(code: int, said: str) -> str:
+def describe_exit(code: int, said: str) -> str:
     """What ended the renderer, in one line."""
     if code < 0:
         name = signal.Signals(-code).name

@@ -14,7 +14,7 @@ from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
 from harness.report.kit.skeleton_player import heading_rad
-from harness.score.pair import Posed, posed
+from harness.score.pair import PoseSequence, compute_poses
 
 STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
 """Width and height in pixels; a movie's must be even."""
@@ -24,17 +24,20 @@ def main(jobs: Sequence[str]) -> None:
     for job in jobs:
         with np.load(job, allow_pickle=False) as content:
             true, believed = (standard_skeleton().with_bones(content[name]) for name in ("bone_m", "estimate_bone_m"))
-            truth, estimate = posed(true, content["truth_qpos"]), posed(believed, content["estimate_qpos"])
+            truth, estimate = (
+                compute_poses(true, content["truth_qpos"]),
+                compute_poses(believed, content["estimate_qpos"]),
+            )
             output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
         beside = output.with_name(f".unfinished-{output.name}")
         if fps:
-            movie(truth, estimate, fps, title, beside)
+            write_movie(truth, estimate, fps, title, beside)
         else:
-            strip(truth, estimate, beside)
+            write_strip(truth, estimate, beside)
         os.replace(beside, output)
 
 
-def strip(truth: Posed, estimate: Posed, path: Path) -> None:
+def write_strip(truth: PoseSequence, estimate: PoseSequence, path: Path) -> None:
     """Every frame side by side, in one PNG."""
     from matplotlib.image import imsave
 
@@ -42,7 +45,7 @@ def strip(truth: Posed, estimate: Posed, path: Path) -> None:
     imsave(path, np.ascontiguousarray(np.hstack(pictures)), format="png")
 
 
-def movie(truth: Posed, estimate: Posed, fps: float, title: str, path: Path) -> None:
+def write_movie(truth: PoseSequence, estimate: PoseSequence, fps: float, title: str, path: Path) -> None:
     """Every frame one after another with a caption, as H.264 that browsers play."""
     import imageio_ffmpeg
 
@@ -52,12 +55,12 @@ def movie(truth: Posed, estimate: Posed, fps: float, title: str, path: Path) -> 
     writer.send(None)
     try:
         for frame, picture in enumerate(_pictures(truth, estimate, MOVIE_SIZE)):
-            writer.send(_captioned(picture, title, frame / fps))
+            writer.send(_add_caption(picture, title, frame / fps))
     finally:
         writer.close()
 
 
-def _captioned(picture: Floats, title: str, time_s: float) -> bytes:
+def _add_caption(picture: Floats, title: str, time_s: float) -> bytes:
     """The picture with what it shows and the time since its start, and which body is which."""
     from PIL import Image, ImageDraw, ImageFont
 
@@ -71,7 +74,7 @@ def _captioned(picture: Floats, title: str, time_s: float) -> bytes:
     return image.tobytes()
 
 
-def _pictures(truth: Posed, estimate: Posed, size: tuple[int, int]) -> Iterator[Floats]:
+def _pictures(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int]) -> Iterator[Floats]:
     """(height, width, 3) bytes of every frame."""
     scene = Scene(truth.skeleton, estimate.skeleton, size, heading_rad(truth))
     try:

@@ -1,4 +1,4 @@
-"""The interactive view of the worst seconds: joint centres of truth and estimate, packed for `scrubber.js`."""
+"""The interactive view of the worst seconds: joint centres of truth and estimate, packed for `skeleton_player.js`."""
 
 import base64
 import gzip
@@ -14,34 +14,34 @@ import numpy as np
 from harness.core import rotations
 from harness.core.skeleton import Skeleton
 from harness.errors import MissingExtra
-from harness.report.kit.markup import Markup, joined, tag
-from harness.score.pair import Posed
+from harness.report.kit.markup import Markup, join, tag
+from harness.score.pair import PoseSequence
 
 _MOST_FRAMES = 120
 """Of one window; faster streams are thinned to it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Shot:
+class PlayerSegment:
     """One window to play."""
 
     title: str
     time_s: Sequence[float]
-    truth: Posed
-    estimate: Posed
+    truth: PoseSequence
+    estimate: PoseSequence
 
 
-def scrubber(skeleton: Skeleton, shots: Sequence[Shot]) -> tuple[Markup, str]:
+def skeleton_player(skeleton: Skeleton, shots: Sequence[PlayerSegment]) -> tuple[Markup, str]:
     """The controls with all they need, or nothing and why not."""
     if find_spec("plotly") is None:
         return Markup(), str(MissingExtra("The interactive view", "plotly", "viz"))
     from plotly.offline import get_plotlyjs
 
     bones = [[parent + 1, bone + 1] for bone, parent in enumerate(skeleton.parents)]
-    data = {"bones": bones, "head": skeleton.index("head"), "shots": [_packed(shot) for shot in shots]}
+    data = {"bones": bones, "head": skeleton.index("head"), "shots": [_pack(shot) for shot in shots]}
     script = Path(__file__).with_name("scrubber.js").read_text(encoding="utf-8")
     choices = [tag("option", shot.title, value=n) for n, shot in enumerate(shots)]
-    page = joined(
+    page = join(
         tag("p", tag("label", "Show ", tag("select", *choices, id_="shot")), class_="controls"),
         tag("div", id_="stage", role="img", aria_label="Truth and estimate as skeletons in 3-D; drag to turn"),
         tag(
@@ -52,36 +52,36 @@ def scrubber(skeleton: Skeleton, shots: Sequence[Shot]) -> tuple[Markup, str]:
             tag("button", "Reset view", id_="reset", type_="button"),
             class_="controls",
         ),
-        tag("script", Markup(_compressed(json.dumps(data, separators=(",", ":")))), type_="text/plain", id_="shots"),
-        tag("script", Markup(_compressed(get_plotlyjs())), type_="text/plain", id_="plotly"),
+        tag("script", Markup(_compress(json.dumps(data, separators=(",", ":")))), type_="text/plain", id_="shots"),
+        tag("script", Markup(_compress(get_plotlyjs())), type_="text/plain", id_="plotly"),
         tag("script", Markup(script)),
     )
     return page, ""
 
 
-def _packed(shot: Shot) -> dict[str, Any]:
+def _pack(shot: PlayerSegment) -> dict[str, Any]:
     """Whole millimetres: the first frame, then differences from frame to frame, which compress well."""
     every = -(-len(shot.time_s) // _MOST_FRAMES)
     time_ms = [round(1e3 * t) for t in shot.time_s[::every]]
     return {
         "time_ms": time_ms,
         "heading_rad": heading_rad(shot.truth),
-        "truth": _steps(shot.truth, every),
-        "estimate": _steps(shot.estimate, every),
+        "truth": _frame_differences(shot.truth, every),
+        "estimate": _frame_differences(shot.estimate, every),
     }
 
 
-def heading_rad(motion: Posed) -> float:
+def heading_rad(motion: PoseSequence) -> float:
     """Where the root's forward axis points on average, about the world's z [rad]."""
     ahead = np.mean(rotations.to_matrix(motion.world_from_root)[:, :, 0], axis=0)
     return float(np.arctan2(ahead[1], ahead[0]))
 
 
-def _steps(motion: Posed, every: int) -> list[list[int]]:
+def _frame_differences(motion: PoseSequence, every: int) -> list[list[int]]:
     whole = np.rint(1e3 * motion.joints_m[::every]).astype(int).reshape(-1, 3 * motion.joints_m.shape[1])
     steps: list[list[int]] = np.diff(whole, axis=0, prepend=0).tolist()
     return steps
 
 
-def _compressed(text: str) -> str:
+def _compress(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 6, mtime=0)).decode()

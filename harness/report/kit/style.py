@@ -105,7 +105,7 @@ def line_style(place: int) -> dict[str, Any]:
     }
 
 
-def bare(axes: "Axes") -> None:
+def hide_frame(axes: "Axes") -> None:
     """No frame, no grid, no ticks on the left: for bands that are read by name."""
     axes.grid(False)
     axes.tick_params(length=0)

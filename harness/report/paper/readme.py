@@ -6,12 +6,12 @@ from pathlib import Path
 from harness.core.files import write_text
 from harness.errors import BadFile
 from harness.report.paper.text import text_tables
-from harness.results.findings import Findings
+from harness.results.findings import PaperFindings
 
-_END = "\n"
+_NEWLINE = "\n"
 
 
-def show_in_readme(readme: Path, findings: Findings) -> None:
+def update_readme(readme: Path, findings: PaperFindings) -> None:
     """Put the tables where those of this paper and motion stand, at the end if none do; the rest keeps every byte.
 
     BadFile when the page cannot be read, or has one marker without the other.
@@ -30,26 +30,26 @@ def show_in_readme(readme: Path, findings: Findings) -> None:
         before, _, rest = text.partition(start)
         whole = before + section + rest.partition(end)[2]
     else:
-        whole = f"{text}{'' if text.endswith(_END) else _END}\n{section}\n"
+        whole = f"{text}{'' if text.endswith(_NEWLINE) else _NEWLINE}\n{section}\n"
     if whole != text:
         write_text(readme, whole)
 
 
-def _markers(findings: Findings) -> tuple[str, str]:
+def _markers(findings: PaperFindings) -> tuple[str, str]:
     name = re.sub(r"[^\w.]+", "-", f"{findings.paper} {findings.motion}").strip("-")
     return f"<!-- paper {name} -->", f"<!-- end of paper {name} -->"
 
 
-def _section(findings: Findings) -> str:
+def _section(findings: PaperFindings) -> str:
     """The command and what it printed, as a block that no text in it can end."""
     made = findings.circumstances
     commit = f"commit {str(made['commit'])[:12]}" if made.get("commit") else "no commit"
     title = f"### {findings.paper}, {findings.motion}"
     by = f"By harness {made.get('harness')}, {commit}{' with changes' if made.get('dirty') else ''}:"
     block = [f"    {line}".rstrip() for line in (findings.command, "", *text_tables(findings).split("\n"))]
-    return "\n".join([_tame(title), "", _tame(by), "", *map(_tame, block)])
+    return "\n".join([_escape_markers(title), "", _escape_markers(by), "", *map(_escape_markers, block)])
 
 
-def _tame(line: str) -> str:
+def _escape_markers(line: str) -> str:
     """On one line, and no marker."""
     return re.sub(r"[\r\n]+", " ", line).replace("<!--", "<! --")

@@ -5,14 +5,14 @@ from pathlib import Path
 
 from harness.core.files import write_text
 from harness.report.paper.charts import charts
-from harness.report.paper.page import PaperContent, inside, paper_page
+from harness.report.paper.page import PaperContent, paper_page, run_link
 from harness.results.findings import read_findings
 
 FINDINGS = "findings.json"
 """In the folder of a study."""
 
 
-def write_paper(folder: Path) -> Path:
+def write_paper_page(folder: Path) -> Path:
     """Write FOLDER/plots and FOLDER/report.html of the study in `folder`; returns the page.
 
     Without matplotlib the page has the figures' numbers instead and says why. BadFile when there are no findings.
@@ -27,7 +27,7 @@ def write_paper(folder: Path) -> Path:
     for chart in (chart for found in pictures.values() for chart in found if chart):
         chart.write(plots)
     runs = (name for experiment in findings.experiments for name in experiment.runs)
-    pages = {name: target for name in runs if (target := inside(folder, name))}
+    pages = {name: target for name in runs if (target := run_link(folder, name))}
     any_figure = any(experiment.figures for experiment in findings.experiments)
     missing = [] if drawable or not any_figure else ["Figures: matplotlib is not installed; their numbers are tables"]
     path = folder / "report.html"

@@ -16,43 +16,45 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.errors import MissingExtra
-from harness.report.kit.render_process import started, why_ended
+from harness.report.kit.render_process import describe_exit, start_renderer
 from harness.report.kit.style import FAINT, INK, Chart
-from harness.report.paper.line_chart import apart
-from harness.report.placement.wording import plain_name, signed
-from harness.report.run.charts import drawn
-from harness.results.placement_findings import Place, Stations, Worth
+from harness.report.paper.line_chart import spread_positions
+from harness.report.placement.wording import format_signed, plain_name
+from harness.report.run.charts import draw_chart
+from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _COLOURS = "viridis"
-_NEAR_M = 0.02
+_SOFTENING_M = 0.02
 """As large as a ball: nearer than this a place does not count more."""
-_PATIENCE_S = 120.0
+_TIMEOUT_S = 120.0
 _HEIGHT_IN, _MOST_NAMED, _GAP = 4.9, 18, 0.048
 """Of the chart; places with names, those worth most; between two names, as a share of the picture's height."""
 _TOP, _ARMS, _TRUNK, _OUTER = 0.04, (0.145, 0.34), 0.12, 0.25
 _NECK = 0.17
 """Shares of the picture: the first name from above, what lies above and below the arms; half of the trunk's width, and
 how far from the edge hands and forearms are."""
-Values = Mapping[str, float | None]
+CandidateValues = Mapping[str, float | None]
 """Candidate -> what it is worth; None where that was not measured."""
 
 
 @dataclass(frozen=True)
-class Shown:
+class BodyMapValues:
     """One map: what each candidate is worth in one way of asking."""
 
-    values: Values
+    values: CandidateValues
     what: str
     """The same in words."""
-    worn: Stations = ()
+    worn: StationNames = ()
     """What is worn already: it has no value, and a dark ball."""
 
 
-def body_map(places: Sequence[Place], shown: Shown, *, unit: str, number: int = 1) -> tuple[Chart | None, str]:
+def draw_body_map(
+    places: Sequence[StationPlacement], shown: BodyMapValues, *, unit: str, number: int = 1
+) -> tuple[Chart | None, str]:
     """The chart, or None and why there is none.
 
     Places that have no value and are not worn are left out. Without matplotlib or pyvista, or where nothing can be
@@ -67,14 +69,14 @@ def body_map(places: Sequence[Place], shown: Shown, *, unit: str, number: int = 
             return None, str(MissingExtra("A rendered picture", package, "viz"))
     low, high = min(0.0, *known), max(0.0, *known)
     ends = (low, high if high > low else low + 1.0)
-    views, reason = _rendered(here, shown.values, ends)
+    views, reason = _render(here, shown.values, ends)
     if views is None:
         return None, reason
     return _chart(here, shown, views, ends, unit, number), ""
 
 
-def _rendered(
-    places: Sequence[Place], values: Values, ends: tuple[float, float]
+def _render(
+    places: Sequence[StationPlacement], values: CandidateValues, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
     """The pictures of both sides and where the places are on them (see `body_scene`), or why there are none."""
     from matplotlib import colormaps
@@ -92,9 +94,9 @@ def _rendered(
             colour=colormaps[_COLOURS](shares)[:, :3],
             known=np.array([value is not None for value in found]),
         )
-        process = started("harness.report.placement.body_map_worker", [str(job), str(output)])
+        process = start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)])
         try:
-            _, said = process.communicate(timeout=_PATIENCE_S)
+            _, said = process.communicate(timeout=_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             return None, "the renderer did not finish in time"
         finally:
@@ -102,14 +104,14 @@ def _rendered(
                 process.kill()
                 process.communicate()
         if process.returncode != 0 or not output.exists():
-            return None, why_ended(process.returncode, said)
+            return None, describe_exit(process.returncode, said)
         with np.load(output, allow_pickle=False) as content:
             return {name: content[name] for name in content.files}, ""
 
 
 def _chart(
-    places: Sequence[Place],
-    shown: Shown,
+    places: Sequence[StationPlacement],
+    shown: BodyMapValues,
     views: Mapping[str, np.ndarray],
     ends: tuple[float, float],
     unit: str,
@@ -117,7 +119,7 @@ def _chart(
 ) -> Chart:
     values = {n: value for n, place in enumerate(places) if (value := shown.values.get(place.name)) is not None}
     order = sorted(values, key=lambda n: -values[n])
-    texts = {n: f"{plain_name(places[n].name)} {signed(values[n])}" for n in order[:_MOST_NAMED]}
+    texts = {n: f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order[:_MOST_NAMED]}
     texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
 
     def draw(canvas: "Figure") -> None:
@@ -132,7 +134,7 @@ def _chart(
             axes.set_axis_off()
             axes.text(0.5, 0.0, title, transform=axes.transAxes, ha="center", va="top", color=FAINT)
             here = [n for n in texts if (at[1, n, 2] > at[0, n, 2] + 1e-6) == bool(side)]
-            _name(axes, at[side], {n: texts[n] for n in here}, views["picture"].shape[1:3])
+            _label_places(axes, at[side], {n: texts[n] for n in here}, views["picture"].shape[1:3])
         bar = canvas.add_subplot(grid[1, :])
         canvas.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
         bar.set_xlabel(f"{shown.what} [{unit}]")
@@ -145,8 +147,8 @@ def _chart(
         named.get(name.replace("left_", "right_", 1)) == value for name, value in named.items() if "left_" in name
     )
     pairs = " Both of a pair that is worn together have the pair's value." if alike else ""
-    said = ", ".join(f"{plain_name(places[n].name)} {signed(values[n])}" for n in order)
-    return drawn(
+    said = ", ".join(f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order)
+    return draw_chart(
         f"body_map_{number}",
         f"{shown.what[0].upper()}{shown.what[1:]}",
         f"Balls: places that were tried, with what they are worth [{unit}]. Skin has the colour of the places on its "
@@ -158,7 +160,7 @@ def _chart(
     )
 
 
-def _name(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
+def _label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
     """A name for each place with a line to its ball: over the arms, and in columns beside the rest of the body."""
     height, width = size
     for right in (False, True):
@@ -177,7 +179,7 @@ def _name(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, i
         below = [n for n in rest if n not in above]
         highest = min([_TOP, *(down - _GAP for _, down, *_ in ends.values())])
         wanted = [max(float(at[n, 1]) / height, _ARMS[1] + _GAP * k) for k, n in enumerate(below)]
-        heights = [highest - _GAP * k for k in range(len(above))][::-1] + apart(wanted, _GAP)
+        heights = [highest - _GAP * k for k in range(len(above))][::-1] + spread_positions(wanted, _GAP)
         ends |= {n: (0.01, down, True, 1.0) for n, down in zip((*above, *below), heights, strict=True)}
         for n, (across, down, begins, start) in ends.items():
             axes.annotate(
@@ -200,18 +202,18 @@ def _name(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, i
             )
 
 
-def blended(points_m: Floats, places_m: Floats, colours: Floats) -> Floats:
+def interpolate_colours(points_m: Floats, places_m: Floats, colours: Floats) -> Floats:
     """(P, 3) colours of points on a skin (P, 3) [m], of places on it (N, 3) that have colours (N, 3): nearer places
     count more, by the inverse square of the distance (Shepard 1968, Proc. ACM National Conference)."""
     gap_m = np.linalg.norm(points_m[:, None] - places_m, axis=2)
-    weight = 1.0 / (gap_m**2 + _NEAR_M**2)
+    weight = 1.0 / (gap_m**2 + _SOFTENING_M**2)
     out: Floats = (weight / weight.sum(axis=1, keepdims=True)) @ colours
     return out
 
 
-def maps(worth: Sequence[Worth]) -> list[Shown]:
+def select_body_maps(worth: Sequence[MarginalContribution]) -> list[BodyMapValues]:
     """What there is to show: candidates among each other, as many as can be, and what one more is worth."""
-    groups: dict[tuple[str, Stations], dict[str, float | None]] = {}
+    groups: dict[tuple[str, StationNames], dict[str, float | None]] = {}
     for each in worth:
         groups.setdefault((each.mode, each.base), {})[each.candidate] = each.difference
     words = {
@@ -220,7 +222,7 @@ def maps(worth: Sequence[Worth]) -> list[Shown]:
         "exhaustive": "error of sets without it less error of sets with it, on average",
     }
     found = [
-        Shown(values, words[mode].format(count=len(base)), base if mode == "add" else ())
+        BodyMapValues(values, words[mode].format(count=len(base)), base if mode == "add" else ())
         for (mode, base), values in sorted(groups.items(), key=lambda group: group[0][0] != "exhaustive")
         if any(value is not None for value in values.values())
     ]

@@ -12,26 +12,26 @@ from typing import Any
 import numpy as np
 import pyvista as pv
 
-from harness.body.anatomy import Shape, shapes
+from harness.body.anatomy import BodyGeom, body_geoms
 from harness.body.humanoid import tpose
-from harness.body.mounts import Mount, place
+from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton, unpack
-from harness.core.skeleton import Skeleton, forward
-from harness.report.placement.body_map import blended
+from harness.core.skeleton import Skeleton, forward_kinematics
+from harness.report.placement.body_map import interpolate_colours
 
 SIZE = (760, 740)
 """Of one view, width and height in pixels."""
-_FINER = 2
+_SUPERSAMPLING = 2
 """Times so many are rendered and averaged, for a picture without background is not smoothed."""
-NEUTRAL = (0.74, 0.76, 0.79)
+NEUTRAL_COLOUR = (0.74, 0.76, 0.79)
 """Skin of bones on which no place was tried."""
-_WORN = "#3a4250"
+_BASE_COLOUR = "#3a4250"
 """Balls that have no value: what is worn already."""
-_TALL_M = 1.86
+_VIEW_HEIGHT_M = 1.86
 """Of what a view shows."""
-_BALLS = ((0.030, "#16191d"), (0.026, "#ffffff"))
+_RIMS = ((0.030, "#16191d"), (0.026, "#ffffff"))
 """Radius [m] and colour of the rims around a ball."""
 _BALL_M = 0.019
 _PELVIS = ("root", "lhipjoint", "rhipjoint")
@@ -50,10 +50,10 @@ def main(job: str, output: str) -> None:
         ]
         colour, known = content["colour"], content["known"]
     skeleton = standard_skeleton()
-    standing = _Standing(skeleton)
-    at_m, outward = _places(skeleton, standing, mounts)
+    standing = _TPose(skeleton)
+    at_m, outward = _mount_positions(skeleton, standing, mounts)
     bones = [mount.bone for mount in mounts]
-    body = [_painted(standing, shape, bones, at_m, colour, known) for shape in shapes(skeleton)]
+    body = [_coloured_mesh(standing, shape, bones, at_m, colour, known) for shape in body_geoms(skeleton)]
     views = _views(body, at_m, outward, colour, known)
     beside = Path(output).with_name(f".unfinished-{Path(output).name}")
     with open(beside, "wb") as file:
@@ -61,12 +61,12 @@ def main(job: str, output: str) -> None:
     os.replace(beside, output)
 
 
-class _Standing:
+class _TPose:
     """Where the bones of a body in the T-pose are."""
 
     def __init__(self, skeleton: Skeleton) -> None:
         root_m, turned, angles = unpack(tpose(skeleton)[None])
-        pose = forward(skeleton, root_m, turned, angles)
+        pose = forward_kinematics(skeleton, root_m, turned, angles)
         self._root = root_m[0], rotations.to_matrix(turned[0])
         self._bones = dict(zip(skeleton.names, zip(pose.start_m[0], pose.world_from_bone[0], strict=True), strict=True))
 
@@ -75,19 +75,19 @@ class _Standing:
         return self._bones.get(bone, self._root)
 
 
-def _places(skeleton: Skeleton, standing: _Standing, mounts: list[Mount]) -> tuple[Floats, Floats]:
+def _mount_positions(skeleton: Skeleton, standing: _TPose, mounts: list[Mount]) -> tuple[Floats, Floats]:
     """(N, 3) where the skin under each mount is in the room, and (N, 3) which way it faces."""
     at_m, outward = np.empty((len(mounts), 3)), np.empty((len(mounts), 3))
     for n, mount in enumerate(mounts):
         start_m, turn = standing.of(mount.bone)
-        local_m, bone_from_station = place(skeleton, mount)
+        local_m, bone_from_station = locate_mount(skeleton, mount)
         at_m[n] = start_m + turn @ local_m
         outward[n] = turn @ rotations.rotate(bone_from_station, np.array([0.0, 0.0, 1.0]))
     return at_m, outward
 
 
-def _painted(
-    standing: _Standing, shape: Shape, bones: list[str], at_m: Floats, colour: Floats, known: Floats
+def _coloured_mesh(
+    standing: _TPose, shape: BodyGeom, bones: list[str], at_m: Floats, colour: Floats, known: Floats
 ) -> "pv.PolyData":
     """One part of the body, each point in the colour of the places of its bone."""
     mesh = _mesh(shape)
@@ -96,13 +96,13 @@ def _painted(
     mesh.points = np.asarray(mesh.points) @ turn.T + start_m
     carriers = _PELVIS if shape.bone in _PELVIS else (shape.bone,)
     mine = np.array([n for n, bone in enumerate(bones) if bone in carriers and known[n]], dtype=int)
-    mesh["colour"] = np.tile(NEUTRAL, (mesh.n_points, 1))
+    mesh["colour"] = np.tile(NEUTRAL_COLOUR, (mesh.n_points, 1))
     if len(mine):
-        mesh["colour"] = blended(np.asarray(mesh.points, dtype=float), at_m[mine], colour[mine])
+        mesh["colour"] = interpolate_colours(np.asarray(mesh.points, dtype=float), at_m[mine], colour[mine])
     return mesh
 
 
-def _mesh(shape: Shape) -> "pv.PolyData":
+def _mesh(shape: BodyGeom) -> "pv.PolyData":
     """A capsule along z, or an ellipsoid, with points close enough to take colours."""
     half = float(shape.size_m[1]) if shape.kind == "capsule" else 0.0
     radii = np.full(3, shape.size_m[0]) if shape.kind == "capsule" else shape.size_m
@@ -123,7 +123,7 @@ def _views(
     body: "list[pv.PolyData]", at_m: Floats, outward: Floats, colour: Floats, known: Floats
 ) -> list[tuple[np.ndarray, Floats]]:
     """The picture from ahead and the one from behind, each with where the places are on it."""
-    plotter: Any = pv.Plotter(off_screen=True, window_size=[_FINER * side for side in SIZE], lighting="none")
+    plotter: Any = pv.Plotter(off_screen=True, window_size=[_SUPERSAMPLING * side for side in SIZE], lighting="none")
     whole = body[0].append_polydata(*body[1:])
     low, high = whole.bounds[4:6]
     middle = np.array([0.0, 0.0, 0.5 * (low + high)])
@@ -132,12 +132,12 @@ def _views(
         plotter.add_mesh(whole, scalars="colour", rgb=True, **look)
         for at, way, shade, there in zip(at_m, outward, colour, known, strict=True):
             centre = at + 0.5 * _BALL_M * way
-            for radius, rim in _BALLS:
+            for radius, rim in _RIMS:
                 ball = pv.Sphere(radius=radius, center=centre)
                 plotter.add_mesh(ball, color=rim, culling="front", lighting=False)
-            plotter.add_mesh(pv.Sphere(radius=_BALL_M, center=centre), color=shade if there else _WORN, **look)
+            plotter.add_mesh(pv.Sphere(radius=_BALL_M, center=centre), color=shade if there else _BASE_COLOUR, **look)
         plotter.enable_parallel_projection()
-        plotter.camera.parallel_scale = 0.5 * _TALL_M
+        plotter.camera.parallel_scale = 0.5 * _VIEW_HEIGHT_M
         return [_view(plotter, middle, at_m, outward, towards) for towards in (1.0, -1.0)]
     finally:
         plotter.close()
@@ -158,19 +158,21 @@ def _view(plotter: Any, middle: Floats, at_m: Floats, outward: Floats, towards: 
     picture = np.asarray(plotter.screenshot(transparent_background=True, return_img=True))
     if picture[..., :3].std() == 0.0:
         raise RuntimeError("OpenGL is there but draws nothing")
-    scale = SIZE[1] / _TALL_M
+    scale = SIZE[1] / _VIEW_HEIGHT_M
     across = SIZE[0] / 2 + scale * towards * (at_m[:, 1] - middle[1])
     down = SIZE[1] / 2 - scale * (at_m[:, 2] - middle[2])
-    return _averaged(picture), np.stack([across, down, outward @ eye], axis=1)
+    return _downsample(picture), np.stack([across, down, outward @ eye], axis=1)
 
 
-def _averaged(picture: np.ndarray) -> np.ndarray:
+def _downsample(picture: np.ndarray) -> np.ndarray:
     """(H, W, 4) of blocks of pixels, each counted by how opaque it is."""
     height, width, _ = picture.shape
-    blocks = picture.reshape(height // _FINER, _FINER, width // _FINER, _FINER, 4).astype(float)
+    blocks = picture.reshape(
+        height // _SUPERSAMPLING, _SUPERSAMPLING, width // _SUPERSAMPLING, _SUPERSAMPLING, 4
+    ).astype(float)
     opaque = blocks[..., 3:].sum(axis=(1, 3))
     colour = (blocks[..., :3] * blocks[..., 3:]).sum(axis=(1, 3)) / np.maximum(opaque, 1.0)
-    return np.concatenate([colour, opaque / _FINER**2], axis=-1).round().astype(np.uint8)
+    return np.concatenate([colour, opaque / _SUPERSAMPLING**2], axis=-1).round().astype(np.uint8)
 
 
 if __name__ == "__main__":

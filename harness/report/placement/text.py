@@ -2,48 +2,48 @@
 
 import textwrap
 
-from harness.report.paper.text import WIDTH, claims_text
+from harness.report.paper.text import WIDTH, claims_lines
 from harness.report.placement.wording import (
-    TIES,
-    difference,
-    error,
-    figure,
-    given,
-    held_out,
-    listed,
-    named,
+    TIE_NOTE,
+    format_difference,
+    format_error,
+    format_held_out,
+    format_percent,
+    format_rank_range,
+    format_value,
+    list_sets,
+    original_candidates,
     plain_name,
-    ranks,
-    saved,
+    search_gain_sentence,
     sentence,
-    share,
-    way,
+    set_name,
+    worth_label,
 )
-from harness.report.run.text import aligned
-from harness.results.placement_findings import MODES, PlacementFindings, Ranking, Search
+from harness.report.run.text import align_columns
+from harness.results.placement_findings import MODES, PlacementFindings, PlacementSearch, Ranking
 
 _MOST_ROWS, _MOST_FAILED = 12, 5
 
 
 def text(findings: PlacementFindings) -> str:
     """Lines for the terminal."""
-    parts = [[textwrap.fill(sentence(findings), WIDTH), *_about(findings)], _best(findings)]
+    parts = [[textwrap.fill(sentence(findings), WIDTH), *_setup(findings)], _best(findings)]
     if findings.claims:
-        parts.append(["what papers say", *claims_text(findings.claims)])
+        parts.append(["what papers say", *claims_lines(findings.claims)])
     parts += [_ranking(findings, ranking) for ranking in findings.rankings if len(ranking.rows) > 1]
     parts += [_search(findings, search) for search in findings.searches]
-    parts += [_worth(findings), _stability(findings), _rest(findings)]
+    parts += [_worth(findings), _stability(findings), _notes_and_failures(findings)]
     return "\n\n".join("\n".join(part) for part in parts if part)
 
 
-def _about(findings: PlacementFindings) -> list[str]:
+def _setup(findings: PlacementFindings) -> list[str]:
     what = f"{findings.metric} [{findings.unit}] of {', '.join(findings.methods)} on {', '.join(findings.behaviours)}"
     link = f"; {findings.link}" if findings.link else ""
     return [
         textwrap.fill(f"{what}, {findings.motion}, noise {findings.noise}, seed {findings.seed}{link}", WIDTH),
-        f"{len(given(findings))} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
+        f"{len(original_candidates(findings))} candidates, {len(findings.tried)} sets, {findings.planned:,} cells, "
         f"{len(findings.failures)} failed; mean over clips with its 95 % interval",
-        textwrap.fill(TIES, WIDTH),
+        textwrap.fill(TIE_NOTE, WIDTH),
     ]
 
 
@@ -55,13 +55,13 @@ def _best(findings: PlacementFindings) -> list[str]:
         tried = findings.of(best.stations)
         rate = f"{tried.rate_hz:g} Hz" if tried else ""
         front = "" if best.on_front else "fewer do better"
-        ties = listed(best.ties, 2) if best.ties else "none"
-        kept = [str(best.of or ""), share(best.stays), ties]
-        errors = [error(findings, tried), held_out(findings, best)]
-        rows.append([str(len(best.stations)), named(best.stations), front, *errors, rate, *kept])
+        ties = list_sets(best.ties, 2) if best.ties else "none"
+        kept = [str(best.of or ""), format_percent(best.stays), ties]
+        errors = [format_error(findings, tried), format_held_out(findings, best)]
+        rows.append([str(len(best.stations)), set_name(best.stations), front, *errors, rate, *kept])
     used = [i for i in range(len(head)) if any(row[i] for row in rows)]
     lines = [[row[i] for i in used] for row in (head, *rows)]
-    return aligned(lines, text_columns=used.index(3)) if rows else []
+    return align_columns(lines, text_columns=used.index(3)) if rows else []
 
 
 def _ranking(findings: PlacementFindings, ranking: Ranking) -> list[str]:
@@ -70,45 +70,47 @@ def _ranking(findings: PlacementFindings, ranking: Ranking) -> list[str]:
     rows = []
     for row in ranking.rows[:_MOST_ROWS]:
         tried = findings.of(row.stations)
-        behind = "" if row.rank == 1 else difference(row.difference, row.low, row.high)
+        behind = "" if row.rank == 1 else format_difference(row.difference, row.low, row.high)
         tie = "tie" if row.tied and row.rank > 1 else ""
-        rank = f"{row.rank} ({ranks(row.rank_low, row.rank_high)})"
-        rows.append([rank, named(row.stations), tie, figure(tried.mean if tried else None), behind])
+        rank = f"{row.rank} ({format_rank_range(row.rank_low, row.rank_high)})"
+        rows.append([rank, set_name(row.stations), tie, format_value(tried.mean if tried else None), behind])
     more = len(ranking.rows) - _MOST_ROWS
-    return [title, *aligned([head, *rows], text_columns=3), *([f"and {more} more"] if more > 0 else [])]
+    return [title, *align_columns([head, *rows], text_columns=3), *([f"and {more} more"] if more > 0 else [])]
 
 
-def _search(findings: PlacementFindings, search: Search) -> list[str]:
+def _search(findings: PlacementFindings, search: PlacementSearch) -> list[str]:
     head = ["step", "stations", "or as well", findings.unit, "gain"]
     rows = []
     for step in search.steps:
         tried = findings.of(step.stations)
-        gain = "" if step.difference is None else difference(step.difference, step.low, step.high)
+        gain = "" if step.difference is None else format_difference(step.difference, step.low, step.high)
         also = ", ".join(map(plain_name, step.tied))
-        mean = figure(tried.mean if tried else None)
-        rows.append([plain_name(step.changed) or "start", named(step.stations), also, mean, gain])
+        mean = format_value(tried.mean if tried else None)
+        rows.append([plain_name(step.changed) or "start", set_name(step.stations), also, mean, gain])
     ended = [f"ended: {search.ended}"] if search.ended else []
-    ended += [held] if (held := saved(search, findings.unit)) else []
+    ended += [held] if (held := search_gain_sentence(search, findings.unit)) else []
     return [
         f"{search.mode}: {plain_name(search.title)} ({MODES[search.mode]})",
-        *aligned([head, *rows], text_columns=3),
+        *align_columns([head, *rows], text_columns=3),
         *ended,
     ]
 
 
 def _worth(findings: PlacementFindings) -> list[str]:
     """What each candidate is worth in every mode."""
-    ways = list(dict.fromkeys(way(findings, worth) for worth in findings.worth))
+    ways = list(dict.fromkeys(worth_label(findings, worth) for worth in findings.worth))
     if not ways:
         return []
-    found = {(w.candidate, way(findings, w)): difference(w.difference, w.low, w.high) for w in findings.worth}
+    found = {
+        (w.candidate, worth_label(findings, w)): format_difference(w.difference, w.low, w.high) for w in findings.worth
+    }
     rows = [
         [plain_name(place.name), *(found.get((place.name, one), "") for one in ways)]
         for place in findings.candidates
         if any((place.name, one) in found for one in ways)
     ]
     title = f"what each is worth [{findings.unit}]: error without it less error with it"
-    return [title, *aligned([["candidate", *ways], *rows], text_columns=1)]
+    return [title, *align_columns([["candidate", *ways], *rows], text_columns=1)]
 
 
 def _stability(findings: PlacementFindings) -> list[str]:
@@ -120,20 +122,20 @@ def _stability(findings: PlacementFindings) -> list[str]:
     rows = [
         [
             f"{c.kind}: {c.name}",
-            *(named(c.best[str(size)]) if str(size) in c.best else "" for size in sizes),
-            *(str(c.clips), share(c.stays)),
+            *(set_name(c.best[str(size)]) if str(size) in c.best else "" for size in sizes),
+            *(str(c.clips), format_percent(c.stays)),
         ]
         for c in findings.conditions
     ]
-    lines = ["elsewhere", *aligned([head, *rows], text_columns=1 + len(sizes))]
+    lines = ["elsewhere", *align_columns([head, *rows], text_columns=1 + len(sizes))]
     for pair in findings.agreements:
-        tau = "not measured" if pair.tau is None else figure(pair.tau)
-        within = "" if pair.low is None else f" ({figure(pair.low)} to {figure(pair.high)})"
+        tau = "not measured" if pair.tau is None else format_value(pair.tau)
+        within = "" if pair.low is None else f" ({format_value(pair.low)} to {format_value(pair.high)})"
         lines.append(f"{pair.a} and {pair.b} rank {pair.sets} sets alike by Kendall's tau {tau}{within}")
     return lines
 
 
-def _rest(findings: PlacementFindings) -> list[str]:
+def _notes_and_failures(findings: PlacementFindings) -> list[str]:
     lines = [textwrap.fill(f"note: {note}", WIDTH) for note in findings.notes]
     failed = list(findings.failures.items())
     lines += [f"FAILED {cell}: {(why.strip().splitlines() or [''])[-1]}" for cell, why in failed[:_MOST_FAILED]]

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from harness.core.files import write_text
 from harness.report.kit.style import Chart
-from harness.report.placement.body_map import body_map, maps
+from harness.report.placement.body_map import draw_body_map, select_body_maps
 from harness.report.placement.charts import charts
 from harness.report.placement.page import PlacementContent, placement_page
 from harness.results.placement_findings import PlacementFindings, read_placement
@@ -24,7 +24,7 @@ def write_placement_page(folder: Path) -> Path:
     plots.mkdir(exist_ok=True)
     for old in (*plots.glob("*.svg"), *plots.glob("*.png")):
         old.unlink()
-    shown, missing = _drawn(findings)
+    shown, missing = _draw_charts(findings)
     for chart in (chart for found in shown.values() for chart in found):
         chart.write(plots)
     path = folder / "report.html"
@@ -32,13 +32,13 @@ def write_placement_page(folder: Path) -> Path:
     return path
 
 
-def _drawn(findings: PlacementFindings) -> tuple[dict[str, list[Chart]], list[str]]:
+def _draw_charts(findings: PlacementFindings) -> tuple[dict[str, list[Chart]], list[str]]:
     """Section -> charts, and what is missing."""
     if find_spec("matplotlib") is None:
         return {}, ["Figures: matplotlib is not installed (extra viz); their numbers are tables"]
     pictures = [
-        body_map(findings.candidates, shown, unit=findings.unit, number=number)
-        for number, shown in enumerate(maps(findings.worth), start=1)
+        draw_body_map(findings.candidates, shown, unit=findings.unit, number=number)
+        for number, shown in enumerate(select_body_maps(findings.worth), start=1)
     ]
     gaps = dict.fromkeys(f"The body in colours: {reason}" for chart, reason in pictures if chart is None)
     return {"body": [chart for chart, _ in pictures if chart], **charts(findings)}, list(gaps)

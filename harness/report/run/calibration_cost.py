@@ -5,18 +5,18 @@ from typing import Any
 
 import numpy as np
 
-from harness.compare.paired_statistics import paired
-from harness.report.kit.markup import Markup, joined, table, tag
-from harness.report.run.calibration_errors import aligned
+from harness.compare.paired_statistics import compare_paired
+from harness.report.kit.markup import Markup, join, table, tag
+from harness.report.run.calibration_errors import align_left
 from harness.results.cell import varied_text
 
 _EXACT = "exact"
 _METRICS = (("joint angle [deg]", "joint_angle_mean_deg", 2), ("mpjpe_pa [mm]", "mpjpe_pa_mm", 1))
 """Title, metric and decimals; positions without the room's error, which is another matter."""
-_HOW = "beside exact: mean difference over clips and its paired 95 % interval (docs/methods.md H17)"
+_CAPTION = "beside exact: mean difference over clips and its paired 95 % interval (docs/methods.md H17)"
 
 
-def lines(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
+def table_rows(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     """The table's cells, head first; empty when not both exact and other calibrations were measured."""
     groups: dict[tuple[str, ...], dict[str, list[Mapping[str, Any]]]] = {}
     for cell in cells:
@@ -36,31 +36,31 @@ def lines(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
             exact = by_clip.get(_EXACT, {})
             known = [error for error in exact.values() if error is not None]
             mean = f"{np.mean(known):.{decimals}f}" if known else "not measured"
-            costs = [_cost(by_clip.get(kind, {}), exact, decimals) for kind in kinds]
+            costs = [_format_cost(by_clip.get(kind, {}), exact, decimals) for kind in kinds]
             found.append([*(setting[i] for i in named), title, mean, *costs])
     return found
 
 
 def text(summary: Mapping[str, Any]) -> list[str]:
     """Lines for the terminal."""
-    found = lines(summary.get("cells", []))
+    found = table_rows(summary.get("cells", []))
     if not found:
         return []
-    return [f"what calibrating costs, {_HOW}", "", *aligned(found), ""]
+    return [f"what calibrating costs, {_CAPTION}", "", *align_left(found), ""]
 
 
 def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
     """The same for the page."""
-    found = lines(cells)
+    found = table_rows(cells)
     if not found:
         return Markup()
     head, *rows = found
-    caption = joined(tag("b", "What calibrating costs"), f", {_HOW}")
+    caption = join(tag("b", "What calibrating costs"), f", {_CAPTION}")
     return table(caption, head, rows, label="what calibrating costs")
 
 
-def _cost(errors: Mapping[str, float | None], exact: Mapping[str, float | None], decimals: int) -> str:
-    found = paired(errors, exact)
+def _format_cost(errors: Mapping[str, float | None], exact: Mapping[str, float | None], decimals: int) -> str:
+    found = compare_paired(errors, exact)
     if found.mean is None:
         return "not measured"
     ends = "too few clips" if found.low is None else f"{found.low:+.{decimals}f} to {found.high:+.{decimals}f}"

@@ -8,8 +8,20 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
-from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, SETTINGS, Chart, bare, line_style, to_png, to_svg
-from harness.report.run.data import Run, Trace, file_name
+from harness.report.kit.style import (
+    COLOURS,
+    FAINT,
+    GRID,
+    INK,
+    PAPER,
+    SETTINGS,
+    Chart,
+    hide_frame,
+    line_style,
+    to_png,
+    to_svg,
+)
+from harness.report.run.data import RunData, Trace, to_file_name
 from harness.score.pair import hinged_bones, joint_names
 
 if TYPE_CHECKING:
@@ -17,52 +29,52 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _WIDTH_IN = 8.6
-_LETTERS, _SIGN_LETTERS, _ROW_IN = 105, 9, 0.2
+_LETTERS, _HANDLE_LETTERS, _ROW_IN = 105, 9, 0.2
 """Of a legend: the width of the page and of a line's sign with its margins in average letters, and one row's height."""
 _MOST_POINTS = 1500
 """Along one line; more are no sharper on a screen."""
-ANGLE, POSITION = "joint_angle_mean_deg", "mpjpe_mm"
-UNITS = {ANGLE: "joint angle error [deg]", POSITION: "joint position error [mm]"}
+ANGLE_METRIC, POSITION_METRIC = "joint_angle_mean_deg", "mpjpe_mm"
+UNITS = {ANGLE_METRIC: "joint angle error [deg]", POSITION_METRIC: "joint position error [mm]"}
 
 
-def over_time(run: Run, behaviour: str) -> Chart:
+def error_over_time(run: RunData, behaviour: str) -> Chart:
     """Error of every method on the clip of this behaviour with the largest mean error, and station quality."""
     traces = [trace for trace in run.traces if trace.behaviour == behaviour]
     clips = tuple(dict.fromkeys(trace.clip for trace in traces))
-    clip = max(clips, key=lambda name: _mean([t.errors[ANGLE][t.scored] for t in traces if t.clip == name]))
+    clip = max(clips, key=lambda name: _mean([t.errors[ANGLE_METRIC][t.scored] for t in traces if t.clip == name]))
     shown = [trace for trace in traces if trace.clip == clip]
     which = f"{clip}" + (f", of {len(clips)} clips the one with the largest error" if len(clips) > 1 else "")
 
     def draw(figure: "Figure") -> None:
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
         for trace in (trace for trace in shown if trace.series in run.lines):
-            values = np.where(trace.scored, trace.errors[ANGLE], np.nan)
-            time_s, values = thinned(*_with_gaps(trace.time_s, values))
+            values = np.where(trace.scored, trace.errors[ANGLE_METRIC], np.nan)
+            time_s, values = decimate(*_insert_gaps(trace.time_s, values))
             error.plot(time_s, values, label=trace.series, **line_style(run.lines.index(trace.series)))
-        _logarithmic(error, "y")
-        error.set_ylabel(UNITS[ANGLE])
+        _set_log_scale(error, "y")
+        error.set_ylabel(UNITS[ANGLE_METRIC])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
-        legend(figure, error)
-        _quality(quality, max(shown, key=lambda trace: len(trace.time_s)))
+        add_legend(figure, error)
+        _draw_quality(quality, max(shown, key=lambda trace: len(trace.time_s)))
 
-    return drawn(
-        f"error_{file_name(behaviour)}",
+    return draw_chart(
+        f"error_{to_file_name(behaviour)}",
         behaviour.replace("_", " "),
-        f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).{left_out(run)}",
+        f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).{omitted_series_note(run)}",
         f"Joint angle error of methods over time on {clip}, and the quality of every station below it.",
         draw,
         2.6 + 0.2 * len(shown[0].stations),
     )
 
 
-def per_joint(run: Run, series: str) -> Chart:
+def error_per_joint(run: RunData, series: str) -> Chart:
     """Boxes of the errors of each joint for one method; medians of others as points, as many as colours tell apart."""
     skeleton = standard_skeleton()
     bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
     joints = list(joint_names(skeleton))
-    own = _pool(run, series)
-    others = [name for name in run.ranked if name != series and len(_pool(run, name)[0])]
+    own = _pooled_errors(run, series)
+    others = [name for name in run.ranked if name != series and len(_pooled_errors(run, name)[0])]
     shown = others[: len(COLOURS) - 1]
     which = f"the {len(shown)} methods with the next least error" if len(shown) < len(others) else "the other methods"
 
@@ -73,9 +85,9 @@ def per_joint(run: Run, series: str) -> Chart:
             (right, joints, 1, "position of the far end [mm]"),
         ):
             places = np.arange(len(names))
-            _boxes(axes, own[part], COLOURS[0])
+            _draw_boxes(axes, own[part], COLOURS[0])
             for colour, name in zip(COLOURS[1:], shown, strict=False):
-                middle = np.median(_pool(run, name)[part], axis=0)
+                middle = np.median(_pooled_errors(run, name)[part], axis=0)
                 axes.plot(middle, places, "o", markersize=3.5, color=colour, label=name)
             axes.set_yticks(places, names)
             axes.set_ylim(len(names) - 0.3, -0.7)
@@ -86,9 +98,9 @@ def per_joint(run: Run, series: str) -> Chart:
             axes.set_title(title)
             axes.grid(False, axis="y")
         if shown:
-            legend(figure, left)
+            add_legend(figure, left)
 
-    return drawn(
+    return draw_chart(
         "per_joint",
         f"Each joint, {series}",
         f"{series}: box from quartile to quartile, line at the median, whiskers at the 5th and 95th percentile of all "
@@ -99,7 +111,7 @@ def per_joint(run: Run, series: str) -> Chart:
     )
 
 
-def distribution(run: Run) -> Chart:
+def error_distribution(run: RunData) -> Chart:
     """How many of the frames stay below an error, for every method."""
     shares = np.concatenate([np.linspace(0.0, 0.98, 150), np.linspace(0.981, 1.0, 60)])
 
@@ -112,30 +124,30 @@ def distribution(run: Run) -> Chart:
                 values = values[np.isfinite(values)]
                 if len(values):
                     axes.plot(np.quantile(values, shares), 100.0 * shares, label=name, **line_style(place))
-            _logarithmic(axes, "x")
+            _set_log_scale(axes, "x")
             axes.set_xlabel(UNITS[metric])
             axes.set_ylim(0.0, 100.0)
         first = figure.axes[0]
         first.set_ylabel("frames below [%]")
-        legend(figure, first)
+        add_legend(figure, first)
 
-    return drawn(
+    return draw_chart(
         "error_cdf",
         "How often an error stays below",
-        f"All scored frames of all clips; the axis of the error is logarithmic. Further left is better.{left_out(run)}",
+        f"All scored frames of all clips; the axis of the error is logarithmic. Further left is better.{omitted_series_note(run)}",
         "Cumulative distribution of joint angle and joint position error of methods.",
         draw,
         3.3,
     )
 
 
-def left_out(run: Run) -> str:
+def omitted_series_note(run: RunData) -> str:
     """What a caption says of series that have no line."""
     lines, series = len(run.lines), len(run.series)
     return f" Shown are the {lines} of {series} with the least error." if lines < series else ""
 
 
-def drawn(
+def draw_chart(
     name: str,
     title: str,
     caption: str,
@@ -162,7 +174,7 @@ def drawn(
         return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"")
 
 
-def _quality(axes: "Axes", trace: Trace) -> None:
+def _draw_quality(axes: "Axes", trace: Trace) -> None:
     """A band for each station."""
     from matplotlib.colors import LinearSegmentedColormap
 
@@ -175,18 +187,18 @@ def _quality(axes: "Axes", trace: Trace) -> None:
     axes.imshow(band, aspect="auto", extent=extent, cmap=colours, vmin=0.0, vmax=1.0, interpolation="nearest")
     for edge in np.arange(0.5, len(trace.stations) - 1):
         axes.axhline(edge, color=PAPER, linewidth=1.5)
-    bare(axes)
+    hide_frame(axes)
     axes.set_yticks(range(len(trace.stations)), trace.stations)
     axes.set_xlabel("time [s]")
 
 
-def _pool(run: Run, series: str) -> tuple[Floats, Floats]:
+def _pooled_errors(run: RunData, series: str) -> tuple[Floats, Floats]:
     """Rotation (N, 22) and position (N, 25) errors of every scored frame of a method."""
     traces = [trace for trace in run.traces if trace.series == series]
     return np.concatenate([t.rotation_deg for t in traces]), np.concatenate([t.position_mm for t in traces])
 
 
-def _boxes(axes: "Axes", values: Floats, colour: str) -> None:
+def _draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
     """One lying box for each column of (N, M) values. Axes.boxplot would pull in pyplot and its global state."""
     low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
     places = np.arange(values.shape[1])
@@ -195,7 +207,7 @@ def _boxes(axes: "Axes", values: Floats, colour: str) -> None:
     axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
 
 
-def legend(figure: "Figure", axes: "Axes") -> None:
+def add_legend(figure: "Figure", axes: "Axes") -> None:
     """What the lines of `axes` are called, above the chart; it grows by the rows that do not fit into the first."""
     handles, names = axes.get_legend_handles_labels()
     room = _LETTERS * figure.get_figwidth() / _WIDTH_IN
@@ -207,10 +219,10 @@ def legend(figure: "Figure", axes: "Axes") -> None:
 
 def _legend_letters(names: Sequence[str], columns: int) -> int:
     """As wide as so many letters; matplotlib fills columns one after another."""
-    return sum(_SIGN_LETTERS + max(map(len, part)) for part in np.array_split(np.array(names, object), columns))
+    return sum(_HANDLE_LETTERS + max(map(len, part)) for part in np.array_split(np.array(names, object), columns))
 
 
-def _logarithmic(axes: "Axes", which: Literal["x", "y"]) -> None:
+def _set_log_scale(axes: "Axes", which: Literal["x", "y"]) -> None:
     """A logarithmic axis with plain numbers, unless nothing on it is above zero (a perfect method)."""
     from matplotlib.ticker import LogLocator, NullLocator
 
@@ -235,14 +247,14 @@ def _root_ticks(end: float) -> list[float]:
     return ticks
 
 
-def _with_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+def _insert_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """A NaN wherever frames are missing, so that no line is drawn across."""
     step_s = np.diff(time_s)
     holes = np.flatnonzero(step_s > 1.5 * np.min(step_s, initial=np.inf)) + 1
     return np.insert(time_s, holes, time_s[holes - 1]), np.insert(values, holes, np.nan)
 
 
-def thinned(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
+def decimate(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Every n-th point of a long line."""
     every = max(1, len(time_s) // _MOST_POINTS)
     return time_s[::every], values[::every]

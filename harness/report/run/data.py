@@ -14,9 +14,9 @@ from harness.report.kit.style import STYLES
 from harness.results.cell import Cell, cell_folder, varied_text
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
-from harness.results.summary import GROUP
+from harness.results.summary import GROUP_KEYS
 from harness.score.angles import local_errors_deg
-from harness.score.pair import Pair, Posed, posed
+from harness.score.pair import Pair, PoseSequence, compute_poses
 from harness.score.positions import joint_errors_mm
 
 Row = Mapping[str, Any]
@@ -38,7 +38,7 @@ class Trace:
 
     key: str
     series: str
-    """Name of the group that it belongs to, see `Run.series`."""
+    """Name of the group that it belongs to, see `RunData.series`."""
     behaviour: str
     clip: str
     stations: tuple[str, ...]
@@ -60,7 +60,7 @@ class Trace:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class RunData:
     """A finished run, ready to be shown."""
 
     out: Path
@@ -124,10 +124,10 @@ class Run:
         return read_cell(cell_folder(self.out, key))
 
 
-def read_run(out: Path) -> Run:
+def read_run(out: Path) -> RunData:
     """Read it, one cell at a time; BadFile when the folder holds no run or a damaged one."""
     manifest, whole = Manifest.read(out / "manifest.json"), read_summary(out)
-    run = Run(out, manifest, _last_varied(whole), (), whole)
+    run = RunData(out, manifest, _last_varied(whole), (), whole)
     keys = [str(row["key"]) for row in run.cells]
     return replace(run, traces=tuple(_trace(run, run.cell(key)) for key in keys))
 
@@ -141,11 +141,11 @@ def _last_varied(summary: Row) -> Row:
     return {**summary, **parts}
 
 
-def _trace(run: Run, cell: Cell) -> Trace:
-    pair = pair_of(cell)
+def _trace(run: RunData, cell: Cell) -> Trace:
+    pair = scored_pair(cell)
     return Trace(
         key=cell.key,
-        series=run.series_of({name: getattr(cell, name) for name in GROUP}),
+        series=run.series_of({name: getattr(cell, name) for name in GROUP_KEYS}),
         behaviour=cell.behaviour,
         clip=cell.clip,
         stations=cell.stations,
@@ -163,18 +163,18 @@ def _trace(run: Run, cell: Cell) -> Trace:
     )
 
 
-def pair_of(cell: Cell) -> Pair:
+def scored_pair(cell: Cell) -> Pair:
     """Truth and estimate of the scored frames."""
     rows = cell.scores.scored
-    return Pair(*both_posed(cell, rows), cell.frame_index[rows], cell.rate_hz)
+    return Pair(*pose_pair(cell, rows), cell.frame_index[rows], cell.rate_hz)
 
 
-def both_posed(cell: Cell, rows: Bools | Ints) -> tuple[Posed, Posed]:
+def pose_pair(cell: Cell, rows: Bools | Ints) -> tuple[PoseSequence, PoseSequence]:
     """Truth and estimate at some of its frames, each on its own skeleton."""
     true, believed = (standard_skeleton().with_bones(bone_m) for bone_m in (cell.bone_m, cell.estimate_bone_m))
-    return posed(true, cell.truth_qpos[rows]), posed(believed, cell.estimate_qpos[rows])
+    return compute_poses(true, cell.truth_qpos[rows]), compute_poses(believed, cell.estimate_qpos[rows])
 
 
-def file_name(text: str) -> str:
+def to_file_name(text: str) -> str:
     """Letters, digits and underscores only."""
     return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in text)

@@ -5,44 +5,58 @@ from typing import Any
 
 import numpy as np
 
-from harness.report.kit.markup import Markup, folded, joined, table, tag
-from harness.report.run.data import Row, Run, Trace
+from harness.report.kit.markup import Markup, details, join, table, tag
+from harness.report.run.data import Row, RunData, Trace
 from harness.score.metrics import DEFINITIONS
 
-FIRST = ("joint_angle_mean_deg", "mpjpe_mm")
+OPEN_METRICS = ("joint_angle_mean_deg", "mpjpe_mm")
 """Metrics whose table by behaviour is open."""
-FURTHER = ("joint_angle_rms_deg", "mpjre_deg", "mpjpe_root_mm", "mpjpe_pa_mm", "jitter_m_s3", "lag_ms", "step_p50_ms")
-_NO_RANK = ("jitter_m_s3", "lag_ms")
+FOLDED_METRICS = (
+    "joint_angle_rms_deg",
+    "mpjre_deg",
+    "mpjpe_root_mm",
+    "mpjpe_pa_mm",
+    "jitter_m_s3",
+    "lag_ms",
+    "step_p50_ms",
+)
+_UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
 """Where the lowest is not the best: truth has jitter of its own, and a lag has a sign."""
 NOT_MEASURED = tag("span", "not measured", class_="none")
 _DECIMALS = {"deg": 2, "mm": 1, "mm/s": 1, "m/s³": 1, "ms": 2, "frames/s": 0, "%": 1}
 
 
-def number(value: float, unit: str, *, decimals: int = 0) -> str:
+def format_number(value: float, unit: str, *, decimals: int = 0) -> str:
     """With the decimals that suit the unit, `decimals` of them at least."""
     return f"{value:,.{max(decimals, _DECIMALS.get(unit, 2))}f}"
 
 
-def statistics(found: Mapping[str, Any] | None, unit: str, *, n: int | None = None) -> Markup:
+def format_statistics(found: Mapping[str, Any] | None, unit: str, *, n: int | None = None) -> Markup:
     """Mean ± standard deviation over sequences, and their number where it differs from `n`."""
     if found is None or found["mean"] is None:
         return NOT_MEASURED
-    spread = None if found["sd"] is None else tag("span", f" ± {number(found['sd'], unit)}", class_="spread")
-    return joined(number(found["mean"], unit), spread, None if found["sequences"] == n else count(found["sequences"]))
+    spread = None if found["sd"] is None else tag("span", f" ± {format_number(found['sd'], unit)}", class_="spread")
+    return join(
+        format_number(found["mean"], unit),
+        spread,
+        None if found["sequences"] == n else format_count(found["sequences"]),
+    )
 
 
-def count(n: int | str) -> Markup:
+def format_count(n: int | str) -> Markup:
     """Of how many sequences, never broken across lines."""
     return tag("span", f" n\u00a0{n}", class_="spread")
 
 
-def results(run: Run) -> Markup:
+def results_tables(run: RunData) -> Markup:
     """Methods by behaviours: the first metrics open, further ones folded."""
-    further = [by_behaviour(run, metric) for metric in FURTHER]
-    return joined(*(by_behaviour(run, metric) for metric in FIRST), folded("More metrics by behaviour", *further))
+    further = [behaviour_table(run, metric) for metric in FOLDED_METRICS]
+    return join(
+        *(behaviour_table(run, metric) for metric in OPEN_METRICS), details("More metrics by behaviour", *further)
+    )
 
 
-def by_behaviour(run: Run, metric: str) -> Markup:
+def behaviour_table(run: RunData, metric: str) -> Markup:
     """One metric: a row for each method, a column for each behaviour, then all sequences of several."""
     found: dict[tuple[str, str | None], Row] = {}
     for row in run.summary["behaviours"]:
@@ -56,22 +70,22 @@ def by_behaviour(run: Run, metric: str) -> Markup:
         here = {name: found[name, column] for name in run.series if (name, column) in found}
         counts[column] = max((s["sequences"] for s in here.values()), default=0)
         means = {name: s["mean"] for name, s in here.items() if s["mean"] is not None}
-        ranked = len(means) > 1 and metric not in _NO_RANK
+        ranked = len(means) > 1 and metric not in _UNRANKED_METRICS
         best[column] = min(means, key=lambda name: means[name]) if ranked else None
 
     def cell(name: str, column: str | None) -> Markup:
-        text = statistics(found.get((name, column)), unit, n=counts[column])
+        text = format_statistics(found.get((name, column)), unit, n=counts[column])
         return tag("strong", text) if name == best[column] else text
 
-    numbers = [count(counts[column]) for column in columns]
+    numbers = [format_count(counts[column]) for column in columns]
     names = [(column or "all").replace("_", " ") for column in columns]
-    titles = [joined(name, n) for name, n in zip(names, numbers, strict=True)]
+    titles = [join(name, n) for name, n in zip(names, numbers, strict=True)]
     rows = [[name, *(cell(name, column) for column in columns)] for name in run.series]
-    caption = joined(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")
+    caption = join(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")
     return table(caption, ["method", *titles], rows, label=metric)
 
 
-def coverage(run: Run) -> Markup:
+def coverage_tables(run: RunData) -> Markup:
     """How much of the motion each method answered for."""
     rows = []
     for row in run.summary["methods"]:
@@ -84,17 +98,17 @@ def coverage(run: Run) -> Markup:
         "Frames after the warm-up. Held: carried on because too little came in; "
         "lost: most stations had been gone for long; not finite counts as not matched."
     )
-    failures = [tag("li", tag("b", cell), folded(_last_line(text), tag("pre", text))) for cell, text in _failures(run)]
-    failed = joined(tag("h3", "Failed cells"), tag("ul", *failures)) if failures else None
+    failures = [tag("li", tag("b", cell), details(_last_line(text), tag("pre", text))) for cell, text in _failures(run)]
+    failed = join(tag("h3", "Failed cells"), tag("ul", *failures)) if failures else None
     finished, planned = run.summary["cells_finished"], run.summary["cells_planned"]
-    return joined(
+    return join(
         tag("p", f"{finished} of {planned} cells finished."),
         table(caption, head, rows, label="coverage") if rows else None,
         failed,
     )
 
 
-def health(run: Run) -> Markup:
+def health_tables(run: RunData) -> Markup:
     """What the stream lost, by station and by clip; every method on a clip was shown the same stream."""
     streams: dict[str, Trace] = {}
     for trace in sorted(run.traces, key=lambda trace: -len(trace.time_s)):
@@ -114,12 +128,12 @@ def health(run: Run) -> Markup:
     head = ["station", "valid", "suspect", "mean quality", "longest gap [s]"]
     caption = f"All frames of {len(streams)} clip{'s'[: len(streams) != 1]}. Gap: a run of frames without position."
     names = list(dict.fromkeys(name for trace in streams.values() for name in trace.health))
-    counts = [[clip, *(_plain(trace.health.get(name)) for name in names)] for clip, trace in streams.items()]
+    counts = [[clip, *(_format_plain(trace.health.get(name)) for name in names)] for clip, trace in streams.items()]
     by_clip = table("Counts of the stream, by clip", ["clip", *names], counts, label="stream counts")
-    return joined(table(caption, head, rows, label="stream health"), folded("Counts by clip", by_clip))
+    return join(table(caption, head, rows, label="stream health"), details("Counts by clip", by_clip))
 
 
-def everything(run: Run) -> Markup:
+def all_metrics_table(run: RunData) -> Markup:
     """Every metric of every method over all sequences, with its definition."""
     found = {run.series_of(row): row["metrics"] for row in run.summary["methods"]}
     rows = []
@@ -129,14 +143,16 @@ def everything(run: Run) -> Markup:
         cells = []
         for metrics in found.values():
             frames = metrics[metric]["frame_weighted"]
-            below = None if frames is None else tag("span", number(frames, definition.unit), class_="spread under")
-            cells.append(joined(statistics(metrics[metric], definition.unit), below))
-        rows.append([joined(f"{metric} [{definition.unit}]", tag("small", definition.text)), *cells])
+            below = (
+                None if frames is None else tag("span", format_number(frames, definition.unit), class_="spread under")
+            )
+            cells.append(join(format_statistics(metrics[metric], definition.unit), below))
+        rows.append([join(f"{metric} [{definition.unit}]", tag("small", definition.text)), *cells])
     caption = "Mean ± sd over sequences; below it the figure over all frames together, where there is one."
     return table(caption, ["metric", *found], rows, label="every metric")
 
 
-def _failures(run: Run) -> list[tuple[str, str]]:
+def _failures(run: RunData) -> list[tuple[str, str]]:
     return [(str(cell), str(text)) for cell, text in run.summary["failures"].items()]
 
 
@@ -153,9 +169,9 @@ def _longest_gap_s(trace: Trace, station: int) -> float:
     return longest if longest > 1.5 * period_s else 0.0
 
 
-def _plain(value: Any) -> Any:
+def _format_plain(value: Any) -> Any:
     if value is None:
         return NOT_MEASURED
     if isinstance(value, Mapping):
-        return ", ".join(f"{name} {_plain(item)}" for name, item in value.items())
+        return ", ".join(f"{name} {_format_plain(item)}" for name, item in value.items())
     return f"{value:g}" if isinstance(value, float) else str(value)

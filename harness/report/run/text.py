@@ -17,25 +17,25 @@ COLUMNS = (
 _RECORDS = ("records_sent", "records_dropped")
 
 
-def table(summary: Mapping[str, Any]) -> str:
+def run_table(summary: Mapping[str, Any]) -> str:
     """A row for each method and behaviour: mean and spread over sequences, and how much of the motion was matched."""
     cells = summary["cells"]
     finished = f"cells finished {summary['cells_finished']} of {summary['cells_planned']}"
     failed = [f"FAILED {cell}: {text.strip().splitlines()[-1]}" for cell, text in summary["failures"].items()]
     if not cells:
         return "\n".join(["nothing was measured", finished, *failed])
-    lines = [["behaviour", "method", *_varying(cells), "clips", "matched", *(title for title, *_ in COLUMNS)]]
+    lines = [["behaviour", "method", *_varying_columns(cells), "clips", "matched", *(title for title, *_ in COLUMNS)]]
     for row in sorted(summary["behaviours"], key=lambda row: str(row["behaviour"])):
-        varying = [_text(row[name]) for name in _varying(cells)]
+        varying = [_format_cell(row[name]) for name in _varying_columns(cells)]
         matched = f"{row['frames_matched']}/{row['frames_expected']}"
-        figures = [_figure(row["metrics"][name], decimals) for _, name, decimals in COLUMNS]
+        figures = [_format_statistic(row["metrics"][name], decimals) for _, name, decimals in COLUMNS]
         lines.append([row["behaviour"], row["method"], *varying, str(row["sequences"]), matched, *figures])
     return "\n".join(
         [
-            _setting(cells),
-            *_line(cells),
+            _setup_lines(cells),
+            *_link_loss(cells),
             "",
-            *aligned(lines, text_columns=2 + len(_varying(cells))),
+            *align_columns(lines, text_columns=2 + len(_varying_columns(cells))),
             "",
             *calibration_errors.text(summary),
             *calibration_cost.text(summary),
@@ -47,7 +47,7 @@ def table(summary: Mapping[str, Any]) -> str:
     )
 
 
-def _setting(cells: Sequence[Mapping[str, Any]]) -> str:
+def _setup_lines(cells: Sequence[Mapping[str, Any]]) -> str:
     """What all cells share, in two lines."""
     one = cells[0]
     noise, known = (", ".join(dict.fromkeys(str(cell[name]) for cell in cells)) for name in ("noise", "calibration"))
@@ -59,7 +59,7 @@ def _setting(cells: Sequence[Mapping[str, Any]]) -> str:
     )
 
 
-def _line(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+def _link_loss(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the line between tracker and host could not carry."""
     sent, lost = (sum(float(cell["health"].get(name, 0.0)) for cell in cells) for name in _RECORDS)
     if not lost:
@@ -67,24 +67,24 @@ def _line(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     return [f"THE LINE IS TOO SLOW: {100.0 * lost / (sent + lost):.0f} % of the records were dropped"]
 
 
-def _varying(cells: Sequence[Mapping[str, Any]]) -> list[str]:
+def _varying_columns(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     """Protocol always (examples decide much); inputs, performer and varied values where there is a choice."""
-    choices = {name: {_text(cell[name]) for cell in cells} for name in ("inputs", "performer", "varied")}
+    choices = {name: {_format_cell(cell[name]) for cell in cells} for name in ("inputs", "performer", "varied")}
     return ["protocol", *(name for name, texts in choices.items() if len(texts) > 1)]
 
 
-def _text(value: Any) -> str:
+def _format_cell(value: Any) -> str:
     return varied_text(value) if isinstance(value, Mapping) else str(value)
 
 
-def _figure(statistics: Mapping[str, Any], decimals: int) -> str:
+def _format_statistic(statistics: Mapping[str, Any], decimals: int) -> str:
     if statistics["mean"] is None:
         return "not measured"
     spread = "" if statistics["sd"] is None else f" ± {statistics['sd']:.{decimals}f}"
     return f"{statistics['mean']:.{decimals}f}{spread}"
 
 
-def aligned(lines: Sequence[Sequence[str]], text_columns: int) -> list[str]:
+def align_columns(lines: Sequence[Sequence[str]], text_columns: int) -> list[str]:
     """Words on the left of their columns, in the first `text_columns`, and figures on the right."""
     widths = [max(len(line[i]) for line in lines) for i in range(len(lines[0]))]
     return [

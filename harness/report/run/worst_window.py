@@ -11,7 +11,7 @@ WINDOW_S = 2.0
 
 
 @dataclass(frozen=True)
-class Window:
+class WorstWindow:
     """Some two seconds of one cell, the whole of a shorter one."""
 
     key: str
@@ -26,7 +26,7 @@ class Window:
     """Of the metric over the window's scored frames, in its unit."""
 
 
-def worst_window(key: str, metric: str, time_s: Floats, values: Floats, scored: Bools) -> Window | None:
+def find_worst_window(key: str, metric: str, time_s: Floats, values: Floats, scored: Bools) -> WorstWindow | None:
     """The worst of all windows that begin at a scored frame, or None if the metric has no value in any of them.
 
     A window holds the frames within 2 s of its first one; `time_s` (F,) rises. It counts only if at least half as
@@ -39,25 +39,25 @@ def worst_window(key: str, metric: str, time_s: Floats, values: Floats, scored: 
     whole = scored & (time_s + WINDOW_S <= time_s[-1] + 1.5 * period_s)
     begins = whole if whole.any() else np.arange(len(scored)) == np.argmax(scored)
     stop = np.searchsorted(time_s, time_s + WINDOW_S - 0.5 * period_s)
-    count = _over_windows(known.astype(float), stop)
-    total = _over_windows(np.where(known, values, 0.0), stop)
+    count = _window_sums(known.astype(float), stop)
+    total = _window_sums(np.where(known, values, 0.0), stop)
     begins = begins & (count > 0.0) & (count >= 0.5 * np.max(count[begins]))
     if not begins.any():
         return None
     mean = np.where(begins, total / np.maximum(count, 1.0), -np.inf)
     first = int(np.argmax(mean))
     last = int(stop[first])
-    return Window(key, metric, first, last, float(time_s[first]), float(time_s[last - 1]), float(mean[first]))
+    return WorstWindow(key, metric, first, last, float(time_s[first]), float(time_s[last - 1]), float(mean[first]))
 
 
-def worst_of(windows: Iterable[Window]) -> Window | None:
+def select_worst(windows: Iterable[WorstWindow]) -> WorstWindow | None:
     """The one with the largest mean; the first of equals."""
     return max(windows, key=lambda window: window.mean, default=None)
 
 
-def together(windows: Iterable[Window]) -> list[tuple[Window, ...]]:
+def group_overlapping(windows: Iterable[WorstWindow]) -> list[tuple[WorstWindow, ...]]:
     """Windows of one cell that overlap by more than half, so that the same moment is shown once; the first leads."""
-    groups: list[list[Window]] = []
+    groups: list[list[WorstWindow]] = []
     for window in windows:
         for group in groups:
             lead = group[0]
@@ -70,7 +70,7 @@ def together(windows: Iterable[Window]) -> list[tuple[Window, ...]]:
     return [tuple(group) for group in groups]
 
 
-def _over_windows(values: Floats, stop: Ints) -> Floats:
+def _window_sums(values: Floats, stop: Ints) -> Floats:
     """Sums (F,) from each frame to the end of its window."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     out: Floats = sums[stop] - sums[: len(values)]

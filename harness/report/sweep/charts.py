@@ -8,24 +8,24 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.report.kit.style import COLOURS, GRID, Chart, line_style
-from harness.report.paper.line_chart import name_ends
-from harness.report.run.charts import drawn, legend
-from harness.report.run.data import file_name
-from harness.report.run.tables import number
-from harness.report.sweep.data import HEADLINE, Key, Statistic, Sweep, unit_of
+from harness.report.paper.line_chart import label_line_ends
+from harness.report.run.charts import add_legend, draw_chart
+from harness.report.run.data import to_file_name
+from harness.report.run.tables import format_number
+from harness.report.sweep.data import PRIMARY_METRIC, Statistic, SweepData, VariedKey, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_SERIES, MOST_SCENARIOS, MOST_INTERVALS = 10, 12, 600
+MAX_SERIES, MAX_SCENARIOS, MAX_INTERVALS = 10, 12, 600
 """In one chart; that have a chart for a key; that are worked out for one page, for each takes a moment."""
 _WIDTH_IN, _LINES_IN, _ROW_IN, _LETTER_IN = 4.2, 2.7, 0.085, 0.165
 _LETTERS, _MOST_ROWS, _MOST_NAMED, _MOST_LETTERS, _MOST_TICKS = 18, 4, 8, 44, 5
 """Of a name beside an axis; rows of it; lines that have their names at their ends; letters of a name in a legend;
 values that a logarithmic axis names."""
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
-_WIDE = 30.0
+_LOG_SCALE_RATIO = 30.0
 """Positive values that reach so many times as far as the first have a logarithmic axis."""
 
 
@@ -40,25 +40,27 @@ class Curve:
     """For each value of the key."""
 
 
-def curves(sweep: Sweep, key: Key, scenario: int, metric: str = HEADLINE, *, ends: bool = True) -> list[Curve]:
+def curves(
+    sweep: SweepData, key: VariedKey, scenario: int, metric: str = PRIMARY_METRIC, *, ends: bool = True
+) -> list[Curve]:
     """Of each series that has anything there, in the order of the sweep; intervals for those that are drawn."""
     found = [_curve(sweep, key, scenario, place, metric) for place in range(len(sweep.series))]
     found = [curve for curve in found if any(point.mean is not None for point in curve.points)]
-    drawn = {curve.place for curve in shown_of(found)} if ends else set()
+    drawn = {curve.place for curve in select_curves(found)} if ends else set()
     return [_curve(sweep, key, scenario, c.place, metric, ends=True) if c.place in drawn else c for c in found]
 
 
-def shown_of(found: Sequence[Curve]) -> list[Curve]:
+def select_curves(found: Sequence[Curve]) -> list[Curve]:
     """The series with the least error, as many as can be told apart, in the order of the sweep."""
-    return sorted(sorted(found, key=_mean)[:MOST_SERIES], key=lambda curve: curve.place)
+    return sorted(sorted(found, key=_curve_mean)[:MAX_SERIES], key=lambda curve: curve.place)
 
 
-def _curve(sweep: Sweep, key: Key, scenario: int, place: int, metric: str, *, ends: bool = False) -> Curve:
+def _curve(sweep: SweepData, key: VariedKey, scenario: int, place: int, metric: str, *, ends: bool = False) -> Curve:
     chosen = [sweep.where(scenario, place, **{key.name: value}) for value in range(len(key.texts))]
     return Curve(sweep.series[place], place, tuple(sweep.statistic(metric, one, ends=ends) for one in chosen))
 
 
-def varying(sweep: Sweep, key: Key) -> list[int]:
+def scenarios_varying(sweep: SweepData, key: VariedKey) -> list[int]:
     """The scenarios whose cells take several values of the key."""
     values = sweep.value_of[key.name]
     return [
@@ -66,33 +68,33 @@ def varying(sweep: Sweep, key: Key) -> list[int]:
     ]
 
 
-def chart(sweep: Sweep, key: Key, scenario: int, found: Sequence[Curve]) -> Chart:
+def sweep_chart(sweep: SweepData, key: VariedKey, scenario: int, found: Sequence[Curve]) -> Chart:
     """Of one scenario."""
-    shown = shown_of(found)
+    shown = select_curves(found)
     some = f" Shown are the {len(shown)} of {len(found)} with the least error." if len(shown) < len(found) else ""
     counts = sorted({point.clips for curve in shown for point in curve.points if point.clips})
     clips = f"{counts[0]}" if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
     caption = f"Mean over {clips} clip{'s'[: counts[-1] != 1]}.{some}"
-    told = "; ".join(f"{curve.name} {_said(curve, key)}" for curve in shown)
-    name = f"{file_name(key.name)}_{file_name(sweep.scenarios[scenario])}"
-    return drawn(
+    told = "; ".join(f"{curve.name} {_curve_values_text(curve, key)}" for curve in shown)
+    name = f"{to_file_name(key.name)}_{to_file_name(sweep.scenarios[scenario])}"
+    return draw_chart(
         f"varied_{name}",
         f"{key.name}, {sweep.scenarios[scenario]}" if len(sweep.scenarios) > 1 else key.name,
         caption,
-        f"{HEADLINE} [{unit_of(HEADLINE)}] against {key.name}: {told}.",
+        f"{PRIMARY_METRIC} [{unit_of(PRIMARY_METRIC)}] against {key.name}: {told}.",
         lambda figure: _draw(figure, key, shown),
-        _LINES_IN if key.numbers else _dots_in(key, len(shown)),
+        _LINES_IN if key.numbers else _dot_chart_height_in(key, len(shown)),
         width_in=_WIDTH_IN,
     )
 
 
-def _dots_in(key: Key, series: int) -> float:
+def _dot_chart_height_in(key: VariedKey, series: int) -> float:
     """Height with a row for each value, as high as its name or its dots need."""
-    rows = max(1 + text.count("\n") for text in _names(key))
+    rows = max(1 + text.count("\n") for text in _row_labels(key))
     return 0.75 + len(key.texts) * max(_ROW_IN * (series + 1), _LETTER_IN * rows + 0.08)
 
 
-def _names(key: Key) -> list[str]:
+def _row_labels(key: VariedKey) -> list[str]:
     """Values in several rows, broken after a plus where they can be."""
     out = []
     for text in key.texts:
@@ -102,48 +104,48 @@ def _names(key: Key) -> list[str]:
     return out
 
 
-def _draw(figure: "Figure", key: Key, shown: Sequence[Curve]) -> None:
+def _draw(figure: "Figure", key: VariedKey, shown: Sequence[Curve]) -> None:
     axes = figure.subplots()
     if not key.numbers:
-        _dots(axes, key, shown)
-        legend(figure, axes)
+        _draw_dots(axes, key, shown)
+        add_legend(figure, axes)
         return
-    ends = _lines(axes, key, shown)
+    ends = _draw_lines(axes, key, shown)
     if len(ends) <= _MOST_NAMED and all(len(name) <= _LETTERS for _, name, _ in ends):
-        name_ends(axes, ends)
+        label_line_ends(axes, ends)
     else:
-        legend(figure, axes)
+        add_legend(figure, axes)
 
 
-def _lines(axes: "Axes", key: Key, shown: Sequence[Curve]) -> list[tuple[float, str, str]]:
+def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tuple[float, str, str]]:
     """Each series; last value, name and colour of each."""
     ends = []
     for curve in shown:
         style = line_style(curve.place)
         at = [n for n, point in enumerate(curve.points) if point.mean is not None]
         x, y = [key.numbers[n] for n in at], [float(curve.points[n].mean or 0.0) for n in at]
-        axes.plot(x, y, marker=_marker(curve), markersize=4.0, label=_short(curve.name), **style)
+        axes.plot(x, y, marker=_marker(curve), markersize=4.0, label=_shorten(curve.name), **style)
         ends.append((y[-1], curve.name, style["color"]))
         for n in at:
             low, high = curve.points[n].low, curve.points[n].high
             if low is not None and high is not None:
                 axes.plot([key.numbers[n]] * 2, [low, high], color=style["color"], linewidth=1.1, alpha=0.7)
-    if key.numbers[0] > 0.0 and key.numbers[-1] > _WIDE * key.numbers[0]:
+    if key.numbers[0] > 0.0 and key.numbers[-1] > _LOG_SCALE_RATIO * key.numbers[0]:
         axes.set_xscale("log")
         every = -(-len(key.numbers) // _MOST_TICKS)
         axes.set_xticks(key.numbers[::every], key.texts[::every])
         axes.set_xticks([], minor=True)
     axes.set_xlabel(key.name)
-    axes.set_ylabel(f"joint angle error [{unit_of(HEADLINE)}]")
+    axes.set_ylabel(f"joint angle error [{unit_of(PRIMARY_METRIC)}]")
     axes.set_ylim(bottom=0.0)
     return ends
 
 
-def _dots(axes: "Axes", key: Key, shown: Sequence[Curve]) -> None:
+def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
     """A row for each value, in it a dot for each series."""
     step = 0.8 / max(len(shown), 1)
     for row, curve in enumerate(shown):
-        colour, label = line_style(curve.place)["color"], _short(curve.name)
+        colour, label = line_style(curve.place)["color"], _shorten(curve.name)
         for value, point in enumerate(curve.points):
             if point.mean is None:
                 continue
@@ -152,9 +154,9 @@ def _dots(axes: "Axes", key: Key, shown: Sequence[Curve]) -> None:
                 axes.plot([point.low, point.high], [y, y], color=colour, linewidth=1.4, alpha=0.7)
             axes.plot([point.mean], [y], _marker(curve), markersize=4.5, color=colour, label=label)
             label = "_"
-    axes.set_yticks(range(len(key.texts)), _names(key))
+    axes.set_yticks(range(len(key.texts)), _row_labels(key))
     axes.set_ylim(len(key.texts) - 0.5, -0.5)
-    axes.set_xlabel(f"joint angle error [{unit_of(HEADLINE)}]")
+    axes.set_xlabel(f"joint angle error [{unit_of(PRIMARY_METRIC)}]")
     axes.set_xlim(left=0.0)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
@@ -162,7 +164,7 @@ def _dots(axes: "Axes", key: Key, shown: Sequence[Curve]) -> None:
         axes.axhline(edge - 0.5, color=GRID, linewidth=0.8)
 
 
-def _short(name: str) -> str:
+def _shorten(name: str) -> str:
     return name if len(name) <= _MOST_LETTERS else f"{name[: _MOST_LETTERS - 1]}…"
 
 
@@ -171,14 +173,14 @@ def _marker(curve: Curve) -> str:
     return _MARKERS[(curve.place + curve.place // len(COLOURS)) % len(_MARKERS)]
 
 
-def _mean(curve: Curve) -> float:
+def _curve_mean(curve: Curve) -> float:
     known = [point.mean for point in curve.points if point.mean is not None]
     return sum(known) / len(known)
 
 
-def _said(curve: Curve, key: Key) -> str:
+def _curve_values_text(curve: Curve, key: VariedKey) -> str:
     figures = [
-        f"{number(point.mean, unit_of(HEADLINE))} at {text}"
+        f"{format_number(point.mean, unit_of(PRIMARY_METRIC))} at {text}"
         for text, point in zip(key.texts, curve.points, strict=True)
         if point.mean is not None
     ]

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.paired_statistics import FEWEST_CLIPS, interval
+from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval
 from harness.core.arrays import Bools, Floats, Ints
 from harness.score.metrics import DEFINITIONS
 
-HEADLINE, SECOND = "joint_angle_mean_deg", "mpjpe_mm"
-METRICS = (HEADLINE, SECOND, "mpjre_deg", "mpjpe_root_mm", "jitter_m_s3", "step_p50_ms", "coverage")
+PRIMARY_METRIC, SECONDARY_METRIC = "joint_angle_mean_deg", "mpjpe_mm"
+METRICS = (PRIMARY_METRIC, SECONDARY_METRIC, "mpjre_deg", "mpjpe_root_mm", "jitter_m_s3", "step_p50_ms", "coverage")
 """What the page has of each cell; the table has the rest."""
 
 
@@ -22,12 +22,12 @@ class Statistic:
     clips: int
     sd: float | None = None
     low: float | None = None
-    """End of the 95 % interval; None with fewer than `FEWEST_CLIPS`, or where it was not asked for."""
+    """End of the 95 % interval; None with fewer than `MIN_CLIPS`, or where it was not asked for."""
     high: float | None = None
 
 
 @dataclass(frozen=True)
-class Key:
+class VariedKey:
     """What was varied: its values in rising order if they are numbers, else as they came."""
 
     name: str
@@ -37,7 +37,7 @@ class Key:
 
 
 @dataclass(frozen=True, eq=False)
-class Sweep:
+class SweepData:
     """N finished cells."""
 
     name: str
@@ -51,7 +51,7 @@ class Sweep:
     """"known", "new" or "" of each series: these have other clips."""
     clips: tuple[str, ...]
     """As "scenario: clip", for equal names may be other motion."""
-    keys: tuple[Key, ...]
+    keys: tuple[VariedKey, ...]
     scenario_of: Ints
     """(N,) index into `scenarios`."""
     series_of: Ints
@@ -92,7 +92,7 @@ class Sweep:
         if not len(means):
             return Statistic(None, 0)
         sd = float(means.std(ddof=1)) if len(means) > 1 else None
-        low, high = interval(means) if ends and len(means) >= FEWEST_CLIPS else (None, None)
+        low, high = bootstrap_interval(means) if ends and len(means) >= MIN_CLIPS else (None, None)
         return Statistic(float(means.mean()), len(means), sd, low, high)
 
 

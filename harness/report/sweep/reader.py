@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Ints
-from harness.report.sweep.data import METRICS, Key, Sweep
+from harness.report.sweep.data import METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
 
-_TELLING = ("inputs", "protocol", "performer")
+_GROUP_COLUMNS = ("inputs", "protocol", "performer")
 """Never pooled, the performer last: a method has a series for each combination of them that it has."""
-_COLUMNS = ("scenario", "clip", "method", *_TELLING, "varied", *METRICS)
+_COLUMNS = ("scenario", "clip", "method", *_GROUP_COLUMNS, "varied", *METRICS)
 
 
-def read_sweep(out: Path) -> Sweep:
+def read_sweep(out: Path) -> SweepData:
     """Everything that is finished in the folder of a sweep, also while it runs; BadFile when it is none."""
     with CellIndex(out, read_only=True) as index:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
-        return gathered(
+        return collect_cells(
             index.columns(*_COLUMNS),
             name=str(facts.get("name", out.name)),
             planned=counts.planned,
@@ -30,29 +30,29 @@ def read_sweep(out: Path) -> Sweep:
         )
 
 
-def gathered(
+def collect_cells(
     cells: Iterable[Sequence[Any]], *, name: str, planned: int, failures: Mapping[str, str], command: str = ""
-) -> Sweep:
+) -> SweepData:
     """From the index's columns, a cell at a time."""
-    scenarios, clips, groups, values = _Codes(), _Codes(), _Codes(), _Codes()
+    scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
     figures: list[Sequence[float | None]] = []
     for scenario, clip, method, *telling in cells:
-        group = (method, *telling[: len(_TELLING)])
-        varied, *metrics = telling[len(_TELLING) :]
+        group = (method, *telling[: len(_GROUP_COLUMNS)])
+        varied, *metrics = telling[len(_GROUP_COLUMNS) :]
         clip_code = clips.of(f"{scenario}: {clip}")
         codes.append((scenarios.of(scenario), clip_code, groups.of(group), values.of(varied)))
         figures.append(metrics)
     scenario_of, clip_of, series_of, varied_of = np.array(codes, dtype=np.int64).reshape(-1, 4).T
     table = np.array(figures, dtype=np.float64).reshape(-1, len(METRICS))  # None becomes NaN
-    keys, value_of = _keys([json.loads(text) for text in values.names], varied_of)
-    return Sweep(
+    keys, value_of = _varied_keys([json.loads(text) for text in values.names], varied_of)
+    return SweepData(
         name=name,
         planned=planned,
         failures=dict(failures),
         command=command,
         scenarios=tuple(scenarios.names),
-        series=_named(groups.names),
+        series=_series_names(groups.names),
         performers=tuple(group[-1] for group in groups.names),
         clips=tuple(clips.names),
         keys=keys,
@@ -64,7 +64,7 @@ def gathered(
     )
 
 
-class _Codes:
+class _LabelEncoder:
     """Numbers for names, in the order in which they are met."""
 
     def __init__(self) -> None:
@@ -78,7 +78,7 @@ class _Codes:
         return self._places[name]
 
 
-def _named(groups: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+def _series_names(groups: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     """Methods, with what tells series of one method apart."""
     names = []
     for method, *telling in groups:
@@ -88,22 +88,22 @@ def _named(groups: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _keys(found: Sequence[Mapping[str, Any]], varied_of: Ints) -> tuple[tuple[Key, ...], dict[str, Ints]]:
+def _varied_keys(found: Sequence[Mapping[str, Any]], varied_of: Ints) -> tuple[tuple[VariedKey, ...], dict[str, Ints]]:
     """Those that take several values, and which value each cell has; `found` are the combinations that there are."""
     keys, value_of = [], {}
     for name in dict.fromkeys(name for varied in found for name in varied):
-        values = {_text(name, varied[name]): varied[name] for varied in found if name in varied}
+        values = {_value_label(name, varied[name]): varied[name] for varied in found if name in varied}
         if len(values) < 2:
             continue
         if numeric := all(isinstance(value, int | float) and not isinstance(value, bool) for value in values.values()):
             values = dict(sorted(values.items(), key=lambda item: float(item[1])))
-        keys.append(Key(name, tuple(values), tuple(map(float, values.values())) if numeric else ()))
+        keys.append(VariedKey(name, tuple(values), tuple(map(float, values.values())) if numeric else ()))
         place = {text: n for n, text in enumerate(values)}
-        each = [place[_text(name, varied[name])] if name in varied else -1 for varied in found]
+        each = [place[_value_label(name, varied[name])] if name in varied else -1 for varied in found]
         value_of[name] = np.array(each, dtype=np.int64)[varied_of]
     return tuple(keys), value_of
 
 
-def _text(name: str, value: Any) -> str:
+def _value_label(name: str, value: Any) -> str:
     """As tables have it, without the key."""
     return varied_text({name: value}).removeprefix(f"{name}=")

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.compare.paired_statistics import FEWEST_CLIPS, interval
+from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval
 from harness.core.arrays import Floats
-from harness.report.comparison.wording import listed, percent
-from harness.report.run.tables import number
-from harness.report.sweep.data import HEADLINE, Key, Sweep, unit_of
+from harness.report.comparison.wording import format_percent, list_first
+from harness.report.run.tables import format_number
+from harness.report.sweep.data import PRIMARY_METRIC, SweepData, VariedKey, unit_of
 
 
 @dataclass(frozen=True)
-class Fault:
+class FailureGroup:
     """What several cells failed of."""
 
     line: str
@@ -23,12 +23,12 @@ class Fault:
     """The first cell's, whole."""
 
 
-def sentence(sweep: Sweep) -> str:
+def sentence(sweep: SweepData) -> str:
     """What a reader should know first."""
-    return f"{progress(sweep)} {_best(sweep)}".strip()
+    return f"{progress_sentence(sweep)} {_best(sweep)}".strip()
 
 
-def progress(sweep: Sweep) -> str:
+def progress_sentence(sweep: SweepData) -> str:
     """How many cells are finished, failed and still to come."""
     to_come = sweep.planned - len(sweep) - len(sweep.failures)
     said = [f"{len(sweep):,} of {sweep.planned:,} cells finished"]
@@ -37,9 +37,9 @@ def progress(sweep: Sweep) -> str:
     return f"{', '.join(said)}."
 
 
-def _best(sweep: Sweep) -> str:
+def _best(sweep: SweepData) -> str:
     """Of known and of new performers, which have other clips."""
-    found = {name: sweep.by_clip(HEADLINE, sweep.where(series=n)) for n, name in enumerate(sweep.series)}
+    found = {name: sweep.by_clip(PRIMARY_METRIC, sweep.where(series=n)) for n, name in enumerate(sweep.series)}
     found = {name: means for name, means in found.items() if np.isfinite(means).any()}
     kinds = {name: kind for name, kind in zip(sweep.series, sweep.performers, strict=True) if name in found}
     if not found:
@@ -56,27 +56,27 @@ def _best_of(found: Mapping[str, Floats]) -> str:
     clips = int(shared.sum())
     over = f"over {clips:,} clip{'s'[: clips != 1]}"
     if not clips:
-        return f"{listed(list(found))} share no measured clip: none is best."
+        return f"{list_first(list(found))} share no measured clip: none is best."
     errors = {name: float(means[shared].mean()) for name, means in found.items()}
     first, *others = sorted(errors, key=lambda name: errors[name])
-    start = f"{first}{' errs least' if others else ''}: {_figure(errors[first])} mean joint-angle error {over}"
+    start = f"{first}{' errs least' if others else ''}: {_format_error(errors[first])} mean joint-angle error {over}"
     if not others:
         return f"{start}."
-    apart = _apart(found[others[0]][shared] - found[first][shared])
-    return f"{start}; next {others[0]} with {_figure(errors[others[0]])}, {apart}."
+    apart = _describe_difference(found[others[0]][shared] - found[first][shared])
+    return f"{start}; next {others[0]} with {_format_error(errors[others[0]])}, {apart}."
 
 
-def _apart(difference: Floats) -> str:
+def _describe_difference(difference: Floats) -> str:
     """Whether clips tell the second from the first."""
-    if len(difference) < FEWEST_CLIPS:
+    if len(difference) < MIN_CLIPS:
         return "which so few clips cannot tell apart"
-    low, high = interval(difference)
+    low, high = bootstrap_interval(difference)
     if low <= 0.0 <= high:
         return "which these clips cannot tell apart"
-    return f"worse by {number(low, unit_of(HEADLINE))} to {_figure(high)} (95 %)"
+    return f"worse by {format_number(low, unit_of(PRIMARY_METRIC))} to {_format_error(high)} (95 %)"
 
 
-def effect(sweep: Sweep, key: Key) -> str:
+def describe_effect(sweep: SweepData, key: VariedKey) -> str:
     """From which value to which the error goes, over the series and clips that have all values."""
     means = np.array([_per_series(sweep, key, value) for value in range(len(key.texts))])
     shared = np.isfinite(means).all(axis=0)
@@ -84,31 +84,33 @@ def effect(sweep: Sweep, key: Key) -> str:
         return "no clip was measured with all values"
     errors = means[:, shared].mean(axis=1)
     least, most = int(np.argmin(errors)), int(np.argmax(errors))
-    rise = percent(100.0 * (errors[most] / errors[least] - 1.0)) if errors[least] else "–"
-    return f"{_figure(errors[least])} at {key.texts[least]}, {_figure(errors[most])} at {key.texts[most]} ({rise})"
+    rise = format_percent(100.0 * (errors[most] / errors[least] - 1.0)) if errors[least] else "–"
+    return f"{_format_error(errors[least])} at {key.texts[least]}, {_format_error(errors[most])} at {key.texts[most]} ({rise})"
 
 
-def faults(sweep: Sweep) -> list[Fault]:
+def group_failures(sweep: SweepData) -> list[FailureGroup]:
     """Failures that end alike are one, the most frequent first."""
     found: dict[str, list[str]] = {}
     for cell, text in sweep.failures.items():
         found.setdefault(_last_line(text), []).append(cell)
     in_order = sorted(found.items(), key=lambda item: -len(item[1]))
-    return [Fault(line, tuple(cells), sweep.failures[cells[0]]) for line, cells in in_order]
+    return [FailureGroup(line, tuple(cells), sweep.failures[cells[0]]) for line, cells in in_order]
 
 
-def values(key: Key, most: int = 8) -> str:
-    return listed(key.texts, most)
+def list_values(key: VariedKey, most: int = 8) -> str:
+    return list_first(key.texts, most)
 
 
-def _per_series(sweep: Sweep, key: Key, value: int) -> Floats:
+def _per_series(sweep: SweepData, key: VariedKey, value: int) -> Floats:
     """(series * clips,) errors at one value."""
-    parts = [sweep.by_clip(HEADLINE, sweep.where(series=n, **{key.name: value})) for n in range(len(sweep.series))]
+    parts = [
+        sweep.by_clip(PRIMARY_METRIC, sweep.where(series=n, **{key.name: value})) for n in range(len(sweep.series))
+    ]
     return np.concatenate(parts)
 
 
-def _figure(value: float) -> str:
-    return f"{number(value, unit_of(HEADLINE))} {unit_of(HEADLINE)}"
+def _format_error(value: float) -> str:
+    return f"{format_number(value, unit_of(PRIMARY_METRIC))} {unit_of(PRIMARY_METRIC)}"
 
 
 def _last_line(text: str) -> str:

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Clock:
     """How much faster it runs [1e-6]."""
 
     def __post_init__(self) -> None:
-        require(self, offset_s=(0.0, 1e6), drift_ppm=(-1e5, 1e5))
+        require_ranges(self, offset_s=(0.0, 1e6), drift_ppm=(-1e5, 1e5))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         sensed.device_s = self.offset_s + (1.0 + 1e-6 * self.drift_ppm) * sensed.time_s

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class Slow:
+class DriftNoise:
     """First-order Gauss-Markov on each axis, stationary from the start.
 
     1.5 mm is what Gilson et al. 2006 measured at rest; the angles are the maker's, unverified; a correlation time
@@ -28,9 +28,11 @@ class Slow:
     """Time after which the correlation is 1/e [s]."""
 
     def __post_init__(self) -> None:
-        require(self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6))
+        require_ranges(
+            self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6)
+        )
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         draws = [sensed.draw("slow", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
         wander = gauss_markov(np.stack(draws, axis=1), float(np.exp(-1.0 / (sensed.rate_hz * self.correlation_s))))
         sensed.move(self.position_m * wander[..., :3])

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import GRAVITY_M_S2, Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Dropout:
     """Tilt error while coasting [rad]: the RMS of pitch and roll."""
 
     def __post_init__(self) -> None:
-        require(self, share=(0.0, 0.99), gap_s=(1e-3, 1e6), coast_s=(1e-3, 60.0), tilt_rad=(0.0, 1.0))
+        require_ranges(self, share=(0.0, 0.99), gap_s=(1e-3, 1e6), coast_s=(1e-3, 60.0), tilt_rad=(0.0, 1.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         lost = np.zeros(sensed.time_s.shape, bool)
         coasting = np.zeros(sensed.time_s.shape, bool)
         leak_m_s2 = GRAVITY_M_S2 * float(np.sin(self.tilt_rad))

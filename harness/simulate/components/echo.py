@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.simulate.components.excursion import direction
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 _WARM_UP = 64
 """Readings before the take, so that it may begin inside a burst."""
@@ -28,16 +28,16 @@ class Echo:
     """Smallest and largest push [m]."""
 
     def __post_init__(self) -> None:
-        require(self, share=(0.0, 0.99), burst_records=(1, 100_000), size_m=(0.0, 10.0))
+        require_ranges(self, share=(0.0, 0.99), burst_records=(1, 100_000), size_m=(0.0, 10.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         hit = np.zeros(sensed.time_s.shape, bool)
         if self.share > 0.0:
             for row, station in enumerate(sensed.stations):
                 self._one(sensed, hit, row, sensed.draw("echo", station))
         sensed.hits["echo"] = hit
 
-    def _one(self, sensed: Sensed, hit: np.ndarray, row: int, rng: np.random.Generator) -> None:
+    def _one(self, sensed: SimulatedReadings, hit: np.ndarray, row: int, rng: np.random.Generator) -> None:
         fewest, most = self.burst_records
         clean = 0.5 * (fewest + most) * (1.0 - self.share) / self.share
         at = -_WARM_UP

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
@@ -27,9 +27,9 @@ class Excursion:
     """Time to get there, and to get back [s]."""
 
     def __post_init__(self) -> None:
-        require(self, onsets_per_min=(0.0, 600.0), size_m=(0.0, 10.0), stay_s=(0.0, 1e6), ramp_s=(0.0, 60.0))
+        require_ranges(self, onsets_per_min=(0.0, 600.0), size_m=(0.0, 10.0), stay_s=(0.0, 1e6), ramp_s=(0.0, 60.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         hit = np.zeros(sensed.time_s.shape, bool)
         for row, station in enumerate(sensed.stations):
             time_s = sensed.time_s[:, row]

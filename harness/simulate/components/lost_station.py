@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
@@ -20,9 +20,9 @@ class LostStation:
     """Quality falls for so long before `from_s`, as ranges become fewer (docs/is900.md 13.3; length: a choice)."""
 
     def __post_init__(self) -> None:
-        require(self, to_s=(self.from_s, math.inf), fade_s=(0.0, math.inf))
+        require_ranges(self, to_s=(self.from_s, math.inf), fade_s=(0.0, math.inf))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         lost = sensed.during((self.station,), self.from_s, self.to_s)
         row = sensed.stations.index(self.station)
         left = np.clip((self.from_s - sensed.time_s[:, row]) / max(self.fade_s, 1e-9), 1.0 / 255.0, 1.0)

@@ -7,8 +7,8 @@ import numpy as np
 
 from harness.core import rotations
 from harness.errors import UnknownName
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
@@ -21,9 +21,9 @@ class MountOffset:
     """Standard deviation about each axis of the station [rad]."""
 
     def __post_init__(self) -> None:
-        require(self, position_m=(0.0, 1.0), orientation_rad=(0.0, math.pi))
+        require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, math.pi))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         for row, station in enumerate(sensed.stations):
             draw = sensed.draw_of_session("mount", station).normal(size=6)
             sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], self.position_m * draw[:3])
@@ -46,9 +46,9 @@ class MountSlip:
     """Distance along the bone, towards its far end, that it ends with [m]."""
 
     def __post_init__(self) -> None:
-        require(self, over_s=(0.0, math.inf))
+        require_ranges(self, over_s=(0.0, math.inf))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         if self.station not in sensed.stations:
             raise UnknownName("station", self.station, sensed.stations)
         row = sensed.stations.index(self.station)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class Turned:
+class OrientationOffset:
     """Orientations turned about the vertical from one moment to another, positions as they are. A fault.
 
     All stations turned alike agree with each other and contradict every position: the hard case.
@@ -24,9 +24,9 @@ class Turned:
     """About the tracker's z axis [rad]."""
 
     def __post_init__(self) -> None:
-        require(self, to_s=(self.from_s, math.inf))
+        require_ranges(self, to_s=(self.from_s, math.inf))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         hit = sensed.during(self.stations, self.from_s, self.to_s)
         sensed.rotate(hit[:, :, None] * np.array([0.0, 0.0, self.angle_rad]))
         sensed.hits["turned"] = hit | sensed.hits.get("turned", False)

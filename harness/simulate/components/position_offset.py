@@ -3,12 +3,12 @@
 import math
 from dataclasses import dataclass
 
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class Displaced:
+class PositionOffset:
     """Positions off by one and the same vector from one moment to another; quality tells nothing of it. A fault."""
 
     stations: tuple[str, ...] = ()
@@ -19,9 +19,9 @@ class Displaced:
     """Along the tracker's axes [m]."""
 
     def __post_init__(self) -> None:
-        require(self, to_s=(self.from_s, math.inf))
+        require_ranges(self, to_s=(self.from_s, math.inf))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         hit = sensed.during(self.stations, self.from_s, self.to_s)
         sensed.position_m = sensed.position_m + hit[:, :, None] * self.offset_m
         sensed.hits["displaced"] = hit | sensed.hits.get("displaced", False)

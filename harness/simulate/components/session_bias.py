@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 
 from harness.core import rotations
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class Session:
+class SessionBias:
     """The scale of space, by temperature (0.17 % per deg C), and where in its housing each station believes to be.
 
     Both normal, drawn once (docs/is900.md 13.3 and 13.5; the sizes are inferred).
@@ -20,9 +20,9 @@ class Session:
     """Standard deviation on each axis of a station [m]."""
 
     def __post_init__(self) -> None:
-        require(self, scale=(0.0, 0.1), station_offset_m=(0.0, 1.0))
+        require_ranges(self, scale=(0.0, 0.1), station_offset_m=(0.0, 1.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         for row, station in enumerate(sensed.stations):
             offset_m = self.station_offset_m * sensed.draw_of_session("session", station).normal(size=3)
             sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], offset_m)

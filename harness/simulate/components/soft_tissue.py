@@ -11,15 +11,15 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 _FASTER_INWARD = 2.0
 """How much higher the frequency is square to the skin than along it: higher, by Wakeling & Nigg 2001 [choice]."""
 
 
 @dataclass(frozen=True)
-class Wobble:
+class SoftTissueArtefact:
     """A damped oscillator for each axis of a station, driven by what its place on the bone is accelerated by.
 
     Flesh of thickness h is a layer in shear: its stiffness goes with 1/h, so that a tracker gives way in proportion to
@@ -36,27 +36,27 @@ class Wobble:
     """The thickness that `frequency_hz` is of [m]."""
 
     def __post_init__(self) -> None:
-        require(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), of_flesh_m=(1e-3, 0.5))
+        require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), of_flesh_m=(1e-3, 0.5))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         frequency_hz = self.frequency_hz * np.sqrt(self.of_flesh_m / sensed.flesh_m)
         pace = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
-        linear_m = follow(-sensed.force_m_s2, pace, self.damping, 1.0 / sensed.rate_hz)
-        shift_m = bounded(linear_m, sensed.flesh_m[:, None])
+        linear_m = simulate_oscillators(-sensed.force_m_s2, pace, self.damping, 1.0 / sensed.rate_hz)
+        shift_m = soft_limit(linear_m, sensed.flesh_m[:, None])
         sensed.position_m = sensed.position_m + rotations.rotate(sensed.turn, shift_m)
         # The bone runs along x, `radius_m` below: what goes by y to the left of it turns about x by -y/radius.
         roll_rad = -shift_m[..., 1] / sensed.radius_m
         sensed.turn = rotations.multiply(sensed.turn, rotations.exp(roll_rad[..., None] * np.array([1.0, 0.0, 0.0])))
 
 
-def follow(push: Floats, pace: Floats, damping: float, step_s: float) -> Floats:
+def simulate_oscillators(push: Floats, pace: Floats, damping: float, step_s: float) -> Floats:
     """Where oscillators x'' + 2 d w x' + w^2 x = push are, (N, ...) [m], under pushes (N, ...) [m/s^2].
 
     `pace` w (...) [rad/s]. Pushes are straight lines between samples, for which each step is exact however stiff the
     oscillator; it begins where the first push holds it.
     """
     # With a push of u + r t the motion is c + s t + e(t): c, s and the free part e are matched at each sample.
-    step = _free(pace, damping, step_s)
+    step = _free_response(pace, damping, step_s)
     place, speed = push[0] / pace**2, np.zeros_like(push[0])
     out = np.empty_like(push)
     out[0] = place
@@ -70,14 +70,14 @@ def follow(push: Floats, pace: Floats, damping: float, step_s: float) -> Floats:
     return out
 
 
-def bounded(shift_m: Floats, most_m: Floats) -> Floats:
+def soft_limit(shift_m: Floats, most_m: Floats) -> Floats:
     """Vectors (..., 3) that come ever nearer to a length of `most_m` (..., 1), the short ones as they are."""
     length_m = np.maximum(np.sqrt(np.sum(shift_m**2, axis=-1, keepdims=True)), 1e-12)
     out: Floats = shift_m * (most_m * np.tanh(length_m / most_m) / length_m)
     return out
 
 
-def _free(pace: Floats, damping: float, step_s: float) -> Floats:
+def _free_response(pace: Floats, damping: float, step_s: float) -> Floats:
     """(2, 2, ...) what a step makes of place and speed without a push."""
     root = np.sqrt(complex(damping**2 - 1.0))
     root = root if abs(root) > 1e-6 else 1e-6  # critical damping is the limit of both sides

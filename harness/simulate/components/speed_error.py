@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class Speed:
+class SpeedError:
     """Ranges are measured at another moment than the record's: an error along the velocity.
 
     Gilson et al. 2006 found errors that grow with speed; the size is inferred (docs/is900.md 13.3 and 13.5).
@@ -17,7 +17,7 @@ class Speed:
     """Motion that is added [s]; negative lags behind."""
 
     def __post_init__(self) -> None:
-        require(self, ahead_s=(-1.0, 1.0))
+        require_ranges(self, ahead_s=(-1.0, 1.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         sensed.move(self.ahead_s * sensed.velocity_m_s)

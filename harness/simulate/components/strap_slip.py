@@ -4,12 +4,12 @@ import math
 from dataclasses import dataclass
 
 from harness.simulate.components.mount import MountSlip
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class Loose:
+class StrapSlip:
     """Each strap slips once in a take with probability `share`, at any moment as likely as at any other, by N(0,
     `along_m`) along the bone and N(0, `around_rad`) around it (see `MountSlip`). In no level; all numbers are choices.
 
@@ -26,9 +26,9 @@ class Loose:
     """How long a slip takes [s]."""
 
     def __post_init__(self) -> None:
-        require(self, share=(0.0, 1.0), along_m=(0.0, 0.5), around_rad=(0.0, math.pi), over_s=(0.0, 60.0))
+        require_ranges(self, share=(0.0, 1.0), along_m=(0.0, 0.5), around_rad=(0.0, math.pi), over_s=(0.0, 60.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         begin_s, end_s = float(sensed.time_s.min()), float(sensed.time_s.max())
         for station in sensed.stations:
             rng = sensed.draw("loose", station)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.simulate.parameter_ranges import require
-from harness.simulate.readings import Sensed
+from harness.simulate.parameter_ranges import require_ranges
+from harness.simulate.readings import SimulatedReadings
 
 
 @dataclass(frozen=True)
-class White:
+class WhiteNoise:
     """Independent from record to record, normal on each axis: the resolution floor (docs/is900.md 13.5, unverified)."""
 
     position_m: float = 0.00075
@@ -19,9 +19,9 @@ class White:
     """Standard deviation about each axis [rad]."""
 
     def __post_init__(self) -> None:
-        require(self, position_m=(0.0, 1.0), orientation_rad=(0.0, 1.0))
+        require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, 1.0))
 
-    def spoil(self, sensed: Sensed) -> None:
+    def spoil(self, sensed: SimulatedReadings) -> None:
         draws = [sensed.draw("white", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
         noise: Floats = np.stack(draws, axis=1)
         sensed.move(self.position_m * noise[..., :3])

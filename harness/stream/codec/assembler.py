@@ -5,16 +5,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.stream.codec.readings import Readings, join
+from harness.stream.codec.readings import Readings, concatenate_readings
 from harness.stream.frame import TrackerFrame
 
-PATIENCE = 1.5
+TIMEOUT_PERIODS = 1.5
 """A frame that lacks stations is closed after so many periods."""
 _NEVER = -np.inf
 
 
 @dataclass(frozen=True)
-class _Round:
+class _RoundState:
     """What the device's clock leads to expect of the next reading."""
 
     began_s: float = _NEVER
@@ -33,7 +33,7 @@ class _Round:
     """Those of the one before."""
 
 
-class Assembler:
+class FrameAssembler:
     """Closes a frame when the station number does not increase, at once when every station is there, or after
     1.5 periods.
 
@@ -49,7 +49,7 @@ class Assembler:
         self._period_s = period_s
         self._open: Readings | None = None
         """The beginning of a frame."""
-        self._round, self._after = _Round(), _Round()
+        self._round, self._after = _RoundState(), _RoundState()
         """As it was before and after that beginning."""
         self._received_s = _NEVER
         """When the frame that was closed last was complete."""
@@ -63,7 +63,7 @@ class Assembler:
         """The frames that these readings complete."""
         if len(more) == 0:
             return []
-        given = more if self._open is None else join([self._open, more])
+        given = more if self._open is None else concatenate_readings([self._open, more])
         frame, doubtful = self._cut(given)
         given = given.doubted(doubtful)
         open_from = int(np.searchsorted(frame, frame[-1]))
@@ -78,7 +78,7 @@ class Assembler:
 
     def has_waited(self, since_s: float | None, now_s: float) -> bool:
         """Whether a frame that began then has waited long enough for its last stations."""
-        return since_s is not None and now_s - since_s > PATIENCE * self._period_s
+        return since_s is not None and now_s - since_s > TIMEOUT_PERIODS * self._period_s
 
     def finish(self) -> list[TrackerFrame]:
         """The unfinished frame."""
@@ -106,10 +106,10 @@ class Assembler:
                 doubtful[i] = True
                 if filled < self._stations:
                     doubtful[i - 1] = True
-            late = received_s - arrived_s > PATIENCE * self._period_s if untimed else elapsed_s >= self._period_s
+            late = received_s - arrived_s > TIMEOUT_PERIODS * self._period_s if untimed else elapsed_s >= self._period_s
             opens = late or not increases
             if opens:
-                self._round = _Round(began_s, first, before_s, led_s, led, heard, heard_before)
+                self._round = _RoundState(began_s, first, before_s, led_s, led, heard, heard_before)
                 number, filled, arrived_s, heard, heard_before = number + 1, 0, received_s, 0, heard
             if back or began_s != began_s or (opens and not early):
                 began_s, first = stamp_s, station
@@ -119,7 +119,7 @@ class Assembler:
                 before_s = stamp_s
             station_before, filled, heard = station, filled + 1, heard | 1 << station
             frame[i] = number
-        self._after = _Round(began_s, first, before_s, led_s, led, heard, heard_before)
+        self._after = _RoundState(began_s, first, before_s, led_s, led, heard, heard_before)
         return frame, doubtful
 
     def _shortest_s(self, first: int, station: int) -> float:

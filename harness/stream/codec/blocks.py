@@ -23,8 +23,8 @@ from dataclasses import dataclass
 
 MAGIC = b"\x89IS900\r\n"
 VERSION = 1
-MARKER = b"\x90BLK"
-LONGEST = 1 << 16
+BLOCK_MARKER = b"\x90BLK"
+MAX_PAYLOAD_BYTES = 1 << 16
 """No payload has more bytes: a damaged length is soon seen through."""
 
 RECEIVED, SENT = "recv", "sent"
@@ -38,7 +38,7 @@ _HEAD = struct.Struct("<4s4sIdd")
 
 
 @dataclass(frozen=True)
-class Block:
+class RecordingBlock:
     """One entry of a recording."""
 
     kind: str
@@ -48,62 +48,62 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Lost:
+class DamagedSpan:
     """Bytes of a file, from `begin` to before `end`, that are no whole block."""
 
     begin: int
     end: int
 
 
-def _checked(content: bytes) -> bytes:
+def _append_crc(content: bytes) -> bytes:
     return content + _CRC.pack(zlib.crc32(content))
 
 
-HEADER = _checked(_VERSION.pack(MAGIC, VERSION))
+FILE_HEADER = _append_crc(_VERSION.pack(MAGIC, VERSION))
 
 
-def encode(block: Block) -> bytes:
+def encode_block(block: RecordingBlock) -> bytes:
     """The bytes of a block; its payload is no longer than LONGEST."""
-    head = _HEAD.pack(MARKER, block.kind.encode(), len(block.payload), block.monotonic_s, block.wall_s)
-    return _checked(head + block.payload)
+    head = _HEAD.pack(BLOCK_MARKER, block.kind.encode(), len(block.payload), block.monotonic_s, block.wall_s)
+    return _append_crc(head + block.payload)
 
 
-def version_of(data: bytes) -> int | None:
+def read_version(data: bytes) -> int | None:
     """What the header of a file says; None when it is cut, damaged or another file's."""
-    head, check = data[: _VERSION.size], data[_VERSION.size : len(HEADER)]
+    head, check = data[: _VERSION.size], data[_VERSION.size : len(FILE_HEADER)]
     if not head.startswith(MAGIC) or check != _CRC.pack(zlib.crc32(head)):
         return None
     return int(_VERSION.unpack(head)[1])
 
 
-def blocks(data: bytes, begin: int = len(HEADER)) -> Iterator[Block | Lost]:
+def read_blocks(data: bytes, begin: int = len(FILE_HEADER)) -> Iterator[RecordingBlock | DamagedSpan]:
     """Every whole block of a file from byte `begin` on, and in their places the bytes that belong to none."""
     at = whole_until = begin
     while at < len(data):
-        block, size = _block_at(data, at)
+        block, size = _read_block(data, at)
         if block is None:
-            found = data.find(MARKER, at + 1)
+            found = data.find(BLOCK_MARKER, at + 1)
             at = found if found >= 0 else len(data)
             continue
         if at > whole_until:
-            yield Lost(whole_until, at)
+            yield DamagedSpan(whole_until, at)
         yield block
         at = whole_until = at + size
     if whole_until < len(data):
-        yield Lost(whole_until, len(data))
+        yield DamagedSpan(whole_until, len(data))
 
 
-def _block_at(data: bytes, at: int) -> tuple[Block | None, int]:
+def _read_block(data: bytes, at: int) -> tuple[RecordingBlock | None, int]:
     """The block that begins here and its bytes; None when there is none, or not all of it, or it is damaged."""
     if len(data) - at < _HEAD.size:
         return None, 0
     marker, kind, length, monotonic_s, wall_s = _HEAD.unpack_from(data, at)
     end = at + _HEAD.size + length
     if (
-        marker != MARKER
-        or length > LONGEST
+        marker != BLOCK_MARKER
+        or length > MAX_PAYLOAD_BYTES
         or data[end : end + _CRC.size] != _CRC.pack(zlib.crc32(memoryview(data)[at:end]))
     ):
         return None, 0
     payload = data[at + _HEAD.size : end]
-    return Block(kind.decode("latin-1"), monotonic_s, wall_s, payload), end + _CRC.size - at
+    return RecordingBlock(kind.decode("latin-1"), monotonic_s, wall_s, payload), end + _CRC.size - at

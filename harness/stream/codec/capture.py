@@ -8,7 +8,7 @@ from harness.core.arrays import Floats, Ints, freeze
 
 
 @dataclass(frozen=True, eq=False)
-class Capture:
+class ByteCapture:
     """K chunks, one after another."""
 
     data: bytes

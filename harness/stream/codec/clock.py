@@ -8,17 +8,17 @@ import numpy as np
 
 from harness.core.arrays import Floats
 
-TOLERANCE_S = 0.25
+CLOCK_TOLERANCE_S = 0.25
 """Delays of the host's reading differ by less than this [s]; no sound record is farther out of order."""
-LATEST_S = 1e7
+MAX_STAMP_S = 1e7
 """By then, 32-bit milliseconds have a step of a second: a stamp beyond is a damaged number [s]."""
 
 
-class Unwrapper:
+class ClockUnwrapper:
     """Turns stamps into seconds that go on where the clock was set back.
 
     A stamp is believed when, since the last one believed or the one before, it did not step back and advanced no more
-    than the host's clock did, both within `TOLERANCE_S`. Others are damaged (NaN), unless the next stamp agrees with
+    than the host's clock did, both within `CLOCK_TOLERANCE_S`. Others are damaged (NaN), unless the next stamp agrees with
     them: then the device set its clock anew, and time goes on from there by the host's clock.
     """
 
@@ -42,7 +42,7 @@ class Unwrapper:
         if self._odd is None and len(out) > 1:
             before = self._last or (float(out[0]), float(received_s[0]))
             device, host = np.diff(out, prepend=before[0]), np.diff(received_s, prepend=before[1])
-            if bool(np.all((device > -TOLERANCE_S) & (device < host + TOLERANCE_S))):
+            if bool(np.all((device > -CLOCK_TOLERANCE_S) & (device < host + CLOCK_TOLERANCE_S))):
                 self._before = float(out[-2]), float(received_s[-2])
                 self._last = float(out[-1]), float(received_s[-1])
                 return out
@@ -51,14 +51,14 @@ class Unwrapper:
         return out
 
     def _one(self, stamp_s: float, received_s: float) -> float:
-        if not 0.0 <= stamp_s < LATEST_S:
+        if not 0.0 <= stamp_s < MAX_STAMP_S:
             return float("nan")
         now_s = stamp_s + self._epoch_s
         believed = [known for known in (self._last, self._before) if known is not None]
-        if self._last is None or any(_follows(known, (now_s, received_s)) for known in believed):
+        if self._last is None or any(_is_same_clock(known, (now_s, received_s)) for known in believed):
             self._before, self._last, self._odd = self._last, (now_s, received_s), None
             return now_s
-        if self._odd is not None and _follows(self._odd, (stamp_s, received_s)):
+        if self._odd is not None and _is_same_clock(self._odd, (stamp_s, received_s)):
             self._epoch_s = self._last[0] + (received_s - self._last[1]) - stamp_s
             self.resets += 1
             self._before, self._last, self._odd = None, (stamp_s + self._epoch_s, received_s), None
@@ -67,6 +67,6 @@ class Unwrapper:
         return float("nan")
 
 
-def _follows(before: tuple[float, float], now: tuple[float, float]) -> bool:
+def _is_same_clock(before: tuple[float, float], now: tuple[float, float]) -> bool:
     """Whether device and host time (each) may belong to the same running clock."""
-    return -TOLERANCE_S < now[0] - before[0] < now[1] - before[1] + TOLERANCE_S
+    return -CLOCK_TOLERANCE_S < now[0] - before[0] < now[1] - before[1] + CLOCK_TOLERANCE_S

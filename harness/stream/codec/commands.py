@@ -15,9 +15,9 @@ SAVE, RESUME, SUSPEND, RESTART = b"\x0b", b"\x11", b"\x13", b"\x19"
 MILLISECONDS, MICROSECONDS, ZERO_CLOCK = b"MT\r\n", b"Mt\r\n", b"MZ\r\n"
 STATION_STATES, TRACKING, SYSTEM, GENLOCK, EMITTERS = b"l*\r\n", b"MP\r\n", b"MS\r\n", b"MG\r\n", b"MCF\r\n"
 
-IMMEDIATE = b"PCcFfSUuW"
+IMMEDIATE_LETTERS = b"PCcFfSUuW"
 """Letters that act at once at the start of a line."""
-CONTROL = SAVE + RESUME + SUSPEND + RESTART
+CONTROL_CHARACTERS = SAVE + RESUME + SUSPEND + RESTART
 """Characters that act at once anywhere."""
 LONGEST_LINE = 256
 """No command in the sources is half as long; what goes on is cut [bytes]."""
@@ -27,12 +27,12 @@ def _line(text: str) -> bytes:
     return text.encode("ascii") + b"\r\n"
 
 
-def output_list(station: str, items: Sequence[int]) -> bytes:
+def set_output_list(station: str, items: Sequence[int]) -> bytes:
     """Set the output list of a station; it answers nothing."""
     return _line(f"O{station}," + ",".join(map(str, items)))
 
 
-def read_list(station: str) -> bytes:
+def query_output_list(station: str) -> bytes:
     return _line(f"O{station}")
 
 
@@ -91,7 +91,7 @@ class Command:
     @property
     def immediate(self) -> bool:
         """Whether it needed no terminator."""
-        return len(self.line) == 1 and self.line in IMMEDIATE + CONTROL
+        return len(self.line) == 1 and self.line in IMMEDIATE_LETTERS + CONTROL_CHARACTERS
 
 
 class CommandReader:
@@ -109,7 +109,7 @@ class CommandReader:
         """The commands that these bytes complete."""
         out: list[Command] = []
         for byte in data:
-            if byte in CONTROL or (not self._line and byte in IMMEDIATE):
+            if byte in CONTROL_CHARACTERS or (not self._line and byte in IMMEDIATE_LETTERS):
                 out.append(Command(bytes([byte])))
                 if byte == RESTART[0]:
                     self._forget()

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from harness.stream.codec.capture import Capture
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import FrameReader, WireFormat
 from harness.stream.frame import TrackerFrame
 
-SILENCE = 2.0
+SILENCE_PERIODS = 2.0
 """After so many periods without a byte every unfinished frame is due."""
 
 
-class Sessions:
+class ContinuousFrameReader:
     """Frames of one session after another: host times strictly increase, device time never steps back.
 
     The device's clock begins anew when it is set up; device time then goes on by the host's clock, from the first
@@ -51,7 +51,7 @@ class Sessions:
     @property
     def silent_from_s(self) -> float:
         """When every unfinished frame is due if no byte comes before."""
-        return self._heard_s + SILENCE * self._period_s
+        return self._heard_s + SILENCE_PERIODS * self._period_s
 
     def configured(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
         """What was unfinished; from here on bytes are read with this format, and the device's clock began at zero."""
@@ -63,9 +63,9 @@ class Sessions:
 
     def received(self, data: bytes, now_s: float) -> list[TrackerFrame]:
         """What these bytes complete; nothing unless it is set up."""
-        return self.received_all(Capture(data, np.array([len(data)]), np.array([now_s])))
+        return self.received_all(ByteCapture(data, np.array([len(data)]), np.array([now_s])))
 
-    def received_all(self, capture: Capture) -> list[TrackerFrame]:
+    def received_all(self, capture: ByteCapture) -> list[TrackerFrame]:
         """The same of one chunk or more at once."""
         if self._reader is None or not len(capture.ends):
             return []

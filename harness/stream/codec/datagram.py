@@ -7,8 +7,8 @@ import struct
 from dataclasses import dataclass
 
 _HEAD, _STATION_DATA = 0xFF, 1
-_FORM = struct.Struct("<4B4B8B3f3f")
-_TIME = struct.Struct("<f")
+_BODY_STRUCT = struct.Struct("<4B4B8B3f3f")
+_TIME_STRUCT = struct.Struct("<f")
 
 
 @dataclass(frozen=True)
@@ -36,18 +36,20 @@ class Datagram:
         """40 bytes, or 44 with the time."""
         values = (self.model, self.station, self.quality, self.buttons, *self.analogue)
         places = (*self.yaw_pitch_roll_deg, *self.position_m)
-        body = _FORM.pack(_HEAD, _STATION_DATA, self.sequence & 0xFF, 0, *values, *places)[4:]
-        body += b"" if self.time_s is None else _TIME.pack(self.time_s)
+        body = _BODY_STRUCT.pack(_HEAD, _STATION_DATA, self.sequence & 0xFF, 0, *values, *places)[4:]
+        body += b"" if self.time_s is None else _TIME_STRUCT.pack(self.time_s)
         return bytes([_HEAD, _STATION_DATA, self.sequence & 0xFF, sum(body) & 0xFF]) + body
 
 
-def parse(packet: bytes) -> Datagram | None:
+def parse_datagram(packet: bytes) -> Datagram | None:
     """What a packet says; None for camera data, a wrong length or a wrong sum."""
-    if len(packet) not in (_FORM.size, _FORM.size + _TIME.size) or packet[:2] != bytes([_HEAD, _STATION_DATA]):
+    if len(packet) not in (_BODY_STRUCT.size, _BODY_STRUCT.size + _TIME_STRUCT.size) or packet[:2] != bytes(
+        [_HEAD, _STATION_DATA]
+    ):
         return None
     if sum(packet[4:]) & 0xFF != packet[3]:
         return None
-    _, _, sequence, _, model, station, quality, buttons, *rest = _FORM.unpack_from(packet)
+    _, _, sequence, _, model, station, quality, buttons, *rest = _BODY_STRUCT.unpack_from(packet)
     yaw, pitch, roll, x, y, z = rest[8:]
-    time_s = float(_TIME.unpack_from(packet, _FORM.size)[0]) if len(packet) > _FORM.size else None
+    time_s = float(_TIME_STRUCT.unpack_from(packet, _BODY_STRUCT.size)[0]) if len(packet) > _BODY_STRUCT.size else None
     return Datagram(sequence, model, station, quality, buttons, tuple(rest[:8]), (yaw, pitch, roll), (x, y, z), time_s)

@@ -12,11 +12,11 @@ import numpy as np
 
 from harness.errors import BadInput, UnknownName
 
-HEAD = ord("0")
+RECORD_HEAD = ord("0")
 """Byte 0 of every data record."""
-BLANK = ord(" ")
+BLANK_STATUS = ord(" ")
 """Byte 2, the status, of an IS-900."""
-HEADER = 3
+HEADER_BYTES = 3
 """Bytes before the items: head, station, status."""
 STATION_CHARACTERS = b"123456789ABC"
 STANDARD_LIST = (40, 2, 11, 21, 1)
@@ -27,12 +27,12 @@ SINCE_FIRMWARE = {40: 4.13, 76: 4.26}
 """Firmware from which on an item is known (docs/is900.md 5.1)."""
 BITS_PER_BYTE = 10
 """8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
-BAUDS = (115200, 57600, 38400, 19200, 9600)
+BAUD_RATES = (115200, 57600, 38400, 19200, 9600)
 """In the order in which InterSense's own library looks for a tracker (docs/is900.md 2) [bit/s]."""
 
 
 @dataclass(frozen=True)
-class Item:
+class OutputItem:
     """One entry of an output list: `count` values."""
 
     name: str
@@ -55,52 +55,52 @@ class Item:
         return self.count * (self.width or np.dtype(self.kind).itemsize) + self.blanks
 
 
-ITEMS: dict[int, Item] = {
-    0: Item("space", "u1", 1, fixed=b" "),
-    1: Item("end_of_line", "u1", 2, fixed=b"\r\n"),
-    2: Item("position", "<f4", 3, 7, 2),
-    4: Item("yaw_pitch_roll_deg", "<f4", 3, 7, 2),
-    5: Item("x_cosines", "<f4", 3, 7, 4),
-    6: Item("y_cosines", "<f4", 3, 7, 4),
-    7: Item("z_cosines", "<f4", 3, 7, 4),
-    11: Item("quaternion", "<f4", 4, 7, 4),
-    16: Item("stylus", "u1", 2, 1),
-    18: Item("position_16", "u1", 6, sevens=True),
-    19: Item("yaw_pitch_roll_16", "u1", 6, sevens=True),
-    20: Item("quaternion_16", "u1", 8, sevens=True),
-    21: Item("time", "<f4", 1, 14),
-    22: Item("buttons", "u1", 1, 4, blanks=1),
-    23: Item("joystick", "u1", 2, 4),
-    38: Item("camera_position", "<f4", 3, 7, 2),
-    39: Item("camera_yaw_pitch_roll_deg", "<f4", 3, 7, 2),
-    40: Item("quality", "u1", 1, 4),
-    41: Item("time_code", "<u4", 1, 10),
-    42: Item("user_bits", "<u4", 1, 10),
-    43: Item("encoder_1", "<i4", 1, 8),
-    44: Item("encoder_2", "<i4", 1, 8),
-    45: Item("encoder_3", "<i4", 1, 8),
-    46: Item("lens_1", "<f4", 1, 7, 2),
-    47: Item("lens_2", "<f4", 1, 7, 2),
-    48: Item("lens_3", "<f4", 1, 7, 2),
-    49: Item("lens_4", "<f4", 1, 7, 2),
-    75: Item("radio_integrity", "u1", 1, 4),
-    76: Item("measurement_quality", "u1", 1, 4),
+ITEMS: dict[int, OutputItem] = {
+    0: OutputItem("space", "u1", 1, fixed=b" "),
+    1: OutputItem("end_of_line", "u1", 2, fixed=b"\r\n"),
+    2: OutputItem("position", "<f4", 3, 7, 2),
+    4: OutputItem("yaw_pitch_roll_deg", "<f4", 3, 7, 2),
+    5: OutputItem("x_cosines", "<f4", 3, 7, 4),
+    6: OutputItem("y_cosines", "<f4", 3, 7, 4),
+    7: OutputItem("z_cosines", "<f4", 3, 7, 4),
+    11: OutputItem("quaternion", "<f4", 4, 7, 4),
+    16: OutputItem("stylus", "u1", 2, 1),
+    18: OutputItem("position_16", "u1", 6, sevens=True),
+    19: OutputItem("yaw_pitch_roll_16", "u1", 6, sevens=True),
+    20: OutputItem("quaternion_16", "u1", 8, sevens=True),
+    21: OutputItem("time", "<f4", 1, 14),
+    22: OutputItem("buttons", "u1", 1, 4, blanks=1),
+    23: OutputItem("joystick", "u1", 2, 4),
+    38: OutputItem("camera_position", "<f4", 3, 7, 2),
+    39: OutputItem("camera_yaw_pitch_roll_deg", "<f4", 3, 7, 2),
+    40: OutputItem("quality", "u1", 1, 4),
+    41: OutputItem("time_code", "<u4", 1, 10),
+    42: OutputItem("user_bits", "<u4", 1, 10),
+    43: OutputItem("encoder_1", "<i4", 1, 8),
+    44: OutputItem("encoder_2", "<i4", 1, 8),
+    45: OutputItem("encoder_3", "<i4", 1, 8),
+    46: OutputItem("lens_1", "<f4", 1, 7, 2),
+    47: OutputItem("lens_2", "<f4", 1, 7, 2),
+    48: OutputItem("lens_3", "<f4", 1, 7, 2),
+    49: OutputItem("lens_4", "<f4", 1, 7, 2),
+    75: OutputItem("radio_integrity", "u1", 1, 4),
+    76: OutputItem("measurement_quality", "u1", 1, 4),
 }
 """By code. Inferred, not documented: what the bytes of 41 to 45 mean (integers), how 16 looks in ASCII (a digit per
 byte), and 75 and 76 altogether (their ranges are known, the layout is taken to be that of 40)."""
-UNREADABLE = (68, 69, 70, 71)
+UNDOCUMENTED_ITEMS = (68, 69, 70, 71)
 """The auxiliary inputs: their sizes stand on pages of the manual that nobody could read."""
 
 
 @lru_cache(maxsize=64)
-def fields(items: tuple[int, ...], stylus_bytes: int = 2) -> tuple[Item, ...]:
+def resolve_items(items: tuple[int, ...], stylus_bytes: int = 2) -> tuple[OutputItem, ...]:
     """The items of a list; those that come again are spaces and line ends, and are given names of their own.
 
     UnknownName for a code that no source has, BadInput for one of unknown size or one listed twice.
     """
-    out: list[Item] = []
+    out: list[OutputItem] = []
     for at, code in enumerate(items):
-        if code in UNREADABLE:
+        if code in UNDOCUMENTED_ITEMS:
             raise BadInput(
                 f"Output item {code} (auxiliary input): no source tells its size, so records cannot be found.",
                 "Leave it out of the list.",
@@ -121,17 +121,17 @@ def record_type(items: tuple[int, ...], stylus_bytes: int = 2) -> np.dtype[Any]:
     """The packed layout of a binary record: `head`, `station`, `status`, then each item by its name."""
     own = [
         (item.name, item.kind) if item.count == 1 else (item.name, item.kind, (item.count,))
-        for item in fields(items, stylus_bytes)
+        for item in resolve_items(items, stylus_bytes)
     ]
     return np.dtype([("head", "u1"), ("station", "u1"), ("status", "u1"), *own])
 
 
 @lru_cache(maxsize=64)
-def size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int = 2) -> int:
+def record_size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int = 2) -> int:
     """Bytes of a record on the wire."""
     if binary:
         return int(record_type(items, stylus_bytes).itemsize)
-    return HEADER + sum(item.ascii_size for item in fields(items, stylus_bytes))
+    return HEADER_BYTES + sum(item.ascii_size for item in resolve_items(items, stylus_bytes))
 
 
 def terminator(items: tuple[int, ...]) -> bytes:

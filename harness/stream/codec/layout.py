@@ -5,22 +5,22 @@ import re
 import numpy as np
 
 from harness.stream.codec import ascii_records as text
-from harness.stream.codec.items import Item, fields, record_type, size, terminator
-from harness.stream.codec.records import Settings, Table
+from harness.stream.codec.items import OutputItem, record_size, record_type, resolve_items, terminator
+from harness.stream.codec.records import RecordFormat, Table
 
 
-class Layout:
+class RecordLayout:
     """Records of one list, sent by these stations with these settings."""
 
-    def __init__(self, items: tuple[int, ...], stations: bytes, settings: Settings, next_head: bytes) -> None:
+    def __init__(self, items: tuple[int, ...], stations: bytes, settings: RecordFormat, next_head: bytes) -> None:
         """`next_head` is a regular expression of what may follow a record."""
         self.items = items
-        self.size = size(items, settings.binary, settings.stylus_bytes)
+        self.size = record_size(items, settings.binary, settings.stylus_bytes)
         self.end = terminator(items)
         """What every record ends in; empty where nothing is fixed."""
         self._binary, self._stylus_bytes = settings.binary, settings.stylus_bytes
-        own = fields(items, settings.stylus_bytes)
-        record = data_head(stations) + b"".join(self._expression(item) for item in own)
+        own = resolve_items(items, settings.stylus_bytes)
+        record = record_head_pattern(stations) + b"".join(self._expression(item) for item in own)
         ahead = b"" if self.end else b"(?=%b)" % next_head
         self.record = re.compile(record, re.DOTALL)
         self.run = re.compile(b"(?:%b%b)*+" % (record, ahead), re.DOTALL)
@@ -31,18 +31,18 @@ class Layout:
         if self._binary:
             return np.frombuffer(buffer, record_type(self.items, self._stylus_bytes), count, at)
         raw = np.frombuffer(buffer, np.uint8, count * self.size, at).reshape(count, self.size)
-        return text.parse(self.items, raw, self._stylus_bytes)
+        return text.parse_records(self.items, raw, self._stylus_bytes)
 
-    def _expression(self, item: Item) -> bytes:
+    def _expression(self, item: OutputItem) -> bytes:
         if item.fixed:
             return re.escape(item.fixed)
         if item.sevens:
             return rb"[\x80-\xff][\x00-\x7f]{%d}" % (item.count - 1)
         if item.width and not self._binary:
-            return text.pattern(item)
+            return text.item_pattern(item)
         return b".{%d}" % np.dtype((item.kind, item.count)).itemsize
 
 
-def data_head(stations: bytes) -> bytes:
+def record_head_pattern(stations: bytes) -> bytes:
     """A regular expression of a record's head: a blank is an IS-900's status, a letter a Fastrak's."""
     return b"0[%b][ A-Za-z]" % stations

@@ -13,21 +13,21 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.stream.codec.readings import Readings
 
-FASTEST_M_S, STEP_M = 40.0, 1.0
+MAX_SPEED_M_S, MAX_STEP_M = 40.0, 1.0
 """Speed, and what a reading may be off besides [m/s, m]."""
-FASTEST_RAD_S, STEP_RAD = math.radians(4000.0), math.radians(45.0)
+MAX_TURN_RATE_RAD_S, MAX_TURN_STEP_RAD = math.radians(4000.0), math.radians(45.0)
 """Likewise for turns [rad/s, rad]."""
-_SURELY = 0.999
+_LIMIT_MARGIN = 0.999
 """Of the limits: what is nearer has no need to be looked at one by one."""
 
-_FEW = 24
+_SEQUENTIAL_BELOW = 24
 """So many readings are looked at one by one faster than all at once."""
 
-_Seen = tuple[float, float, tuple[float, ...], tuple[float, ...]]
+_StationState = tuple[float, float, tuple[float, ...], tuple[float, ...]]
 """Device time, host time [s], place (3,) [m] and quaternion (4,) of a reading; NaN for what it lacks."""
 
 
-class Motion:
+class PlausibilityCheck:
     """Marks a reading that nobody could reach since the last one believed, unless the next agrees with it: then the
     station really is there. Every decision depends on the readings alone, never on how they came in pieces.
 
@@ -36,9 +36,9 @@ class Motion:
 
     def __init__(self, stations: int, period_s: float) -> None:
         self._period_s = period_s
-        self._last: list[_Seen | None] = [None] * stations
+        self._last: list[_StationState | None] = [None] * stations
         """Of each station, the reading that was believed last."""
-        self._odd: list[_Seen | None] = [None] * stations
+        self._odd: list[_StationState | None] = [None] * stations
         """The one after it, where it was not."""
 
     def judge(self, given: Readings) -> Readings:
@@ -47,20 +47,20 @@ class Motion:
         if not usable.any():
             return given
         doubtful: Bools = given.doubtful.copy()
-        if len(given) <= _FEW:
+        if len(given) <= _SEQUENTIAL_BELOW:
             for row in np.flatnonzero(usable).tolist():
-                doubtful[row] = not self._believed(int(given.station[row]), _seen(given, row))
+                doubtful[row] = not self._believed(int(given.station[row]), _state_of_row(given, row))
             return given.doubted(doubtful)
         for station in np.unique(given.station[usable]).tolist():
             rows = np.flatnonzero(usable & (given.station == station))
             if self._calm(given, rows, station):
-                self._last[station] = _seen(given, int(rows[-1]))
+                self._last[station] = _state_of_row(given, int(rows[-1]))
                 continue
             for row in rows.tolist():
-                doubtful[row] = not self._believed(station, _seen(given, row))
+                doubtful[row] = not self._believed(station, _state_of_row(given, row))
         return given.doubted(doubtful)
 
-    def _believed(self, station: int, now: _Seen) -> bool:
+    def _believed(self, station: int, now: _StationState) -> bool:
         last, odd = self._last[station], self._odd[station]
         believed = last is None or self._reachable(last, now) or (odd is not None and self._reachable(odd, now))
         if believed:
@@ -69,21 +69,21 @@ class Motion:
             self._odd[station] = now
         return believed
 
-    def _reachable(self, before: _Seen, now: _Seen) -> bool:
+    def _reachable(self, before: _StationState, now: _StationState) -> bool:
         elapsed_s = now[0] - before[0]
         if elapsed_s != elapsed_s:  # a stamp is missing: the host may read late, or several at once
             elapsed_s = now[1] - before[1] + 2.0 * self._period_s
         elapsed_s = max(elapsed_s, 0.0)
         moved_m = math.dist(before[2], now[2])
         along = abs(sum(a * b for a, b in zip(before[3], now[3], strict=True)))
-        turn_rad = min(STEP_RAD + FASTEST_RAD_S * elapsed_s, math.pi)
-        return not (moved_m > STEP_M + FASTEST_M_S * elapsed_s or along < math.cos(0.5 * turn_rad) - 1e-3)
+        turn_rad = min(MAX_TURN_STEP_RAD + MAX_TURN_RATE_RAD_S * elapsed_s, math.pi)
+        return not (moved_m > MAX_STEP_M + MAX_SPEED_M_S * elapsed_s or along < math.cos(0.5 * turn_rad) - 1e-3)
 
     def _calm(self, given: Readings, rows: Ints, station: int) -> bool:
         """Whether a station's readings (rows) are all believed, for sure; the same as one by one, but fast."""
         last = self._last[station]
         if self._odd[station] is not None or (
-            last is not None and not self._reachable(last, _seen(given, int(rows[0])))
+            last is not None and not self._reachable(last, _state_of_row(given, int(rows[0])))
         ):
             return False
         elapsed_s = np.diff(given.measured_s[rows])
@@ -94,12 +94,12 @@ class Motion:
         step_m = np.diff(given.position_m[rows], axis=0)
         turn = given.tracker_from_station[rows]
         along: Floats = np.abs(np.einsum("ij,ij->i", turn[1:], turn[:-1]))
-        turn_rad = np.minimum(_SURELY * (STEP_RAD + FASTEST_RAD_S * elapsed_s), np.pi)
-        far = np.einsum("ij,ij->i", step_m, step_m) > (_SURELY * (STEP_M + FASTEST_M_S * elapsed_s)) ** 2
+        turn_rad = np.minimum(_LIMIT_MARGIN * (MAX_TURN_STEP_RAD + MAX_TURN_RATE_RAD_S * elapsed_s), np.pi)
+        far = np.einsum("ij,ij->i", step_m, step_m) > (_LIMIT_MARGIN * (MAX_STEP_M + MAX_SPEED_M_S * elapsed_s)) ** 2
         return not bool(np.any(far | (along < np.cos(0.5 * turn_rad))))
 
 
-def _seen(given: Readings, row: int) -> _Seen:
+def _state_of_row(given: Readings, row: int) -> _StationState:
     return (
         float(given.measured_s[row]),
         float(given.received_s[row]),

@@ -8,15 +8,15 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
 from harness.errors import BadInput
-from harness.stream.codec.assembler import Assembler
-from harness.stream.codec.capture import Capture
-from harness.stream.codec.clock import Unwrapper
-from harness.stream.codec.decoder import Decoder, Event, Garbage, Records, Reply
+from harness.stream.codec.assembler import FrameAssembler
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.clock import ClockUnwrapper
+from harness.stream.codec.decoder import Decoder, DecoderEvent, Garbage, RecordRun, Reply
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
-from harness.stream.codec.plausibility import Motion
-from harness.stream.codec.readings import Readings, readings, tells_quality
-from harness.stream.codec.records import Settings, Table
-from harness.stream.codec.replies import ReplyEvent, TrackingStatus, parse
+from harness.stream.codec.plausibility import PlausibilityCheck
+from harness.stream.codec.readings import Readings, decode_readings, has_quality
+from harness.stream.codec.records import RecordFormat, Table
+from harness.stream.codec.replies import ParsedReply, TrackingStatus, parse_reply
 from harness.stream.frame import TrackerFrame
 
 
@@ -30,7 +30,7 @@ class WireFormat:
     """Records per second of each station."""
     items: tuple[int, ...] = STANDARD_LIST
     """Output list of every station."""
-    settings: Settings = field(default_factory=Settings)
+    settings: RecordFormat = field(default_factory=RecordFormat)
     characters: bytes = b""
     """What the stations are called on the wire, ascending; by default the first is `1`, and so on."""
 
@@ -63,10 +63,10 @@ class FrameReader:
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that were no data."""
         self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
-        self._clock = Unwrapper()
-        self._motion = Motion(len(wire.stations), 1.0 / wire.rate_hz)
-        self._assembler = Assembler(len(wire.stations), 1.0 / wire.rate_hz)
-        self._stamped, self._tells_quality = 21 in wire.items, tells_quality(wire.items)
+        self._clock = ClockUnwrapper()
+        self._motion = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
+        self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
+        self._stamped, self._tells_quality = 21 in wire.items, has_quality(wire.items)
         self._lost: Bools | None = None
         """(S,) by the latest reply to `MP`, where records do not tell."""
         self._aside: list[tuple[Table, Floats]] = []
@@ -92,7 +92,7 @@ class FrameReader:
         """The frames that these bytes, received at this moment, complete."""
         return self._feed(data, np.array([len(data)]), np.array([received_s]))
 
-    def feed_all(self, capture: Capture) -> list[TrackerFrame]:
+    def feed_all(self, capture: ByteCapture) -> list[TrackerFrame]:
         """The frames of many chunks at once; the same as chunk by chunk."""
         return self._feed(capture.data, capture.ends, capture.received_s)
 
@@ -116,22 +116,22 @@ class FrameReader:
         """What is left at the end of the stream."""
         return [*self._frames(self._decoder.finish()), *self._settle(), *self._assembler.finish()]
 
-    def _frames(self, events: list[Event]) -> list[TrackerFrame]:
+    def _frames(self, events: list[DecoderEvent]) -> list[TrackerFrame]:
         frames: list[TrackerFrame] = []
         for event in events:
             match event:
-                case Records():
+                case RecordRun():
                     if self._take(event):
                         frames += self._settle()
                 case Reply():
                     frames += self._settle()
                     self.replies.append(event)
-                    self._heed(parse(event.line))
+                    self._heed(parse_reply(event.line))
                 case Garbage():
                     self.garbage_bytes += event.size
         return frames
 
-    def _take(self, run: Records) -> bool:
+    def _take(self, run: RecordRun) -> bool:
         """Put records aside until they may complete a frame; whether they may."""
         count = len(run.table)
         last_byte = run.offset + run.size * np.arange(1, count + 1)
@@ -154,12 +154,12 @@ class FrameReader:
             self._row = -1
         return frames
 
-    def _heed(self, said: ReplyEvent) -> None:
+    def _heed(self, said: ParsedReply) -> None:
         if isinstance(said, TrackingStatus) and not self._tells_quality:
             self._lost = np.array([character in said.lost for character in self.wire.characters])
 
     def _readings(self, table: Table, received_s: Floats) -> Readings:
-        raw = readings(table, received_s, self.wire.characters, self.wire.settings)
+        raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
         measured_s = self._clock.unwrap(raw.measured_s, received_s)
         doubtful = raw.doubtful | np.isnan(measured_s) if self._stamped else raw.doubtful
         quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
@@ -170,7 +170,7 @@ class FrameReader:
 class CaptureStream:
     """A `TrackerStream` over bytes received before."""
 
-    def __init__(self, wire: WireFormat, capture: Capture) -> None:
+    def __init__(self, wire: WireFormat, capture: ByteCapture) -> None:
         self._wire, self._capture, self._closed = wire, capture, False
 
     @property

@@ -11,7 +11,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.errors import BadInput
 from harness.stream.codec import ascii_records as text
-from harness.stream.codec.items import BLANK, HEAD, fields, record_type
+from harness.stream.codec.items import BLANK_STATUS, RECORD_HEAD, record_type, resolve_items
 
 Table = NDArray[Any]
 """Records (N,) of one output list, with a field for each item (`items.record_type`)."""
@@ -21,7 +21,7 @@ FULL_SCALE_M, FULL_SCALE_DEG = 3.0, 180.0
 
 
 @dataclass(frozen=True)
-class Settings:
+class RecordFormat:
     """How the device was told to write numbers."""
 
     metres_per_unit: float = 0.01
@@ -39,7 +39,7 @@ class Settings:
 
 
 @dataclass(frozen=True, eq=False)
-class Said:
+class RecordValues:
     """What N records are to say."""
 
     measured_s: Floats
@@ -56,25 +56,27 @@ class Said:
     """(N, 2) left to right and rear to front, 0 to 255, centre 127 (item 23)."""
 
 
-def encode(items: tuple[int, ...], stations: NDArray[np.uint8], said: Said, settings: Settings) -> Table:
+def encode_records(
+    items: tuple[int, ...], stations: NDArray[np.uint8], said: RecordValues, settings: RecordFormat
+) -> Table:
     """Records (N,) of these station characters (N,), of which `to_bytes` makes the bytes.
 
     Nothing is said of cameras, lenses and the stylus: their items are 0, and the frame of a camera set is the
     tracker's. Radio never loses a packet. UnknownName or BadInput for an item of unknown size.
     """
     table = np.zeros(len(stations), record_type(items, settings.stylus_bytes))
-    table["head"], table["station"], table["status"] = HEAD, stations, BLANK
-    for item in fields(items, settings.stylus_bytes):
+    table["head"], table["station"], table["status"] = RECORD_HEAD, stations, BLANK_STATUS
+    for item in resolve_items(items, settings.stylus_bytes):
         if item.fixed:
             table[item.name] = np.frombuffer(item.fixed, np.uint8) if item.count > 1 else item.fixed[0]
-        elif item.name in _COLUMNS:
-            table[item.name] = _COLUMNS[item.name](said, settings)
+        elif item.name in _ITEM_ENCODERS:
+            table[item.name] = _ITEM_ENCODERS[item.name](said, settings)
     return table
 
 
-def to_bytes(items: tuple[int, ...], table: Table, settings: Settings) -> bytes:
+def to_bytes(items: tuple[int, ...], table: Table, settings: RecordFormat) -> bytes:
     """Records (N,) as they go over the wire, binary or ASCII."""
-    return table.tobytes() if settings.binary else text.write(items, table, settings.stylus_bytes)
+    return table.tobytes() if settings.binary else text.format_records(items, table, settings.stylus_bytes)
 
 
 def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
@@ -115,18 +117,18 @@ def from_yaw_pitch_roll_deg(angles: Floats) -> Floats:
     return rotations.multiply(rotations.multiply(yaw, pitch), roll)
 
 
-def cosines(turn: Floats, axis: int) -> Floats:
+def direction_cosines(turn: Floats, axis: int) -> Floats:
     """The station's X, Y or Z axis (N, 3) in the tracker's frame, of quaternions (N, 4) (items 5, 6, 7)."""
     out: Floats = rotations.to_matrix(turn)[:, :, axis]
     return out
 
 
-_COLUMNS: dict[str, Callable[[Said, Settings], Any]] = {
+_ITEM_ENCODERS: dict[str, Callable[[RecordValues, RecordFormat], Any]] = {
     "position": lambda said, settings: said.position_m / settings.metres_per_unit,
     "yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
-    "x_cosines": lambda said, settings: cosines(said.tracker_from_station, 0),
-    "y_cosines": lambda said, settings: cosines(said.tracker_from_station, 1),
-    "z_cosines": lambda said, settings: cosines(said.tracker_from_station, 2),
+    "x_cosines": lambda said, settings: direction_cosines(said.tracker_from_station, 0),
+    "y_cosines": lambda said, settings: direction_cosines(said.tracker_from_station, 1),
+    "z_cosines": lambda said, settings: direction_cosines(said.tracker_from_station, 2),
     "quaternion": lambda said, settings: said.tracker_from_station,
     "position_16": lambda said, settings: pack_14_bit(said.position_m / FULL_SCALE_M),
     "yaw_pitch_roll_16": lambda said, settings: pack_14_bit(

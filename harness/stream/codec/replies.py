@@ -1,6 +1,6 @@
 """What an IS-900 says besides data, as values: a line into one of them, and each into its line (docs/is900.md 6, 7).
 
-`parse` never fails: what no source describes is `Unknown`. `line()` is what the device sends, with its CR LF, so that
+`parse_reply` never fails: what no source describes is `UnknownReply`. `line()` is what the device sends, with its CR LF, so that
 an emulator says what a driver reads. Stations are their characters, "1" to "9" and "A" to "C".
 """
 
@@ -9,11 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from harness.stream.codec.replies_intersense import (
-    Digits,
     Emitter,
-    Genlock,
-    Prediction,
-    Sensitivity,
+    GenlockReply,
+    IntegerReply,
+    PredictionReply,
+    SensitivityReply,
     StationRecord,
     SystemRecord,
     TrackingStatus,
@@ -21,28 +21,28 @@ from harness.stream.codec.replies_intersense import (
 
 __all__ = [
     "DeviceError",
-    "Digits",
+    "IntegerReply",
     "Emitter",
-    "Genlock",
-    "Numbers",
+    "GenlockReply",
+    "GeometryReply",
     "OutputList",
-    "Prediction",
-    "ReplyEvent",
-    "Sensitivity",
+    "PredictionReply",
+    "ParsedReply",
+    "SensitivityReply",
     "StationRecord",
     "StationStates",
-    "Status",
+    "StatusRecord",
     "SystemRecord",
     "TrackingStatus",
-    "Unknown",
-    "parse",
+    "UnknownReply",
+    "parse_reply",
 ]
 
 _STATIONS = "123456789ABC"
 
 
 @dataclass(frozen=True)
-class Status:
+class StatusRecord:
     """The answer to `S`: 55 bytes, or 54 from some firmware (6.1)."""
 
     station: str = "1"
@@ -65,10 +65,10 @@ class Status:
         low = self.binary | self.centimetres << 1 | self.compensation << 2 | self.continuous << 3
         flags = f"{(self.reserved & 0xFF0) | low:03X}"
         text = f"2{self.station[:1]:1}S{flags}{self.self_test[:3]:3}      {self.firmware[:6]:6} {self.identification}"
-        return _sent(f"{text:53.53}"[: 52 if self.short else 53])
+        return _encode_line(f"{text:53.53}"[: 52 if self.short else 53])
 
     @classmethod
-    def parse(cls, text: str) -> "Status | None":
+    def parse(cls, text: str) -> "StatusRecord | None":
         if not (re.match(r"2[1-9A-C]S[0-9A-Fa-f]{3}", text) and len(text) in (52, 53)):
             return None
         flags = int(text[3:6], 16)
@@ -94,7 +94,7 @@ class OutputList:
     items: tuple[int, ...]
 
     def line(self) -> bytes:
-        return _sent(f"2{self.station}O" + "".join(f"{code:2d}" for code in self.items))
+        return _encode_line(f"2{self.station}O" + "".join(f"{code:2d}" for code in self.items))
 
     @classmethod
     def parse(cls, text: str) -> "OutputList | None":
@@ -112,7 +112,7 @@ class StationStates:
     """(4,) the station asked for, then stations 2, 3 and 4; (32,) all."""
 
     def line(self) -> bytes:
-        return _sent(f"2{self.station or '1'}l" + "".join("01"[on] for on in self.active))
+        return _encode_line(f"2{self.station or '1'}l" + "".join("01"[on] for on in self.active))
 
     @classmethod
     def parse(cls, text: str) -> "StationStates | None":
@@ -129,7 +129,7 @@ class StationStates:
 
 
 @dataclass(frozen=True)
-class Numbers:
+class GeometryReply:
     """The answer to a question for a station's settings: alignment `A` [cm], mounting angles `G` [deg], boresight
     reference `H` [deg], tip offset `N` [cm] or envelope `V` [m].
 
@@ -141,19 +141,19 @@ class Numbers:
     values: tuple[float, ...]
 
     def line(self) -> bytes:
-        _, width, decimals = _NUMBERS[self.letter]
-        return _sent(f"2{self.station}{self.letter}" + "".join(f"{v:{width}.{decimals}f}" for v in self.values))
+        _, width, decimals = _GEOMETRY_COLUMNS[self.letter]
+        return _encode_line(f"2{self.station}{self.letter}" + "".join(f"{v:{width}.{decimals}f}" for v in self.values))
 
     @classmethod
-    def parse(cls, text: str) -> "Numbers | None":
-        count, width, _ = _NUMBERS.get(text[2:3], (0, 0, 0))
+    def parse(cls, text: str) -> "GeometryReply | None":
+        count, width, _ = _GEOMETRY_COLUMNS.get(text[2:3], (0, 0, 0))
         fields = [text[3 + k * width : 3 + (k + 1) * width] for k in range(count)]
         if not fields or len(text) != 3 + count * width or not all(_FLOAT.fullmatch(field) for field in fields):
             return None
         return cls(text[1], text[2], tuple(map(float, fields)))
 
 
-_NUMBERS = {"A": (9, 7, 2), "G": (3, 7, 2), "H": (3, 7, 2), "N": (3, 8, 3), "V": (6, 8, 3)}
+_GEOMETRY_COLUMNS = {"A": (9, 7, 2), "G": (3, 7, 2), "H": (3, 7, 2), "N": (3, 8, 3), "V": (6, 8, 3)}
 """How many, how wide, how many decimals."""
 _FLOAT = re.compile(r" *-?\d*\.?\d+ *")
 
@@ -171,7 +171,7 @@ class DeviceError:
 
     def line(self) -> bytes:
         said = _printable(self.command)
-        return _sent(f"2 E*ERROR*{said}*ERROR* EC {self.code}*PS{self.ps}  *FL{self.fl} *ST{self.st}")
+        return _encode_line(f"2 E*ERROR*{said}*ERROR* EC {self.code}*PS{self.ps}  *FL{self.fl} *ST{self.st}")
 
     @classmethod
     def parse(cls, text: str) -> "DeviceError | None":
@@ -190,7 +190,7 @@ _ERROR = re.compile(
 
 
 @dataclass(frozen=True)
-class Unknown:
+class UnknownReply:
     """A line that no source describes."""
 
     text: bytes
@@ -200,46 +200,46 @@ class Unknown:
         return self.text + b"\r\n"
 
 
-ReplyEvent = (
-    Status
+ParsedReply = (
+    StatusRecord
     | OutputList
     | StationStates
-    | Numbers
+    | GeometryReply
     | DeviceError
     | SystemRecord
     | StationRecord
-    | Prediction
-    | Sensitivity
-    | Digits
-    | Genlock
+    | PredictionReply
+    | SensitivityReply
+    | IntegerReply
+    | GenlockReply
     | Emitter
     | TrackingStatus
-    | Unknown
+    | UnknownReply
 )
 
-_READERS: tuple[Callable[[str], ReplyEvent | None], ...] = (
+_PARSERS: tuple[Callable[[str], ParsedReply | None], ...] = (
     DeviceError.parse,
-    Status.parse,
+    StatusRecord.parse,
     OutputList.parse,
     StationStates.parse,
-    Numbers.parse,
+    GeometryReply.parse,
     TrackingStatus.parse,
     SystemRecord.parse,
     StationRecord.parse,
-    Prediction.parse,
-    Sensitivity.parse,
-    Digits.parse,
-    Genlock.parse,
+    PredictionReply.parse,
+    SensitivityReply.parse,
+    IntegerReply.parse,
+    GenlockReply.parse,
     Emitter.parse,
 )
 
 
-def parse(line: bytes) -> ReplyEvent:
+def parse_reply(line: bytes) -> ParsedReply:
     """What a line says, with or without its CR LF."""
     bare = line.removesuffix(b"\n").removesuffix(b"\r")
     text = bare.decode("latin-1")
-    return next((found for read in _READERS if (found := read(text)) is not None), Unknown(bare))
+    return next((found for read in _PARSERS if (found := read(text)) is not None), UnknownReply(bare))
 
 
-def _sent(text: str) -> bytes:
+def _encode_line(text: str) -> bytes:
     return text.encode("latin-1", "replace") + b"\r\n"

@@ -48,7 +48,7 @@ class StationRecord:
 
 
 @dataclass(frozen=True)
-class Prediction:
+class PredictionReply:
     """The answer to `Mp{st}`."""
 
     station: str
@@ -58,13 +58,13 @@ class Prediction:
         return f"3{self.station}p{self.ahead_ms:2d}\r\n".encode("latin-1")
 
     @classmethod
-    def parse(cls, text: str) -> "Prediction | None":
+    def parse(cls, text: str) -> "PredictionReply | None":
         found = re.fullmatch(r"3([1-9A-C])p([ \d]\d)", text)
         return found and cls(found[1], int(found[2]))
 
 
 @dataclass(frozen=True)
-class Sensitivity:
+class SensitivityReply:
     """The answer to `MQ{st}`: how closely rotation is followed, 1 to 5."""
 
     station: str
@@ -74,13 +74,13 @@ class Sensitivity:
         return f"3{self.station}Q{self.level}\r\n".encode("latin-1")
 
     @classmethod
-    def parse(cls, text: str) -> "Sensitivity | None":
+    def parse(cls, text: str) -> "SensitivityReply | None":
         found = re.fullmatch(r"3([1-9A-C])Q(\d)", text)
         return found and cls(found[1], int(found[2]))
 
 
 @dataclass(frozen=True)
-class Digits:
+class IntegerReply:
     """The answer to `MU` (ultrasonic time-out, two digits), `Mg` (ultrasonic sensitivity, one) or `MCI{st}` (the
     InertiaCube that serves a station, one or two; -1 for none)."""
 
@@ -94,13 +94,13 @@ class Digits:
         return f"3{self.station}{self.letter}{digits}\r\n".encode("latin-1")
 
     @classmethod
-    def parse(cls, text: str) -> "Digits | None":
+    def parse(cls, text: str) -> "IntegerReply | None":
         found = re.fullmatch(r"3([1-9A-C])(U(?=..$)|g(?=.$)|I)(-1|[ \d]?\d)", text)
         return found and cls(found[1], found[2], int(found[3]))
 
 
 @dataclass(frozen=True)
-class Genlock:
+class GenlockReply:
     """The answer to `MG`."""
 
     state: str = "0"
@@ -111,7 +111,7 @@ class Genlock:
         return f"31G{self.state}{self.rate_hz:7.2f}{self.cycles:3d}\r\n".encode("latin-1")
 
     @classmethod
-    def parse(cls, text: str) -> "Genlock | None":
+    def parse(cls, text: str) -> "GenlockReply | None":
         found = re.fullmatch(r"31G(.)(?=.{7}.{3}$)( *\d+\.\d\d)( *\d+)", text)
         return found and cls(found[1], float(found[2]), int(found[3]))
 

@@ -6,7 +6,7 @@ from harness.core.arrays import Floats, freeze
 
 
 @dataclass(frozen=True, eq=False)
-class Samples:
+class DeviceSamples:
     """E instants of S stations in the tracker's frame; after the last one it goes on from the first, without a jump."""
 
     stations: tuple[str, ...]

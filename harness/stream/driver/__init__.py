@@ -1,7 +1,7 @@
 """A real IS-900 on a serial port or a TCP connection, as a `TrackerStream` (docs/device.md, Driver)."""
 
-from harness.stream.driver.config import Timing, Wanted
+from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.is900 import Is900
-from harness.stream.line_events import LineEvent, Witness
+from harness.stream.line_events import LineEvent, LineObserver
 
-__all__ = ["Is900", "LineEvent", "Timing", "Wanted", "Witness"]
+__all__ = ["Is900", "LineEvent", "DriverTiming", "DriverConfig", "LineObserver"]

@@ -3,33 +3,35 @@
 import math
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, size
+from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, record_size
 
-TRACKING_BYTES = 48
+TRACKING_REPLY_BYTES = 48
 """Of an answer to `MP` (docs/is900.md 7)."""
 
 
-def load(stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float = 0.0) -> float:
+def required_bit_rate(stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float = 0.0) -> float:
     """Bits per second of so many stations, with `MP` asked so often."""
-    return BITS_PER_BYTE * (stations * size(items) * rate_hz + TRACKING_BYTES * asked_hz)
+    return BITS_PER_BYTE * (stations * record_size(items) * rate_hz + TRACKING_REPLY_BYTES * asked_hz)
 
 
 def check_capacity(
     port: str, baud: int | None, stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float
 ) -> None:
     """BadInput when the stations say more than the line carries; `baud` is None where there is no such limit."""
-    if baud is None or load(stations, items, rate_hz, asked_hz) <= baud:
+    if baud is None or required_bit_rate(stations, items, rate_hz, asked_hz) <= baud:
         return
-    fitting = max((n for n in range(stations) if load(n, items, rate_hz, asked_hz) <= baud), default=0)
+    fitting = max((n for n in range(stations) if required_bit_rate(n, items, rate_hz, asked_hz) <= baud), default=0)
     ways = [f"{fitting} station{'s' * (fitting > 1)}"] if fitting else []
-    if load(stations, SHORT_LIST, rate_hz, asked_hz) <= baud and size(items) > size(SHORT_LIST):
-        ways.append(f"the {size(SHORT_LIST)}-byte list (--items {','.join(map(str, SHORT_LIST))})")
-    slower = (baud - load(0, items, 0.0, asked_hz)) / load(stations, items, 1.0)
+    if required_bit_rate(stations, SHORT_LIST, rate_hz, asked_hz) <= baud and record_size(items) > record_size(
+        SHORT_LIST
+    ):
+        ways.append(f"the {record_size(SHORT_LIST)}-byte list (--items {','.join(map(str, SHORT_LIST))})")
+    slower = (baud - required_bit_rate(0, items, 0.0, asked_hz)) / required_bit_rate(stations, items, 1.0)
     ways.append(f"a device that runs at {math.floor(slower)} Hz or less")
     if baud < 115200:
         ways.append("a device set to 115200 baud")
     raise BadInput(
-        f"Port {port}: {stations} stations x {size(items)} bytes x {BITS_PER_BYTE} bits x {rate_hz:g} Hz are "
-        f"{load(stations, items, rate_hz, asked_hz):.0f} bit/s, and the line carries {baud}.",
+        f"Port {port}: {stations} stations x {record_size(items)} bytes x {BITS_PER_BYTE} bits x {rate_hz:g} Hz are "
+        f"{required_bit_rate(stations, items, rate_hz, asked_hz):.0f} bit/s, and the line carries {baud}.",
         f"Try {', or '.join(ways)}.",
     )

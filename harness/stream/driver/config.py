@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BAUDS, STANDARD_LIST, record_type
-from harness.stream.codec.records import Settings
+from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, record_type
+from harness.stream.codec.records import RecordFormat
 
-TELL_QUALITY = (40, 76)
+QUALITY_ITEMS = (40, 76)
 """Items that say how well a station is tracked (docs/is900.md 7)."""
 
 Alignment = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
@@ -16,7 +16,7 @@ Alignment = tuple[tuple[float, float, float], tuple[float, float, float], tuple[
 
 
 @dataclass(frozen=True)
-class Wanted:
+class DriverConfig:
     """The set-up asked for; BadInput where it contradicts itself."""
 
     items: tuple[int, ...] = STANDARD_LIST
@@ -30,7 +30,7 @@ class Wanted:
     rate_hz: float | None = None
     """Rounds per second that the device is known to run at. None: as it says itself, else measured."""
     baud: int | None = None
-    """Of a serial port. None: each of `BAUDS` is tried."""
+    """Of a serial port. None: each of `BAUD_RATES` is tried."""
     boresight: bool = False
     """Whether every station's heading is zeroed where it points at set-up."""
     alignment: Alignment | Mapping[str, Alignment] | None = None
@@ -42,22 +42,22 @@ class Wanted:
         record_type(self.items)
         if self.quality not in ("record", "mp"):
             raise BadInput(f"Quality {self.quality!r} is not known.", "Take 'record' or 'mp'.")
-        if self.quality == "record" and not set(TELL_QUALITY) & set(self.items):
+        if self.quality == "record" and not set(QUALITY_ITEMS) & set(self.items):
             raise BadInput(
-                f"The output list {_comma(self.items)} has no item 40, so a lost station would not show.",
+                f"The output list {_join_commas(self.items)} has no item 40, so a lost station would not show.",
                 "Add 40 to it, or take quality 'mp' (--quality mp).",
             )
         if self.rate_hz is not None and not 0.0 < self.rate_hz <= 1000.0:
             raise BadInput(f"A rate of {self.rate_hz} Hz.", "An IS-900 runs at up to 180 Hz.")
         if self.baud is not None and self.baud <= 0:
-            raise BadInput(f"{self.baud} baud.", f"An IS-900 speaks at {_comma(BAUDS)}.")
+            raise BadInput(f"{self.baud} baud.", f"An IS-900 speaks at {_join_commas(BAUD_RATES)}.")
         if self.stations is not None and len(set(self.stations)) < len(self.stations):
-            raise BadInput(f"Stations {_comma(self.stations)}: a name twice.", "Each has a name of its own.")
+            raise BadInput(f"Stations {_join_commas(self.stations)}: a name twice.", "Each has a name of its own.")
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> RecordFormat:
         """How numbers will be written."""
-        return Settings(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6)
+        return RecordFormat(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6)
 
     def alignment_of(self, station: str) -> Alignment | None:
         """The frame of a station, by its name."""
@@ -65,7 +65,7 @@ class Wanted:
 
 
 @dataclass(frozen=True)
-class Timing:
+class DriverTiming:
     """How long the driver waits for what [s]."""
 
     quiet_s: float = 0.1
@@ -93,5 +93,5 @@ class Timing:
     adapters hold bytes back for 0.016 s, and what is only late shall not be torn."""
 
 
-def _comma(values: tuple[object, ...]) -> str:
+def _join_commas(values: tuple[object, ...]) -> str:
     return ",".join(map(str, values))

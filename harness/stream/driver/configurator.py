@@ -7,23 +7,23 @@ from harness.errors import BadInput
 from harness.stream.codec import commands
 from harness.stream.codec.items import SINCE_FIRMWARE
 from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.replies import OutputList, Status, SystemRecord, TrackingStatus
-from harness.stream.driver.capacity import check_capacity, load
-from harness.stream.driver.config import TELL_QUALITY, Wanted
-from harness.stream.driver.connection import Line
-from harness.stream.driver.rate_measurement import measured_rate_hz
-from harness.stream.driver.stations import Stations
+from harness.stream.codec.replies import OutputList, StatusRecord, SystemRecord, TrackingStatus
+from harness.stream.driver.capacity import check_capacity, required_bit_rate
+from harness.stream.driver.config import QUALITY_ITEMS, DriverConfig
+from harness.stream.driver.connection import DeviceConnection
+from harness.stream.driver.rate_measurement import measure_rate_hz
+from harness.stream.driver.stations import StationSelection
 
-FULL = 0.95
+SATURATED_SHARE = 0.95
 """A line that carries this share of what it can may have left records out [choice]."""
-AGREE = 0.1
+RATE_TOLERANCE = 0.1
 """Rates that differ by less than this share are one; `MP` rounds to whole numbers."""
 
 
-def items_for(port: str, status: Status, wanted: Wanted) -> tuple[int, ...]:
+def select_items(port: str, status: StatusRecord, wanted: DriverConfig) -> tuple[int, ...]:
     """The output list: without quality where `MP` is to tell it; BadInput when the firmware is too old for it."""
     if wanted.quality == "mp":
-        return tuple(code for code in wanted.items if code not in TELL_QUALITY)
+        return tuple(code for code in wanted.items if code not in QUALITY_ITEMS)
     found = re.match(r"\d+\.\d+", status.firmware)
     version = float(found[0]) if found else float("inf")  # then the device itself says whether it takes the list
     for code in wanted.items:
@@ -36,14 +36,16 @@ def items_for(port: str, status: Status, wanted: Wanted) -> tuple[int, ...]:
     return wanted.items
 
 
-class SetUp:
+class DeviceConfigurator:
     """Sets up one device, once. `boresight` is for the first time: later, nobody stands in the pose of reference."""
 
-    def __init__(self, port: str, baud: int | None, line: Line, status: Status, wanted: Wanted) -> None:
+    def __init__(
+        self, port: str, baud: int | None, line: DeviceConnection, status: StatusRecord, wanted: DriverConfig
+    ) -> None:
         self._port, self._baud, self._line, self._wanted = port, baud, line, wanted
-        self._items = items_for(port, status, wanted)
+        self._items = select_items(port, status, wanted)
 
-    def carry_out(self, stations: Stations, boresight: bool, known_hz: float | None = None) -> WireFormat:
+    def carry_out(self, stations: StationSelection, boresight: bool, known_hz: float | None = None) -> WireFormat:
         """Tell and ask; BadInput when the device does not do as it is told, or the line is too slow for it.
 
         `known_hz` is the rate that an earlier set-up found; without it the device is believed what it says of its rate
@@ -78,15 +80,15 @@ class SetUp:
 
         Records that fill the line say nothing against a higher rate: the others have found no room.
         """
-        asked_hz, measured_hz = self._wanted.rate_hz, measured_rate_hz(self._line, wire)
+        asked_hz, measured_hz = self._wanted.rate_hz, measure_rate_hz(self._line, wire)
         own_hz = measured_hz or told_hz
-        if asked_hz and own_hz and not _near(asked_hz, own_hz):
+        if asked_hz and own_hz and not _rates_agree(asked_hz, own_hz):
             raise BadInput(
                 f"Port {self._port}: a rate of {asked_hz:g} Hz is asked for, the device runs at {own_hz:.4g} Hz.",
                 "Leave the rate out, or set the device's own.",
             )
         for rate_hz in (asked_hz, told_hz):
-            if rate_hz and (measured_hz is None or _near(rate_hz, measured_hz)):
+            if rate_hz and (measured_hz is None or _rates_agree(rate_hz, measured_hz)):
                 return rate_hz
         if measured_hz is not None and told_hz > measured_hz and self._filled(len(wire.stations), measured_hz):
             return told_hz
@@ -104,7 +106,10 @@ class SetUp:
 
     def _filled(self, stations: int, rate_hz: float) -> bool:
         """Whether the line has next to no room left at this rate."""
-        return self._baud is not None and load(stations, self._items, rate_hz, self._asked_hz) >= FULL * self._baud
+        return (
+            self._baud is not None
+            and required_bit_rate(stations, self._items, rate_hz, self._asked_hz) >= SATURATED_SHARE * self._baud
+        )
 
     @property
     def _asked_hz(self) -> float:
@@ -117,14 +122,14 @@ class SetUp:
         self._line.send(commands.CENTIMETRES if wanted.centimetres else commands.INCHES)
         self._line.send(commands.MILLISECONDS if wanted.milliseconds else commands.MICROSECONDS)
         for station in wire.characters.decode():
-            self._line.send(commands.output_list(station, wire.items))
+            self._line.send(commands.set_output_list(station, wire.items))
             # the answer paces us: the device's own buffer is small (error -5, docs/is900.md 6.4)
-            self._line.ask(commands.read_list(station), OutputList, self._line.timing.answer_s)
+            self._line.ask(commands.query_output_list(station), OutputList, self._line.timing.answer_s)
 
     def _differences(self, wire: WireFormat) -> str:
         """What the device has otherwise than it was told; empty when all is well."""
         line, answer_s = self._line, self._line.timing.answer_s
-        status = line.ask(commands.STATUS, Status, answer_s)
+        status = line.ask(commands.STATUS, StatusRecord, answer_s)
         if status is None:
             return "no answer to S"
         system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
@@ -139,7 +144,7 @@ class SetUp:
             else "",
         ]
         for station in wire.characters.decode():
-            answer = line.ask(commands.read_list(station), OutputList, answer_s)
+            answer = line.ask(commands.query_output_list(station), OutputList, answer_s)
             if answer is None:
                 found.append(f"no answer to O{station}")
             elif answer.station != station or answer.items != wire.items:
@@ -156,7 +161,7 @@ class SetUp:
             if boresight:
                 self._line.send(commands.boresight(station))
         if boresight or self._wanted.alignment is not None:
-            self._line.ask(commands.STATUS, Status, self._line.timing.answer_s)  # errors come before its answer
+            self._line.ask(commands.STATUS, StatusRecord, self._line.timing.answer_s)  # errors come before its answer
         if self._line.errors:
             raise BadInput(f"Port {self._port}: the device refuses its frame.", self._advice())
 
@@ -165,5 +170,5 @@ class SetUp:
         return f"It said: {said}." if said else "Switch it off and on, and see that no other program talks to it."
 
 
-def _near(one_hz: float, other_hz: float) -> bool:
-    return abs(one_hz - other_hz) <= AGREE * other_hz
+def _rates_agree(one_hz: float, other_hz: float) -> bool:
+    return abs(one_hz - other_hz) <= RATE_TOLERANCE * other_hz

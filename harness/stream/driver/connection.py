@@ -4,36 +4,36 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from harness.stream.codec.commands import RESUME, STOP
-from harness.stream.codec.replies import DeviceError, ReplyEvent, parse
-from harness.stream.driver.config import Timing
+from harness.stream.codec.replies import DeviceError, ParsedReply, parse_reply
+from harness.stream.driver.config import DriverTiming
 from harness.stream.driver.host import Host
 from harness.stream.driver.transport import Transport
-from harness.stream.line_events import Witness
+from harness.stream.line_events import LineObserver
 
-LONGEST = 4096
+MAX_UNFINISHED_BYTES = 4096
 """An unfinished line beyond this is no reply [bytes]."""
 WAKE_UP = RESUME + b"\r" + STOP
 """Resumes a suspended device, ends a line that somebody began, stops a streaming one; does no harm to any other. In
 this order, one that takes 11 for an ordinary byte still sees `c` at the start of a line."""
-_WITHIN = 10
+_STOP_TIMEOUT_FACTOR = 10
 """Times `quiet_s`: so long a device may go on after `c`, since its buffers empty first."""
 
-Answer = TypeVar("Answer", bound=ReplyEvent)
+Answer = TypeVar("Answer", bound=ParsedReply)
 
 
-class Closing(Exception):
+class DriverClosed(Exception):
     """How a wait ends when the driver is closed meanwhile."""
 
 
-class Line:
+class DeviceConnection:
     """A transport with the host's clocks and a witness to all that passes."""
 
-    def __init__(self, transport: Transport, host: Host, witness: Witness, timing: Timing) -> None:
+    def __init__(self, transport: Transport, host: Host, witness: LineObserver, timing: DriverTiming) -> None:
         self.transport, self.timing = transport, timing
         self.heard = 0
         """Bytes received."""
         self.closing: Callable[[], bool] = lambda: False
-        """Asked before each wait, which is short; True ends it with `Closing`."""
+        """Asked before each wait, which is short; True ends it with `DriverClosed`."""
         self.on_data: Callable[[bytes, float], None] = lambda data, now_s: None
         """Called with whatever comes, and when (host's monotonic clock [s])."""
         self.errors: list[DeviceError] = []
@@ -51,7 +51,7 @@ class Line:
     def receive(self, timeout_s: float) -> bytes:
         """What is there, after a wait of so long, or of `poll_s`, at most; LineLost, Closing."""
         if self.closing():
-            raise Closing
+            raise DriverClosed
         data = self.transport.read(min(timeout_s, self.timing.poll_s))
         if data:
             now_s = self._host.monotonic_s()
@@ -62,7 +62,7 @@ class Line:
 
     def quiet(self) -> bool:
         """Wait for silence and forget what came before; False when the device goes on."""
-        until_s = self._host.monotonic_s() + _WITHIN * self.timing.quiet_s
+        until_s = self._host.monotonic_s() + _STOP_TIMEOUT_FACTOR * self.timing.quiet_s
         silent_from_s = self._host.monotonic_s()
         while (now_s := self._host.monotonic_s()) < silent_from_s + self.timing.quiet_s:
             if now_s > until_s:
@@ -95,12 +95,12 @@ class Line:
             for reply in self._replies(self.receive(left_s)):
                 if isinstance(reply, kind):
                     return reply
-        last, self._begun = parse(self._begun), b""  # very old firmware leaves out CR LF (docs/is900.md 6.2)
+        last, self._begun = parse_reply(self._begun), b""  # very old firmware leaves out CR LF (docs/is900.md 6.2)
         return last if isinstance(last, kind) else None
 
-    def _replies(self, data: bytes) -> list[ReplyEvent]:
+    def _replies(self, data: bytes) -> list[ParsedReply]:
         *lines, begun = (self._begun + data).split(b"\n")
-        self._begun = begun[-LONGEST:]
-        replies = [parse(line) for line in lines]
+        self._begun = begun[-MAX_UNFINISHED_BYTES:]
+        replies = [parse_reply(line) for line in lines]
         self.errors += [reply for reply in replies if isinstance(reply, DeviceError)]
         return replies

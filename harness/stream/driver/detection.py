@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from harness.errors import BadInput
 from harness.stream.codec.commands import STATUS
-from harness.stream.codec.items import BAUDS
-from harness.stream.codec.replies import Status
-from harness.stream.driver.config import Wanted
-from harness.stream.driver.connection import WAKE_UP, Line
+from harness.stream.codec.items import BAUD_RATES
+from harness.stream.codec.replies import StatusRecord
+from harness.stream.driver.config import DriverConfig
+from harness.stream.driver.connection import WAKE_UP, DeviceConnection
 from harness.stream.driver.transport import LineLost
 
 
@@ -18,32 +18,34 @@ class NoAnswer(BadInput):
 
 
 @dataclass(frozen=True)
-class Found:
+class DetectedDevice:
     """A device that answered."""
 
-    line: Line
+    line: DeviceConnection
     baud: int | None
     """Of the port [bit/s]; None where bytes go as fast as they can, over TCP."""
-    status: Status
+    status: StatusRecord
 
 
-def bauds_of(port: str, wanted: Wanted) -> Sequence[int | None]:
+def candidate_baud_rates(port: str, wanted: DriverConfig) -> Sequence[int | None]:
     """The rates to try on this port."""
     if "://" in port:
         return (None,)
-    return BAUDS if wanted.baud is None else (wanted.baud,)
+    return BAUD_RATES if wanted.baud is None else (wanted.baud,)
 
 
-def find(port: str, bauds: Sequence[int | None], connect: Callable[[int | None], Line], answer_s: float) -> Found:
+def detect_device(
+    port: str, bauds: Sequence[int | None], connect: Callable[[int | None], DeviceConnection], answer_s: float
+) -> DetectedDevice:
     """Open the port at one rate after another, until an IS-900 answers; BadInput when none does."""
     heard = 0
     for baud in bauds:
         line = connect(baud)
         try:
-            status = status_of(line, answer_s)
+            status = query_status(line, answer_s)
             if status is not None:
                 _check_kind(port, status)
-                return Found(line, baud, status)
+                return DetectedDevice(line, baud, status)
             heard += line.heard
         except LineLost as lost:
             line.transport.close()
@@ -54,21 +56,21 @@ def find(port: str, bauds: Sequence[int | None], connect: Callable[[int | None],
             line.transport.close()
             raise
         line.transport.close()
-    raise _no_answer(port, bauds, heard)
+    raise _no_answer_error(port, bauds, heard)
 
 
-def status_of(line: Line, answer_s: float) -> Status | None:
+def query_status(line: DeviceConnection, answer_s: float) -> StatusRecord | None:
     """The device's answer to `S`, once it is silent."""
     if not line.stop(WAKE_UP):
         return None
-    status = line.ask(STATUS, Status, answer_s)
+    status = line.ask(STATUS, StatusRecord, answer_s)
     if status is None and line.heard:
         line.quiet()
-        status = line.ask(b"\r" + STATUS, Status, answer_s)
+        status = line.ask(b"\r" + STATUS, StatusRecord, answer_s)
     return status
 
 
-def _check_kind(port: str, status: Status) -> None:
+def _check_kind(port: str, status: StatusRecord) -> None:
     if "IS900" not in re.sub("[- ]", "", status.identification.upper()):
         raise BadInput(
             f"Port {port}: {status.identification.strip()!r}, firmware {status.firmware}, answers, which is no IS-900.",
@@ -76,7 +78,7 @@ def _check_kind(port: str, status: Status) -> None:
         )
 
 
-def _no_answer(port: str, bauds: Sequence[int | None], heard: int) -> NoAnswer:
+def _no_answer_error(port: str, bauds: Sequence[int | None], heard: int) -> NoAnswer:
     rates = " at " + ", ".join(map(str, bauds)) + " baud" if bauds[0] else ""
     one_rate = "The rate may be wrong: leave it out, and each is tried. " if bauds[0] and len(bauds) == 1 else ""
     if heard == 0:

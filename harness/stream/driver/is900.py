@@ -8,21 +8,21 @@ from types import TracebackType
 
 from harness.errors import BadInput
 from harness.stream.codec import commands
-from harness.stream.codec.continuous_reader import Sessions
+from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.replies import OutputList, Status
-from harness.stream.driver.config import Timing, Wanted
-from harness.stream.driver.configurator import SetUp
-from harness.stream.driver.connection import Closing, Line
-from harness.stream.driver.detection import Found, NoAnswer, bauds_of, find, status_of
+from harness.stream.codec.replies import OutputList, StatusRecord
+from harness.stream.driver.config import DriverConfig, DriverTiming
+from harness.stream.driver.configurator import DeviceConfigurator
+from harness.stream.driver.connection import DeviceConnection, DriverClosed
+from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
 from harness.stream.driver.host import Host
-from harness.stream.driver.stations import Stations, choose, restore
+from harness.stream.driver.stations import StationSelection, restore_stations, select_stations
 from harness.stream.driver.transport import LineLost
-from harness.stream.driver.watchdog import Finding, Watchdog, complaint_of
+from harness.stream.driver.watchdog import Diagnosis, Watchdog, diagnose_reply
 from harness.stream.frame import TrackerFrame
-from harness.stream.line_events import Kind, LineEvent, NoWitness, Witness
+from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, NullLineObserver
 
-_RATE_OVER = 50
+_RATE_WINDOW_FRAMES = 50
 """Frames that the present rate is counted over."""
 
 
@@ -37,32 +37,32 @@ class Is900:
     def __init__(
         self,
         port: str,
-        wanted: Wanted | None = None,
+        wanted: DriverConfig | None = None,
         *,
-        witness: Witness | None = None,
+        witness: LineObserver | None = None,
         on_event: Callable[[LineEvent], None] = lambda event: None,
-        timing: Timing | None = None,
+        timing: DriverTiming | None = None,
         host: Host | None = None,
     ) -> None:
         """`witness` sees all bytes and events, `on_event` the events; both in the thread that iterates."""
-        self.port, self.wanted = port, wanted or Wanted()
-        self._timing, self._host = timing or Timing(), host or Host()
-        self._witness, self._on_event = witness or NoWitness(), on_event
+        self.port, self.wanted = port, wanted or DriverConfig()
+        self._timing, self._host = timing or DriverTiming(), host or Host()
+        self._witness, self._on_event = witness or NullLineObserver(), on_event
         self._wall_ahead_s = self._host.wall_s() - self._host.monotonic_s()
-        self._sessions, self._watchdog = Sessions(), Watchdog(self._timing)
+        self._sessions, self._watchdog = ContinuousFrameReader(), Watchdog(self._timing)
         self._frames: deque[TrackerFrame] = deque()
-        self._recent_s: deque[float] = deque(maxlen=_RATE_OVER)
+        self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
         self._line_lock, self._closing = threading.RLock(), threading.Event()
         self._streaming = False
         self._heard_s = self._tracked_s = self._zeroed_s = self._host.monotonic_s()
         self._reconnects = 0
-        found = find(port, bauds_of(port, self.wanted), self._connect, self._timing.answer_s)
+        found = detect_device(port, candidate_baud_rates(port, self.wanted), self._connect, self._timing.answer_s)
         self._line, self._baud, self._status = found.line, found.baud, found.status
-        self._stations = Stations("", (), "")
+        self._stations = StationSelection("", (), "")
         try:
-            self._stations = choose(port, self._line, self.wanted.stations)
+            self._stations = select_stations(port, self._line, self.wanted.stations)
             if self._stations.others:
-                restore(port, self._line, self._stations)
+                restore_stations(port, self._line, self._stations)
             self._wire = self._set_up(self._status, known_hz=None)
         except LineLost as lost:
             self.close()
@@ -121,7 +121,7 @@ class Is900:
                 continue
             try:
                 self._step()
-            except Closing:
+            except DriverClosed:
                 return
             except BaseException:
                 self.close()
@@ -183,35 +183,35 @@ class Is900:
             self._watchdog.zeroed()
             self._line.send(commands.ZERO_CLOCK)
 
-    def _act(self, finding: Finding) -> None:
+    def _act(self, finding: Diagnosis) -> None:
         if finding.kind is not None:
             self._tell(finding.kind, finding.text)
         if finding.step == "ask":
             self._line.send(commands.STATUS)
             for station in self._stations.characters:
-                self._line.send(commands.read_list(station))
+                self._line.send(commands.query_output_list(station))
         elif finding.step != "none" and self._streaming:
             self._come_back(reopen=finding.step == "reopen")
 
     def _lost(self, lost: LineLost) -> None:
         if self._closing.is_set():
-            raise Closing from lost
+            raise DriverClosed from lost
         self._act(self._watchdog.tell("unplugged", lost.why, self._host.monotonic_s()))
         self._come_back(reopen=True)
 
-    def _tell(self, kind: Kind, text: str) -> None:
+    def _tell(self, kind: LineEventKind, text: str) -> None:
         if kind == "reset" and self.wanted.boresight:
             text += "; boresight is lost, and nobody may stand in the pose for it now"
         event = LineEvent(kind, self._host.monotonic_s(), self._host.wall_s(), text)
         self._witness.happened(event)
         self._on_event(event)
 
-    def _connect(self, baud: int | None) -> Line:
+    def _connect(self, baud: int | None) -> DeviceConnection:
         try:
             transport = self._host.open(self.port, baud or 115200)
         except BadInput as error:
             raise NoAnswer(error.what, error.advice) from error
-        line = Line(transport, self._host, self._witness, self._timing)
+        line = DeviceConnection(transport, self._host, self._witness, self._timing)
         line.closing, line.on_data = self._closing.is_set, self._received
         return line
 
@@ -225,9 +225,9 @@ class Is900:
         for finding in self._watchdog.framed(frames, now_s):
             self._act(finding)
 
-    def _set_up(self, status: Status, known_hz: float | None) -> WireFormat:
+    def _set_up(self, status: StatusRecord, known_hz: float | None) -> WireFormat:
         """Boresight is for the first time, when nothing is known."""
-        set_up = SetUp(self.port, self._baud, self._line, status, self.wanted)
+        set_up = DeviceConfigurator(self.port, self._baud, self._line, status, self.wanted)
         return set_up.carry_out(self._stations, self.wanted.boresight and known_hz is None, known_hz)
 
     def _start(self) -> None:
@@ -247,7 +247,7 @@ class Is900:
         self._watchdog.pause()
         while True:
             try:
-                status = None if reopen else status_of(self._line, self._timing.answer_s)
+                status = None if reopen else query_status(self._line, self._timing.answer_s)
                 if status is None:
                     status = self._reopened().status
                 self._diagnose(status)
@@ -258,34 +258,34 @@ class Is900:
                 return
             except (NoAnswer, LineLost):
                 if self._closing.is_set():
-                    raise Closing from None
+                    raise DriverClosed from None
             except BadInput as error:
                 self._act(self._watchdog.tell("refused", str(error), self._host.monotonic_s()))
             reopen = True
             self._pause()
 
-    def _reopened(self) -> Found:
+    def _reopened(self) -> DetectedDevice:
         self._line.transport.close()
-        found = find(self.port, (self._baud,), self._connect, self._timing.answer_s)
+        found = detect_device(self.port, (self._baud,), self._connect, self._timing.answer_s)
         self._line, self._status = found.line, found.status
         return found
 
-    def _diagnose(self, status: Status) -> None:
+    def _diagnose(self, status: StatusRecord) -> None:
         """Tell what the device has forgotten."""
         now_s, line = self._host.monotonic_s(), self._line
-        kind, text = complaint_of(self._wire, status, streaming=False)
+        kind, text = diagnose_reply(self._wire, status, streaming=False)
         if kind is not None:
             self._act(self._watchdog.tell(kind, text, now_s))
             return
         for station in self._stations.characters:
-            answer = line.ask(commands.read_list(station), OutputList, self._timing.answer_s)
+            answer = line.ask(commands.query_output_list(station), OutputList, self._timing.answer_s)
             if answer is not None:
-                kind, text = complaint_of(self._wire, answer)
+                kind, text = diagnose_reply(self._wire, answer)
                 if kind is not None:
                     self._act(self._watchdog.tell(kind, text, now_s))
 
     def _restore(self) -> None:
-        if missing := restore(self.port, self._line, self._stations):
+        if missing := restore_stations(self.port, self._line, self._stations):
             now_s = self._host.monotonic_s()
             self._act(self._watchdog.tell("missing", f"station {', '.join(missing)} is not there", now_s))
 
@@ -294,5 +294,5 @@ class Is900:
         until_s = self._host.monotonic_s() + self._timing.retry_s
         while (left_s := until_s - self._host.monotonic_s()) > 0.0:
             if self._closing.is_set():
-                raise Closing
+                raise DriverClosed
             self._host.sleep(min(left_s, self._timing.poll_s))

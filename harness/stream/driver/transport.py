@@ -18,19 +18,24 @@ from typing import Protocol
 import serial
 
 from harness.errors import HarnessError
-from harness.stream.driver.transport_errors import no_connection, no_port, no_scheme, tcp_address
+from harness.stream.driver.transport_errors import (
+    parse_tcp_address,
+    serial_port_error,
+    tcp_connection_error,
+    unknown_scheme_error,
+)
 
 if sys.platform == "win32":
-    _TROUBLE: tuple[type[Exception], ...] = (OSError, ValueError)
+    _IO_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError)
 else:
     import termios
 
-    _TROUBLE = (OSError, ValueError, termios.error)
-CHUNK = 65536
+    _IO_ERRORS = (OSError, ValueError, termios.error)
+READ_BYTES = 65536
 """More than any operating system keeps for a port [bytes]."""
-WRITE_S, CONNECT_S = 2.0, 2.0
+WRITE_TIMEOUT_S, CONNECT_TIMEOUT_S = 2.0, 2.0
 """A line that takes no byte for so long is lost; so is a host that does not answer [s]."""
-_NAP_S = 0.002
+_POLL_INTERVAL_S = 0.002
 """Between two looks at a port that cannot be waited for [s]."""
 
 
@@ -73,17 +78,17 @@ def open_transport(port: str, baud: int = 115200) -> Transport:
     BadInput when there is no such port or host, it is taken, or may not be opened.
     """
     if port.startswith(("tcp://", "socket://")):
-        return _Tcp(port, tcp_address(port))
+        return _TcpTransport(port, parse_tcp_address(port))
     if "://" in port:
-        raise no_scheme(port)
+        raise unknown_scheme_error(port)
     try:
-        opened = serial.Serial(port, baud, timeout=0, write_timeout=WRITE_S, exclusive=True)
-    except _TROUBLE as error:
-        raise no_port(port, baud, error) from error
-    return PolledPort(port, opened) if sys.platform == "win32" else WaitedPort(port, opened)
+        opened = serial.Serial(port, baud, timeout=0, write_timeout=WRITE_TIMEOUT_S, exclusive=True)
+    except _IO_ERRORS as error:
+        raise serial_port_error(port, baud, error) from error
+    return PolledSerialTransport(port, opened) if sys.platform == "win32" else SelectSerialTransport(port, opened)
 
 
-class _Line(ABC):
+class _BaseTransport(ABC):
     """What the kinds of lines share: one reader at a time, and a close that a reader notices."""
 
     def __init__(self, name: str) -> None:
@@ -95,7 +100,7 @@ class _Line(ABC):
         with self._reading:
             try:
                 data = b"" if self._closed.is_set() else self._receive(timeout_s)
-            except _TROUBLE as error:
+            except _IO_ERRORS as error:
                 raise LineLost(self.name, self._reason(error)) from error
             if self._closed.is_set():
                 raise LineLost(self.name, "closed")
@@ -104,7 +109,7 @@ class _Line(ABC):
     def write(self, data: bytes) -> None:
         try:
             self._send(data)
-        except _TROUBLE as error:
+        except _IO_ERRORS as error:
             raise LineLost(self.name, self._reason(error)) from error
 
     def close(self) -> None:
@@ -130,7 +135,7 @@ class _Line(ABC):
     def _shut(self) -> None: ...
 
 
-class _Waited(_Line):
+class _SelectTransport(_BaseTransport):
     """A line whose descriptor can be waited for."""
 
     def __init__(self, name: str, descriptor: int) -> None:
@@ -161,7 +166,7 @@ class _Waited(_Line):
         self._waker.close()
 
 
-class WaitedPort(_Waited):
+class SelectSerialTransport(_SelectTransport):
     """A serial port where the operating system can wait for it."""
 
     def __init__(self, name: str, port: serial.Serial) -> None:
@@ -169,7 +174,7 @@ class WaitedPort(_Waited):
         self._port = port
 
     def _take(self) -> bytes:
-        return bytes(self._port.read(CHUNK))
+        return bytes(self._port.read(READ_BYTES))
 
     def _look(self) -> None:
         if os.stat(self.name).st_rdev != os.fstat(self._descriptor).st_rdev:
@@ -183,7 +188,7 @@ class WaitedPort(_Waited):
         super()._shut()
 
 
-class PolledPort(_Line):
+class PolledSerialTransport(_BaseTransport):
     """A serial port on Windows: looked at every other millisecond."""
 
     def __init__(self, name: str, port: serial.Serial) -> None:
@@ -193,8 +198,8 @@ class PolledPort(_Line):
     def _receive(self, timeout_s: float) -> bytes:
         until_s = time.monotonic() + timeout_s
         while True:
-            data = bytes(self._port.read(CHUNK))
-            if data or time.monotonic() >= until_s or self._closed.wait(_NAP_S):
+            data = bytes(self._port.read(READ_BYTES))
+            if data or time.monotonic() >= until_s or self._closed.wait(_POLL_INTERVAL_S):
                 return data
 
     def _send(self, data: bytes) -> None:
@@ -204,20 +209,20 @@ class PolledPort(_Line):
         self._port.close()
 
 
-class _Tcp(_Waited):
+class _TcpTransport(_SelectTransport):
     """A TCP connection, small packets sent at once."""
 
     def __init__(self, name: str, address: tuple[str, int]) -> None:
         try:
-            self._socket = socket.create_connection(address, CONNECT_S)
+            self._socket = socket.create_connection(address, CONNECT_TIMEOUT_S)
         except (OSError, UnicodeError) as error:
-            raise no_connection(name, address, error) from error
+            raise tcp_connection_error(name, address, error) from error
         super().__init__(name, self._socket.fileno())
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._socket.settimeout(WRITE_S)
+        self._socket.settimeout(WRITE_TIMEOUT_S)
 
     def _take(self) -> bytes:
-        data = self._socket.recv(CHUNK)
+        data = self._socket.recv(READ_BYTES)
         if not data:
             raise OSError("closed by the other side")
         return data

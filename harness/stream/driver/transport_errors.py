@@ -8,13 +8,13 @@ from urllib.parse import urlsplit
 from serial.tools import list_ports
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BAUDS
+from harness.stream.codec.items import BAUD_RATES
 
-_BUSY = (errno.EBUSY, errno.EAGAIN)
-_SETTINGS = f"{', '.join(map(str, BAUDS[:-1]))} and {BAUDS[-1]}"
+_BUSY_ERRNOS = (errno.EBUSY, errno.EAGAIN)
+_BAUD_RATES_TEXT = f"{', '.join(map(str, BAUD_RATES[:-1]))} and {BAUD_RATES[-1]}"
 
 
-def no_scheme(port: str) -> BadInput:
+def unknown_scheme_error(port: str) -> BadInput:
     """For `spy://...` and other addresses that are not ours."""
     return BadInput(
         f"Port {port}: this kind of address is not known.",
@@ -22,7 +22,7 @@ def no_scheme(port: str) -> BadInput:
     )
 
 
-def tcp_address(port: str) -> tuple[str, int]:
+def parse_tcp_address(port: str) -> tuple[str, int]:
     """Host and number of `tcp://host:port`; BadInput when either is missing."""
     try:
         parts = urlsplit(port)
@@ -36,7 +36,7 @@ def tcp_address(port: str) -> tuple[str, int]:
     return host, number
 
 
-def no_connection(port: str, address: tuple[str, int], error: Exception) -> BadInput:
+def tcp_connection_error(port: str, address: tuple[str, int], error: Exception) -> BadInput:
     """A host that could not be reached."""
     host, number = address
     if isinstance(error, (socket.gaierror, UnicodeError)):
@@ -48,31 +48,34 @@ def no_connection(port: str, address: tuple[str, int], error: Exception) -> BadI
             f"Port {port}: nothing listens at {host}, port {number}.",
             "Start the device (or `harness emulate`) first, and check the number.",
         )
-    return BadInput(f"Port {port}: {_said(error)}.", "Check the address and the network.")
+    return BadInput(f"Port {port}: {_error_text(error)}.", "Check the address and the network.")
 
 
-def no_port(port: str, baud: int, error: Exception) -> BadInput:
+def serial_port_error(port: str, baud: int, error: Exception) -> BadInput:
     """A serial port that could not be opened."""
     number = getattr(error, "errno", None)
     if isinstance(error, ValueError):
-        return BadInput(f"Port {port} at {baud} baud: {error}.", f"An IS-900 speaks at {_SETTINGS}.")
+        return BadInput(f"Port {port} at {baud} baud: {error}.", f"An IS-900 speaks at {_BAUD_RATES_TEXT}.")
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV) or isinstance(error, FileNotFoundError):
         here = ", ".join(sorted(known.device for known in list_ports.comports())) or "none"
         return BadInput(f"Port {port}: there is no such port.", f"Serial ports of this computer: {here}.")
     if number == errno.EACCES and os.name == "posix":
         return BadInput(
-            f"Port {port}: permission denied.", f"Join the group that may open it ({_group(port)}), then log in anew."
+            f"Port {port}: permission denied.",
+            f"Join the group that may open it ({_owner_group(port)}), then log in anew.",
         )
-    if number in (*_BUSY, errno.EACCES):
+    if number in (*_BUSY_ERRNOS, errno.EACCES):
         return BadInput(f"Port {port}: another program has it open.", "Close that program; one alone may use the port.")
-    return BadInput(f"Port {port} cannot be used as a serial port: {_said(error)}.", "Name the port of the device.")
+    return BadInput(
+        f"Port {port} cannot be used as a serial port: {_error_text(error)}.", "Name the port of the device."
+    )
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
 
 
-def _group(port: str) -> str:
+def _owner_group(port: str) -> str:
     """Who owns a port file, as far as can be told."""
     try:
         import grp

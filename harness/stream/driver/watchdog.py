@@ -11,30 +11,30 @@ from typing import Literal
 import numpy as np
 
 from harness.stream.codec.reader import FrameReader, WireFormat
-from harness.stream.codec.replies import OutputList, ReplyEvent, Status, parse
-from harness.stream.driver.config import Timing
+from harness.stream.codec.replies import OutputList, ParsedReply, StatusRecord, parse_reply
+from harness.stream.driver.config import DriverTiming
 from harness.stream.frame import TrackerFrame
-from harness.stream.line_events import Kind
+from harness.stream.line_events import LineEventKind
 
-Step = Literal["none", "ask", "set up", "reopen"]
+RecoveryAction = Literal["none", "ask", "set up", "reopen"]
 """Ask how the device is, set it up anew, or open the line anew and then set it up."""
 
 
 @dataclass(frozen=True)
-class Finding:
+class Diagnosis:
     """Something to be told, something to be done, or both."""
 
-    step: Step
-    kind: Kind | None = None
+    step: RecoveryAction
+    kind: LineEventKind | None = None
     text: str = ""
 
 
 class Watchdog:
     """Looks on while data flow; `pause` and `start` enclose a set-up."""
 
-    def __init__(self, timing: Timing) -> None:
+    def __init__(self, timing: DriverTiming) -> None:
         self._timing = timing
-        self._told: dict[Kind, float] = {}
+        self._told: dict[LineEventKind, float] = {}
         """Troubles since records came last, and when each was told [s]."""
         self._wire: WireFormat | None = None
         """While data flow."""
@@ -61,14 +61,14 @@ class Watchdog:
         """The device's clock was set to zero on purpose."""
         self._zeroed += 1
 
-    def tell(self, kind: Kind, text: str, now_s: float, step: Step = "none") -> Finding:
+    def tell(self, kind: LineEventKind, text: str, now_s: float, step: RecoveryAction = "none") -> Diagnosis:
         """The finding, without its words when it was told before."""
         if kind in self._told:
-            return Finding(step)
+            return Diagnosis(step)
         self._told[kind] = now_s
-        return Finding(step, kind, text)
+        return Diagnosis(step, kind, text)
 
-    def framed(self, frames: Sequence[TrackerFrame], now_s: float) -> list[Finding]:
+    def framed(self, frames: Sequence[TrackerFrame], now_s: float) -> list[Diagnosis]:
         """Frames came; they are sound when the device's clock goes on."""
         if self._wire is None or not frames:
             return []
@@ -83,9 +83,9 @@ class Watchdog:
         if not news:
             return []
         stations = f"{len(self._wire.stations)} stations at {self._wire.rate_hz:g} Hz"
-        return [Finding("none", "connected", f"records come{again}: {stations}")]
+        return [Diagnosis("none", "connected", f"records come{again}: {stations}")]
 
-    def look(self, now_s: float, came: bool, reader: FrameReader) -> list[Finding]:
+    def look(self, now_s: float, came: bool, reader: FrameReader) -> list[Diagnosis]:
         """What is amiss now; `came` tells whether bytes did since the last look."""
         if self._wire is None:
             return []
@@ -94,7 +94,7 @@ class Watchdog:
         found = self._garbage_found(now_s, reader)
         found += self._silence_found(now_s)
         while reader.replies:
-            found += self._answer(self._wire, parse(reader.replies.popleft().line), now_s)
+            found += self._answer(self._wire, parse_reply(reader.replies.popleft().line), now_s)
         if reader.clock_resets > self._resets + self._zeroed:
             found.append(self._ask(now_s))
         if reader.clock_resets > self._resets:
@@ -102,7 +102,7 @@ class Watchdog:
         self._resets = reader.clock_resets
         return found
 
-    def _garbage_found(self, now_s: float, reader: FrameReader) -> list[Finding]:
+    def _garbage_found(self, now_s: float, reader: FrameReader) -> list[Diagnosis]:
         more, self._garbage = reader.garbage_bytes - self._garbage, reader.garbage_bytes
         if not more:
             if now_s - self._spoilt_s > self._timing.garbage_s:
@@ -116,11 +116,11 @@ class Watchdog:
             found.append(self._ask(now_s))  # it goes on: is it the list that we expect?
         return found
 
-    def _silence_found(self, now_s: float) -> list[Finding]:
+    def _silence_found(self, now_s: float) -> list[Diagnosis]:
         without_s, timing = now_s - self._sound_s, self._timing
         if without_s > timing.silent_s:
             if now_s - self._heard_s < timing.stalled_s:
-                return [Finding("set up")]
+                return [Diagnosis("set up")]
             return [self.tell("silent", f"no byte for {now_s - self._heard_s:.1f} s", now_s, "reopen")]
         if without_s > timing.stalled_s and now_s - self._asked_s > timing.stalled_s:
             silent = now_s - self._heard_s > timing.stalled_s
@@ -128,15 +128,15 @@ class Watchdog:
             return [self.tell("stalled", f"{what} for {without_s:.1f} s", now_s), self._ask(now_s)]
         return []
 
-    def _ask(self, now_s: float) -> Finding:
+    def _ask(self, now_s: float) -> Diagnosis:
         self._asked_s = now_s
-        return Finding("ask")
+        return Diagnosis("ask")
 
-    def _answer(self, wire: WireFormat, reply: ReplyEvent, now_s: float) -> list[Finding]:
+    def _answer(self, wire: WireFormat, reply: ParsedReply, now_s: float) -> list[Diagnosis]:
         """A wrong answer may be a damaged one: it counts when it soon comes twice."""
         recent_s = now_s - self._timing.silent_s
         self._complaints = {text: said_s for text, said_s in self._complaints.items() if said_s > recent_s}
-        kind, complaint = complaint_of(wire, reply)
+        kind, complaint = diagnose_reply(wire, reply)
         if kind is None:
             return []
         if complaint in self._complaints:
@@ -146,9 +146,9 @@ class Watchdog:
         return [self._ask(now_s)] if first else []
 
 
-def complaint_of(wire: WireFormat, reply: ReplyEvent, streaming: bool = True) -> tuple[Kind | None, str]:
+def diagnose_reply(wire: WireFormat, reply: ParsedReply, streaming: bool = True) -> tuple[LineEventKind | None, str]:
     """What an answer shows to be otherwise than it was set up, as a kind of trouble and in words."""
-    if isinstance(reply, Status):
+    if isinstance(reply, StatusRecord):
         amiss = [
             "it reports in ASCII" if not reply.binary else "",
             "its unit is another" if reply.centimetres != (wire.settings.metres_per_unit == 0.01) else "",

@@ -1,13 +1,22 @@
 """An IS-900 that plays readings in real time, for drivers and for programs of others (docs/device.md, Emulator).
 
-`Device` is the machine without input or output; `Emulator` adds a line and its faults; `serving` puts it at a port.
+`Device` is the machine without input or output; `Emulator` adds a line and its faults; `serve_emulator` puts it at a port.
 """
 
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.message import Message, Sent
-from harness.stream.emulator.server import Serving, serving
+from harness.stream.emulator.message import Message, SentMessage
+from harness.stream.emulator.server import RunningEmulator, serve_emulator
 
-__all__ = ["Device", "Emulator", "EmulatorConfig", "Fault", "Message", "Sent", "Serving", "serving"]
+__all__ = [
+    "Device",
+    "Emulator",
+    "EmulatorConfig",
+    "Fault",
+    "Message",
+    "SentMessage",
+    "RunningEmulator",
+    "serve_emulator",
+]

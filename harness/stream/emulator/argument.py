@@ -3,15 +3,15 @@
 import math
 from dataclasses import dataclass
 
-from harness.stream.emulator.settings import STATIONS
+from harness.stream.emulator.settings import STATION_NAMES
 
-MISSING, NOT_A_NUMBER, OUT_OF_RANGE, UNKNOWN = -1, -2, -3, -99
+MISSING, NOT_A_NUMBER, OUT_OF_RANGE, UNKNOWN_COMMAND = -1, -2, -3, -99
 """Error codes (docs/is900.md 6.4)."""
-_LARGEST = 1e6
+_MAX_MAGNITUDE = 1e6
 """No place, angle or rate that a device could mean is larger [choice]."""
 
 
-class Refused(Exception):
+class CommandError(Exception):
     """A command that gets an error record."""
 
     def __init__(self, code: int, field: int = 1) -> None:
@@ -20,7 +20,7 @@ class Refused(Exception):
 
 
 @dataclass(frozen=True)
-class Argument:
+class CommandArgument:
     """Such as `1,2,11,0` of `O1,2,11,0`."""
 
     text: str
@@ -39,50 +39,50 @@ class Argument:
         """Stations may be named in either case (docs/is900.md 3)."""
         name = self.fields[0].upper()
         if not name:
-            raise Refused(MISSING)
-        if len(name) != 1 or name not in STATIONS:
-            raise Refused(OUT_OF_RANGE)
+            raise CommandError(MISSING)
+        if len(name) != 1 or name not in STATION_NAMES:
+            raise CommandError(OUT_OF_RANGE)
         return name
 
-    def numbers(self, count: int | None = None, after: int = 1, largest: float = _LARGEST) -> list[float]:
+    def numbers(self, count: int | None = None, after: int = 1, largest: float = _MAX_MAGNITUDE) -> list[float]:
         """The fields after so many others, as many as `count`; none is larger in size."""
         texts = self.fields[after:]
         if count is not None and len(texts) > count:
-            raise Refused(OUT_OF_RANGE, after + count + 1)
+            raise CommandError(OUT_OF_RANGE, after + count + 1)
         if count is not None and len(texts) < count:
-            raise Refused(MISSING, after + len(texts) + 1)
-        return [_number(text, after + k + 1, largest) for k, text in enumerate(texts)]
+            raise CommandError(MISSING, after + len(texts) + 1)
+        return [_parse_number(text, after + k + 1, largest) for k, text in enumerate(texts)]
 
     def codes(self) -> list[int]:
         """The fields after the first: whole numbers."""
         values = self.numbers()
         for place, value in enumerate(values):
             if value != int(value):
-                raise Refused(OUT_OF_RANGE, place + 2)
+                raise CommandError(OUT_OF_RANGE, place + 2)
         return [int(value) for value in values]
 
     def whole(self, low: int, high: int, after: int = 1) -> int:
         """The one field after so many others: a whole number within these."""
         (value,) = self.numbers(1, after, largest=high)
         if value != int(value) or not low <= value <= high:
-            raise Refused(OUT_OF_RANGE, after + 1)
+            raise CommandError(OUT_OF_RANGE, after + 1)
         return int(value)
 
     def nothing(self) -> None:
         """The command has no argument."""
         if self.text.strip():
-            raise Refused(UNKNOWN)
+            raise CommandError(UNKNOWN_COMMAND)
 
 
-def _number(text: str, field: int, largest: float) -> float:
+def _parse_number(text: str, field: int, largest: float) -> float:
     if not text:
-        raise Refused(MISSING, field)
+        raise CommandError(MISSING, field)
     try:
         value = float(text) if "_" not in text else math.nan
     except ValueError:
         value = math.nan
     if not math.isfinite(value):
-        raise Refused(NOT_A_NUMBER, field)
+        raise CommandError(NOT_A_NUMBER, field)
     if abs(value) > largest:
-        raise Refused(OUT_OF_RANGE, field)
+        raise CommandError(OUT_OF_RANGE, field)
     return value

@@ -1,12 +1,12 @@
 """Whether a line can carry what a scenario asks of it, before anybody waits for records that never come."""
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, size
+from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, record_size
 
 
 def check_capacity(stations: int, rate_hz: float, items: tuple[int, ...], baud: int) -> None:
     """BadInput, with numbers and ways out, when binary records of this list do not fit the line."""
-    record = size(items)
+    record = record_size(items)
     wanted, capacity = stations * record * rate_hz, baud / BITS_PER_BYTE
     if wanted <= capacity:
         return
@@ -15,7 +15,7 @@ def check_capacity(stations: int, rate_hz: float, items: tuple[int, ...], baud: 
     ways = [
         *([f"--stations {fewer}"] if fewer else []),
         *([f"--rate {slower_hz}"] if slower_hz else []),
-        f"shorter records such as --items {','.join(map(str, SHORT_LIST))} ({size(SHORT_LIST)} bytes)",
+        f"shorter records such as --items {','.join(map(str, SHORT_LIST))} ({record_size(SHORT_LIST)} bytes)",
         "--unpaced",
         "--overload to see records dropped",
     ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from harness.errors import BadInput
 from harness.stream.emulator.faults import Fault, check_firmware
 
-RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+SUPPORTED_BAUD_RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
 """Of the serial line [bit/s] (docs/is900.md 2)."""
 
 
@@ -40,8 +40,8 @@ class EmulatorConfig:
             raise BadInput(f"identification {self.identification!r}.", "Give up to 31 ASCII characters.")
         if self.status_bytes not in (54, 55):
             raise BadInput(f"status records of {self.status_bytes} bytes.", "They have 55 or 54.")
-        if self.baud not in RATES:
-            raise BadInput(f"{self.baud} baud.", f"An IS-900 knows {', '.join(map(str, RATES))}.")
+        if self.baud not in SUPPORTED_BAUD_RATES:
+            raise BadInput(f"{self.baud} baud.", f"An IS-900 knows {', '.join(map(str, SUPPORTED_BAUD_RATES))}.")
         if self.queue_records < 1:
             raise BadInput(f"queue_records = {self.queue_records}.", "Give 1 at least.")
         if not 0.0 <= self.restart_s <= 3600.0:

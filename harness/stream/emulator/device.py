@@ -10,40 +10,40 @@ from dataclasses import replace
 
 from harness.stream.codec.commands import Command, CommandReader
 from harness.stream.codec.items import SINCE_FIRMWARE
-from harness.stream.codec.replies import DeviceError, ReplyEvent
-from harness.stream.codec.samples import Samples
-from harness.stream.emulator.argument import OUT_OF_RANGE, UNKNOWN, Argument, Refused
+from harness.stream.codec.replies import DeviceError, ParsedReply
+from harness.stream.codec.samples import DeviceSamples
+from harness.stream.emulator.argument import OUT_OF_RANGE, UNKNOWN_COMMAND, CommandArgument, CommandError
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.device_commands import AT_ONCE, ORDERS
+from harness.stream.emulator.device_commands import DEVICE_COMMANDS, IMMEDIATE_COMMANDS
 from harness.stream.emulator.message import Message
-from harness.stream.emulator.player import Player
+from harness.stream.emulator.player import SamplePlayer
 from harness.stream.emulator.queries import QUERIES
-from harness.stream.emulator.round_encoder import Rounds
-from harness.stream.emulator.setters import BARE, SETTERS, SILENT
-from harness.stream.emulator.settings import STATIONS, DeviceSettings, StationSettings
+from harness.stream.emulator.round_encoder import RoundEncoder
+from harness.stream.emulator.setters import SET_ONLY_COMMANDS, SETTER_COMMANDS, SINGLE_FIELD_SETTERS
+from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
 
 _BUFFER_FULL = -5
-_KEPT = 100
+_LOG_LENGTH = 100
 """Entries of a log."""
-_NAMES = sorted({*ORDERS, *SILENT, *SETTERS, *QUERIES}, key=len, reverse=True)
+_COMMAND_NAMES = sorted({*DEVICE_COMMANDS, *SET_ONLY_COMMANDS, *SETTER_COMMANDS, *QUERIES}, key=len, reverse=True)
 """Longest first, since some begin with others."""
 
 
 class Device:
     """Plays samples; stations beyond the samples' are not plugged in. Same bytes at the same times: same answer."""
 
-    def __init__(self, samples: Samples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
+    def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
         """Power-on at this moment."""
         self.samples, self.config = samples, config or EmulatorConfig()
         self.firmware = self.config.firmware
-        self.rounds = Rounds(Player(samples, now_s))
+        self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
         self.streaming = self.suspended = False
         self.commands = self.refused = 0
         """Commands obeyed or refused, and those refused."""
-        self.errors: deque[ReplyEvent] = deque(maxlen=_KEPT)
-        self.log: deque[str] = deque(maxlen=_KEPT)
+        self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
+        self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
         """Commands, while that is asked for."""
-        stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATIONS)
+        stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
         self._factory = DeviceSettings(stations, baud=self.config.baud)
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
@@ -52,7 +52,7 @@ class Device:
         """Round and row of the reading that is sent next while streaming."""
         self._silent_until_s = float("-inf")
         self._out: list[Message] = []
-        self._held: deque[Message] = deque(maxlen=_KEPT)
+        self._held: deque[Message] = deque(maxlen=_LOG_LENGTH)
         """Replies of a suspended device."""
 
     def receive(self, data: bytes, now_s: float) -> None:
@@ -64,7 +64,7 @@ class Device:
             self.commands += 1
             try:
                 self._obey(command, now_s)
-            except Refused as refused:
+            except CommandError as refused:
                 self.refused += 1
                 error = DeviceError(command.line.decode("latin-1"), refused.code, fl=refused.field)
                 if self.settings.error_log:
@@ -95,7 +95,7 @@ class Device:
         """From now on these are out of sight, and no others (but where the samples say so)."""
         self.rounds.lose(stations)
 
-    def say(self, now_s: float, *replies: ReplyEvent) -> None:
+    def say(self, now_s: float, *replies: ParsedReply) -> None:
         said = [Message(now_s, reply.line()) for reply in replies]
         if self.suspended:
             self._held.extend(said)
@@ -115,7 +115,7 @@ class Device:
     def poll(self, now_s: float) -> None:
         """One record of each active station, ascending: its last reading."""
         for name in "" if self.suspended else self.active:
-            number = self.rounds.player.latest(now_s, STATIONS.index(name))
+            number = self.rounds.player.latest(now_s, STATION_NAMES.index(name))
             self._out.append(Message(now_s, self.rounds.records(number, self.settings)[name], name))
 
     def suspend(self, now_s: float) -> None:
@@ -156,36 +156,36 @@ class Device:
                 return
             self._next = (number, row + 1) if row + 1 < rows else (number + 1, 0)
             if self.settings.stations[row].active and not self.suspended:
-                data = self.rounds.records(number, self.settings)[STATIONS[row]]
-                self._out.append(Message(taken_s + self.samples.ready_s, data, STATIONS[row]))
+                data = self.rounds.records(number, self.settings)[STATION_NAMES[row]]
+                self._out.append(Message(taken_s + self.samples.ready_s, data, STATION_NAMES[row]))
 
     def _obey(self, command: Command, now_s: float) -> None:
         text = command.line.decode("latin-1")
         if self.settings.command_log and not text.startswith("MLog"):
             self.log.append(f"{1e3 * self.rounds.player.clock_s(now_s):.0f}:{text}")
         if command.cut:
-            raise Refused(_BUFFER_FULL)
+            raise CommandError(_BUFFER_FULL)
         if command.immediate:
-            AT_ONCE[text](self, now_s)
+            IMMEDIATE_COMMANDS[text](self, now_s)
             return
-        name = next((name for name in _NAMES if text.startswith(name)), None)
+        name = next((name for name in _COMMAND_NAMES if text.startswith(name)), None)
         if name is None:
-            raise Refused(UNKNOWN)
-        argument = Argument(text[len(name) :])
-        sets = argument.sets or (name in BARE and bool(argument.text.strip()))
-        if name in ORDERS:
-            ORDERS[name](self, argument, now_s)
-        elif name in SILENT:
-            self.settings = SILENT[name](self.settings, argument)
-        elif name in SETTERS and sets:
+            raise CommandError(UNKNOWN_COMMAND)
+        argument = CommandArgument(text[len(name) :])
+        sets = argument.sets or (name in SINGLE_FIELD_SETTERS and bool(argument.text.strip()))
+        if name in DEVICE_COMMANDS:
+            DEVICE_COMMANDS[name](self, argument, now_s)
+        elif name in SET_ONLY_COMMANDS:
+            self.settings = SET_ONLY_COMMANDS[name](self.settings, argument)
+        elif name in SETTER_COMMANDS and sets:
             if name == "O":
                 self._check_items(argument)
-            self.settings = SETTERS[name](self.settings, argument)
+            self.settings = SETTER_COMMANDS[name](self.settings, argument)
         else:
             self.say(now_s, *QUERIES[name](self.settings, argument))
 
-    def _check_items(self, argument: Argument) -> None:
+    def _check_items(self, argument: CommandArgument) -> None:
         """Items that this firmware does not have yet."""
         for place, code in enumerate(argument.numbers()):
             if float(self.firmware[:4]) < SINCE_FIRMWARE.get(int(code), 0.0):
-                raise Refused(OUT_OF_RANGE, place + 2)
+                raise CommandError(OUT_OF_RANGE, place + 2)

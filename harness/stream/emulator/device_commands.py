@@ -6,22 +6,22 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from harness.stream.codec.replies import Status, TrackingStatus, Unknown
+from harness.stream.codec.replies import StatusRecord, TrackingStatus, UnknownReply
 from harness.stream.emulator import geometry
-from harness.stream.emulator.argument import Argument
+from harness.stream.emulator.argument import CommandArgument
 from harness.stream.emulator.queries import QUERIES
-from harness.stream.emulator.settings import STATIONS
+from harness.stream.emulator.settings import STATION_NAMES
 
 if TYPE_CHECKING:
     from harness.stream.emulator.device import Device
 
-_MOST_RANGES = 12
+_MAX_RANGES = 12
 """Two microphones, six emitters (docs/is900.md 7)."""
 
 
-def _status(device: "Device", now_s: float) -> None:
+def _report_status(device: "Device", now_s: float) -> None:
     settings = device.settings
-    status = Status(
+    status = StatusRecord(
         binary=settings.binary,
         centimetres=settings.centimetres,
         continuous=device.streaming,
@@ -32,7 +32,7 @@ def _status(device: "Device", now_s: float) -> None:
     device.say(now_s, status)
 
 
-def _switch(device: "Device", argument: Argument, now_s: float) -> None:
+def _switch_station(device: "Device", argument: CommandArgument, now_s: float) -> None:
     """`l`: sets with a second field, else asks. A station that is not plugged in stays off."""
     if not argument.sets:
         device.say(now_s, *QUERIES["l"](device.settings, argument))
@@ -42,14 +42,14 @@ def _switch(device: "Device", argument: Argument, now_s: float) -> None:
     device.settings = device.settings.with_station(name, station)
 
 
-def _boresight(device: "Device", argument: Argument, now_s: float, full: bool) -> None:
+def _boresight(device: "Device", argument: CommandArgument, now_s: float, full: bool) -> None:
     name = argument.station()
     if name in device.rounds.plugged:
-        station = geometry.boresighted(device.settings.station(name), device.rounds.turn(now_s, name), full)
+        station = geometry.boresight(device.settings.station(name), device.rounds.turn(now_s, name), full)
         device.settings = device.settings.with_station(name, station)
 
 
-def _zero_clock(device: "Device", argument: Argument, now_s: float) -> None:
+def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> None:
     """Polled, the motion begins anew too, so that what follows is known to the bit."""
     argument.nothing()
     if device.streaming:
@@ -58,56 +58,58 @@ def _zero_clock(device: "Device", argument: Argument, now_s: float) -> None:
         device.rounds.player.begin(now_s)
 
 
-def _tracking(device: "Device", argument: Argument, now_s: float) -> None:
+def _report_tracking(device: "Device", argument: CommandArgument, now_s: float) -> None:
     """Ranges are as many as the quality lets one expect; none is ever rejected."""
     argument.nothing()
     quality = {name: device.rounds.quality(now_s, name) for name in device.active}
-    states = "".join("X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATIONS)
-    received = tuple(int(np.ceil(_MOST_RANGES * quality.get(name, 0.0))) for name in STATIONS)
-    device.say(now_s, TrackingStatus(states, received, (0,) * len(STATIONS), device.samples.rate_hz))
+    states = "".join(
+        "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
+    )
+    received = tuple(int(np.ceil(_MAX_RANGES * quality.get(name, 0.0))) for name in STATION_NAMES)
+    device.say(now_s, TrackingStatus(states, received, (0,) * len(STATION_NAMES), device.samples.rate_hz))
 
 
-def _read_errors(device: "Device", argument: Argument, now_s: float) -> None:
+def _read_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
     argument.nothing()
     device.say(now_s, *device.errors)
 
 
-def _clear_errors(device: "Device", argument: Argument, now_s: float) -> None:
+def _clear_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
     argument.nothing()
     device.errors.clear()
 
 
-def _send_log(device: "Device", argument: Argument, now_s: float) -> None:
+def _send_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
     argument.nothing()
-    device.say(now_s, *(Unknown(f"31LF{entry}".encode("latin-1")) for entry in device.log))
+    device.say(now_s, *(UnknownReply(f"31LF{entry}".encode("latin-1")) for entry in device.log))
 
 
-def _clear_log(device: "Device", argument: Argument, now_s: float) -> None:
+def _clear_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
     argument.nothing()
     device.log.clear()
 
 
-def _information(device: "Device", argument: Argument, now_s: float) -> None:
+def _report_information(device: "Device", argument: CommandArgument, now_s: float) -> None:
     argument.nothing()
-    device.say(now_s, Unknown(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
+    device.say(now_s, UnknownReply(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
 
 
-def _setting(**values: Any) -> Callable[["Device", float], None]:
+def _settings_change(**values: Any) -> Callable[["Device", float], None]:
     def order(device: "Device", now_s: float) -> None:
         device.settings = replace(device.settings, **values)
 
     return order
 
 
-AT_ONCE: dict[str, Callable[["Device", float], None]] = {
+IMMEDIATE_COMMANDS: dict[str, Callable[["Device", float], None]] = {
     "P": lambda device, now_s: device.poll(now_s),
     "C": lambda device, now_s: device.stream(now_s),
     "c": lambda device, now_s: device.stop(now_s),
-    "F": _setting(binary=False),
-    "f": _setting(binary=True),
-    "S": _status,
-    "U": _setting(centimetres=False),
-    "u": _setting(centimetres=True),
+    "F": _settings_change(binary=False),
+    "f": _settings_change(binary=True),
+    "S": _report_status,
+    "U": _settings_change(centimetres=False),
+    "u": _settings_change(centimetres=True),
     "W": lambda device, now_s: device.forget(),
     "\x0b": lambda device, now_s: device.save(),
     "\x11": lambda device, now_s: device.resume(now_s),
@@ -116,16 +118,16 @@ AT_ONCE: dict[str, Callable[["Device", float], None]] = {
 }
 """Without a terminator."""
 
-ORDERS: dict[str, Callable[["Device", Argument, float], None]] = {
-    "l": _switch,
+DEVICE_COMMANDS: dict[str, Callable[["Device", CommandArgument, float], None]] = {
+    "l": _switch_station,
     "B": lambda device, argument, now_s: _boresight(device, argument, now_s, device.settings.boresight_as_fastrak),
     "MB": lambda device, argument, now_s: _boresight(device, argument, now_s, not device.settings.boresight_as_fastrak),
     "MZ": _zero_clock,
-    "MP": _tracking,
+    "MP": _report_tracking,
     "ME": _read_errors,
     "MEC": _clear_errors,
     "MLogSend": _send_log,
     "MLogClear": _clear_log,
-    "MInfoSystem": _information,
+    "MInfoSystem": _report_information,
 }
 """Lines."""

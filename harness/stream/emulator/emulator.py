@@ -1,29 +1,29 @@
 """Device, faults and line together, still without input or output: bytes in, bytes with their times out."""
 
 from harness.errors import UnknownName
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
-from harness.stream.emulator.faults import Faults, Spell
-from harness.stream.emulator.message import Sent
-from harness.stream.emulator.serial_line import Line
-from harness.stream.emulator.settings import STATIONS
+from harness.stream.emulator.faults import FaultEpisode, FaultInjector
+from harness.stream.emulator.message import SentMessage
+from harness.stream.emulator.serial_line import SerialLine
+from harness.stream.emulator.settings import STATION_NAMES
 
 
 class Emulator:
     """What a host finds at the other end of a line. Times are asked for in order."""
 
-    def __init__(self, samples: Samples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
+    def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
         """UnknownName when a fault is about a station that nobody wears."""
         self.config = config or EmulatorConfig()
         self.device = Device(samples, self.config, now_s)
-        self.line = Line(self.config.baud, self.config.queue_records, self.config.paced)
-        self.spells: list[Spell] = []
+        self.line = SerialLine(self.config.baud, self.config.queue_records, self.config.paced)
+        self.spells: list[FaultEpisode] = []
         """All that have begun."""
         self.unheard = 0
         """Messages that went while the line was unplugged."""
-        self._lasting: list[Spell] = []
-        self._faults = Faults(self.config.faults, self.config.seed, now_s)
+        self._lasting: list[FaultEpisode] = []
+        self._faults = FaultInjector(self.config.faults, self.config.seed, now_s)
         for fault in self.config.faults:
             if fault.station and fault.station not in samples.stations:
                 raise UnknownName("station", fault.station, samples.stations)
@@ -37,7 +37,7 @@ class Emulator:
             self.device.receive(data, now_s)
             self._hand_over(now_s)
 
-    def advance(self, now_s: float) -> list[Sent]:
+    def advance(self, now_s: float) -> list[SentMessage]:
         """What has gone over the line by now, and was not asked for before."""
         self._until(now_s)
         out = []
@@ -46,7 +46,7 @@ class Emulator:
             if self._on("disconnect", due_s):
                 self.unheard += 1
             else:
-                out.append(Sent(message, due_s, data, damage))
+                out.append(SentMessage(message, due_s, data, damage))
         self._lasting = [spell for spell in self._lasting if spell.to_s > now_s]
         return out
 
@@ -73,7 +73,7 @@ class Emulator:
                 self._lose(at_s)
         self._hand_over(now_s)
 
-    def _begin(self, spell: Spell) -> None:
+    def _begin(self, spell: FaultEpisode) -> None:
         self.spells.append(spell)
         self._lasting.append(spell)
         if spell.fault.kind == "stall":
@@ -86,7 +86,7 @@ class Emulator:
         names = self.device.samples.stations
         spells = (spell for spell in self._lasting if spell.fault.kind == "lost_station")
         out = (spell.fault.station or names[0] for spell in spells if spell.from_s <= at_s < spell.to_s)
-        self.device.lose(STATIONS[names.index(name)] for name in out)
+        self.device.lose(STATION_NAMES[names.index(name)] for name in out)
 
     def _hand_over(self, now_s: float) -> None:
         """What the device says until now goes to the line, at the rate that it has set."""

@@ -14,14 +14,14 @@ import numpy as np
 from harness.core.seeds import generator
 from harness.errors import BadInput
 
-ByteKind = Literal["lost", "garbled", "duplicated", "added"]
-SpellKind = Literal["burst", "stall", "disconnect", "reset", "lost_station"]
-Kind = Literal[
+ByteFaultKind = Literal["lost", "garbled", "duplicated", "added"]
+FaultEpisodeKind = Literal["burst", "stall", "disconnect", "reset", "lost_station"]
+FaultKind = Literal[
     "lost", "garbled", "duplicated", "added", "burst", "stall", "disconnect", "reset", "lost_station", "firmware"
 ]
-BYTE_KINDS: tuple[str, ...] = get_args(ByteKind)
-SPELL_KINDS: tuple[str, ...] = get_args(SpellKind)
-_INSTANT_KINDS = (*BYTE_KINDS, "reset")
+BYTE_FAULT_KINDS: tuple[str, ...] = get_args(ByteFaultKind)
+FAULT_EPISODE_KINDS: tuple[str, ...] = get_args(FaultEpisodeKind)
+_INSTANT_KINDS = (*BYTE_FAULT_KINDS, "reset")
 _FIRMWARE = re.compile(r"\d\.\d{2,4}")
 
 
@@ -40,7 +40,7 @@ class Fault:
     device's power is cut for a moment. `lost_station`: a station out of sight. `firmware`: another version.
     """
 
-    kind: Kind
+    kind: FaultKind
     share: float = 0.0
     """Of the records and replies that lose, change, double or gain a byte, 0 to 1."""
     at_s: tuple[float, ...] = ()
@@ -56,7 +56,7 @@ class Fault:
 
     def __post_init__(self) -> None:
         told = {
-            "share": (self.share != 0.0, self.kind in BYTE_KINDS),
+            "share": (self.share != 0.0, self.kind in BYTE_FAULT_KINDS),
             "at_s and per_minute": (bool(self.at_s) or self.per_minute != 0.0, self.kind != "firmware"),
             "lasts_s": (self.lasts_s != 0.0, self.kind not in (*_INSTANT_KINDS, "firmware")),
             "station": (bool(self.station), self.kind == "lost_station"),
@@ -67,7 +67,7 @@ class Fault:
                 raise BadInput(f"fault {self.kind!r} has no {name}.", "Leave it out.")
         if not (0.0 <= self.share <= 1.0 and self.per_minute >= 0.0 and min((0.0, self.lasts_s, *self.at_s)) >= 0.0):
             raise BadInput(f"Not a fault: {self}.", "A share is 0 to 1; times are not negative.")
-        if self.kind in SPELL_KINDS and self.kind not in _INSTANT_KINDS and self.lasts_s == 0.0:
+        if self.kind in FAULT_EPISODE_KINDS and self.kind not in _INSTANT_KINDS and self.lasts_s == 0.0:
             raise BadInput(f"fault {self.kind!r} does not last.", "Give lasts_s.")
         if not (self.share or self.at_s or self.per_minute or self.firmware):
             raise BadInput(f"fault {self.kind!r} never happens.", "Give share, at_s, per_minute or firmware.")
@@ -76,7 +76,7 @@ class Fault:
 
 
 @dataclass(frozen=True, slots=True)
-class Spell:
+class FaultEpisode:
     """A stretch of time in which something is wrong."""
 
     fault: Fault
@@ -84,18 +84,18 @@ class Spell:
     to_s: float
 
 
-class Faults:
+class FaultInjector:
     """All faults of a scenario from power-on; asked in order of time."""
 
     def __init__(self, faults: Iterable[Fault], seed: int, began_s: float) -> None:
-        self._byte_faults: list[tuple[Fault, np.random.Generator, _Moments]] = []
-        self._spells: list[_Moments] = []
+        self._byte_faults: list[tuple[Fault, np.random.Generator, _FaultSchedule]] = []
+        self._spells: list[_FaultSchedule] = []
         for number, fault in enumerate(faults):
-            moments = _Moments(fault, generator(seed, "fault", number, fault.kind, "when"), began_s)
+            moments = _FaultSchedule(fault, generator(seed, "fault", number, fault.kind, "when"), began_s)
             draws = generator(seed, "fault", number, fault.kind, "what")
-            if fault.kind in BYTE_KINDS:
+            if fault.kind in BYTE_FAULT_KINDS:
                 self._byte_faults.append((fault, draws, moments))
-            elif fault.kind in SPELL_KINDS:
+            elif fault.kind in FAULT_EPISODE_KINDS:
                 self._spells.append(moments)
         self._noise = generator(seed, "fault", "burst")
 
@@ -104,11 +104,11 @@ class Faults:
         """When the next spell begins [s]."""
         return min((moments.next_s for moments in self._spells), default=float("inf"))
 
-    def begun(self, now_s: float) -> list[Spell]:
+    def begun(self, now_s: float) -> list[FaultEpisode]:
         """The spells that have begun since this was asked last, in order of time."""
-        found: list[Spell] = []
+        found: list[FaultEpisode] = []
         for moments in self._spells:
-            found += [Spell(moments.fault, at_s, at_s + moments.fault.lasts_s) for at_s in moments.until(now_s)]
+            found += [FaultEpisode(moments.fault, at_s, at_s + moments.fault.lasts_s) for at_s in moments.until(now_s)]
         return sorted(found, key=lambda spell: spell.from_s)
 
     def damaged(self, data: bytes, bursting: bool, due_s: float) -> tuple[bytes, tuple[str, ...]]:
@@ -118,7 +118,7 @@ class Faults:
             struck = bool(fault.share) and draws.random() < fault.share
             if struck or moments.until(due_s):
                 at, byte = int(draws.integers(len(data))), bytes([int(draws.integers(1, 256))])
-                data = _struck(fault.kind, data, at, byte)
+                data = _corrupt(fault.kind, data, at, byte)
                 kinds.append(fault.kind)
         if bursting:
             data = self._noise.bytes(len(data))
@@ -126,7 +126,7 @@ class Faults:
         return data, tuple(kinds)
 
 
-def _struck(kind: str, data: bytes, at: int, byte: bytes) -> bytes:
+def _corrupt(kind: str, data: bytes, at: int, byte: bytes) -> bytes:
     head, own, tail = data[:at], data[at : at + 1], data[at + 1 :]
     match kind:
         case "lost":
@@ -139,7 +139,7 @@ def _struck(kind: str, data: bytes, at: int, byte: bytes) -> bytes:
             return head + byte + own + tail
 
 
-class _Moments:
+class _FaultSchedule:
     """When a fault strikes: at given moments, and at random ones, of which none begins while the last one lasts."""
 
     def __init__(self, fault: Fault, draws: np.random.Generator, began_s: float) -> None:

@@ -11,21 +11,21 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.stream.codec.records import from_yaw_pitch_roll_deg, yaw_pitch_roll_deg
-from harness.stream.emulator.settings import StationSettings, Turn, Vector
+from harness.stream.emulator.settings import Quaternion, StationSettings, Vector
 
-_ALONG_M = 2.0
+_AXIS_POINT_M = 2.0
 """Points on the axes lie so far from the origin where an alignment is read; any distance says the same."""
 
 
-def reported(position_m: Floats, turn: Floats, station: StationSettings) -> tuple[Floats, Floats]:
+def apply_station_settings(position_m: Floats, turn: Floats, station: StationSettings) -> tuple[Floats, Floats]:
     """Place (3,) and orientation (4,) of a reading as the station's settings let it be reported."""
     if station.plain:
         return position_m, turn
-    position_m, turn = _aligned(position_m, turn, station)
+    position_m, turn = _apply_alignment(position_m, turn, station)
     return position_m, rotations.multiply(rotations.multiply(np.array(station.before), turn), np.array(station.after))
 
 
-def aligned(station: StationSettings, origin_m: Floats, on_x_m: Floats, on_y_m: Floats) -> StationSettings | None:
+def align(station: StationSettings, origin_m: Floats, on_x_m: Floats, on_y_m: Floats) -> StationSettings | None:
     """The alignment whose frame has these points (3,) in the present one; None where they fix no frame."""
     x, towards_y = on_x_m - origin_m, on_y_m - origin_m
     z = np.cross(x, towards_y)
@@ -42,26 +42,26 @@ def alignment_cm(station: StationSettings) -> tuple[float, ...]:
     """The nine numbers of the present alignment: origin, a point on X, a point on Y, in the tracker's frame [cm]."""
     axes = rotations.to_matrix(np.array(station.tracker_from_aligned))
     origin = np.array(station.origin_m)
-    points = np.concatenate([origin, origin + _ALONG_M * axes[:, 0], origin + _ALONG_M * axes[:, 1]])
+    points = np.concatenate([origin, origin + _AXIS_POINT_M * axes[:, 0], origin + _AXIS_POINT_M * axes[:, 1]])
     return tuple((100.0 * points).tolist())
 
 
-def boresighted(station: StationSettings, turn: Floats, full: bool) -> StationSettings:
+def boresight(station: StationSettings, turn: Floats, full: bool) -> StationSettings:
     """From now on this orientation (4,), as it was taken, reads as the reference; or its heading alone does."""
-    _, now = _aligned(np.zeros(3), turn, station)
+    _, now = _apply_alignment(np.zeros(3), turn, station)
     wanted = from_yaw_pitch_roll_deg(np.array([station.reference_deg]))[0]
     if full:
         after = rotations.multiply(rotations.inverse(now), wanted)
-        return replace(without_boresight(station), after=_turn(after))
+        return replace(clear_boresight(station), after=_turn(after))
     by_deg = station.reference_deg[0] - float(yaw_pitch_roll_deg(now[None])[0, 0])
-    return replace(without_boresight(station), before=_turn(rotations.about_z(np.deg2rad(by_deg))))
+    return replace(clear_boresight(station), before=_turn(rotations.about_z(np.deg2rad(by_deg))))
 
 
-def without_boresight(station: StationSettings) -> StationSettings:
+def clear_boresight(station: StationSettings) -> StationSettings:
     return replace(station, before=(1.0, 0.0, 0.0, 0.0), after=(1.0, 0.0, 0.0, 0.0))
 
 
-def _aligned(position_m: Floats, turn: Floats, station: StationSettings) -> tuple[Floats, Floats]:
+def _apply_alignment(position_m: Floats, turn: Floats, station: StationSettings) -> tuple[Floats, Floats]:
     """The same before boresight."""
     position_m = position_m + rotations.rotate(turn, np.array(station.tip_m))
     mounting = from_yaw_pitch_roll_deg(np.array([station.mounting_deg]))[0]
@@ -76,6 +76,6 @@ def _vector(values: Floats) -> Vector:
     return x, y, z
 
 
-def _turn(values: Floats) -> Turn:
+def _turn(values: Floats) -> Quaternion:
     w, x, y, z = values.tolist()
     return w, x, y, z

@@ -17,7 +17,7 @@ class Message:
 
 
 @dataclass(frozen=True, slots=True)
-class Sent:
+class SentMessage:
     """A message that has gone over the line."""
 
     message: Message

@@ -3,16 +3,16 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 
-_SOON_S = 1e-9
+_SAME_TIME_S = 1e-9
 """Moments closer than this are one [s]."""
 
 
-class Player:
+class SamplePlayer:
     """Rounds are counted from the beginning of the motion, through all laps; rows are stations."""
 
-    def __init__(self, samples: Samples, now_s: float) -> None:
+    def __init__(self, samples: DeviceSamples, now_s: float) -> None:
         self.samples = samples
         self._taken_s: list[list[float]] = samples.taken_s.tolist()
         self._lap_s, self._device_lap_s = samples.lap_s, samples.device_lap_s
@@ -46,14 +46,14 @@ class Player:
     def first_from(self, now_s: float) -> int:
         """The first whole round that is still to come."""
         number = max(int((now_s - self._began_s) * self.samples.rate_hz) - 1, 0)
-        while self.time_s(number, 0) < now_s - _SOON_S:
+        while self.time_s(number, 0) < now_s - _SAME_TIME_S:
             number += 1
         return number
 
     def latest(self, now_s: float, row: int) -> int:
         """The round of the last reading of a station up to now; the first one before any."""
         number = int((now_s - self._began_s) * self.samples.rate_hz) + 1
-        while number > 0 and self.time_s(number, row) > now_s + _SOON_S:
+        while number > 0 and self.time_s(number, row) > now_s + _SAME_TIME_S:
             number -= 1
         return max(number, 0)
 

@@ -9,14 +9,14 @@ import tty
 from pathlib import Path
 
 from harness.errors import BadInput
-from harness.stream.emulator.config import RATES
+from harness.stream.emulator.config import SUPPORTED_BAUD_RATES
 
-_CHUNK = 4096
-_MOST_WAITING = 4000
+_READ_BYTES = 4096
+_MAX_UNREAD_BYTES = 4000
 """Bytes that a client may leave unread before records are dropped; the terminal holds 4095."""
 
 
-_RATES = {getattr(termios, f"B{rate}"): rate for rate in RATES}
+_BAUD_BY_CONSTANT = {getattr(termios, f"B{rate}"): rate for rate in SUPPORTED_BAUD_RATES}
 
 
 class PtyPort:
@@ -42,13 +42,13 @@ class PtyPort:
     def read(self) -> bytes:
         self._flush()
         try:
-            return os.read(self._master, _CHUNK) if self._master >= 0 else b""
+            return os.read(self._master, _READ_BYTES) if self._master >= 0 else b""
         except BlockingIOError:
             return b""
 
     def write(self, data: bytes) -> bool:
         self._flush()
-        if self._master < 0 or self._rest or self._waiting() + len(data) > _MOST_WAITING:
+        if self._master < 0 or self._rest or self._waiting() + len(data) > _MAX_UNREAD_BYTES:
             return False
         self._rest = data
         self._flush()
@@ -58,12 +58,12 @@ class PtyPort:
         return False
 
     def baud(self) -> int | None:
-        return _RATES.get(termios.tcgetattr(self._slave)[5]) if self._slave >= 0 else None
+        return _BAUD_BY_CONSTANT.get(termios.tcgetattr(self._slave)[5]) if self._slave >= 0 else None
 
     def plug(self) -> None:
         if self._master >= 0:
             return
-        _refuse_other(self._link)
+        _check_link_is_free(self._link)
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
@@ -105,7 +105,7 @@ class PtyPort:
                 self._rest = self._rest[os.write(self._master, self._rest) :]
 
 
-def _refuse_other(link: Path) -> None:
+def _check_link_is_free(link: Path) -> None:
     """BadInput unless the place is free, or a link to a pty that is gone."""
     if link.is_symlink():
         target = os.readlink(link)

@@ -6,18 +6,18 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.stream.codec import ascii_records
-from harness.stream.codec.records import Said, Settings, encode
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
 from harness.stream.emulator import geometry
-from harness.stream.emulator.player import Player
-from harness.stream.emulator.settings import STATIONS, DeviceSettings
+from harness.stream.emulator.player import SamplePlayer
+from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings
 
 _INCH_M, _CENTIMETRE_M = 0.0254, 0.01
 
 
-class Rounds:
+class RoundEncoder:
     """The records of one round of stations at a time, written once."""
 
-    def __init__(self, player: Player) -> None:
+    def __init__(self, player: SamplePlayer) -> None:
         self.player = player
         self._lost: frozenset[str] = frozenset()
         self._written: tuple[int, DeviceSettings, tuple[float, float], dict[str, bytes]] | None = None
@@ -26,7 +26,7 @@ class Rounds:
     @property
     def plugged(self) -> str:
         """Characters of the stations that are there."""
-        return STATIONS[: len(self.player.samples.stations)]
+        return STATION_NAMES[: len(self.player.samples.stations)]
 
     def lose(self, stations: Iterable[str]) -> None:
         """From now on these are out of sight, and no others (but where the samples say so)."""
@@ -34,13 +34,13 @@ class Rounds:
 
     def quality(self, now_s: float, station: str) -> float:
         """Of the last reading, 0 to 1."""
-        row = STATIONS.index(station)
+        row = STATION_NAMES.index(station)
         k = self.player.row_of(self.player.latest(now_s, row))
         return 0.0 if station in self._lost else float(np.clip(self.player.samples.quality[k, row], 0.0, 1.0))
 
     def turn(self, now_s: float, station: str) -> Floats:
         """(4,) orientation of the last reading, as it was taken."""
-        row = STATIONS.index(station)
+        row = STATION_NAMES.index(station)
         out: Floats = self.player.samples.tracker_from_station[self.player.row_of(self.player.latest(now_s, row)), row]
         return out
 
@@ -58,23 +58,25 @@ class Rounds:
         rows_of: dict[tuple[int, ...], list[int]] = {}
         for row, (name, station) in enumerate(zip(self.plugged, settings.stations, strict=False)):
             if not station.plain:
-                position_m[row], turn[row] = geometry.reported(position_m[row], turn[row], station)
+                position_m[row], turn[row] = geometry.apply_station_settings(position_m[row], turn[row], station)
             if name in self._lost:
                 quality[row] = 0.0
             rows_of.setdefault(station.items, []).append(row)
         out = {}
         for items, rows in rows_of.items():
-            said = Said(stamps_s[rows], position_m[rows], turn[rows], quality[rows])
-            table = encode(items, np.array([ord(STATIONS[row]) for row in rows], np.uint8), said, form_of(settings))
+            said = RecordValues(stamps_s[rows], position_m[rows], turn[rows], quality[rows])
+            table = encode_records(
+                items, np.array([ord(STATION_NAMES[row]) for row in rows], np.uint8), said, record_format(settings)
+            )
             for place, row in enumerate(rows):
                 one = table[place : place + 1]
-                out[STATIONS[row]] = one.tobytes() if settings.binary else ascii_records.write(items, one)
+                out[STATION_NAMES[row]] = one.tobytes() if settings.binary else ascii_records.format_records(items, one)
         return out
 
 
-def form_of(settings: DeviceSettings) -> Settings:
+def record_format(settings: DeviceSettings) -> RecordFormat:
     """How a decoder has to read what a device with these settings writes."""
-    return Settings(
+    return RecordFormat(
         metres_per_unit=_CENTIMETRE_M if settings.centimetres else _INCH_M,
         seconds_per_tick=1e-6 if settings.microseconds else 1e-3,
         binary=settings.binary,

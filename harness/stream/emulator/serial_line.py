@@ -5,13 +5,13 @@ from collections import deque
 from harness.stream.codec.items import BITS_PER_BYTE
 from harness.stream.emulator.message import Message
 
-_LAST = "~"
+_END_OF_ROUND = "~"
 """After all stations: the next record begins a round."""
-MOST_REPLIES = 256
+MAX_QUEUED_REPLIES = 256
 """Replies that wait; a client that asks faster than the line answers loses the oldest."""
 
 
-class Line:
+class SerialLine:
     """When each message has gone. A record that finds the queue full displaces the oldest whole round that waits.
 
     Were it the oldest record, a steady overload would hit the same stations again and again, since the rhythm of the
@@ -29,7 +29,7 @@ class Line:
         self._going: deque[tuple[float, Message]] = deque()
         """Messages that began, and when the last byte of each is due [s]."""
         self._free_s = float("-inf")
-        self._begun = _LAST
+        self._begun = _END_OF_ROUND
         """Station of the last record that began."""
 
     def add(self, message: Message) -> None:
@@ -37,13 +37,13 @@ class Line:
         self._begin(message.ready_s, before=True)
         if message.halts:
             self._waiting = deque(waiting for waiting in self._waiting if not waiting.station)
-            self._begun = _LAST
+            self._begun = _END_OF_ROUND
             return
         self._waiting.append(message)
         alike = [waiting for waiting in self._waiting if bool(waiting.station) == bool(message.station)]
         if message.station and len(alike) > self._queue_records:
             self._drop(self._oldest_round(alike))
-        elif not message.station and len(alike) > MOST_REPLIES:
+        elif not message.station and len(alike) > MAX_QUEUED_REPLIES:
             self._waiting.remove(alike[0])
             self.dropped_replies += 1
 

@@ -15,21 +15,21 @@ import numpy as np
 
 from harness.core.seeds import generator
 from harness.errors import BadInput
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
-from harness.stream.emulator.message import Sent
+from harness.stream.emulator.message import SentMessage
 from harness.stream.emulator.port import Port
-from harness.stream.emulator.tcp_port import Say, TcpPort
+from harness.stream.emulator.tcp_port import LogCallback, TcpPort
 
-OnSent = Callable[[Sent], None]
-LONGEST_WAIT_S = 1.0
-_KEPT = 100_000
+SentCallback = Callable[[SentMessage], None]
+MAX_WAIT_S = 1.0
+_KEPT_LATENCIES = 100_000
 """Pacing errors kept for the quantiles: some minutes of them."""
 
 
 @dataclass
-class Counts:
+class ServerCounts:
     """What has happened so far."""
 
     records: int = 0
@@ -40,11 +40,11 @@ class Counts:
     unread: int = 0
     """Records and replies that found no room, or no client."""
     bytes: int = 0
-    late_s: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    late_s: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_LATENCIES))
     """From when a message's last byte was due to when it was written [s]."""
     latest_s: float = 0.0
 
-    def add(self, sent: Sent) -> None:
+    def add(self, sent: SentMessage) -> None:
         if sent.unread:
             self.unread += 1
             return
@@ -56,11 +56,11 @@ class Counts:
         self.latest_s = max(self.latest_s, self.late_s[-1])
 
 
-class Server:
+class EmulatorServer:
     """Plays until it is told to stop."""
 
-    def __init__(self, emulator: Emulator, port: Port, on_sent: OnSent | None = None) -> None:
-        self.emulator, self.port, self.counts = emulator, port, Counts()
+    def __init__(self, emulator: Emulator, port: Port, on_sent: SentCallback | None = None) -> None:
+        self.emulator, self.port, self.counts = emulator, port, ServerCounts()
         self._on_sent = on_sent
         self._woken, self._waker = socket.socketpair()
         self._stopped = False
@@ -92,7 +92,7 @@ class Server:
 
     def _wait(self) -> bool:
         """Until something is due or comes; whether the port has something to read, or room for what it kept."""
-        wait_s = min(max(self.emulator.next_s - time.monotonic(), 0.0), LONGEST_WAIT_S)
+        wait_s = min(max(self.emulator.next_s - time.monotonic(), 0.0), MAX_WAIT_S)
         waking = self._woken.fileno()
         ready, free, _ = select.select([*self.port.readable(), waking], self.port.writable(), [], wait_s)
         return bool(free) or any(end != waking for end in ready)
@@ -103,7 +103,7 @@ class Server:
         else:
             self.port.plug()
 
-    def _write(self, sent: Sent) -> None:
+    def _write(self, sent: SentMessage) -> None:
         taken = self.port.write(self._heard(sent.data))
         sent = replace(sent, written_s=time.monotonic(), unread=not taken)
         self.counts.add(sent)
@@ -135,21 +135,21 @@ class Server:
         }
 
 
-def play(samples: Samples, config: EmulatorConfig, port: Port) -> dict[str, float]:
-    """Play samples at a port until Ctrl-C, the normal end; what was sent, as `Server.summary` has it."""
-    server = Server(Emulator(samples, config, time.monotonic()), port)
+def play_samples(samples: DeviceSamples, config: EmulatorConfig, port: Port) -> dict[str, float]:
+    """Play samples at a port until Ctrl-C, the normal end; what was sent, as `EmulatorServer.summary` has it."""
+    server = EmulatorServer(Emulator(samples, config, time.monotonic()), port)
     with contextlib.suppress(KeyboardInterrupt):
         server.run()
     return server.summary()
 
 
 @dataclass(frozen=True)
-class Serving:
+class RunningEmulator:
     """An emulator that runs in a thread of its own."""
 
     name: str
     """What a client opens: a link to a pty, or tcp://host:port."""
-    server: Server
+    server: EmulatorServer
 
     @property
     def emulator(self) -> Emulator:
@@ -160,20 +160,20 @@ class Serving:
 
 
 @contextlib.contextmanager
-def serving(
-    samples: Samples,
+def serve_emulator(
+    samples: DeviceSamples,
     config: EmulatorConfig | None = None,
     *,
     pty: Path | str | None = None,
     tcp: str | None = None,
-    on_sent: OnSent | None = None,
-) -> Iterator[Serving]:
+    on_sent: SentCallback | None = None,
+) -> Iterator[RunningEmulator]:
     """Play samples at a pty behind this link or at this `host:port` (port 0 takes a free one) while the block runs.
 
     `on_sent` sees each record and reply that was written, with its times and damage, in the emulator's thread.
     """
     port = open_port(pty, tcp)
-    server = Server(Emulator(samples, config, time.monotonic()), port, on_sent)
+    server = EmulatorServer(Emulator(samples, config, time.monotonic()), port, on_sent)
     name = port.name
     failed: list[BaseException] = []
 
@@ -186,7 +186,7 @@ def serving(
     thread = threading.Thread(target=run, name="emulator")
     thread.start()
     try:
-        yield Serving(name, server)
+        yield RunningEmulator(name, server)
     finally:
         server.stop()
         thread.join()
@@ -194,7 +194,9 @@ def serving(
         raise failed[0]
 
 
-def open_port(pty: Path | str | None, tcp: str | None, *, anywhere: bool = False, say: Say = lambda line: None) -> Port:
+def open_port(
+    pty: Path | str | None, tcp: str | None, *, anywhere: bool = False, say: LogCallback = lambda line: None
+) -> Port:
     """The port that is asked for, one of the two; BadInput."""
     if (pty is None) == (tcp is None):
         raise BadInput("Neither or both of a pty and a TCP port are asked for.", "Name one of them.")

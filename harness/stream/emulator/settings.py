@@ -4,14 +4,14 @@ from dataclasses import dataclass, field, replace
 
 from harness.stream.codec.replies import Emitter
 
-STATIONS = "123456789ABC"
-DEFAULT_LIST = (2, 4, 1)
+STATION_NAMES = "123456789ABC"
+DEFAULT_OUTPUT_LIST = (2, 4, 1)
 """Position, angles, CR LF (docs/is900.md 12)."""
 Vector = tuple[float, float, float]
-Turn = tuple[float, float, float, float]
-NOWHERE: Vector = (0.0, 0.0, 0.0)
-UNTURNED: Turn = (1.0, 0.0, 0.0, 0.0)
-CONSTELLATION = tuple(
+Quaternion = tuple[float, float, float, float]
+ZERO_VECTOR: Vector = (0.0, 0.0, 0.0)
+IDENTITY_QUATERNION: Quaternion = (1.0, 0.0, 0.0, 0.0)
+DEFAULT_EMITTERS = tuple(
     Emitter(
         1 + 3 * row + column, (0.9144 * row - 0.9144, 0.6096 * column - 0.6096, 0.0), (0.0, 0.0, 1.0), 5001 + number
     )
@@ -25,19 +25,19 @@ class StationSettings:
     """One station."""
 
     active: bool = False
-    items: tuple[int, ...] = DEFAULT_LIST
-    origin_m: Vector = NOWHERE
+    items: tuple[int, ...] = DEFAULT_OUTPUT_LIST
+    origin_m: Vector = ZERO_VECTOR
     """Of the alignment frame, in the tracker's."""
-    tracker_from_aligned: Turn = UNTURNED
-    before: Turn = UNTURNED
+    tracker_from_aligned: Quaternion = IDENTITY_QUATERNION
+    before: Quaternion = IDENTITY_QUATERNION
     """Boresight of the heading: turns what is reported about the frame's own axes."""
-    after: Turn = UNTURNED
+    after: Quaternion = IDENTITY_QUATERNION
     """Full boresight: turns the station's axes."""
-    reference_deg: Vector = NOWHERE
+    reference_deg: Vector = ZERO_VECTOR
     """Angles that boresight makes of the present ones."""
-    tip_m: Vector = NOWHERE
+    tip_m: Vector = ZERO_VECTOR
     """In the station's own axes."""
-    mounting_deg: Vector = NOWHERE
+    mounting_deg: Vector = ZERO_VECTOR
     """Yaw, pitch and roll of the transmitter's mounting."""
     envelope_m: tuple[float, ...] = (10.0, 10.0, 10.0, -10.0, -10.0, -10.0)
     prediction_ms: int = 0
@@ -49,8 +49,8 @@ class StationSettings:
     def plain(self) -> bool:
         """Whether readings are reported as they were taken."""
         return (
-            self.origin_m == self.tip_m == self.mounting_deg == NOWHERE
-            and self.tracker_from_aligned == self.before == self.after == UNTURNED
+            self.origin_m == self.tip_m == self.mounting_deg == ZERO_VECTOR
+            and self.tracker_from_aligned == self.before == self.after == IDENTITY_QUATERNION
         )
 
 
@@ -58,7 +58,7 @@ class StationSettings:
 class DeviceSettings:
     """The device; the defaults are those after power-on (docs/is900.md 12)."""
 
-    stations: tuple[StationSettings, ...] = field(default_factory=lambda: (StationSettings(),) * len(STATIONS))
+    stations: tuple[StationSettings, ...] = field(default_factory=lambda: (StationSettings(),) * len(STATION_NAMES))
     binary: bool = False
     centimetres: bool = False
     microseconds: bool = False
@@ -73,8 +73,8 @@ class DeviceSettings:
     genlock_hz: float = 0.0
     genlock_source: int = 1
     genlock_phase: float = 0.0
-    emitters: tuple[Emitter, ...] = CONSTELLATION
-    drafted: tuple[Emitter, ...] = CONSTELLATION
+    emitters: tuple[Emitter, ...] = DEFAULT_EMITTERS
+    drafted: tuple[Emitter, ...] = DEFAULT_EMITTERS
     """Emitters as `MCe` would make them."""
     error_log: bool = True
     command_log: bool = False
@@ -88,8 +88,8 @@ class DeviceSettings:
     """Parity, bits and hardware handshake; kept and without effect."""
 
     def station(self, name: str) -> StationSettings:
-        return self.stations[STATIONS.index(name)]
+        return self.stations[STATION_NAMES.index(name)]
 
     def with_station(self, name: str, station: StationSettings) -> "DeviceSettings":
-        k = STATIONS.index(name)
+        k = STATION_NAMES.index(name)
         return replace(self, stations=(*self.stations[:k], station, *self.stations[k + 1 :]))

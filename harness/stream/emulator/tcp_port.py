@@ -5,16 +5,16 @@ from collections.abc import Callable
 
 from harness.errors import BadInput
 
-Say = Callable[[str], None]
+LogCallback = Callable[[str], None]
 """Takes a line for whoever watches."""
-_CHUNK = 4096
+_READ_BYTES = 4096
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 class TcpPort:
     """A TCP port for one client at a time; others are turned away at once."""
 
-    def __init__(self, host: str, port: int, *, anywhere: bool = False, say: Say = lambda line: None) -> None:
+    def __init__(self, host: str, port: int, *, anywhere: bool = False, say: LogCallback = lambda line: None) -> None:
         """BadInput when it is taken, or open to others unless that is asked for."""
         if host not in _LOOPBACK and not anywhere:
             advice = "Use 127.0.0.1, or say --anywhere: whoever reaches the port may then command the emulator."
@@ -48,7 +48,7 @@ class TcpPort:
         if self._client is None:
             return b""
         try:
-            data = self._client.recv(_CHUNK)
+            data = self._client.recv(_READ_BYTES)
         except BlockingIOError:
             return b""
         except OSError:

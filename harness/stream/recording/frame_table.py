@@ -5,7 +5,7 @@ from typing import Any
 
 from harness.stream.frame import TrackerFrame
 
-COLUMNS = (
+FRAME_COLUMNS = (
     "received_s",
     "wall_s",
     "station",
@@ -24,7 +24,7 @@ COLUMNS = (
 )
 
 
-def rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> Iterator[dict[str, Any]]:
+def frame_rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> Iterator[dict[str, Any]]:
     """One for each station, by the names of COLUMNS; None for what did not come or is not valid."""
     for i, station in enumerate(stations):
         numbers = (frame.measured_s[i], *frame.position_m[i], *frame.tracker_from_station[i])
@@ -38,21 +38,21 @@ def rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> Iterato
             float(frame.quality[i]),
             bool(frame.suspect[i]),
         )
-        yield dict(zip(COLUMNS, values, strict=True))
+        yield dict(zip(FRAME_COLUMNS, values, strict=True))
 
 
-def as_csv(row: dict[str, Any]) -> str:
+def format_csv_row(row: dict[str, Any]) -> str:
     """A line; numbers in full, so that they come back as they were, 1 and 0 for yes and no."""
-    return ",".join(_text(row[name]) for name in COLUMNS)
+    return ",".join(_format_value(row[name]) for name in FRAME_COLUMNS)
 
 
-def _text(value: Any) -> str:
+def _format_value(value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, bool):
         return str(int(value))
-    return repr(value) if isinstance(value, float) else _quoted(value)
+    return repr(value) if isinstance(value, float) else _quote(value)
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return '"' + text.replace('"', '""') + '"' if set(text) & set(',"\n\r') else text

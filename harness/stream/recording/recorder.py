@@ -5,17 +5,17 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from harness.stream.codec.blocks import RECEIVED
-from harness.stream.driver import Is900, LineEvent, Wanted
+from harness.stream.driver import DriverConfig, Is900, LineEvent
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import RecordingWriter
 
-TALK_S = 1.0
+PROGRESS_INTERVAL_S = 1.0
 """Progress is told so often [s]."""
 
 
 def record_port(
     port: str,
-    wanted: Wanted,
+    wanted: DriverConfig,
     into: RecordingWriter,
     *,
     seconds: float | None = None,
@@ -38,17 +38,17 @@ def record_port(
         if seconds is not None:
             end.start()
         try:
-            told_s = -TALK_S
+            told_s = -PROGRESS_INTERVAL_S
             for frame in device:
-                if frame.received_s - told_s >= TALK_S:
+                if frame.received_s - told_s >= PROGRESS_INTERVAL_S:
                     told_s = frame.received_s
-                    progress(_how_it_goes(device, frame, into))
+                    progress(_progress_text(device, frame, into))
         finally:
             end.cancel()
             progress("")
 
 
-def _how_it_goes(device: Is900, frame: TrackerFrame, into: RecordingWriter) -> str:
+def _progress_text(device: Is900, frame: TrackerFrame, into: RecordingWriter) -> str:
     health = device.health()
     tracked = int((frame.position_valid | frame.orientation_valid).sum())
     return (

@@ -1,4 +1,4 @@
-"""Recordings: all that went over the line, both ways, with the host's times; the layout is that of `blocks.py`.
+"""Recordings: all that went over the line, both ways, with the host's times; the layout is that of `read_blocks.py`.
 
 A recording only ever grows, by whole blocks. What a crash cut off at the end, or a disk spoilt in the middle, costs
 the blocks it touches and is named; recording into a file of ours goes on behind it. Blocks by kind:
@@ -27,25 +27,25 @@ from harness.errors import BadFile, HarnessError
 from harness.stream.codec.blocks import (
     CONFIGURED,
     EVENT,
-    HEADER,
-    LONGEST,
+    FILE_HEADER,
+    MAX_PAYLOAD_BYTES,
     NOTE,
     RECEIVED,
     SENT,
     VERSION,
-    Block,
-    Lost,
-    blocks,
-    encode,
-    version_of,
+    DamagedSpan,
+    RecordingBlock,
+    encode_block,
+    read_blocks,
+    read_version,
 )
-from harness.stream.codec.capture import Capture
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
 
 if TYPE_CHECKING:
     from harness.stream.driver import LineEvent
 
-EXPECTED = "a recording by `harness record`"
+EXPECTED_FILE = "a recording by `harness record`"
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,25 +55,25 @@ class Recording:
     path: Path
     data: bytes
 
-    def blocks(self) -> Iterator[Block]:
+    def blocks(self) -> Iterator[RecordingBlock]:
         """Every whole block, in the order of the file."""
-        return (entry for entry in self._entries() if isinstance(entry, Block))
+        return (entry for entry in self._entries() if isinstance(entry, RecordingBlock))
 
     @cached_property
     def lost(self) -> tuple[str, ...]:
         """What is cut off or damaged, a line each, in the order of the file."""
         out: list[str] = []
-        spoilt: Lost | None = None
+        spoilt: DamagedSpan | None = None
         before_s = None
         for entry in self._entries():
-            if isinstance(entry, Lost):
+            if isinstance(entry, DamagedSpan):
                 spoilt = entry
                 continue
             if spoilt:
-                out.append(_damaged(spoilt, before_s, entry.monotonic_s))
+                out.append(_damage_text(spoilt, before_s, entry.monotonic_s))
             spoilt, before_s = None, entry.monotonic_s
         if spoilt:
-            out.append(_cut(spoilt, before_s))
+            out.append(_truncation_text(spoilt, before_s))
         return tuple(out)
 
     @cached_property
@@ -93,7 +93,7 @@ class Recording:
         happened = [block for block in self.blocks() if block.kind == EVENT]
         return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in happened]
 
-    def format_of(self, configured: Block) -> WireFormat:
+    def format_of(self, configured: RecordingBlock) -> WireFormat:
         """The wire format in a block of that kind; BadFile."""
         content = self._json(configured)
         try:
@@ -103,17 +103,17 @@ class Recording:
                 raise TypeError(f"wire format.rate_hz: {wire.rate_hz:g} is not positive")
             return wire
         except (TypeError, HarnessError) as error:
-            raise BadFile(self.path, f"a wire format that cannot be used ({error})", EXPECTED, "") from error
+            raise BadFile(self.path, f"a wire format that cannot be used ({error})", EXPECTED_FILE, "") from error
 
-    def _json(self, block: Block) -> dict[str, Any]:
+    def _json(self, block: RecordingBlock) -> dict[str, Any]:
         try:
             content = json.loads(block.payload)
         except ValueError as error:
-            raise BadFile(self.path, f"a {block.kind} block that is no JSON", EXPECTED, "") from error
+            raise BadFile(self.path, f"a {block.kind} block that is no JSON", EXPECTED_FILE, "") from error
         return content if isinstance(content, dict) else {}
 
-    def _entries(self) -> Iterator[Block | Lost]:
-        return blocks(self.data, len(HEADER) if version_of(self.data) else 0)
+    def _entries(self) -> Iterator[RecordingBlock | DamagedSpan]:
+        return read_blocks(self.data, len(FILE_HEADER) if read_version(self.data) else 0)
 
 
 def read_recording(path: Path | str) -> Recording:
@@ -122,21 +122,25 @@ def read_recording(path: Path | str) -> Recording:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise _unusable(path, error) from error
+        raise _file_error(path, error) from error
     if not data:
-        raise BadFile(path, "an empty file", EXPECTED, "Nothing was recorded into it.")
+        raise BadFile(path, "an empty file", EXPECTED_FILE, "Nothing was recorded into it.")
     _check_kind(path, data)
     return Recording(path, data)
 
 
 def _check_kind(path: Path, data: bytes) -> None:
     """BadFile unless the file is ours, as far as it goes."""
-    version = version_of(data)
+    version = read_version(data)
     if version is not None and version > VERSION:
         found = f"a recording of version {version}"
         raise BadFile(path, found, f"version {VERSION} at most", "A newer version of the harness made it; use that.")
-    if version is None and not HEADER.startswith(data) and all(isinstance(entry, Lost) for entry in blocks(data, 0)):
-        raise BadFile(path, "no recording", EXPECTED, "Is it the right file? Nothing was changed in it.")
+    if (
+        version is None
+        and not FILE_HEADER.startswith(data)
+        and all(isinstance(entry, DamagedSpan) for entry in read_blocks(data, 0))
+    ):
+        raise BadFile(path, "no recording", EXPECTED_FILE, "Is it the right file? Nothing was changed in it.")
 
 
 class RecordingWriter:
@@ -206,8 +210,8 @@ class RecordingWriter:
         self.close()
 
     def _append_all(self, kind: str, data: bytes, monotonic_s: float, wall_s: float) -> None:
-        for begin in range(0, max(len(data), 1), LONGEST):
-            self._append(Block(kind, monotonic_s, wall_s, data[begin : begin + LONGEST]))
+        for begin in range(0, max(len(data), 1), MAX_PAYLOAD_BYTES):
+            self._append(RecordingBlock(kind, monotonic_s, wall_s, data[begin : begin + MAX_PAYLOAD_BYTES]))
         self.counts[kind] += len(data)
 
     def _append_json(
@@ -215,30 +219,32 @@ class RecordingWriter:
     ) -> None:
         now_s = time.monotonic() if monotonic_s is None else monotonic_s
         then_s = time.time() if wall_s is None else wall_s
-        self._append(Block(kind, now_s, then_s, json.dumps(content, default=str).encode()))
+        self._append(RecordingBlock(kind, now_s, then_s, json.dumps(content, default=str).encode()))
 
-    def _append(self, block: Block) -> None:
+    def _append(self, block: RecordingBlock) -> None:
         with self._lock:
             if self._closed:
                 return
             try:
                 if self._file is None:
                     self._file = self._opened()
-                    note = Block(NOTE, block.monotonic_s, block.wall_s, json.dumps(self._note, default=str).encode())
-                    _write(self._file, encode(note))
-                _write(self._file, encode(block))
+                    note = RecordingBlock(
+                        NOTE, block.monotonic_s, block.wall_s, json.dumps(self._note, default=str).encode()
+                    )
+                    _write_all(self._file, encode_block(note))
+                _write_all(self._file, encode_block(block))
             except OSError as error:
-                raise _unusable(self.path, error) from error
+                raise _file_error(self.path, error) from error
 
     def _opened(self) -> int:
         """The file, ours alone, with its header whole."""
         new = os.O_CREAT | os.O_EXCL if self._new else 0
         file = os.open(self.path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0) | new, 0o644)
-        if not _locked(file):
+        if not _lock_file(file):
             os.close(file)
             raise BadFile(self.path, "in use", "a file to record into", "Another process is recording into it.")
         size = os.fstat(file).st_size
-        _write(file, HEADER[size:])
+        _write_all(file, FILE_HEADER[size:])
         return file
 
     def _what_is_there(self) -> Recording | None:
@@ -256,13 +262,13 @@ class RecordingWriter:
                 raise BadFile(self.path, "no such folder", "a file to record into", "Make the folder first.") from None
             return None
         except OSError as error:
-            raise _unusable(self.path, error) from error
+            raise _file_error(self.path, error) from error
         _check_kind(self.path, data)
         return Recording(self.path, data)
 
 
 def record_capture(
-    path: Path | str, wire: WireFormat, capture: Capture, note: Mapping[str, Any], *, seconds: float = math.inf
+    path: Path | str, wire: WireFormat, capture: ByteCapture, note: Mapping[str, Any], *, seconds: float = math.inf
 ) -> RecordingWriter:
     """Write what a simulated line carried (in its first so many seconds), chunk by chunk.
 
@@ -278,14 +284,14 @@ def record_capture(
     return writer
 
 
-def _write(file: int, data: bytes) -> None:
+def _write_all(file: int, data: bytes) -> None:
     """All of it, though the system may take it in parts."""
     left = memoryview(data)
     while left:
         left = left[os.write(file, left) :]
 
 
-def _locked(file: int) -> bool:
+def _lock_file(file: int) -> bool:
     """Whether nobody else records into the file, where the system can tell."""
     try:
         import fcntl
@@ -298,21 +304,23 @@ def _locked(file: int) -> bool:
     return True
 
 
-def _unusable(path: Path, error: OSError) -> BadFile:
+def _file_error(path: Path, error: OSError) -> BadFile:
     if isinstance(error, IsADirectoryError):
-        return BadFile(path, "a folder", EXPECTED, "Name a file in it.")
+        return BadFile(path, "a folder", EXPECTED_FILE, "Name a file in it.")
     if isinstance(error, FileNotFoundError):
-        return BadFile(path, "no such file", EXPECTED, "`harness record PORT FILE` makes one.")
-    return BadFile(path, f"cannot be used ({error.strerror or error})", EXPECTED, "What it held before is still there.")
+        return BadFile(path, "no such file", EXPECTED_FILE, "`harness record PORT FILE` makes one.")
+    return BadFile(
+        path, f"cannot be used ({error.strerror or error})", EXPECTED_FILE, "What it held before is still there."
+    )
 
 
-def _damaged(lost: Lost, before_s: float | None, after_s: float) -> str:
+def _damage_text(lost: DamagedSpan, before_s: float | None, after_s: float) -> str:
     what = f"bytes {lost.begin} to {lost.end} are damaged"
     if before_s is None:
         return f"{what}: the beginning, until {after_s:.3f} s"
     return f"{what}: between {before_s:.3f} s and {after_s:.3f} s of the host's clock"
 
 
-def _cut(lost: Lost, before_s: float | None) -> str:
+def _truncation_text(lost: DamagedSpan, before_s: float | None) -> str:
     when = "" if before_s is None else f", from {before_s:.3f} s of the host's clock on"
     return f"the last {lost.end - lost.begin} bytes are no whole block: cut off{when}"

@@ -16,19 +16,19 @@ import numpy as np
 
 from harness.errors import BadFile, BadInput
 from harness.stream.codec.blocks import CONFIGURED, RECEIVED
-from harness.stream.codec.capture import Capture
-from harness.stream.codec.continuous_reader import Sessions
+from harness.stream.codec.capture import ByteCapture
+from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.reader import WireFormat
 from harness.stream.frame import TrackerFrame
-from harness.stream.recording.recording import EXPECTED, Recording, read_recording
+from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
 
-AT_ONCE = 1000
+CHUNKS_PER_BATCH = 1000
 """Chunks that are decoded together where nobody waits for the clock."""
-Speed = float | Literal["step", "max"]
+ReplaySpeed = float | Literal["step", "max"]
 """So many times as fast as it was, a frame at a time, or without waiting."""
 
 
-def speed_of(text: str) -> Speed:
+def parse_speed(text: str) -> ReplaySpeed:
     """`step`, `max`, or a positive number; BadInput."""
     if text in ("step", "max"):
         return "step" if text == "step" else "max"
@@ -41,7 +41,7 @@ def speed_of(text: str) -> Speed:
     return speed
 
 
-def next_line() -> bool:
+def wait_for_enter() -> bool:
     """Wait for Enter; False at the end of the input."""
     return bool(sys.stdin.readline())
 
@@ -55,7 +55,11 @@ class RecordingStream:
     """
 
     def __init__(
-        self, recording: Recording | Path | str, speed: Speed = "max", *, step: Callable[[], bool] = next_line
+        self,
+        recording: Recording | Path | str,
+        speed: ReplaySpeed = "max",
+        *,
+        step: Callable[[], bool] = wait_for_enter,
     ) -> None:
         """`step` waits for leave to give the next frame where the speed is `step`, and says False to end."""
         self.recording = recording if isinstance(recording, Recording) else read_recording(recording)
@@ -63,7 +67,7 @@ class RecordingStream:
         if not formats:
             lost = "; ".join(self.recording.lost)
             found = "the device was never set up in it" + (f" ({lost})" if lost else "")
-            raise BadFile(self.recording.path, found, EXPECTED, "There are no frames in it.")
+            raise BadFile(self.recording.path, found, EXPECTED_FILE, "There are no frames in it.")
         for wire in formats[1:]:
             if wire.stations != formats[0].stations:
                 found = f"stations {', '.join(formats[0].stations)} become {', '.join(wire.stations)}"
@@ -72,7 +76,7 @@ class RecordingStream:
         """As it was first set up."""
         self._speed, self._step = speed, step
         self._wall_ahead_s = 0.0
-        self._played_by = Sessions()
+        self._played_by = ContinuousFrameReader()
         self._closed = Event()
 
     @property
@@ -86,7 +90,7 @@ class RecordingStream:
 
     @property
     def counts(self) -> dict[str, int]:
-        """Of what was read so far (see `Sessions.counts`)."""
+        """Of what was read so far (see `ContinuousFrameReader.counts`)."""
         return self._played_by.counts
 
     def close(self) -> None:
@@ -109,8 +113,8 @@ class RecordingStream:
 
     def _played(self) -> Iterator[tuple[float, TrackerFrame]]:
         """Every frame, and when it was due by the virtual clock [s]."""
-        self._played_by = sessions = Sessions()
-        at_once = 1 if isinstance(self._speed, float) else AT_ONCE
+        self._played_by = sessions = ContinuousFrameReader()
+        at_once = 1 if isinstance(self._speed, float) else CHUNKS_PER_BATCH
         now_s, wall_s, shift_s = -math.inf, 0.0, 0.0
         waiting: list[tuple[float, bytes]] = []
         for block in self.recording.blocks():
@@ -118,14 +122,14 @@ class RecordingStream:
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 waiting.append((now_s, block.payload))
                 if len(waiting) >= at_once:
-                    yield from _due(now_s, sessions.received_all(_joined(waiting)))
+                    yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
             elif block.kind == RECEIVED:
-                yield from _due(now_s, sessions.received_all(_joined(waiting)))
+                yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
-                yield from _due(now_s, sessions.expire(now_s))
+                yield from _with_due_time(now_s, sessions.expire(now_s))
             elif block.kind == CONFIGURED:
-                yield from _due(now_s, sessions.received_all(_joined(waiting)))
-                yield from _due(now_s, sessions.finish())
+                yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
+                yield from _with_due_time(now_s, sessions.finish())
                 wire = self.recording.format_of(block)
                 if block.monotonic_s + shift_s < now_s:  # recorded after a restart of the computer
                     pause_s = max(block.wall_s - wall_s, 1.0 / wire.rate_hz)
@@ -133,16 +137,18 @@ class RecordingStream:
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 self._wall_ahead_s = wall_s - now_s
                 sessions.configured(wire, now_s)
-        yield from _due(now_s, sessions.received_all(_joined(waiting)))
-        yield from _due(now_s, sessions.finish())
+        yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
+        yield from _with_due_time(now_s, sessions.finish())
 
 
-def _due(now_s: float, frames: list[TrackerFrame]) -> Iterator[tuple[float, TrackerFrame]]:
+def _with_due_time(now_s: float, frames: list[TrackerFrame]) -> Iterator[tuple[float, TrackerFrame]]:
     return ((now_s, frame) for frame in frames)
 
 
-def _joined(waiting: list[tuple[float, bytes]]) -> Capture:
+def _concatenate_chunks(waiting: list[tuple[float, bytes]]) -> ByteCapture:
     """The chunks as one capture; they wait no longer."""
     received_s, chunks = [now_s for now_s, _ in waiting], [data for _, data in waiting]
     waiting.clear()
-    return Capture(b"".join(chunks), np.cumsum([len(data) for data in chunks], dtype=np.int64), np.array(received_s))
+    return ByteCapture(
+        b"".join(chunks), np.cumsum([len(data) for data in chunks], dtype=np.int64), np.array(received_s)
+    )

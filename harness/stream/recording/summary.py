@@ -9,7 +9,7 @@ from harness.core.arrays import Floats
 from harness.stream.frame import TrackerFrame
 
 
-class Summary:
+class StreamSummary:
     """Counts over frames, however many there are."""
 
     def __init__(self, stations: Sequence[str]) -> None:

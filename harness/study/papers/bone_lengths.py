@@ -10,7 +10,7 @@ from harness.core.seeds import generator
 
 MODES = 5
 """That Liu et al. 2011 keep."""
-DRAWS = 200
+SUBSAMPLES = 200
 """Of some of the people, to see what their number does."""
 OTHER_SIDE = [
     BONES.index(other) if (other := {"l": "r", "r": "l"}.get(name[0], "") + name[1:]) in BONES else b
@@ -38,7 +38,7 @@ class Eigenmodes:
         return out
 
 
-def eigenmodes(numbers: Floats) -> Eigenmodes:
+def fit_eigenmodes(numbers: Floats) -> Eigenmodes:
     """Of the numbers (P, N) of two people or more."""
     mean = numbers.mean(axis=0)
     _, size, modes = np.linalg.svd(numbers - mean, full_matrices=False)
@@ -46,34 +46,34 @@ def eigenmodes(numbers: Floats) -> Eigenmodes:
     return Eigenmodes(mean, modes * np.sign(largest), size / np.sqrt(len(numbers) - 1.0))
 
 
-def by_tibia(length_m: Floats) -> Floats:
+def normalise_by_tibia(length_m: Floats) -> Floats:
     """Lengths (P, 24) over each person's left tibia."""
     out: Floats = length_m / length_m[:, [BONES.index("ltibia")]]
     return out
 
 
-def mirrored(length_m: Floats) -> Floats:
+def symmetrise(length_m: Floats) -> Floats:
     """Lengths (P, 24) with left and right alike: the mean of both."""
     out: Floats = (length_m + length_m[:, OTHER_SIDE]) / 2.0
     return out
 
 
-def left_out_m(length_m: Floats, modes: int) -> Floats:
+def leave_one_out_errors_m(length_m: Floats, modes: int) -> Floats:
     """Errors (P, 24) [m] of each person's lengths, as told by so many modes of all the others; 0: by their mean."""
     errors = np.empty_like(length_m)
     for person in range(len(length_m)):
-        others = eigenmodes(np.delete(length_m, person, axis=0))
+        others = fit_eigenmodes(np.delete(length_m, person, axis=0))
         off, kept = length_m[person] - others.mean, others.modes[:modes]
         errors[person] = off - off @ kept.T @ kept
     return errors
 
 
-def kept_by_count(length_m: Floats, counts: range, seed: int) -> Floats:
+def explained_variance_by_count(length_m: Floats, counts: range, seed: int) -> Floats:
     """(C, 3) lowest, median and highest share that five modes keep of so many of the people, drawn again and again."""
     found = np.empty((len(counts), 3))
     for row, count in enumerate(counts):
         rng = generator(seed, "eigenmodes", count)
-        chosen = np.array([rng.choice(len(length_m), count, replace=False) for _ in range(DRAWS)])
+        chosen = np.array([rng.choice(len(length_m), count, replace=False) for _ in range(SUBSAMPLES)])
         off = length_m[chosen] - length_m[chosen].mean(axis=1, keepdims=True)
         variance = np.linalg.svd(off, compute_uv=False) ** 2
         shares = variance[:, :MODES].sum(axis=1) / variance.sum(axis=1)

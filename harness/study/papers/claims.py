@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from harness.compare.paired_statistics import paired
+from harness.compare.paired_statistics import compare_paired
 from harness.results.findings import Claim
 
 Errors = Mapping[str, float]
@@ -12,11 +12,11 @@ TOLERANCE = 0.25
 """Within which share of a published figure ours counts as the same."""
 
 
-def errs_less(
+def claim_lower_error(
     text: str, less: Errors, more: Errors, *, published: str = "order", unit: str = "deg", why: str = ""
 ) -> Claim:
     """That `less` is below `more`, by the paired interval of their difference; `why` says what is known where not."""
-    found = paired(more, less)
+    found = compare_paired(more, less)
     if found.mean is None:
         return Claim(text, published, "not measured", "not run", found.why, unit=unit)
     means = [sum(side[clip] for clip in found.clips) / len(found.clips) for side in (less, more)]
@@ -34,7 +34,9 @@ def errs_less(
     )
 
 
-def figure(text: str, published: float, errors: Errors, *, comparable: bool, why: str, unit: str = "deg") -> Claim:
+def claim_published_value(
+    text: str, published: float, errors: Errors, *, comparable: bool, why: str, unit: str = "deg"
+) -> Claim:
     """That the mean of errors is the published figure, within a quarter of it; `why` it is not `comparable`.
 
     What is judged is the mean itself: two figures from two libraries have no paired difference.

@@ -5,29 +5,29 @@ from itertools import pairwise
 
 import numpy as np
 
-from harness.results.findings import Claim, Experiment, Lines, Table
-from harness.study.papers.claims import errs_less
-from harness.study.papers.leave_one_out import METHODS, OURS, differences
-from harness.study.papers.paper_study import Study
-from harness.study.papers.tables import by_clip, error_lines
+from harness.results.findings import Claim, FindingsTable, LineChart, PaperExperiment
+from harness.study.papers.claims import claim_lower_error
+from harness.study.papers.leave_one_out import DYNAMIC_MAP, METHODS, differences
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.tables import error_lines, errors_by_clip
 
 RUN, INPUTS = "leave_one_out", "pos+ori"
-_JUDGED = (OURS, "local_pca", "ik")
+_COMPARED_METHODS = (DYNAMIC_MAP, "local_pca", "ik")
 
 
-def frame_by_frame(study: Study) -> Experiment:
+def frame_by_frame(study: PaperStudy) -> PaperExperiment:
     """Of the first walk and the first jump that the scenario lists: fixed before anything was run."""
     claims: list[Claim] = []
     rows: list[tuple[str, ...]] = []
-    figures: list[Lines] = []
+    figures: list[LineChart] = []
     for behaviour in ("walking", "jumping"):
         motion = study.runs[RUN].motion
         where = {"behaviour": behaviour, "inputs": INPUTS, "clip": motion.test[motion.behaviours.index(behaviour)]}
         title = f"{behaviour}, {where['clip']}"
-        errors = {method: by_clip(study.rows(RUN, method=method, **where)) for method in METHODS}
+        errors = {method: errors_by_clip(study.rows(RUN, method=method, **where)) for method in METHODS}
         claims += [
-            errs_less(f"{title}: {less} errs less than {more}", errors[less], errors[more])
-            for less, more in pairwise(_JUDGED)
+            claim_lower_error(f"{title}: {less} errs less than {more}", errors[less], errors[more])
+            for less, more in pairwise(_COMPARED_METHODS)
         ]
         cells = {cell.method: cell for cell in study.cells(RUN, **where)}
         if cells:
@@ -36,7 +36,7 @@ def frame_by_frame(study: Study) -> Experiment:
             )
             figures.append(lines)
             rows += _statistics(title, lines.series)
-    return Experiment(
+    return PaperExperiment(
         name="frame_by_frame",
         title="Frame by frame: one walk and one jump (Fig. 7)",
         question=(
@@ -50,9 +50,16 @@ def frame_by_frame(study: Study) -> Experiment:
         ),
         claims=tuple(claims),
         tables=(
-            Table(
+            FindingsTable(
                 "Over the frames of each sequence",
-                ("sequence", "method", "mean [deg]", "95th percentile", "largest", f"frames where {OURS} errs less"),
+                (
+                    "sequence",
+                    "method",
+                    "mean [deg]",
+                    "95th percentile",
+                    "largest",
+                    f"frames where {DYNAMIC_MAP} errs less",
+                ),
                 tuple(rows),
             ),
         ),
@@ -67,7 +74,7 @@ def _statistics(title: str, series: Mapping[str, tuple[float | None, ...]]) -> I
     for method, column in values.items():
         known = column[np.isfinite(column)]
         figures = known.mean(), np.quantile(known, 0.95), known.max()
-        ours = values.get(OURS)
-        both = np.isfinite(column) & np.isfinite(ours) if ours is not None and method != OURS else None
+        ours = values.get(DYNAMIC_MAP)
+        both = np.isfinite(column) & np.isfinite(ours) if ours is not None and method != DYNAMIC_MAP else None
         below = "" if both is None or ours is None else f"{np.mean(ours[both] < column[both]):.0%}"
         yield (title, method, *(f"{figure:.2f}" for figure in figures), below)

@@ -6,21 +6,21 @@ and what it calls suitable, are held against intervals over clips.
 
 from functools import partial
 
-from harness.study.papers.five_stations import five_trackers
+from harness.study.papers.five_stations import five_stations
 from harness.study.papers.paper import Paper
-from harness.study.papers.published_speed import KIM2012, speed
+from harness.study.papers.published_speed import KIM2012, compare_speed
 from harness.study.papers.sparse_database import extrapolation, sparse
-from harness.study.papers.station_choice import one_tracker, sensors
+from harness.study.papers.station_choice import one_station, rank_station_sets
 
 PAPER = Paper(
     "kim2012",
     "Kim, Seol, Lee: Realtime performance animation using sparse 3D motion sensors, 2012",
     experiments={
-        "sensors": sensors,
+        "sensors": rank_station_sets,
         "sparse": sparse,
         "extrapolation": extrapolation,
-        "one_tracker": one_tracker,
-        "five_trackers": five_trackers,
-        "speed": partial(speed, published=KIM2012),
+        "one_tracker": one_station,
+        "five_trackers": five_stations,
+        "speed": partial(compare_speed, published=KIM2012),
     },
 )

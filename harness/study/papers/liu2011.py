@@ -3,34 +3,43 @@
 from functools import partial
 from itertools import pairwise
 
-from harness.mocap.skeletons import skeletons
-from harness.mocap.synthetic import population
-from harness.results.findings import Experiment
-from harness.study.papers.claims import errs_less, figure
-from harness.study.papers.eigenmodes import bone_modes
+from harness.mocap.skeletons import read_skeletons
+from harness.mocap.synthetic import sample_skeletons
+from harness.results.findings import PaperExperiment
+from harness.study.papers.claims import claim_lower_error, claim_published_value
+from harness.study.papers.eigenmodes import evaluate_bone_modes
 from harness.study.papers.frame_by_frame import frame_by_frame
-from harness.study.papers.leave_one_out import INPUTS, OURS, WINDOW, differences, leave_one_out, own_model
+from harness.study.papers.leave_one_out import (
+    DYNAMIC_MAP,
+    DYNAMIC_MAP_WINDOW,
+    INPUTS,
+    differences,
+    leave_one_out,
+    own_model,
+)
 from harness.study.papers.paper import Paper
-from harness.study.papers.paper_study import Study
-from harness.study.papers.published_speed import LIU2011, speed
-from harness.study.papers.tables import by_clip, joint_groups, mean_bars, mean_table
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.published_speed import LIU2011, compare_speed
+from harness.study.papers.tables import errors_by_clip, errors_by_joint_group, mean_bars, mean_table
 
 PUBLISHED_DEG = {"pos+ori": 1.25, "pos+torso_ori": 2.25, "pos": 2.52, "mixed": 3.27}
-_PEOPLE = 20
+_SYNTHETIC_PEOPLE = 20
 """As many as skeletons of CMU are behind the spread that they are drawn from."""
 
 
-def boxing_inputs(study: Study) -> Experiment:
+def boxing_inputs(study: PaperStudy) -> PaperExperiment:
     """Four combinations of inputs, the one experiment for which the paper prints errors."""
     real = study.motion == "cmu"
     first = "blocks" if real else "leave_one_out"  # which has two of the four on the same clips
     runs = {inputs: first if inputs in ("pos+ori", "pos") else "boxing_inputs" for inputs in PUBLISHED_DEG}
     errors = {
-        method: {i: by_clip(study.rows(run, behaviour="boxing", method=method, inputs=i)) for i, run in runs.items()}
-        for method in (OURS, WINDOW)
+        method: {
+            i: errors_by_clip(study.rows(run, behaviour="boxing", method=method, inputs=i)) for i, run in runs.items()
+        }
+        for method in (DYNAMIC_MAP, DYNAMIC_MAP_WINDOW)
     }
     orders = [
-        errs_less(
+        claim_lower_error(
             f"{method}: {INPUTS[less]} err less than {INPUTS[more]}",
             each[less],
             each[more],
@@ -41,23 +50,24 @@ def boxing_inputs(study: Study) -> Experiment:
     ]
     why = "other clips and fewer examples" if real else "a procedure's motion, of which no paper has a figure"
     figures = [
-        figure(f"{method}: {INPUTS[inputs]}", published, each[inputs], comparable=real, why=why)
+        claim_published_value(f"{method}: {INPUTS[inputs]}", published, each[inputs], comparable=real, why=why)
         for method, each in errors.items()
         for inputs, published in PUBLISHED_DEG.items()
     ]
     groups = {INPUTS[i]: {method: each[i] for method, each in errors.items()} for i in PUBLISHED_DEG}
     joints = {
-        INPUTS[i]: joint_groups(study.cells(run, behaviour="boxing", method=OURS, inputs=i)) for i, run in runs.items()
+        INPUTS[i]: errors_by_joint_group(study.cells(run, behaviour="boxing", method=DYNAMIC_MAP, inputs=i))
+        for i, run in runs.items()
     }
     bars = mean_bars(
         "Error by inputs",
         "deg",
         groups,
         caption="Mean joint-angle error over clips.",
-        published={OURS: tuple(PUBLISHED_DEG.values())},
+        published={DYNAMIC_MAP: tuple(PUBLISHED_DEG.values())},
     )
     parts = "A fifth of a bout is left out with 1 s around it; the rest of it is in the database: nearest to the paper."
-    return Experiment(
+    return PaperExperiment(
         name="boxing_inputs",
         title="Four combinations of inputs on boxing",
         question=(
@@ -69,19 +79,21 @@ def boxing_inputs(study: Study) -> Experiment:
         claims=(*orders, *figures),
         tables=(
             mean_table("Joint-angle error [deg]", "inputs", groups),
-            mean_table(f"Where {OURS} errs [deg]", "inputs", joints),
+            mean_table(f"Where {DYNAMIC_MAP} errs [deg]", "inputs", joints),
         ),
         figures=(bars,),
         runs=(first, "boxing_inputs"),
     )
 
 
-def eigenmodes(study: Study) -> Experiment:
+def eigenmodes(study: PaperStudy) -> PaperExperiment:
     """Fig. 4."""
     if study.library:
-        return bone_modes(skeletons(study.library), "those of the library", measured=True, seed=study.seed)
-    people = {f"person {n}": person for n, person in enumerate(population(_PEOPLE, study.seed), 1)}
-    return bone_modes(people, "drawn from the spread of CMU's", measured=False, seed=study.seed)
+        return evaluate_bone_modes(
+            read_skeletons(study.library), "those of the library", measured=True, seed=study.seed
+        )
+    people = {f"person {n}": person for n, person in enumerate(sample_skeletons(_SYNTHETIC_PEOPLE, study.seed), 1)}
+    return evaluate_bone_modes(people, "drawn from the spread of CMU's", measured=False, seed=study.seed)
 
 
 PAPER = Paper(
@@ -93,6 +105,6 @@ PAPER = Paper(
         "frame_by_frame": frame_by_frame,
         "boxing_inputs": boxing_inputs,
         "eigenmodes": eigenmodes,
-        "speed": partial(speed, published=LIU2011),
+        "speed": partial(compare_speed, published=LIU2011),
     },
 )

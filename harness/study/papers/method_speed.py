@@ -13,16 +13,16 @@ from time import perf_counter
 import numpy as np
 
 from harness.experiment import benchmark_clips
-from harness.experiment.round_robin_timing import Tally, contest, following
-from harness.study.papers.speed_dataset import Gathered
+from harness.experiment.round_robin_timing import MethodTimings, time_method, time_round_robin
+from harness.study.papers.speed_dataset import SpeedDataset
 
-BESIDE = "ik"
+REFERENCE_METHOD = "ik"
 """Beside which every other runs, in the same turns."""
-_CPU = Path("/proc/cpuinfo")
+_CPUINFO = Path("/proc/cpuinfo")
 
 
 @dataclass(frozen=True)
-class Pace:
+class MethodSpeed:
     """One method with one database."""
 
     method: str
@@ -43,21 +43,24 @@ class Pace:
     error_deg: float
 
 
-def frame_rate(methods: Sequence[str], motion: Gathered, seed: int) -> list[Pace]:
+def measure_speed(methods: Sequence[str], motion: SpeedDataset, seed: int) -> list[MethodSpeed]:
     """Speed of methods that learn from a database and take turns on the held-out takes; `ik` must be among them."""
     ready_s, contenders = {}, {}
     for name in methods:
         start = perf_counter()
-        learnt = benchmark_clips.learner(name, motion.learnt, seed)
+        learnt = benchmark_clips.fit_named_method(name, motion.learnt, seed)
         learnt.begin(motion.shown[0].simulation.calibration)
-        ready_s[name], contenders[name] = perf_counter() - start, following(learnt)
-    tallies = contest(contenders, motion.shown, lambda *_: None)
-    return [_pace(name, len(motion.learnt), ready_s[name], tallies[name], tallies[BESIDE]) for name in methods]
+        ready_s[name], contenders[name] = perf_counter() - start, time_method(learnt)
+    tallies = time_round_robin(contenders, motion.shown, lambda *_: None)
+    return [
+        _method_speed(name, len(motion.learnt), ready_s[name], tallies[name], tallies[REFERENCE_METHOD])
+        for name in methods
+    ]
 
 
-def _pace(name: str, frames: int, ready_s: float, own: Tally, beside: Tally) -> Pace:
+def _method_speed(name: str, frames: int, ready_s: float, own: MethodTimings, beside: MethodTimings) -> MethodSpeed:
     p50_ms, p99_ms = np.percentile(own.step_ms, [50, 99]).tolist()
-    return Pace(
+    return MethodSpeed(
         method=name,
         frames=frames,
         steps=len(own.step_ms),
@@ -71,8 +74,8 @@ def _pace(name: str, frames: int, ready_s: float, own: Tally, beside: Tally) -> 
     )
 
 
-def machine() -> str:
+def processor_name() -> str:
     """The processor's name, as far as the system tells it."""
-    lines = _CPU.read_text(encoding="utf-8").splitlines() if _CPU.is_file() else []
+    lines = _CPUINFO.read_text(encoding="utf-8").splitlines() if _CPUINFO.is_file() else []
     names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
     return f"{names[0]}, {len(names)} cores" if names else platform.processor() or platform.machine()

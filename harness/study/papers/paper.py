@@ -7,14 +7,14 @@ from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
-from harness.core.package_data import share_folder
+from harness.core.package_data import data_folder
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
-from harness.experiment.cells import Progress, source_of
+from harness.experiment.cells import ProgressCallback, open_scenario_motion
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.results import manifest
-from harness.results.findings import Experiment, Findings, write_findings
-from harness.study.papers.paper_study import Study, check_runs, open_study, planned_cells, run_experiments
-from harness.study.papers.provenance import record
+from harness.results.findings import PaperExperiment, PaperFindings, write_findings
+from harness.study.papers.paper_study import PaperStudy, check_run_names, count_cells, open_study, run_scenarios
+from harness.study.papers.provenance import provenance_tables
 
 PAPERS = ("liu2011", "kim2012")
 """Each a module of this folder with a `PAPER`."""
@@ -28,18 +28,18 @@ class Paper:
     name: str
     reference: str
     """Authors, title, venue, year."""
-    experiments: Mapping[str, Callable[[Study], Experiment]]
+    experiments: Mapping[str, Callable[[PaperStudy], PaperExperiment]]
     """In the order in which they are told."""
 
     def plan(self, motion: Motion, seed: int) -> dict[str, Scenario]:
         """Run -> scenario, from the files of that motion."""
-        folder = share_folder("scenarios") / "papers" / self.name
+        folder = data_folder("scenarios") / "papers" / self.name
         files = sorted(folder.glob(f"{motion}_*.toml"))
         found = {path.stem.removeprefix(f"{motion}_"): load_scenario(path) for path in files}
         return {name: replace(scenario, name=name, seed=seed) for name, scenario in found.items()}
 
 
-def paper(name: str) -> Paper:
+def load_paper(name: str) -> Paper:
     """The paper of that name; UnknownName."""
     if name not in PAPERS:
         raise UnknownName("paper", name, PAPERS)
@@ -47,7 +47,7 @@ def paper(name: str) -> Paper:
     return found
 
 
-def rerun(
+def reproduce(
     paper: Paper,
     out: Path,
     *,
@@ -55,8 +55,8 @@ def rerun(
     seed: int = 1,
     jobs: int = 1,
     command: str = "",
-    progress: Progress = lambda last, done, planned: None,
-) -> tuple[Findings, Outcome]:
+    progress: ProgressCallback = lambda last, done, planned: None,
+) -> tuple[PaperFindings, Outcome]:
     """Run what is not finished yet, judge, and write findings.json into `out`.
 
     On the built-in performer, or on the real motion in `library`. `out` is made, or resumed when it holds this very
@@ -67,12 +67,12 @@ def rerun(
     runs = paper.plan(motion, seed)
     if not runs:
         raise BadInput(f"{paper.name} has no runs on {motion} motion.", "Choose the other motion.")
-    check_runs(runs, library)
-    title = source_of(next(iter(runs.values())).motion, library, seed).title
+    check_run_names(runs, library)
+    title = open_scenario_motion(next(iter(runs.values())).motion, library, seed).title
     open_study(out, {"paper": paper.name, "motion": title, "seed": seed})
-    cells = planned_cells(runs)
+    cells = count_cells(runs)
     planned = cells + len(paper.experiments)
-    failures = run_experiments(
+    failures = run_scenarios(
         runs,
         out,
         folder=library,
@@ -80,7 +80,7 @@ def rerun(
         command=command,
         progress=lambda last, done, _: progress(last, done, planned),
     )
-    study = Study(out, motion, seed, runs, library, failures)
+    study = PaperStudy(out, motion, seed, runs, library, failures)
     experiments, broken = [], False
     for done, (name, ask) in enumerate(paper.experiments.items()):
         progress(name, cells + done, planned)
@@ -91,23 +91,25 @@ def rerun(
                 raise
             broken = True
             last = traceback.format_exc().strip().splitlines()[-1]
-            experiments.append(Experiment(name, name, "", (), notes=(f"This experiment could not be judged: {last}",)))
+            experiments.append(
+                PaperExperiment(name, name, "", (), notes=(f"This experiment could not be judged: {last}",))
+            )
     progress("findings", planned, planned)
-    findings = Findings(
+    findings = PaperFindings(
         paper=paper.name,
         reference=paper.reference,
         motion=title,
         command=command,
         seed=seed,
         experiments=tuple(experiments),
-        circumstances=manifest.here(),
-        tables=record(study),
+        circumstances=manifest.current_circumstances(),
+        tables=provenance_tables(study),
     )
     write_findings(out / "findings.json", findings)
     return findings, Outcome.INCOMPLETE if failures or broken else Outcome.PASS
 
 
-def _with_failures(experiment: Experiment, study: Study) -> Experiment:
+def _with_failures(experiment: PaperExperiment, study: PaperStudy) -> PaperExperiment:
     """With a note for each failure of the runs that it rests on."""
     failed = [
         f"FAILED {cell}: {text.strip().splitlines()[-1]}"

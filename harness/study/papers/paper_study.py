@@ -10,21 +10,21 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.files import TEMPORARY, plain, read_json, write_json
-from harness.core.split import Part
+from harness.core.files import TEMPORARY, read_json, to_json_types, write_json
+from harness.core.split import ClipPart
 from harness.errors import BadInput, HarnessError, was_interrupted
 from harness.experiment import cells, engine
-from harness.experiment.cells import Progress
+from harness.experiment.cells import ProgressCallback
 from harness.experiment.scenario import Scenario, variants
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
 from harness.results.storage import read_summary
 
-_LOCK = "study.json"
+_IDENTITY_FILE = "study.json"
 
 
 @dataclass(frozen=True)
-class Study:
+class PaperStudy:
     """What an experiment reads its results from."""
 
     out: Path
@@ -42,10 +42,10 @@ class Study:
 
         Columns are those of `summary.csv`, such as method, inputs, behaviour, performer, clip and varied.
         """
-        summary, wanted = self.out / run / "summary.json", plain(where)
+        summary, wanted = self.out / run / "summary.json", to_json_types(where)
         if run not in self.runs or not summary.is_file():
             return []
-        rows = _rows(summary.parent, summary.stat().st_mtime_ns)
+        rows = _summary_rows(summary.parent, summary.stat().st_mtime_ns)
         return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
 
     def cells(self, run: str, **where: Any) -> Iterator[Cell]:
@@ -65,7 +65,7 @@ class Study:
 
 
 @lru_cache(maxsize=16)
-def _rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
+def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
     """Of a summary as it was written then; experiments ask for it again and again."""
     rows: list[dict[str, Any]] = read_summary(run)["cells"]
     return rows
@@ -77,41 +77,41 @@ def open_study(out: Path, identity: Mapping[str, Any]) -> None:
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out} is a file.", "Name a folder with --out.")
     held = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
-    if _LOCK in held:
-        found, mine = read_json(out / _LOCK, "what a study is"), plain(identity)
+    if _IDENTITY_FILE in held:
+        found, mine = read_json(out / _IDENTITY_FILE, "what a study is"), to_json_types(identity)
         if differences := [f"{k}: {found.get(k)}, not {mine.get(k)}" for k in mine if found.get(k) != mine[k]]:
             raise BadInput(f"{out} holds another study ({'; '.join(differences)}).", advice)
     elif held:
         raise BadInput(f"{out} holds files that are no study ({', '.join(sorted(held)[:3])}).", advice)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_json(out / _LOCK, identity)  # first: without it a folder is no study
+        write_json(out / _IDENTITY_FILE, identity)  # first: without it a folder is no study
     except OSError as error:
         raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
 
 
-def check_runs(runs: Mapping[str, Scenario], folder: Path | None) -> None:
+def check_run_names(runs: Mapping[str, Scenario], folder: Path | None) -> None:
     """That everything exists which the runs name; BadInput, UnknownName. Hours of work are not begun in vain."""
     for scenario in runs.values():
-        parts = [Part.parse(text) for text in scenario.motion.test]
+        parts = [ClipPart.parse(text) for text in scenario.motion.test]
         for _, made in variants(scenario):
-            cells.check_names(made, cells.source_of(made.motion, folder, made.seed), parts)
+            cells.check_names(made, cells.open_scenario_motion(made.motion, folder, made.seed), parts)
 
 
-def run_experiments(
+def run_scenarios(
     runs: Mapping[str, Scenario],
     out: Path,
     *,
     folder: Path | None = None,
     jobs: int = 1,
     command: str = "",
-    progress: Progress = lambda cell, done, planned: None,
+    progress: ProgressCallback = lambda cell, done, planned: None,
 ) -> dict[str, str]:
     """Run each scenario into the folder of its name below `out`; what is finished is kept. "run: cell" -> failure.
 
     A cell that fails stops no other, a run that is refused no other run.
     """
-    planned, before, failures = planned_cells(runs), 0, dict[str, str]()
+    planned, before, failures = count_cells(runs), 0, dict[str, str]()
     for name, scenario in runs.items():
 
         def told(cell: str, done: int, _: int, name: str = name, before: int = before) -> None:
@@ -129,11 +129,11 @@ def run_experiments(
         if name not in failures:
             failed: Mapping[str, str] = read_summary(place)["failures"]
             failures |= {f"{name}: {cell}": text for cell, text in failed.items()}
-        before += planned_cells({name: scenario})
+        before += count_cells({name: scenario})
     return failures
 
 
-def planned_cells(runs: Mapping[str, Scenario]) -> int:
+def count_cells(runs: Mapping[str, Scenario]) -> int:
     """How many cells all runs have."""
     return sum(
         len(made.motion.test) * len(made.methods) * len(made.inputs)

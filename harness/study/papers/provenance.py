@@ -4,72 +4,83 @@ from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any
 
-from harness.core.split import Part, allowed_frames
-from harness.experiment.cells import source_of
+from harness.core.split import ClipPart, allowed_frames
+from harness.experiment.cells import open_scenario_motion
 from harness.experiment.scenario import Scenario
 from harness.reconstruct import registry
 from harness.results.cell import varied_text
-from harness.results.findings import Table
-from harness.study.papers.paper_study import Study
+from harness.results.findings import FindingsTable
+from harness.study.papers.paper_study import PaperStudy
 
-CHOSEN = "scenarios/tune_*.toml and validate_*.toml, on the real clips that stand there as tests"
+TUNING_SCENARIOS = "scenarios/tune_*.toml and validate_*.toml, on the real clips that stand there as tests"
 
 
-def record(study: Study) -> tuple[Table, ...]:
+def provenance_tables(study: PaperStudy) -> tuple[FindingsTable, ...]:
     """Of the whole study."""
     return (
-        Table("Runs", ("run", "setting", "methods", "inputs", "varied"), tuple(map(_run, study.runs.values()))),
-        Table(
+        FindingsTable(
+            "Runs", ("run", "setting", "methods", "inputs", "varied"), tuple(map(_run_row, study.runs.values()))
+        ),
+        FindingsTable(
             "Clips: judged, and learnt from",
             ("run", "behaviour", "judged", "learnt from, the judged clip left out", "frames learnt from, at most"),
-            tuple(chain.from_iterable(_databases(study, scenario) for scenario in study.runs.values())),
+            tuple(chain.from_iterable(_database_rows(study, scenario) for scenario in study.runs.values())),
         ),
-        Table("Left out", ("run", "what", "why"), tuple(chain.from_iterable(map(_left_out, study.runs.values())))),
-        Table(f"Constants of the methods (chosen by {CHOSEN})", ("method", "constants"), _constants(study)),
+        FindingsTable(
+            "Left out", ("run", "what", "why"), tuple(chain.from_iterable(map(_left_out_rows, study.runs.values())))
+        ),
+        FindingsTable(
+            f"Constants of the methods (chosen by {TUNING_SCENARIOS})",
+            ("method", "constants"),
+            _method_constants(study),
+        ),
     )
 
 
-def _run(scenario: Scenario) -> tuple[str, ...]:
+def _run_row(scenario: Scenario) -> tuple[str, ...]:
     motion = scenario.motion
     setting = (
         f"{motion.source}, protocol {motion.protocol}, body {motion.body}, calibration {scenario.calibration}, "
         f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
         f"stations {', '.join(scenario.wearing)}"
     )
-    varied = [f"{key}: {', '.join(_text(key, value) for value in values)}" for key, values in scenario.vary.items()]
+    varied = [
+        f"{key}: {', '.join(_varied_value_text(key, value) for value in values)}"
+        for key, values in scenario.vary.items()
+    ]
     methods, inputs = ", ".join(scenario.methods), ", ".join(scenario.inputs)
     return scenario.name, setting, methods, inputs, "; ".join(varied) or "nothing"
 
 
-def _text(key: str, value: Any) -> str:
+def _varied_value_text(key: str, value: Any) -> str:
     """A varied value alone, as tables have it."""
     return varied_text({key: value}).removeprefix(f"{key}=")
 
 
-def _databases(study: Study, scenario: Scenario) -> Iterator[tuple[str, ...]]:
+def _database_rows(study: PaperStudy, scenario: Scenario) -> Iterator[tuple[str, ...]]:
     motion = scenario.motion
     shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
-    source = source_of(motion, study.library, scenario.seed)
+    source = open_scenario_motion(motion, study.library, scenario.seed)
     for behaviour in dict.fromkeys(shown):
         judged = [clip for clip, what in zip(motion.test, shown, strict=True) if what == behaviour]
         own = motion.database == "behaviour"
         learnt = [name for name in motion.examples if not own or source.behaviour(name) == behaviour]
-        frames = (round(_seconds(study, scenario, name) * scenario.tracker.rate_hz) for name in learnt)
+        frames = (round(_example_duration_s(study, scenario, name) * scenario.tracker.rate_hz) for name in learnt)
         count = motion.thin_to or sum(frames)
         yield scenario.name, behaviour, ", ".join(judged), f"{len(learnt)}: {', '.join(learnt)}", f"{count:,}"
 
 
-def _seconds(study: Study, scenario: Scenario, name: str) -> float:
+def _example_duration_s(study: PaperStudy, scenario: Scenario, name: str) -> float:
     """Of an example, without what is withheld."""
-    clip = source_of(scenario.motion, study.library, scenario.seed).load(Part.parse(name).clip)
-    withheld = map(Part.parse, scenario.motion.withheld)
+    clip = open_scenario_motion(scenario.motion, study.library, scenario.seed).load(ClipPart.parse(name).clip)
+    withheld = map(ClipPart.parse, scenario.motion.withheld)
     return sum(map(len, allowed_frames(withheld, clip.name, len(clip), clip.rate_hz))) / clip.rate_hz
 
 
-def _left_out(scenario: Scenario) -> list[tuple[str, ...]]:
+def _left_out_rows(scenario: Scenario) -> list[tuple[str, ...]]:
     return [(scenario.name, what, why) for what, why in scenario.left_out.items()]
 
 
-def _constants(study: Study) -> tuple[tuple[str, ...], ...]:
+def _method_constants(study: PaperStudy) -> tuple[tuple[str, ...], ...]:
     names: Sequence[str] = list(dict.fromkeys(chain.from_iterable(s.methods for s in study.runs.values())))
     return tuple((name, repr(registry.resolve(name))) for name in names)

@@ -1,21 +1,21 @@
 """Kim et al. 2012, Figs. 4 and 5: hardly any examples, and poses that none of them shows."""
 
-from harness.results.findings import Claim, Experiment, Lines, Table
+from harness.results.findings import Claim, FindingsTable, LineChart, PaperExperiment
 from harness.study.papers.five_stations import (
-    ANYWHERE,
-    BLEND,
-    KERNEL,
+    KERNEL_CCA,
     METHODS,
-    by_method,
+    WEIGHTED_BLEND,
+    WORLD_METRICS,
+    claim_in_run,
     differences,
-    held,
+    errors_by_method,
     method_tables,
     performers,
 )
-from harness.study.papers.paper_study import Study
-from harness.study.papers.tables import by_clip, error_lines, joint_groups, mean_bars, mean_table
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.tables import error_lines, errors_by_clip, errors_by_joint_group, mean_bars, mean_table
 
-FRAMES = {"table_tennis": 31, "walking": 43}
+DATABASE_FRAMES = {"table_tennis": 31, "walking": 43}
 ARM_AND_SPINE = {
     "right arm": ("rclavicle", "rhumerus", "rradius", "rwrist", "rhand"),
     "spine": ("lowerback", "upperback", "thorax"),
@@ -26,35 +26,35 @@ ARM_AND_SPINE = {
 """Bones whose hinges are taken together where the paper's pictures show the right arm and the spine."""
 
 
-def sparse(study: Study) -> Experiment:
+def sparse(study: PaperStudy) -> PaperExperiment:
     """Fig. 4."""
     claims: list[Claim] = []
-    figures: list[Lines] = []
-    tables: list[Table] = []
-    for behaviour, count in FRAMES.items():
+    figures: list[LineChart] = []
+    tables: list[FindingsTable] = []
+    for behaviour, count in DATABASE_FRAMES.items():
         run, shown = f"sparse_{behaviour}", behaviour.replace("_", " ")
         rows = study.rows(run)
         for who in performers(rows) or ("known",):
-            errors = by_method(row for row in rows if row["performer"] == who)
+            errors = errors_by_method(row for row in rows if row["performer"] == who)
             told = f"{shown}, {count} frames, {who} performers" if who == "new" else f"{shown}, {count} frames"
             for less, more in (
-                (KERNEL, BLEND),
-                (KERNEL, "ik"),
-                (KERNEL, "ik:previous"),
-                (f"{KERNEL}[solve=limbs]", f"{BLEND}[solve=limbs]"),
-                (f"{KERNEL}[final_ik=false]", f"{BLEND}[final_ik=false]"),
+                (KERNEL_CCA, WEIGHTED_BLEND),
+                (KERNEL_CCA, "ik"),
+                (KERNEL_CCA, "ik:previous"),
+                (f"{KERNEL_CCA}[solve=limbs]", f"{WEIGHTED_BLEND}[solve=limbs]"),
+                (f"{KERNEL_CCA}[final_ik=false]", f"{WEIGHTED_BLEND}[final_ik=false]"),
             ):
                 text = f"{told}: {less} errs less than {more}"
-                claims.append(held(study, run, text, errors.get(less, {}), errors.get(more, {})))
+                claims.append(claim_in_run(study, run, text, errors.get(less, {}), errors.get(more, {})))
         if rows:
-            tables += method_tables(f"{shown}, {count} frames", rows, ANYWHERE)
+            tables += method_tables(f"{shown}, {count} frames", rows, WORLD_METRICS)
             known = [row for row in rows if row["performer"] == performers(rows)[0]]
             longest = max(known, key=lambda row: int(row["frames_matched"]))["clip"]
             cells = study.cells(run, clip=longest)
             curves = {cell.method: cell for cell in cells if cell.method in METHODS}
             title = f"{shown}, {count} frames: error over time in {longest}, the longest take"
             figures.append(error_lines(title, curves, caption="Mean error of the 48 hinges in every frame."))
-    return Experiment(
+    return PaperExperiment(
         name="sparse",
         title="Extremely sparse databases, frame by frame",
         question=(
@@ -77,23 +77,25 @@ def sparse(study: Study) -> Experiment:
     )
 
 
-def extrapolation(study: Study) -> Experiment:
+def extrapolation(study: PaperStudy) -> PaperExperiment:
     """Fig. 5."""
     run, ends = "extrapolation", "[final_ik=false]"
-    errors = {m: joint_groups(study.cells(run, method=m + ends), ARM_AND_SPINE) for m in (KERNEL, BLEND)}
+    errors = {
+        m: errors_by_joint_group(study.cells(run, method=m + ends), ARM_AND_SPINE) for m in (KERNEL_CCA, WEIGHTED_BLEND)
+    }
     for method in errors:
-        errors[method]["whole body"] = by_clip(study.rows(run, method=method + ends))
+        errors[method]["whole body"] = errors_by_clip(study.rows(run, method=method + ends))
     claims = [
-        held(
+        claim_in_run(
             *(study, run, f"{group}: kernel_cca errs less than weighted_blend"),
-            *(errors[KERNEL][group], errors[BLEND][group]),
+            *(errors[KERNEL_CCA][group], errors[WEIGHTED_BLEND][group]),
         )
         for group in ("right arm", "spine", "whole body")
     ]
-    groups = {group: {method: errors[method][group] for method in errors} for group in errors[KERNEL]}
+    groups = {group: {method: errors[method][group] for method in errors} for group in errors[KERNEL_CCA]}
     title = "Three trackers, 31 frames of table tennis, no final inverse kinematics"
     caption = "Mean error of the hinges of each group."
-    return Experiment(
+    return PaperExperiment(
         name="extrapolation",
         title="Beyond the examples: right arm and spine",
         question=(

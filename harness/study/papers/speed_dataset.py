@@ -10,35 +10,38 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from harness.core.files import content_key
-from harness.core.motion import Take
-from harness.core.split import Part
+from harness.core.motion import BodyMotion
+from harness.core.split import ClipPart
 from harness.experiment import benchmark_clips
-from harness.experiment.benchmark_clips import Trial
-from harness.experiment.cells import source_of
-from harness.experiment.clip_evaluation import Setting
+from harness.experiment.benchmark_clips import BenchmarkClip
+from harness.experiment.cells import open_scenario_motion
+from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import Scenario
 from harness.mocap.library import MotionLibrary
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest
-from harness.study.papers.paper_study import Study
+from harness.study.papers.paper_study import PaperStudy
 
-SECONDS = 12.0
+MAX_TEST_S = 12.0
 """Of each held-out take, at most."""
 
 
 @dataclass(frozen=True, eq=False)
-class Gathered:
+class SpeedDataset:
     """What to learn from, and what to follow."""
 
     learnt: MotionDatabase
-    shown: list[Trial]
+    shown: list[BenchmarkClip]
 
 
-def lacking(study: Study, frames: Mapping[str, int]) -> str:
+def missing_clips(study: PaperStudy, frames: Mapping[str, int]) -> str:
     """Why there is no database of these behaviours, or ""; the built-in performer shows them all."""
     if study.library is None:
         return ""
-    source, test = source_of(benchmark_clips.scenario().motion, study.library, study.seed), judged(study)
+    source, test = (
+        open_scenario_motion(benchmark_clips.load_clean_scenario().motion, study.library, study.seed),
+        list_test_clips(study),
+    )
     names = {
         behaviour: [name for name in source.names() if source.behaviour(name) == behaviour] for behaviour in frames
     }
@@ -47,37 +50,41 @@ def lacking(study: Study, frames: Mapping[str, int]) -> str:
     return f"the library lacks one clip to follow and another to learn from of {', '.join(frames)}"
 
 
-def gathered(study: Study, frames: Mapping[str, int], worn: Scenario, folder: Path) -> Gathered:
+def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], worn: Scenario, folder: Path) -> SpeedDataset:
     """So many frames of each behaviour, and a held-out take of each, as the stations of `worn` read it.
 
     On real motion as many as there are, of clips of every kind where several behaviours are asked for together. Not
-    of what is `lacking`.
+    of what is `missing_clips`.
     """
     if study.library is None:
         makers = [
             take
             for behaviour, count in frames.items()
-            for take in benchmark_clips.makers(count, study.seed, [behaviour])
+            for take in benchmark_clips.make_take_factories(count, study.seed, [behaviour])
         ]
-        takes = [benchmark_clips.held_out(1, study.seed, SECONDS, [behaviour])[0] for behaviour in frames]
-        learnt = built(folder, {"seed": study.seed, "frames": frames}, lambda: makers)
-        return Gathered(learnt, benchmark_clips.trials_of(takes, study.seed, worn))
-    settings, wanted = _settings(study, study.library, frames, worn), sum(frames.values())
+        takes = [
+            benchmark_clips.generate_held_out_takes(1, study.seed, MAX_TEST_S, [behaviour])[0] for behaviour in frames
+        ]
+        learnt = build_database(folder, {"seed": study.seed, "frames": frames}, lambda: makers)
+        return SpeedDataset(learnt, benchmark_clips.simulate_clips(takes, study.seed, worn))
+    settings, wanted = _test_clip_settings(study, study.library, frames, worn), sum(frames.values())
     files = {entry.name: _digest(entry.path) for entry in MotionLibrary(study.library).entries()}
     content = {"files": files, "examples": settings[0].scenario.motion.examples, "frames": wanted}
-    learnt = built(folder, content, lambda: first_frames(settings[0].examples, wanted))
-    return Gathered(learnt, [_trial(setting) for setting in settings])
+    learnt = build_database(folder, content, lambda: truncate_motions(settings[0].examples, wanted))
+    return SpeedDataset(learnt, [_benchmark_clip(setting) for setting in settings])
 
 
-def built(folder: Path, defined_by: object, takes: Callable[[], Iterable[Take | Callable[[], Take]]]) -> MotionDatabase:
+def build_database(
+    folder: Path, defined_by: object, takes: Callable[[], Iterable[BodyMotion | Callable[[], BodyMotion]]]
+) -> MotionDatabase:
     """The database of takes on the common body, in a folder below this one that is named after what defines it."""
     own = folder / content_key({"source": manifest.source_hash(), "defined_by": defined_by})
     if own.is_dir():
         return MotionDatabase.open(own)
-    return MotionDatabase.build(benchmark_clips.body(), takes(), folder=own)
+    return MotionDatabase.build(benchmark_clips.build_common_body(), takes(), folder=own)
 
 
-def first_frames(takes: Iterable[Take], count: int) -> Iterator[Take]:
+def truncate_motions(takes: Iterable[BodyMotion], count: int) -> Iterator[BodyMotion]:
     """Takes up to so many frames together; the last is cut."""
     for take in takes:
         if count <= 0:
@@ -86,39 +93,41 @@ def first_frames(takes: Iterable[Take], count: int) -> Iterator[Take]:
         count -= len(take)
 
 
-def judged(study: Study) -> dict[str, set[str]]:
+def list_test_clips(study: PaperStudy) -> dict[str, set[str]]:
     """Behaviour -> clips that runs of the study judge."""
     found: dict[str, set[str]] = {}
     for scenario in study.runs.values():
         motion = scenario.motion
         shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
         for text, behaviour in zip(motion.test, shown, strict=True):
-            found.setdefault(behaviour, set()).add(Part.parse(text).clip)
+            found.setdefault(behaviour, set()).add(ClipPart.parse(text).clip)
     return found
 
 
-def _settings(study: Study, library: Path, frames: Mapping[str, int], worn: Scenario) -> list[Setting]:
+def _test_clip_settings(
+    study: PaperStudy, library: Path, frames: Mapping[str, int], worn: Scenario
+) -> list[ClipEvaluation]:
     """Of the longest judged clip of each behaviour; none of these is an example."""
-    tables = benchmark_clips.scenario().motion
-    source = source_of(tables, library, study.seed)
+    tables = benchmark_clips.load_clean_scenario().motion
+    source = open_scenario_motion(tables, library, study.seed)
     longest = {
         behaviour: max(sorted(clips), key=lambda clip: source.load(clip).duration_s)
-        for behaviour, clips in judged(study).items()
+        for behaviour, clips in list_test_clips(study).items()
         if behaviour in frames
     }
     others = [name for name in source.names() if name not in longest.values()]
     examples = tuple(name for name in others if len(frames) > 1 or source.behaviour(name) in frames)
-    motion = replace(tables, examples=examples, withheld=(), database="all", longest_s=SECONDS)
+    motion = replace(tables, examples=examples, withheld=(), database="all", longest_s=MAX_TEST_S)
     found = []
     for behaviour, clip in longest.items():
         shown = replace(worn, seed=study.seed, motion=replace(motion, test=(clip,), behaviours=(behaviour,)))
-        found.append(Setting(shown, source, Part(clip), behaviour))
+        found.append(ClipEvaluation(shown, source, ClipPart(clip), behaviour))
     return found
 
 
-def _trial(setting: Setting) -> Trial:
+def _benchmark_clip(setting: ClipEvaluation) -> BenchmarkClip:
     seen = setting.simulation
-    return Trial(setting.part.clip, seen, seen.truth_qpos[seen.frame_index])
+    return BenchmarkClip(setting.part.clip, seen, seen.truth_qpos[seen.frame_index])
 
 
 def _digest(path: Path) -> str:

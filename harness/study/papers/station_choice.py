@@ -3,59 +3,63 @@
 from collections.abc import Iterable, Sequence
 
 from harness.results.cell import Cell
-from harness.results.findings import Experiment, Table
-from harness.study.papers.claims import Errors, errs_less
-from harness.study.papers.five_stations import differences, held
-from harness.study.papers.paper_study import Study
+from harness.results.findings import FindingsTable, PaperExperiment
+from harness.study.papers.claims import Errors, claim_lower_error
+from harness.study.papers.five_stations import claim_in_run, differences
+from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.station_sets import (
-    SHORT,
-    Sets,
-    best_of_its_size,
-    better_than_average,
-    by_set,
-    count_lines,
-    falls_with_each,
-    harder,
-    named,
+    STATION_ABBREVIATIONS,
+    ErrorsBySet,
+    claim_best_of_size,
+    claim_better_than_average,
+    claim_error_decreases,
+    claim_harder,
+    errors_by_set,
+    format_station_set,
     ranked_bars,
     set_table,
+    station_count_lines,
 )
-from harness.study.papers.tables import GROUPS, joint_groups, mean_table
+from harness.study.papers.tables import HINGE_GROUPS, errors_by_joint_group, mean_table
 
-ALL_FIVE, HAND = named(SHORT), "RH"
-SUITED = {"walking": "RA+LA+PEL", "boxing": "RH+LH+PEL"}
+ALL_STATIONS, RIGHT_HAND = format_station_set(STATION_ABBREVIATIONS), "RH"
+PUBLISHED_SETS = {"walking": "RA+LA+PEL", "boxing": "RH+LH+PEL"}
 """The three trackers that the paper calls suitable."""
-_WHY_NOT = {
+_DISAGREEMENT_REASONS = {
     "walking": "the mean counts arms as much as legs: these trackers determine the legs and leave the arms to examples",
     "boxing": "the mean counts legs as much as arms: these trackers leave the legs to examples",
 }
 """See the tables of where sets err."""
-_EASY_WALKS = "the walks are of people whose other walks are learnt from, one much like another; new people's err more"
+_WALKING_NOTE = (
+    "the walks are of people whose other walks are learnt from, one much like another; new people's err more"
+)
 
 
-def sensors(study: Study) -> Experiment:
+def rank_station_sets(study: PaperStudy) -> PaperExperiment:
     """Fig. 3."""
-    rows = {behaviour: study.rows(f"sensors_{behaviour}") for behaviour in SUITED}
-    angles: dict[str, Sets] = {behaviour: by_set(found) for behaviour, found in rows.items()}
-    positions = {behaviour: by_set(found, "mpjpe_mm") for behaviour, found in rows.items()}
+    rows = {behaviour: study.rows(f"sensors_{behaviour}") for behaviour in PUBLISHED_SETS}
+    angles: dict[str, ErrorsBySet] = {behaviour: errors_by_set(found) for behaviour, found in rows.items()}
+    positions = {behaviour: errors_by_set(found, "mpjpe_mm") for behaviour, found in rows.items()}
     claims = []
     for behaviour, other in (("walking", "boxing"), ("boxing", "walking")):
-        sets, suited, theirs = angles[behaviour], SUITED[behaviour], SUITED[other]
+        sets, suited, theirs = angles[behaviour], PUBLISHED_SETS[behaviour], PUBLISHED_SETS[other]
         claims += [
-            best_of_its_size(behaviour, suited, sets, _WHY_NOT[behaviour]),
-            better_than_average(behaviour, suited, sets, _WHY_NOT[behaviour]),
-            errs_less(
+            claim_best_of_size(behaviour, suited, sets, _DISAGREEMENT_REASONS[behaviour]),
+            claim_better_than_average(behaviour, suited, sets, _DISAGREEMENT_REASONS[behaviour]),
+            claim_lower_error(
                 f"{behaviour}: {suited}, called suitable for it, errs less than {theirs}, called so for {other}",
                 sets.get(suited, {}),
                 sets.get(theirs, {}),
-                why=_WHY_NOT[behaviour],
+                why=_DISAGREEMENT_REASONS[behaviour],
             ),
-            falls_with_each(behaviour, sets),
+            claim_error_decreases(behaviour, sets),
         ]
-    walks, bouts = (angles[behaviour].get(ALL_FIVE, {}) for behaviour in ("walking", "boxing"))
-    easy = _EASY_WALKS if study.motion == "cmu" else ""
-    claims.append(harder("with all five, walking is harder than boxing (which has more data)", walks, bouts, easy))
-    return Experiment(
+    walks, bouts = (angles[behaviour].get(ALL_STATIONS, {}) for behaviour in ("walking", "boxing"))
+    easy = _WALKING_NOTE if study.motion == "cmu" else ""
+    claims.append(
+        claim_harder("with all five, walking is harder than boxing (which has more data)", walks, bouts, easy)
+    )
+    return PaperExperiment(
         name="sensors",
         title="Which trackers to wear",
         question=(
@@ -75,10 +79,10 @@ def sensors(study: Study) -> Experiment:
         claims=tuple(claims),
         tables=tuple(
             table
-            for b in SUITED
+            for b in PUBLISHED_SETS
             for table in (
-                _where_it_errs(b, study, f"sensors_{b}", (*SUITED.values(), ALL_FIVE)),
-                set_table(f"{b}: all sets, mean ± sd over clips (clips)", angles[b], positions[b], ALL_FIVE),
+                _body_part_table(b, study, f"sensors_{b}", (*PUBLISHED_SETS.values(), ALL_STATIONS)),
+                set_table(f"{b}: all sets, mean ± sd over clips (clips)", angles[b], positions[b], ALL_STATIONS),
             )
         ),
         figures=(
@@ -86,19 +90,19 @@ def sensors(study: Study) -> Experiment:
                 ranked_bars(
                     f"{b}: mean joint-angle error of kernel_cca, by the trackers worn",
                     angles[b],
-                    f"The paper calls {SUITED[b]} suitable. Intervals are of the mean over clips.",
+                    f"The paper calls {PUBLISHED_SETS[b]} suitable. Intervals are of the mean over clips.",
                 )
-                for b in SUITED
+                for b in PUBLISHED_SETS
             ),
-            count_lines(
+            station_count_lines(
                 "Error against the number of trackers", angles, "Averaged over clips and over all sets of as many."
             ),
         ),
-        runs=tuple(f"sensors_{b}" for b in SUITED),
+        runs=tuple(f"sensors_{b}" for b in PUBLISHED_SETS),
     )
 
 
-def one_tracker(study: Study) -> Experiment:
+def one_station(study: PaperStudy) -> PaperExperiment:
     """The right hand's alone."""
     claims, tables, names = [], [], []
     for behaviour, run in (
@@ -106,13 +110,15 @@ def one_tracker(study: Study) -> Experiment:
         ("boxing", "sensors_boxing"),
         ("walking", "sensors_walking"),
     ):
-        sets = by_set(study.rows(run))
+        sets = errors_by_set(study.rows(run))
         text = f"{behaviour}: five trackers err less than the one on the right hand"
-        claims.append(held(study, run, text, sets.get(ALL_FIVE, {}), sets.get(HAND, {}), published="pictures"))
+        claims.append(
+            claim_in_run(study, run, text, sets.get(ALL_STATIONS, {}), sets.get(RIGHT_HAND, {}), published="pictures")
+        )
         if sets:
             names.append(run)
-            tables.append(_where_it_errs(behaviour, study, run, (HAND, ALL_FIVE)))
-    return Experiment(
+            tables.append(_body_part_table(behaviour, study, run, (RIGHT_HAND, ALL_STATIONS)))
+    return PaperExperiment(
         name="one_tracker",
         title="One tracker on the right hand, or five",
         question=(
@@ -131,18 +137,18 @@ def one_tracker(study: Study) -> Experiment:
     )
 
 
-def _where_it_errs(behaviour: str, study: Study, run: str, sets: Sequence[str]) -> Table:
+def _body_part_table(behaviour: str, study: PaperStudy, run: str, sets: Sequence[str]) -> FindingsTable:
     """Every group of hinges, and the root, with some sets of trackers."""
     groups: dict[str, dict[str, Errors]] = {}
-    worn = {named(row["stations"]): row["stations"] for row in study.rows(run)}
+    worn = {format_station_set(row["stations"]): row["stations"] for row in study.rows(run)}
     for name in sets:
         cells = list(study.cells(run, stations=worn.get(name, [])))
-        for group, errors in joint_groups(cells, GROUPS).items():
+        for group, errors in errors_by_joint_group(cells, HINGE_GROUPS).items():
             groups.setdefault(f"{group} [deg]", {})[name] = errors
         for metric, title in (("root_heading_deg", "root's heading [deg]"), ("root_position_mm", "root [mm]")):
-            groups.setdefault(title, {})[name] = _measured(cells, metric)
+            groups.setdefault(title, {})[name] = _metric_by_clip(cells, metric)
     return mean_table(f"{behaviour}: where it errs", "what", groups)
 
 
-def _measured(cells: Iterable[Cell], metric: str) -> dict[str, float]:
+def _metric_by_clip(cells: Iterable[Cell], metric: str) -> dict[str, float]:
     return {cell.clip: value for cell in cells if (value := cell.metrics[metric]) is not None}

@@ -9,11 +9,11 @@ from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.results.cell import Cell
 from harness.results.expected_orders import METRIC
-from harness.results.findings import Bars, Lines, Table
-from harness.results.summary import GROUP
+from harness.results.findings import BarChart, FindingsTable, LineChart
+from harness.results.summary import GROUP_KEYS
 
-Row = Mapping[str, Any]
-GROUPS = {
+CellRow = Mapping[str, Any]
+HINGE_GROUPS = {
     "trunk": ("lowerback", "upperback", "thorax"),
     "head and neck": ("lowerneck", "upperneck", "head"),
     "shoulders and upper arms": ("lclavicle", "lhumerus", "rclavicle", "rhumerus"),
@@ -24,7 +24,7 @@ GROUPS = {
 """The 48 hinges by the bones they turn."""
 
 
-def by_clip(rows: Iterable[Row], metric: str = METRIC) -> dict[str, float]:
+def errors_by_clip(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, float]:
     """Clip -> error, of rows that differ in nothing but the clip; what was not measured is left out.
 
     BadInput for rows of which two are of one clip, or that are never pooled (see `summary.GROUP`).
@@ -32,7 +32,7 @@ def by_clip(rows: Iterable[Row], metric: str = METRIC) -> dict[str, float]:
     found: dict[str, float] = {}
     kinds: dict[str, Any] = {}
     for row in rows:
-        for name in (*GROUP, "behaviour"):
+        for name in (*GROUP_KEYS, "behaviour"):
             if kinds.setdefault(name, row[name]) != row[name]:
                 raise BadInput(f"Errors of {name} {kinds[name]!r} and {row[name]!r} are not pooled.", "Ask for one.")
         if row["clip"] in found:
@@ -48,7 +48,7 @@ def mean_sd(errors: Mapping[str, float]) -> tuple[float | None, float | None]:
     return float(values.mean()) if len(values) else None, float(values.std(ddof=1)) if len(values) > 1 else None
 
 
-def mean_text(errors: Mapping[str, float], decimals: int = 2) -> str:
+def format_mean(errors: Mapping[str, float], decimals: int = 2) -> str:
     """ "1.23 ± 0.45 (8)": mean, standard deviation over clips, how many."""
     mean, sd = mean_sd(errors)
     if mean is None:
@@ -57,11 +57,11 @@ def mean_text(errors: Mapping[str, float], decimals: int = 2) -> str:
     return f"{mean:.{decimals}f}{spread} ({len(errors)})"
 
 
-def mean_table(title: str, what: str, groups: Mapping[str, Mapping[str, Mapping[str, float]]]) -> Table:
+def mean_table(title: str, what: str, groups: Mapping[str, Mapping[str, Mapping[str, float]]]) -> FindingsTable:
     """Group -> column -> errors by clip, as a row for each group; `what` names the first column."""
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
-    rows = [(group, *(mean_text(each.get(column, {})) for column in columns)) for group, each in groups.items()]
-    return Table(f"{title}: mean ± sd over clips (clips)", (what, *columns), tuple(rows))
+    rows = [(group, *(format_mean(each.get(column, {})) for column in columns)) for group, each in groups.items()]
+    return FindingsTable(f"{title}: mean ± sd over clips (clips)", (what, *columns), tuple(rows))
 
 
 def mean_bars(
@@ -72,11 +72,11 @@ def mean_bars(
     caption: str = "",
     horizontal: bool = False,
     published: Mapping[str, tuple[float | None, ...]] | None = None,
-) -> Bars:
+) -> BarChart:
     """The same as bars: a group for each, a series for each column, standard deviations over clips as spread."""
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
     figures = {column: [mean_sd(each.get(column, {})) for each in groups.values()] for column in columns}
-    return Bars(
+    return BarChart(
         title,
         unit,
         tuple(groups),
@@ -88,7 +88,7 @@ def mean_bars(
     )
 
 
-def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, caption: str = "") -> Lines:
+def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, caption: str = "") -> LineChart:
     """Series -> cell of one and the same clip, as error over time; frames that one has and another has not are gaps."""
     every = sorted({int(k) for cell in cells.values() for k in cell.frame_index[cell.scores.scored]})
     place = {k: i for i, k in enumerate(every)}
@@ -99,10 +99,14 @@ def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, cap
         values[at] = cell.errors[metric][cell.scores.scored]
         time_s[at] = cell.time_s[cell.scores.scored]
         series[name] = tuple(float(v) if np.isfinite(v) else None for v in values)
-    return Lines(title, "time [s]", "mean joint-angle error [deg]", tuple(map(float, time_s)), series, caption=caption)
+    return LineChart(
+        title, "time [s]", "mean joint-angle error [deg]", tuple(map(float, time_s)), series, caption=caption
+    )
 
 
-def joint_groups(cells: Iterable[Cell], groups: Mapping[str, Sequence[str]] = GROUPS) -> dict[str, dict[str, float]]:
+def errors_by_joint_group(
+    cells: Iterable[Cell], groups: Mapping[str, Sequence[str]] = HINGE_GROUPS
+) -> dict[str, dict[str, float]]:
     """Group of hinges -> clip -> mean error [deg], of cells that differ in nothing but the clip."""
     found: dict[str, dict[str, float]] = {name: {} for name in groups}
     for cell in cells:

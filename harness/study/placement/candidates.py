@@ -13,7 +13,7 @@
     around_deg = [0.0, 90.0]
     pair = "together"
 
-What may be worn by itself is a `Unit`: one place, or a mirrored pair.
+What may be worn by itself is a `CandidateGroup`: one place, or a mirrored pair.
 """
 
 import itertools
@@ -22,20 +22,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from harness.body.mounts import Mount, place
+from harness.body.mounts import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
 from harness.experiment.scenario import Station
-from harness.results.placement_findings import Place
+from harness.results.placement_findings import StationPlacement
 
 Pair = Literal["", "each", "together"]
-Unit = tuple[Place, ...]
+CandidateGroup = tuple[StationPlacement, ...]
 """Worn together or not at all."""
-Worn = tuple[Place, ...]
+StationSet = tuple[StationPlacement, ...]
 """A set of trackers, in the order of the candidates."""
-_OTHER: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
-_SIDES: dict[str, Literal["left", "right"]] = {"l": "left", "r": "right"}
+_OPPOSITE_SIDE: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
+_SIDE_BY_PREFIX: dict[str, Literal["left", "right"]] = {"l": "left", "r": "right"}
 
 
 @dataclass(frozen=True)
@@ -53,10 +53,10 @@ class Candidate:
     pair: Pair = ""
     """With its mirror image: `each` by itself, or both `together`."""
 
-    def units(self) -> tuple[Unit, ...]:
+    def units(self) -> tuple[CandidateGroup, ...]:
         """BadInput for a pair in the middle of the body, or a name that says another side than the bone."""
-        side = side_of(self.bone, self.along)
-        one = Place(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
+        side = body_side(self.bone, self.along)
+        one = StationPlacement(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
         if not self.pair:
             return ((one,),)
         if not one.side:
@@ -66,12 +66,12 @@ class Candidate:
         if self.name not in (bare, f"{one.side}_{bare}"):
             raise BadInput(f"Candidate {self.name!r} sits on {self.bone}.", f"Call it {bare!r}: both sides are meant.")
         one = replace(one, name=f"{one.side}_{bare}")
-        both = tuple(sorted((one, mirrored(one)), key=lambda each: each.side, reverse=True))  # the right one first
+        both = tuple(sorted((one, mirror_place(one)), key=lambda each: each.side, reverse=True))  # the right one first
         return (both,) if self.pair == "together" else tuple((each,) for each in both)
 
 
 @dataclass(frozen=True)
-class Grid:
+class CandidateGrid:
     """One [[grid]]: a candidate for each bone, position and angle."""
 
     bones: tuple[str, ...]
@@ -80,43 +80,45 @@ class Grid:
     stand_off_m: float = 0.01
     pair: Pair = ""
 
-    def units(self) -> tuple[Unit, ...]:
+    def units(self) -> tuple[CandidateGroup, ...]:
         found = itertools.product(self.bones, self.along, self.around_deg)
         each = [Candidate(self._name(*at), *at, self.stand_off_m, self.pair).units() for at in found]
         return tuple(itertools.chain.from_iterable(each))
 
     def _name(self, bone: str, along: float, around_deg: float) -> str:
         """Such as "rtibia_50_90", or "tibia_50_90" of a pair: per cent along, degrees around."""
-        sided = bool(self.pair) and other_bone(bone) != bone
+        sided = bool(self.pair) and opposite_bone(bone) != bone
         return f"{bone[1:] if sided else bone}_{100 * along:g}_{around_deg:g}"
 
 
-def side_of(bone: str, along: float) -> Literal["", "left", "right"]:
+def body_side(bone: str, along: float) -> Literal["", "left", "right"]:
     """Of the body; "" in the middle, where the hip bones begin as well."""
     standard_skeleton().index(bone)
-    middle = other_bone(bone) == bone or (bone in ("lhipjoint", "rhipjoint") and along == 0.0)
-    return "" if middle else _SIDES[bone[0]]
+    middle = opposite_bone(bone) == bone or (bone in ("lhipjoint", "rhipjoint") and along == 0.0)
+    return "" if middle else _SIDE_BY_PREFIX[bone[0]]
 
 
-def other_bone(bone: str) -> str:
+def opposite_bone(bone: str) -> str:
     """On the other side; the same in the middle."""
     swapped = {"l": "r", "r": "l"}.get(bone[0], "") + bone[1:]
     return swapped if swapped in standard_skeleton().names else bone
 
 
-def mirrored(one: Place) -> Place:
+def mirror_place(one: StationPlacement) -> StationPlacement:
     """The same place on the other side: the mirror image of a point of the skin is a point of the other's skin.
 
     Angles grow by the right-hand rule about the bone's direction, which a mirror reverses.
     """
-    moved = replace(one, bone=other_bone(one.bone), around_deg=0.0 - one.around_deg)
+    moved = replace(one, bone=opposite_bone(one.bone), around_deg=0.0 - one.around_deg)
     if not one.side:
         return moved
-    other = _OTHER[one.side]
+    other = _OPPOSITE_SIDE[one.side]
     return replace(moved, name=f"{other}_{one.name.removeprefix(f'{one.side}_')}", side=other)
 
 
-def units_of(tables: Iterable[Candidate | Grid], skeleton: Skeleton | None = None) -> tuple[Unit, ...]:
+def make_candidate_groups(
+    tables: Iterable[Candidate | CandidateGrid], skeleton: Skeleton | None = None
+) -> tuple[CandidateGroup, ...]:
     """All that a study may let a performer wear; BadInput names every place without flesh, and names given twice."""
     units = tuple(itertools.chain.from_iterable(table.units() for table in tables))
     places = [one for unit in units for one in unit]
@@ -125,50 +127,50 @@ def units_of(tables: Iterable[Candidate | Grid], skeleton: Skeleton | None = Non
         raise BadInput(f"Candidates called {', '.join(map(repr, twice))} twice.", "Each has a name of its own.")
     if not units:
         raise BadInput("No candidates.", "Name places in [[candidate]] or [[grid]].")
-    if bad := [f"{one.name} ({text})" for one in places if (text := refused(one, skeleton))]:
+    if bad := [f"{one.name} ({text})" for one in places if (text := placement_fault(one, skeleton))]:
         raise BadInput(f"{len(bad)} of {len(places)} candidates cannot be worn: {'; '.join(bad)}", "Leave them out.")
     return units
 
 
-def refused(one: Place, skeleton: Skeleton | None = None) -> str:
+def placement_fault(one: StationPlacement, skeleton: Skeleton | None = None) -> str:
     """Why nobody can wear a tracker there; "" if they can. By default on the standard body."""
     if not 0.0 <= one.along <= 1.0:
         return f"along = {one.along:g}, not from 0 to 1"
     if not 0.0 <= one.stand_off_m < 1.0:
         return f"stand_off_m = {one.stand_off_m:g}, not from 0"
     try:
-        place(skeleton or standard_skeleton(), mount(one))
+        locate_mount(skeleton or standard_skeleton(), to_mount(one))
     except HarnessError as error:
         return error.what if isinstance(error, BadInput) else str(error)
     return ""
 
 
-def mount(one: Place) -> Mount:
+def to_mount(one: StationPlacement) -> Mount:
     return Mount(station_name(one), one.bone, one.along, math.radians(one.around_deg), one.stand_off_m)
 
 
-def station(one: Place) -> Station:
+def to_station(one: StationPlacement) -> Station:
     return Station(one.bone, one.along, one.around_deg, one.stand_off_m)
 
 
-def station_name(one: Place) -> str:
+def station_name(one: StationPlacement) -> str:
     """What the stream calls it: one that was moved keeps its name, and with it its draws of noise."""
     return one.moved_from or one.name
 
 
-def worn(units: Iterable[Unit], order: Sequence[Unit]) -> Worn:
+def station_set(units: Iterable[CandidateGroup], order: Sequence[CandidateGroup]) -> StationSet:
     """The places of some units, each once, in the order of the candidates."""
     taken = set(itertools.chain.from_iterable(units))
     return tuple(one for unit in order for one in unit if one in taken)
 
 
-def chosen(names: Sequence[str], units: Sequence[Unit], where: str) -> tuple[Unit, ...]:
+def select_groups(names: Sequence[str], units: Sequence[CandidateGroup], where: str) -> tuple[CandidateGroup, ...]:
     """The units that these names stand for, () for all: of a place, or "ankle" for both of a pair. BadInput."""
     if not names:
         return tuple(units)
-    found: dict[Unit, None] = {}
+    found: dict[CandidateGroup, None] = {}
     for name in names:
-        meant = [unit for unit in units if any(name in called(one) for one in unit)]
+        meant = [unit for unit in units if any(name in candidate_names(one) for one in unit)]
         if not meant:
             known = ", ".join(one.name for unit in units for one in unit)
             raise BadInput(f"{where} names {name!r}, which is no candidate.", f"Known: {known}.")
@@ -176,7 +178,7 @@ def chosen(names: Sequence[str], units: Sequence[Unit], where: str) -> tuple[Uni
     return tuple(unit for unit in units if unit in found)
 
 
-def called(one: Place) -> Iterator[str]:
+def candidate_names(one: StationPlacement) -> Iterator[str]:
     """Its name, and the name of the pair that it is of."""
     yield one.name
     if one.side:

@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from harness.core.files import content_key, plain
+from harness.core.files import content_key, to_json_types
 from harness.errors import BadInput
-from harness.experiment.cell_scheduler import Cells, planned_cells, run_cells
-from harness.experiment.cells import Progress
-from harness.experiment.executors import Each
+from harness.experiment.cell_scheduler import CellResults, cell_names, run_cells
+from harness.experiment.cells import ProgressCallback
+from harness.experiment.executors import TaskExecutor
 from harness.experiment.scenario import Scenario, variants
-from harness.study.placement.candidates import Worn, station_name
+from harness.study.placement.candidates import StationSet, station_name
 
-FASTEST_HZ = 180.0
+MAX_RATE_HZ = 180.0
 """Of an IS-900 (docs/is900.md)."""
 
 
-def rate_hz(scenario: Scenario, stations: int, link: bool) -> float:
+def link_rate_hz(scenario: Scenario, stations: int, link: bool) -> float:
     """At which so many stations run: the scenario's, and no more than the line carries when that is a constraint.
 
     BadInput when the line cannot carry so many once a second.
@@ -38,33 +38,33 @@ def rate_hz(scenario: Scenario, stations: int, link: bool) -> float:
         raise BadInput(
             f"A line of {tracker.baud} baud carries {stations} stations at {carried_hz:.2f} Hz.", "Wear fewer."
         )
-    return min(tracker.rate_hz, FASTEST_HZ, carried_hz)
+    return min(tracker.rate_hz, MAX_RATE_HZ, carried_hz)
 
 
 @dataclass(frozen=True)
-class Asked:
+class SetRequest:
     """Sets of trackers in one scenario, whose stations are all the candidates."""
 
     scenario: Scenario
-    sets: tuple[Worn, ...]
+    sets: tuple[StationSet, ...]
     link: bool = False
 
 
-Run = Callable[..., Cells]
+RunCells = Callable[..., CellResults]
 
 
 @dataclass
-class Trying:
+class CellCache:
     """Runs what was not tried yet, and remembers what came of it."""
 
     out: Path
     """An opened folder of a study."""
     folder: Path | None
     """The library of real motion."""
-    each: Each
+    each: TaskExecutor
     command: str
-    progress: Progress
-    run: Run = run_cells
+    progress: ProgressCallback
+    run: RunCells = run_cells
     failures: dict[str, str] = field(default_factory=dict)
     """Cell -> why it has no result."""
     planned: int = 0
@@ -74,16 +74,16 @@ class Trying:
     _known: dict[str, set[str]] = field(default_factory=dict)
     """Scenario -> what was varied."""
 
-    def try_all(self, asked: Iterable[Asked]) -> None:
+    def try_all(self, asked: Iterable[SetRequest]) -> None:
         """All at once, so that they share the workers."""
         todo: dict[str, Scenario] = {}
         values: dict[str, dict[str, Any]] = {}
         for one in asked:
             for worn in one.sets:
                 scenario, varied = self._as_varied(one, worn)
-                if _text(varied) not in self._known.get(scenario.name, ()):
+                if _variant_key(varied) not in self._known.get(scenario.name, ()):
                     todo[scenario.name] = scenario
-                    values.setdefault(scenario.name, {})[_text(varied)] = next(iter(varied.values()))
+                    values.setdefault(scenario.name, {})[_variant_key(varied)] = next(iter(varied.values()))
         scenarios = []
         for name, scenario in todo.items():
             key = "worn" if not scenario.worn else "stations"
@@ -99,44 +99,49 @@ class Trying:
         asked_for = {"folder": self.folder, "each": self.each, "command": self.command, "progress": told}
         self._take(scenarios, self.run(scenarios, self.out, **asked_for))
 
-    def errors(self, asked: Asked, metric: str, methods: tuple[str, ...] = ()) -> dict[Worn, dict[str, float | None]]:
+    def errors(
+        self, asked: SetRequest, metric: str, methods: tuple[str, ...] = ()
+    ) -> dict[StationSet, dict[str, float | None]]:
         """Of each set, by clip: the mean over the scenario's methods, or over some of them; None where one of them was
         not measured."""
         self.try_all([asked])
         return {worn: self._errors(asked, worn, metric, methods) for worn in asked.sets}
 
-    def _errors(self, asked: Asked, worn: Worn, metric: str, methods: tuple[str, ...]) -> dict[str, float | None]:
+    def _errors(
+        self, asked: SetRequest, worn: StationSet, metric: str, methods: tuple[str, ...]
+    ) -> dict[str, float | None]:
         scenario, varied = self._as_varied(asked, worn)
         found: dict[str, float | None] = {}
         for clip in scenario.motion.test:
             rows = [
-                self._rows.get((scenario.name, _text(varied), method, clip)) for method in methods or scenario.methods
+                self._rows.get((scenario.name, _variant_key(varied), method, clip))
+                for method in methods or scenario.methods
             ]
             values = [row[metric] if row is not None else None for row in rows]
             measured = [float(value) for value in values if value is not None]
             found[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
         return found
 
-    def _take(self, scenarios: Iterable[Scenario], cells: Cells) -> None:
+    def _take(self, scenarios: Iterable[Scenario], cells: CellResults) -> None:
         """Rows come in planned order, without those of cells that failed."""
         rows = iter(cells.rows)
         for scenario in scenarios:
             each = [
-                (scenario.name, _text(varied), method, clip)
+                (scenario.name, _variant_key(varied), method, clip)
                 for varied, made in variants(scenario)
                 for clip in made.motion.test
                 for method in made.methods
             ]
-            for cell, called in zip(each, planned_cells(scenario), strict=True):
+            for cell, called in zip(each, cell_names(scenario), strict=True):
                 if called not in cells.failures:
                     self._rows[cell] = next(rows)
         self.planned += cells.planned
         self.failures |= cells.failures
 
-    def _as_varied(self, asked: Asked, worn: Worn) -> tuple[Scenario, dict[str, Any]]:
+    def _as_varied(self, asked: SetRequest, worn: StationSet) -> tuple[Scenario, dict[str, Any]]:
         """The scenario that the set is a variant of, and what makes it that: which candidates are worn, or, for places
         that were moved, also where."""
-        rate = rate_hz(asked.scenario, len(worn), asked.link)
+        rate = link_rate_hz(asked.scenario, len(worn), asked.link)
         scenario = replace(asked.scenario, tracker=replace(asked.scenario.tracker, rate_hz=rate), vary={})
         names = [station_name(one) for one in worn]
         moved = {
@@ -148,5 +153,5 @@ class Trying:
         return replace(scenario, name=called), {"stations": moved} if moved else {"worn": names}
 
 
-def _text(varied: Mapping[str, Any]) -> str:
-    return json.dumps(plain(varied), sort_keys=True)
+def _variant_key(varied: Mapping[str, Any]) -> str:
+    return json.dumps(to_json_types(varied), sort_keys=True)

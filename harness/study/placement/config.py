@@ -7,20 +7,26 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.compare.margins import MARGINS
-from harness.core.fields import build, changed
-from harness.core.options import alternatives
-from harness.core.package_data import share_folder
+from harness.core.fields import build, replace_fields
+from harness.core.options import expand_alternatives
+from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario, shipped_placements
 from harness.score.metrics import DEFINITIONS
-from harness.study.placement.candidates import Candidate, Grid, Unit, chosen, units_of
+from harness.study.placement.candidates import (
+    Candidate,
+    CandidateGrid,
+    CandidateGroup,
+    make_candidate_groups,
+    select_groups,
+)
 
-MOST_STATIONS = 12
+MAX_STATIONS = 12
 """Of an IS-900 (docs/is900.md)."""
 
 
 @dataclass(frozen=True)
-class Ablate:
+class AblateOptions:
     """Each unit left out of a set."""
 
     full: tuple[str, ...] = ()
@@ -28,7 +34,7 @@ class Ablate:
 
 
 @dataclass(frozen=True)
-class Add:
+class AddOptions:
     """Each unit added to a set."""
 
     base: tuple[str, ...] = ()
@@ -37,7 +43,7 @@ class Add:
 
 
 @dataclass(frozen=True)
-class Greedy:
+class GreedyOptions:
     """One unit after another, each time the one that helps most."""
 
     most: int
@@ -47,7 +53,7 @@ class Greedy:
 
 
 @dataclass(frozen=True)
-class Exhaustive:
+class ExhaustiveOptions:
     """Every set."""
 
     most: int
@@ -59,7 +65,7 @@ class Exhaustive:
 
 
 @dataclass(frozen=True)
-class Refine:
+class RefineOptions:
     """The stations of a set moved along and around their bones, step by step."""
 
     set: tuple[str, ...] = ()
@@ -73,7 +79,7 @@ class Refine:
 
 
 @dataclass(frozen=True)
-class Condition:
+class ConditionOptions:
     """The same sets of trackers elsewhere."""
 
     name: str
@@ -85,7 +91,7 @@ class Condition:
 
 
 @dataclass(frozen=True)
-class Published:
+class PublishedClaim:
     """That a set suffices: that none of its size serves better, and that all candidates serve hardly better."""
 
     text: str
@@ -123,22 +129,22 @@ class PlacementStudy:
     """To the scenario, such as changes.noise = "clean"; changes.components switches on slipping straps and flesh that
     wobbles."""
     candidate: tuple[Candidate, ...] = ()
-    grid: tuple[Grid, ...] = ()
-    ablate: Ablate | None = None
-    add: Add | None = None
-    greedy: Greedy | None = None
-    exhaustive: Exhaustive | None = None
-    refine: Refine | None = None
-    condition: tuple[Condition, ...] = ()
+    grid: tuple[CandidateGrid, ...] = ()
+    ablate: AblateOptions | None = None
+    add: AddOptions | None = None
+    greedy: GreedyOptions | None = None
+    exhaustive: ExhaustiveOptions | None = None
+    refine: RefineOptions | None = None
+    condition: tuple[ConditionOptions, ...] = ()
     condition_size: int = 3
     """The sets of so many stations that every condition ranks."""
-    claim: tuple[Published, ...] = ()
+    claim: tuple[PublishedClaim, ...] = ()
 
-    def units(self) -> tuple[Unit, ...]:
-        return units_of((*self.candidate, *self.grid))
+    def units(self) -> tuple[CandidateGroup, ...]:
+        return make_candidate_groups((*self.candidate, *self.grid))
 
 
-def find_study(path: Path | str) -> Path:
+def find_placement_study(path: Path | str) -> Path:
     """A file as named, or a shipped study by its bare name."""
     given = Path(path)
     if given.is_file():
@@ -151,9 +157,9 @@ def find_study(path: Path | str) -> Path:
     raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are scenarios/placement_*.toml.")
 
 
-def load_study(path: Path | str) -> PlacementStudy:
+def load_placement_study(path: Path | str) -> PlacementStudy:
     """BadFile and UnknownName name the place."""
-    path = find_study(path)
+    path = find_placement_study(path)
     expected, advice = "a placement study", "See scenarios/placement_walking.toml."
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -164,16 +170,16 @@ def load_study(path: Path | str) -> PlacementStudy:
     content.setdefault("name", path.stem)
     try:
         study = build(PlacementStudy, content, "study")
-        study = replace(study, methods=tuple(name for text in study.methods for name in alternatives(text)))
+        study = replace(study, methods=tuple(name for text in study.methods for name in expand_alternatives(text)))
     except (TypeError, ValueError) as error:
         raise BadFile(path, str(error), expected, advice) from error
-    if fault := _fault(study):
+    if fault := _find_fault(study):
         raise BadFile(path, *fault)
     _check_names(study)
     return study
 
 
-def _fault(study: PlacementStudy) -> tuple[str, str, str] | None:
+def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
     """What types cannot say: what was found, what is expected, what to try."""
     if study.schema != SCHEMA:
         return f"schema {study.schema}", f"schema {SCHEMA}", "This version of the harness reads no other."
@@ -192,8 +198,8 @@ def _fault(study: PlacementStudy) -> tuple[str, str, str] | None:
     if study.refine and min(*study.refine.along, *study.refine.around_deg) <= 0.0:
         return "refine: a step that is not above 0", "steps above 0", "Leave `refine` out, or name larger steps."
     for mode, table in (("greedy", study.greedy), ("exhaustive", study.exhaustive)):
-        if table and not 1 <= table.most <= MOST_STATIONS:
-            return f"{mode}.most = {table.most}", f"1 to {MOST_STATIONS} stations", "An IS-900 has no more."
+        if table and not 1 <= table.most <= MAX_STATIONS:
+            return f"{mode}.most = {table.most}", f"1 to {MAX_STATIONS} stations", "An IS-900 has no more."
     names = [condition.name for condition in study.condition]
     if len(set(names)) < len(names) or not all(names):
         return f"conditions called {', '.join(names)}", "names of their own", "Rename one."
@@ -213,18 +219,18 @@ def _check_names(study: PlacementStudy) -> None:
     for claim in study.claim:
         asked += [(f"the claim {claim.text!r}", claim.set), (f"the claim {claim.text!r}", claim.among)]
     for where, names in asked:
-        found = chosen(names, units, where)
+        found = select_groups(names, units, where)
         if where in ("ablate.full", "add.base", "refine.set") and names:
-            fits(sum(map(len, found)), where)
+            check_station_count(sum(map(len, found)), where)
 
 
-def fits(stations: int, where: str) -> None:
+def check_station_count(stations: int, where: str) -> None:
     """BadInput when nobody can wear so many."""
-    if not 1 <= stations <= MOST_STATIONS:
-        raise BadInput(f"{where}: {stations} stations.", f"An IS-900 has 1 to {MOST_STATIONS}: name some candidates.")
+    if not 1 <= stations <= MAX_STATIONS:
+        raise BadInput(f"{where}: {stations} stations.", f"An IS-900 has 1 to {MAX_STATIONS}: name some candidates.")
 
 
-def base_scenario(study: PlacementStudy, beside: Path, condition: Condition | None = None) -> Scenario:
+def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptions | None = None) -> Scenario:
     """What the trackers are tried in: the scenario with the changes, all candidates as its stations, nothing varied."""
     elsewhere = condition is not None and bool(condition.scenario)
     named = condition.scenario if condition is not None and elsewhere else study.scenario
@@ -241,23 +247,23 @@ def base_scenario(study: PlacementStudy, beside: Path, condition: Condition | No
         ("changes", {} if elsewhere else study.changes),
         (f"changes of {condition.name!r}" if condition else "", condition.changes if condition else {}),
     ):
-        scenario = _with(scenario, content, where)
+        scenario = _apply_changes(scenario, content, where)
     check_scenario(Path(named), scenario)
     return scenario
 
 
-def _with(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
+def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
     if strange := [key for key in ("name", "methods", "inputs", "vary", "worn", "order") if key in content]:
         raise BadInput(f"{where}: {', '.join(strange)}.", "The study has its own.")
     try:
-        return changed(scenario, content, where)
+        return replace_fields(scenario, content, where)
     except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "Values are those that the scenario's own keys may have.") from error
 
 
 def _scenario_file(name: str, beside: Path) -> Path | str:
     """Beside the study, or shipped."""
-    for folder in (beside, share_folder("scenarios")):
+    for folder in (beside, data_folder("scenarios")):
         file = folder / (name if name.endswith(".toml") else f"{name}.toml")
         if file.is_file():
             return file

@@ -8,26 +8,26 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from harness.compare.margins import margin_of
-from harness.core.split import Part
+from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cells import check_names, source_of
+from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario
-from harness.results.placement_findings import Place
+from harness.results.placement_findings import StationPlacement
 from harness.study.placement import published_claims, search
-from harness.study.placement.candidates import Unit, Worn, chosen, worn
-from harness.study.placement.cell_cache import Asked, rate_hz
-from harness.study.placement.config import PlacementStudy, base_scenario, find_study, load_study
+from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.cell_cache import SetRequest, link_rate_hz
+from harness.study.placement.config import PlacementStudy, base_scenario, find_placement_study, load_placement_study
 from harness.study.placement.ranking import Costs
-from harness.study.placement.refinement import refuse_few
-from harness.study.placement.search import stations
+from harness.study.placement.refinement import check_clip_count
+from harness.study.placement.search import names_of_places
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlacementPlan:
     """One study, ready to be done."""
 
     study: PlacementStudy
-    units: tuple[Unit, ...]
+    units: tuple[CandidateGroup, ...]
     scenario: Scenario
     """With the clips on which everything is chosen."""
     held_out: Scenario | None
@@ -42,38 +42,38 @@ class Plan:
         return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
 
     @property
-    def places(self) -> tuple[Place, ...]:
+    def places(self) -> tuple[StationPlacement, ...]:
         return tuple(dict.fromkeys(place for unit in self.units for place in unit))
 
-    def asked(self, scenario: Scenario, sets: Iterable[Worn]) -> Asked:
-        return Asked(scenario, tuple(dict.fromkeys(sets)), self.study.link)
+    def asked(self, scenario: Scenario, sets: Iterable[StationSet]) -> SetRequest:
+        return SetRequest(scenario, tuple(dict.fromkeys(sets)), self.study.link)
 
     def rate_hz(self, size: int) -> float:
         """Of so many stations."""
-        return rate_hz(self.scenario, size, self.study.link)
+        return link_rate_hz(self.scenario, size, self.study.link)
 
-    def known_sets(self) -> list[Worn]:
+    def known_sets(self) -> list[StationSet]:
         """That will be tried whatever comes out: asked for at once they keep all workers busy."""
-        study, found = self.study, list[Worn]()
+        study, found = self.study, list[StationSet]()
         if study.ablate:
-            full, less = search.ablated(study.ablate, self.units)
+            full, less = search.ablation_sets(study.ablate, self.units)
             found += [full, *less.values()]
         if study.add:
-            base, more = search.added(study.add, self.units)
+            base, more = search.addition_sets(study.add, self.units)
             found += [*([base] if base else []), *more.values()]
         if study.exhaustive:
-            found += search.every_set(study.exhaustive, self.units)
+            found += search.exhaustive_sets(study.exhaustive, self.units)
         for claim in study.claim:
-            suited, others, whole = published_claims.sets_of(claim, self.units)
+            suited, others, whole = published_claims.sets_of_claim(claim, self.units)
             found += [suited, *others, whole]
         return list(dict.fromkeys(found))
 
-    def compared(self, tried: Iterable[Worn]) -> list[Worn]:
+    def compared(self, tried: Iterable[StationSet]) -> list[StationSet]:
         """The sets that every condition ranks, those of `exhaustive` if there are; none without another condition."""
         if not self.elsewhere and len(self.study.methods) < 2:
             return []
-        alike = search.every_set(self.study.exhaustive, self.units) if self.study.exhaustive else tried
-        return [one for one in alike if len(one) == self.study.condition_size and not moved(one)]
+        alike = search.exhaustive_sets(self.study.exhaustive, self.units) if self.study.exhaustive else tried
+        return [one for one in alike if len(one) == self.study.condition_size and not is_refined(one)]
 
     def link(self, sizes: Sequence[int]) -> str:
         """In words."""
@@ -91,35 +91,35 @@ class Plan:
         return {clip: None if value is None else self.sign * value for clip, value in errors.items()}
 
 
-def moved(one: Worn) -> bool:
+def is_refined(one: StationSet) -> bool:
     """Whether `refine` moved any of them."""
     return any(place.moved_from for place in one)
 
 
-def plan(path: Path | str, folder: Path | None) -> Plan:
+def plan_placement(path: Path | str, folder: Path | None) -> PlacementPlan:
     """Of a study's TOML file; BadFile, BadInput, UnknownName."""
-    file = find_study(path)
-    study = load_study(file)
+    file = find_placement_study(path)
+    study = load_placement_study(file)
     scenario = base_scenario(study, file.parent)
     elsewhere = {one.name: base_scenario(study, file.parent, one) for one in study.condition}
-    held_out = _held_out(study, scenario)
-    source = source_of(scenario.motion, folder, scenario.seed)
-    made = Plan(study, study.units(), scenario, held_out, elsewhere, source.title)
+    held_out = _held_out_scenario(study, scenario)
+    source = open_scenario_motion(scenario.motion, folder, scenario.seed)
+    made = PlacementPlan(study, study.units(), scenario, held_out, elsewhere, source.title)
     for one in filter(None, (scenario, held_out, *elsewhere.values())):
-        alone = replace(one, worn=stations(worn(made.units[:1], made.units)))
-        parts = [Part.parse(text) for text in one.motion.test]
-        check_names(alone, source_of(one.motion, folder, one.seed), parts)
+        alone = replace(one, worn=names_of_places(station_set(made.units[:1], made.units)))
+        parts = [ClipPart.parse(text) for text in one.motion.test]
+        check_names(alone, open_scenario_motion(one.motion, folder, one.seed), parts)
     if study.exhaustive:
-        search.refuse_absurd(study.exhaustive, made.units, len(scenario.motion.test) * len(scenario.methods))
+        search.check_cell_count(study.exhaustive, made.units, len(scenario.motion.test) * len(scenario.methods))
     if study.refine and study.refine.set:
-        start = worn(chosen(study.refine.set, made.units, "refine.set"), made.units)
-        refuse_few(start, len(scenario.motion.test))
+        start = station_set(select_groups(study.refine.set, made.units, "refine.set"), made.units)
+        check_clip_count(start, len(scenario.motion.test))
     for size in {len(one) for one in made.known_sets()}:
         made.rate_hz(size)
     return made
 
 
-def _held_out(study: PlacementStudy, scenario: Scenario) -> Scenario | None:
+def _held_out_scenario(study: PlacementStudy, scenario: Scenario) -> Scenario | None:
     motion = scenario.motion
     if not study.held_out:
         return None

@@ -9,20 +9,22 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 from harness.results.findings import Claim
-from harness.results.placement_findings import Stations
-from harness.study.papers.claims import errs_less
-from harness.study.placement.candidates import Unit, Worn, chosen, worn
-from harness.study.placement.config import Published
-from harness.study.placement.ranking import Costs, complete, in_order, names
+from harness.results.placement_findings import StationNames
+from harness.study.papers.claims import claim_lower_error
+from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.config import PublishedClaim
+from harness.study.placement.ranking import Costs, complete_sets, join_names, sort_by_cost
 
 
-def sets_of(claim: Published, units: Sequence[Unit]) -> tuple[Worn, list[Worn], Worn]:
+def sets_of_claim(
+    claim: PublishedClaim, units: Sequence[CandidateGroup]
+) -> tuple[StationSet, list[StationSet], StationSet]:
     """The set that suffices, the others of as many stations, and all of the paper's trackers."""
     where = f"the claim {claim.text!r}"
-    of = chosen(claim.among, units, where)
-    suited, whole = worn(chosen(claim.set, units, where), units), worn(of, units)
+    of = select_groups(claim.among, units, where)
+    suited, whole = station_set(select_groups(claim.set, units, where), units), station_set(of, units)
     alike = [
-        worn(each, units)
+        station_set(each, units)
         for n in range(1, len(suited) + 1)
         for each in itertools.combinations(of, n)
         if sum(map(len, each)) == len(suited)
@@ -30,18 +32,18 @@ def sets_of(claim: Published, units: Sequence[Unit]) -> tuple[Worn, list[Worn], 
     return suited, [one for one in alike if one != suited], whole
 
 
-def rival(others: Sequence[Stations], costs: Mapping[Stations, Costs]) -> Stations:
+def best_alternative(others: Sequence[StationNames], costs: Mapping[StationNames, Costs]) -> StationNames:
     """The one that errs least; () of none that was measured."""
-    whole, _ = complete({one: costs[one] for one in others})
-    return next(iter(in_order(whole)), ())
+    whole, _ = complete_sets({one: costs[one] for one in others})
+    return next(iter(sort_by_cost(whole)), ())
 
 
-def judged(
-    claim: Published,
-    suited: Stations,
-    other: Stations,
-    whole: Stations,
-    costs: Mapping[Stations, Costs],
+def evaluate_claim(
+    claim: PublishedClaim,
+    suited: StationNames,
+    other: StationNames,
+    whole: StationNames,
+    costs: Mapping[StationNames, Costs],
     *,
     unit: str,
     judged_on: str,
@@ -52,11 +54,11 @@ def judged(
         for one in (suited, other, whole)
     }
     allowed = {clip: (1.0 + claim.margin) * value for clip, value in found[whole].items()}
-    of_its_size = f"{claim.text}: no other {len(suited)} of them err less (against the best other, {names(other)})"
-    within = f"{claim.text}: {names(suited)} err at most {claim.margin:.0%} more than all {len(whole)}"
+    of_its_size = f"{claim.text}: no other {len(suited)} of them err less (against the best other, {join_names(other)})"
+    within = f"{claim.text}: {join_names(suited)} err at most {claim.margin:.0%} more than all {len(whole)}"
     published = f"said by {claim.source}"
     why = "; ".join(filter(None, (claim.why_not, judged_on)))
     return (
-        errs_less(of_its_size, found[suited], found[other], published=published, unit=unit, why=why),
-        errs_less(within, found[suited], allowed, published=published, unit=unit, why=why),
+        claim_lower_error(of_its_size, found[suited], found[other], published=published, unit=unit, why=why),
+        claim_lower_error(within, found[suited], allowed, published=published, unit=unit, why=why),
     )

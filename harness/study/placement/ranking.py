@@ -5,7 +5,7 @@ the mean; a rank that comparisons leave open is told as a range: with each of th
 flips over clips, the p corrected for their number (Holm 1979), and those surely better and surely worse bound its rank
 (a confidence interval for the rank of each set by itself; Mogstad, Romano, Shaikh and Wilhelm 2024, Inference for ranks
 with applications to mobility across neighbourhoods, Rev. Econ. Stud. 91). The set that comes out best of many on some
-clips is flattered by them: see `crossed`.
+clips is flattered by them: see `cross_validated_cost`.
 """
 
 import math
@@ -13,21 +13,28 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from harness.compare.paired_statistics import FEWEST_CLIPS, interval, paired
+from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, compare_paired
 from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
-from harness.results.placement_findings import Best, Mode, Ranked, Ranking, Stations, Tried
+from harness.results.placement_findings import (
+    BestSet,
+    PlacementMode,
+    RankedSet,
+    Ranking,
+    StationNames,
+    StationSetResult,
+)
 
 Costs = Mapping[str, float | None]
 """Clip -> cost; None where it was not measured."""
 _RESAMPLES = 2000
 
 
-def complete(sets: Mapping[Stations, Costs]) -> tuple[dict[Stations, dict[str, float]], list[str]]:
+def complete_sets(sets: Mapping[StationNames, Costs]) -> tuple[dict[StationNames, dict[str, float]], list[str]]:
     """The sets that were measured on every clip on which any was, and a line about each of the others."""
     clips = sorted({clip for costs in sets.values() for clip, value in costs.items() if value is not None})
-    whole: dict[Stations, dict[str, float]] = {}
+    whole: dict[StationNames, dict[str, float]] = {}
     left_out = []
     for worn, costs in sets.items():
         measured = {clip: value for clip in clips if (value := costs.get(clip)) is not None}
@@ -38,17 +45,17 @@ def complete(sets: Mapping[Stations, Costs]) -> tuple[dict[Stations, dict[str, f
     return whole, left_out
 
 
-def rank(mode: Mode, title: str, sets: Mapping[Stations, Costs], base: Stations = ()) -> Ranking:
-    """Best first; sets that were not measured on every clip are left out (see `complete`)."""
-    whole, _ = complete(sets)
-    order = in_order(whole)
-    better, worse = surely(order, whole)
+def rank_sets(mode: PlacementMode, title: str, sets: Mapping[StationNames, Costs], base: StationNames = ()) -> Ranking:
+    """Best first; sets that were not measured on every clip are left out (see `complete_sets`)."""
+    whole, _ = complete_sets(sets)
+    order = sort_by_cost(whole)
+    better, worse = significant_differences(order, whole)
     rows = []
     for at, worn in enumerate(order):
-        to_best = paired(whole[worn], whole[order[0]])
-        to_last = paired(whole[worn], whole[order[max(at - 1, 0)]])
+        to_best = compare_paired(whole[worn], whole[order[0]])
+        to_last = compare_paired(whole[worn], whole[order[max(at - 1, 0)]])
         rows.append(
-            Ranked(
+            RankedSet(
                 stations=worn,
                 rank=at + 1,
                 rank_low=1 + len(better[at]),
@@ -65,20 +72,20 @@ def rank(mode: Mode, title: str, sets: Mapping[Stations, Costs], base: Stations 
     return Ranking(mode, title, tuple(rows), base)
 
 
-def in_order(whole: Mapping[Stations, Mapping[str, float]]) -> list[Stations]:
+def sort_by_cost(whole: Mapping[StationNames, Mapping[str, float]]) -> list[StationNames]:
     """By mean cost; equal ones by name, so that the order is always the same."""
-    return sorted(whole, key=lambda worn: (mean(whole[worn]), worn))
+    return sorted(whole, key=lambda worn: (mean_cost(whole[worn]), worn))
 
 
-def mean(costs: Mapping[str, float]) -> float:
+def mean_cost(costs: Mapping[str, float]) -> float:
     return math.fsum(costs.values()) / len(costs)
 
 
-def surely(
-    order: Sequence[Stations], whole: Mapping[Stations, Mapping[str, float]]
+def significant_differences(
+    order: Sequence[StationNames], whole: Mapping[StationNames, Mapping[str, float]]
 ) -> tuple[list[set[int]], list[set[int]]]:
     """For each set the places in the order of those that are surely better, and surely worse."""
-    values = _table(order, whole)
+    values = _cost_matrix(order, whole)
     count = len(order)
     p = np.ones((count, count))
     for a in range(count):
@@ -94,63 +101,63 @@ def surely(
     return better, worse
 
 
-def _table(order: Sequence[Stations], whole: Mapping[Stations, Mapping[str, float]]) -> Floats:
+def _cost_matrix(order: Sequence[StationNames], whole: Mapping[StationNames, Mapping[str, float]]) -> Floats:
     """(sets, clips)"""
     clips = sorted(whole[order[0]]) if order else []
     return np.array([[whole[worn][clip] for clip in clips] for worn in order]).reshape(len(order), len(clips))
 
 
-def fewest_clips(comparisons: int) -> int:
+def min_clips(comparisons: int) -> int:
     """So many clips at least before any of so many comparisons can be surely one way: 2 of 2^n flips are as extreme."""
-    return max(FEWEST_CLIPS, math.ceil(1 + math.log2(max(comparisons, 1) / SIGNIFICANCE)))
+    return max(MIN_CLIPS, math.ceil(1 + math.log2(max(comparisons, 1) / SIGNIFICANCE)))
 
 
-def tried(worn: Stations, rate_hz: float, errors: Costs) -> Tried:
+def summarise_set(worn: StationNames, rate_hz: float, errors: Costs) -> StationSetResult:
     """With the interval of the mean where clips suffice."""
     measured = {clip: value for clip, value in errors.items() if value is not None}
-    low, high = interval(np.array(list(measured.values()))) if len(measured) >= FEWEST_CLIPS else (None, None)
-    return Tried(worn, rate_hz, dict(errors), mean(measured) if measured else None, low, high)
+    low, high = bootstrap_interval(np.array(list(measured.values()))) if len(measured) >= MIN_CLIPS else (None, None)
+    return StationSetResult(worn, rate_hz, dict(errors), mean_cost(measured) if measured else None, low, high)
 
 
-def best_of_sizes(sets: Mapping[Stations, Costs], sign: float = 1.0) -> tuple[Best, ...]:
+def best_by_size(sets: Mapping[StationNames, Costs], sign: float = 1.0) -> tuple[BestSet, ...]:
     """For each number of stations the best set, its ties, and whether it is on the front of cost and number.
 
     `sign` -1 tells costs as the metric has them, where high values are good.
     """
-    found: list[Best] = []
+    found: list[BestSet] = []
     least = math.inf
     for size in sorted({len(worn) for worn in sets}):
-        alike, _ = complete({worn: costs for worn, costs in sets.items() if len(worn) == size})
+        alike, _ = complete_sets({worn: costs for worn, costs in sets.items() if len(worn) == size})
         if not alike:
             continue
-        rows = rank("exhaustive", "", alike).rows
+        rows = rank_sets("exhaustive", "", alike).rows
         best, ties = rows[0].stations, tuple(row.stations for row in rows[1:] if row.tied)
-        cost = mean(alike[best])
-        judged = sign * crossed(alike) if len(next(iter(alike.values()))) > 1 else None
-        found.append(Best(best, ties, cost < least, of=len(alike), stays=stays(alike), crossed=judged))
+        cost = mean_cost(alike[best])
+        judged = sign * cross_validated_cost(alike) if len(next(iter(alike.values()))) > 1 else None
+        found.append(BestSet(best, ties, cost < least, of=len(alike), stays=selection_stability(alike), crossed=judged))
         least = min(least, cost)
     return tuple(found)
 
 
-def crossed(whole: Mapping[Stations, Mapping[str, float]]) -> float:
+def cross_validated_cost(whole: Mapping[StationNames, Mapping[str, float]]) -> float:
     """Mean cost on each clip of the set that the other clips would have chosen: a choice judged where it was not made.
 
     Above the mean of the best set by what choosing flatters it (leave-one-out cross-validation).
     """
     order = sorted(whole)
-    values = _table(order, whole)
+    values = _cost_matrix(order, whole)
     others = values.sum(axis=1, keepdims=True) - values
     return float(np.mean(values[np.argmin(others, axis=0), np.arange(values.shape[1])]))
 
 
-def stays(whole: Mapping[Stations, Mapping[str, float]]) -> float:
+def selection_stability(whole: Mapping[StationNames, Mapping[str, float]]) -> float:
     """Share of resamples of the clips in which the best set is still the best."""
-    order = in_order(whole)
-    values = _table(order, whole)
+    order = sort_by_cost(whole)
+    values = _cost_matrix(order, whole)
     draws = generator(0, "placement", "stays").integers(0, values.shape[1], (_RESAMPLES, values.shape[1]))
     return float(np.mean(np.argmin(values[:, draws].mean(axis=2), axis=0) == 0))
 
 
-def names(worn: Iterable[str]) -> str:
+def join_names(worn: Iterable[str]) -> str:
     """Such as "right_hand+pelvis"."""
     return "+".join(worn) or "none"

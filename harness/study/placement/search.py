@@ -11,98 +11,118 @@ from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import Paired, paired
+from harness.compare.paired_statistics import PairedDifference, compare_paired
 from harness.errors import BadInput
-from harness.results.placement_findings import Ranking, Search, Stations, Step, Worth
-from harness.study.placement.candidates import Unit, Worn, chosen, worn
-from harness.study.placement.config import Ablate, Add, Exhaustive, Greedy, fits
-from harness.study.placement.ranking import Costs, complete, in_order, names, rank
+from harness.results.placement_findings import MarginalContribution, PlacementSearch, Ranking, SearchStep, StationNames
+from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
+from harness.study.placement.config import (
+    AblateOptions,
+    AddOptions,
+    ExhaustiveOptions,
+    GreedyOptions,
+    check_station_count,
+)
+from harness.study.placement.ranking import Costs, complete_sets, join_names, rank_sets, sort_by_cost
 
-Measure = Callable[[Sequence[Worn]], Mapping[Worn, Costs]]
+Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
 """Tries sets: what each costs on each clip."""
 
 
 @dataclass(frozen=True)
-class Found:
+class ModeResult:
     """What a mode came to."""
 
     rankings: tuple[Ranking, ...] = ()
-    worth: tuple[Worth, ...] = ()
+    worth: tuple[MarginalContribution, ...] = ()
 
 
-def ablate(table: Ablate, units: Sequence[Unit], measure: Measure) -> Found:
+def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
     """The full set less each unit, and what each is worth there."""
-    full, less = ablated(table, units)
+    full, less = ablation_sets(table, units)
     costs = measure([full, *less.values()])
-    sets = {stations(one): costs[one] for one in less.values()}
-    ranking = rank("ablate", f"{names(stations(full))}: each left out", sets, stations(full))
+    sets = {names_of_places(one): costs[one] for one in less.values()}
+    ranking = rank_sets("ablate", f"{join_names(names_of_places(full))}: each left out", sets, names_of_places(full))
     worth = [
-        _worth(one.name, "ablate", stations(full), paired(_measured(costs[rest]), _measured(costs[full])))
+        _make_worth(
+            one.name,
+            "ablate",
+            names_of_places(full),
+            compare_paired(_measured_costs(costs[rest]), _measured_costs(costs[full])),
+        )
         for unit, rest in less.items()
         for one in unit
     ]
-    return Found((ranking,), tuple(worth))
+    return ModeResult((ranking,), tuple(worth))
 
 
-def ablated(table: Ablate, units: Sequence[Unit]) -> tuple[Worn, dict[Unit, Worn]]:
+def ablation_sets(
+    table: AblateOptions, units: Sequence[CandidateGroup]
+) -> tuple[StationSet, dict[CandidateGroup, StationSet]]:
     """The full set, and unit -> the set without it; BadInput where nothing would be left."""
-    full = chosen(table.full, units, "ablate.full")
-    fits(sum(map(len, full)), "ablate.full")
+    full = select_groups(table.full, units, "ablate.full")
+    check_station_count(sum(map(len, full)), "ablate.full")
     if len(full) < 2:
         raise BadInput("ablate.full is one unit, without which nothing is worn.", "Name two or more.")
-    return worn(full, units), {unit: worn([u for u in full if u != unit], units) for unit in full}
+    return station_set(full, units), {unit: station_set([u for u in full if u != unit], units) for unit in full}
 
 
-def add(table: Add, units: Sequence[Unit], measure: Measure) -> Found:
+def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
     """A base set and each unit, and what each is worth there; without a base each unit alone."""
-    base, more = added(table, units)
+    base, more = addition_sets(table, units)
     costs = measure([*([base] if base else []), *more.values()])
-    sets = {stations(one): costs[one] for one in more.values()}
-    title = f"{names(stations(base))}: each added" if base else "each alone"
+    sets = {names_of_places(one): costs[one] for one in more.values()}
+    title = f"{join_names(names_of_places(base))}: each added" if base else "each alone"
     worth = [
-        _worth(one.name, "add", stations(base), paired(_measured(costs[base]), _measured(costs[both])))
+        _make_worth(
+            one.name,
+            "add",
+            names_of_places(base),
+            compare_paired(_measured_costs(costs[base]), _measured_costs(costs[both])),
+        )
         for unit, both in more.items()
         for one in unit
         if base
     ]
-    return Found((rank("add", title, sets, stations(base)),), tuple(worth))
+    return ModeResult((rank_sets("add", title, sets, names_of_places(base)),), tuple(worth))
 
 
-def added(table: Add, units: Sequence[Unit]) -> tuple[Worn, dict[Unit, Worn]]:
+def addition_sets(
+    table: AddOptions, units: Sequence[CandidateGroup]
+) -> tuple[StationSet, dict[CandidateGroup, StationSet]]:
     """The base, and unit -> the base with it."""
-    base = chosen(table.base, units, "add.base") if table.base else ()
-    of = [unit for unit in chosen(table.of, units, "add.of") if unit not in base]
-    more = {unit: worn([*base, unit], units) for unit in of}
-    fits(max(map(len, more.values()), default=0), "add.of")
-    return worn(base, units), more
+    base = select_groups(table.base, units, "add.base") if table.base else ()
+    of = [unit for unit in select_groups(table.of, units, "add.of") if unit not in base]
+    more = {unit: station_set([*base, unit], units) for unit in of}
+    check_station_count(max(map(len, more.values()), default=0), "add.of")
+    return station_set(base, units), more
 
 
-def exhaustive(table: Exhaustive, units: Sequence[Unit], measure: Measure) -> Found:
+def search_exhaustive(table: ExhaustiveOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
     """Every set of so many stations, ranked by size, and what each unit is worth on average over them."""
-    sets = every_set(table, units)
+    sets = exhaustive_sets(table, units)
     costs = measure(sets)
     sizes = {size: [one for one in sets if len(one) == size] for size in sorted({len(one) for one in sets})}
-    of = chosen(table.of, units, "exhaustive.of")
+    of = select_groups(table.of, units, "exhaustive.of")
     count = sum(map(len, of))
     rankings = [
-        rank("exhaustive", f"{size} of {count} trackers", {stations(one): costs[one] for one in alike})
+        rank_sets("exhaustive", f"{size} of {count} trackers", {names_of_places(one): costs[one] for one in alike})
         for size, alike in sizes.items()
     ]
-    return Found(tuple(rankings), tuple(_average_worth(of, units, costs)))
+    return ModeResult(tuple(rankings), tuple(_shapley_worth(of, units, costs)))
 
 
-def every_set(table: Exhaustive, units: Sequence[Unit]) -> list[Worn]:
+def exhaustive_sets(table: ExhaustiveOptions, units: Sequence[CandidateGroup]) -> list[StationSet]:
     """Of `fewest` to `most` stations, the fewest first."""
-    of = chosen(table.of, units, "exhaustive.of")
+    of = select_groups(table.of, units, "exhaustive.of")
     combined = itertools.chain.from_iterable(itertools.combinations(of, n) for n in range(1, table.most + 1))
-    found = [worn(each, units) for each in combined if table.fewest <= sum(map(len, each)) <= table.most]
+    found = [station_set(each, units) for each in combined if table.fewest <= sum(map(len, each)) <= table.most]
     return sorted(found, key=len)
 
 
-def refuse_absurd(table: Exhaustive, units: Sequence[Unit], cells_each: int) -> None:
+def check_cell_count(table: ExhaustiveOptions, units: Sequence[CandidateGroup], cells_each: int) -> None:
     """BadInput when it would be more cells than the study allows: how many, and about how long."""
-    of = chosen(table.of, units, "exhaustive.of")
-    sets = _count(tuple(map(len, of)), table.fewest, table.most)
+    of = select_groups(table.of, units, "exhaustive.of")
+    sets = _count_sets(tuple(map(len, of)), table.fewest, table.most)
     cells = sets * cells_each
     if not sets:
         raise BadInput(f"exhaustive: no set of {table.fewest} to {table.most} stations.", "Change fewest or most.")
@@ -110,12 +130,12 @@ def refuse_absurd(table: Exhaustive, units: Sequence[Unit], cells_each: int) -> 
         trackers = sum(map(len, of))
         raise BadInput(
             f"exhaustive: {sets:,} sets of up to {table.most} of {trackers} trackers are {cells:,} cells, about "
-            f"{_long(cells)} of one worker at a second each; at most {table.most_cells:,} are run.",
+            f"{_format_duration(cells)} of one worker at a second each; at most {table.most_cells:,} are run.",
             "Lower exhaustive.most, name fewer in exhaustive.of, use [greedy], or raise exhaustive.most_cells.",
         )
 
 
-def _count(sizes: Sequence[int], fewest: int, most: int) -> int:
+def _count_sets(sizes: Sequence[int], fewest: int, most: int) -> int:
     """How many choices of units have so many stations, without listing them."""
     ways = [1] + [0] * most
     for size in sizes:
@@ -124,74 +144,84 @@ def _count(sizes: Sequence[int], fewest: int, most: int) -> int:
     return sum(ways[max(fewest, 1) :])
 
 
-def _long(seconds: float) -> str:
+def _format_duration(seconds: float) -> str:
     for unit, length in (("days", 86400.0), ("hours", 3600.0)):
         if seconds >= 2.0 * length:
             return f"{seconds / length:,.0f} {unit}"
     return f"{seconds / 60.0:,.0f} minutes"
 
 
-def greedy(table: Greedy, units: Sequence[Unit], measure: Measure) -> Search:
+def search_greedy(table: GreedyOptions, units: Sequence[CandidateGroup], measure: Measure) -> PlacementSearch:
     """One unit after another, each time the one with which the mean cost is least."""
-    have = list(chosen(table.base, units, "greedy.base") if table.base else ())
-    of = chosen(table.of, units, "greedy.of")
+    have = list(select_groups(table.base, units, "greedy.base") if table.base else ())
+    of = select_groups(table.of, units, "greedy.of")
     most, title = table.most, f"up to {table.most} trackers, one after another"
-    steps = [Step(stations(worn(have, units)), "")] if have else []
+    steps = [SearchStep(names_of_places(station_set(have, units)), "")] if have else []
     while True:
-        now = worn(have, units)
-        more = {worn([*have, unit], units): unit for unit in of if unit not in have and len(now) + len(unit) <= most}
+        now = station_set(have, units)
+        more = {
+            station_set([*have, unit], units): unit for unit in of if unit not in have and len(now) + len(unit) <= most
+        }
         if not more:
-            return Search("greedy", title, tuple(steps), f"{len(now)} stations; no more fit into {most}")
+            return PlacementSearch("greedy", title, tuple(steps), f"{len(now)} stations; no more fit into {most}")
         costs = measure([*([now] if now else []), *more])
-        whole, _ = complete({stations(one): costs[one] for one in more})
+        whole, _ = complete_sets({names_of_places(one): costs[one] for one in more})
         if not whole:
-            return Search("greedy", title, tuple(steps), "nothing was measured")
-        rows = rank("greedy", "", whole).rows
-        labels = {stations(one): names(place.name for place in unit) for one, unit in more.items()}
-        best = next(one for one in more if stations(one) == rows[0].stations)
-        helps = paired(_measured(costs[now]), _measured(costs[best])) if now else Paired((), None)
+            return PlacementSearch("greedy", title, tuple(steps), "nothing was measured")
+        rows = rank_sets("greedy", "", whole).rows
+        labels = {names_of_places(one): join_names(place.name for place in unit) for one, unit in more.items()}
+        best = next(one for one in more if names_of_places(one) == rows[0].stations)
+        helps = (
+            compare_paired(_measured_costs(costs[now]), _measured_costs(costs[best]))
+            if now
+            else PairedDifference((), None)
+        )
         tied = tuple(labels[row.stations] for row in rows[1:] if row.tied)
         changed = f"+ {labels[rows[0].stations]}"
-        steps.append(Step(rows[0].stations, changed, helps.mean, helps.low, helps.high, tied))
+        steps.append(SearchStep(rows[0].stations, changed, helps.mean, helps.low, helps.high, tied))
         have.append(more[best])
 
 
-def best_tried(size: int, costs: Mapping[Worn, Costs]) -> Worn:
+def best_measured_set(size: int, costs: Mapping[StationSet, Costs]) -> StationSet:
     """Of so many stations; BadInput if none was measured."""
-    alike = {stations(one): one for one in costs if len(one) == size}
-    whole, _ = complete({name: costs[one] for name, one in alike.items()})
+    alike = {names_of_places(one): one for one in costs if len(one) == size}
+    whole, _ = complete_sets({name: costs[one] for name, one in alike.items()})
     if not whole:
         raise BadInput(f"refine: no set of {size} stations was measured.", "Name it in refine.set.")
-    return alike[in_order(whole)[0]]
+    return alike[sort_by_cost(whole)[0]]
 
 
-def stations(one: Worn) -> Stations:
+def names_of_places(one: StationSet) -> StationNames:
     return tuple(place.name for place in one)
 
 
-def _measured(costs: Costs) -> Costs:
+def _measured_costs(costs: Costs) -> Costs:
     return {clip: value for clip, value in costs.items() if value is not None}
 
 
-def _worth(name: str, mode: Literal["ablate", "add", "exhaustive"], base: Stations, found: Paired) -> Worth:
-    return Worth(name, mode, base, found.mean, found.low, found.high, len(found.clips))
+def _make_worth(
+    name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, found: PairedDifference
+) -> MarginalContribution:
+    return MarginalContribution(name, mode, base, found.mean, found.low, found.high, len(found.clips))
 
 
-def _average_worth(units: Sequence[Unit], order: Sequence[Unit], costs: Mapping[Worn, Costs]) -> Iterator[Worth]:
+def _shapley_worth(
+    units: Sequence[CandidateGroup], order: Sequence[CandidateGroup], costs: Mapping[StationSet, Costs]
+) -> Iterator[MarginalContribution]:
     """What adding a unit saves, averaged over the sets it can be added to, those of each size together counting alike:
     Shapley's value, as far as the sets were tried."""
     for unit in units:
-        sizes: dict[int, list[tuple[Worn, Worn]]] = {}
+        sizes: dict[int, list[tuple[StationSet, StationSet]]] = {}
         for one in costs:
-            if not set(unit) & set(one) and (more := worn([one, unit], order)) in costs:
+            if not set(unit) & set(one) and (more := station_set([one, unit], order)) in costs:
                 sizes.setdefault(len(one), []).append((one, more))
-        without = _over([_over([costs[one] for one, _ in pairs]) for pairs in sizes.values()])
-        having = _over([_over([costs[more] for _, more in pairs]) for pairs in sizes.values()])
-        found = paired(without, having)
-        yield from (_worth(one.name, "exhaustive", (), found) for one in unit)
+        without = _mean_by_clip([_mean_by_clip([costs[one] for one, _ in pairs]) for pairs in sizes.values()])
+        having = _mean_by_clip([_mean_by_clip([costs[more] for _, more in pairs]) for pairs in sizes.values()])
+        found = compare_paired(without, having)
+        yield from (_make_worth(one.name, "exhaustive", (), found) for one in unit)
 
 
-def _over(each: Sequence[Costs]) -> dict[str, float | None]:
+def _mean_by_clip(each: Sequence[Costs]) -> dict[str, float | None]:
     """Clip -> mean; None where one of them has none."""
     out: dict[str, float | None] = {}
     for clip in dict.fromkeys(clip for costs in each for clip in costs):

@@ -6,27 +6,27 @@ returns what was seen where the rule holds, and raises `seen.Broken` with what w
 
 from collections.abc import Callable
 
-from harness.testing.contract_case import Trial
+from harness.testing.contract_case import ContractCase
 from harness.testing.rules import degraded_input, reproducibility, semantics, side_effects
 
-Rule = Callable[[Trial], str]
+Rule = Callable[[ContractCase], str]
 RULES: dict[str, Rule] = {
-    "every answer is a pose": degraded_input.answers_are_poses,
-    "poor input is borne": degraded_input.bears_poor_input,
-    "losses are borne": degraded_input.bears_losses,
-    "irregular time is borne": degraded_input.bears_irregular_time,
-    "any quality is borne": degraded_input.bears_any_quality,
-    "any set of stations is borne": degraded_input.wears_other_stations,
+    "every answer is a pose": degraded_input.gives_valid_poses,
+    "poor input is borne": degraded_input.tolerates_partial_readings,
+    "losses are borne": degraded_input.tolerates_dropouts,
+    "irregular time is borne": degraded_input.tolerates_irregular_timing,
+    "any quality is borne": degraded_input.tolerates_any_quality,
+    "any set of stations is borne": degraded_input.supports_other_stations,
     "equal input gives equal answers": reproducibility.is_deterministic,
-    "a session starts from nothing": reproducibility.starts_from_nothing,
-    "sessions do not meet": reproducibility.keeps_sessions_apart,
-    "sessions may run in threads": reproducibility.bears_threads,
-    "what was fitted may go to another process": reproducibility.bears_another_process,
+    "a session starts from nothing": reproducibility.starts_without_history,
+    "sessions do not meet": reproducibility.isolates_sessions,
+    "sessions may run in threads": reproducibility.is_thread_safe,
+    "what was fitted may go to another process": reproducibility.works_in_another_process,
     "an answer rests on no later frame": reproducibility.is_causal,
-    "examples stay as they are": side_effects.leaves_examples_alone,
-    "chance is the generator given": side_effects.leaves_global_chance_alone,
-    "the status tells what the answer rests on": semantics.admits_being_lost,
-    "the error comes back to what it was": semantics.comes_back,
-    "the posture does not depend on the place": semantics.does_not_mind_where,
+    "examples stay as they are": side_effects.preserves_examples,
+    "chance is the generator given": side_effects.preserves_global_random_state,
+    "the status tells what the answer rests on": semantics.reports_tracking_loss,
+    "the error comes back to what it was": semantics.recovers_from_disturbances,
+    "the posture does not depend on the place": semantics.is_invariant_to_placement,
 }
 """What they are called, in the order in which they are tried."""

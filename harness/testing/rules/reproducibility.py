@@ -8,39 +8,47 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
-from harness.core.workers import call_each
+from harness.core.workers import run_in_workers
 from harness.reconstruct.contract import Reconstructor, Session
-from harness.testing.contract_case import FRAMES, Frames, Trial, moved, qpos_of, told, turned
-from harness.testing.rules.assertions import same
+from harness.testing.contract_case import (
+    FRAMES,
+    ContractCase,
+    Frames,
+    offset_positions,
+    rotate_orientations,
+    run_session,
+    stack_qpos,
+)
+from harness.testing.rules.assertions import require_identical
 
 
-def is_deterministic(trial: Trial) -> str:
+def is_deterministic(trial: ContractCase) -> str:
     """The same examples and frames give the same answers."""
-    once, again = (qpos_of(told(trial.begun(1)[0], trial.frames)) for _ in range(2))
-    return same(once, again)
+    once, again = (stack_qpos(run_session(trial.begun(1)[0], trial.frames)) for _ in range(2))
+    return require_identical(once, again)
 
 
-def starts_from_nothing(trial: Trial) -> str:
+def starts_without_history(trial: ContractCase) -> str:
     """A session knows nothing of the one before it."""
     reconstructor = trial.fitted()
-    once, again = (qpos_of(told(reconstructor.begin(trial.calibration), trial.frames)) for _ in range(2))
-    return same(once, again)
+    once, again = (stack_qpos(run_session(reconstructor.begin(trial.calibration), trial.frames)) for _ in range(2))
+    return require_identical(once, again)
 
 
-def keeps_sessions_apart(trial: Trial) -> str:
+def isolates_sessions(trial: ContractCase) -> str:
     """A session knows nothing of one beside it, whose frames run backwards."""
     alone, ours, other = trial.begun(3)
-    plain, beside = qpos_of(told(alone, trial.frames)), []
+    plain, beside = stack_qpos(run_session(alone, trial.frames)), []
     for mine, theirs in zip(trial.frames, reversed(trial.frames), strict=True):
         beside.append(ours.step(mine))
         other.step(theirs)
-    return same(plain, qpos_of(beside))
+    return require_identical(plain, stack_qpos(beside))
 
 
-def bears_threads(trial: Trial) -> str:
+def is_thread_safe(trial: ContractCase) -> str:
     """Two sessions step at the same moment, each in a thread of its own."""
     alone, *both = trial.begun(3)
-    plain = qpos_of(told(alone, trial.frames))
+    plain = stack_qpos(run_session(alone, trial.frames))
     together = threading.Barrier(len(both))
     answers: list[list[Estimate]] = [[] for _ in both]
     errors: list[BaseException] = []
@@ -63,23 +71,23 @@ def bears_threads(trial: Trial) -> str:
         if not isinstance(error, threading.BrokenBarrierError):
             raise error
     for said in answers:
-        same(plain, qpos_of(said))
+        require_identical(plain, stack_qpos(said))
     return "2 threads"
 
 
-def bears_another_process(trial: Trial) -> str:
+def works_in_another_process(trial: ContractCase) -> str:
     """What was fitted is sent to another process, where it answers as it does here."""
     task = trial.fitted(), trial.calibration, trial.frames
-    ((_, there),) = call_each(answers, [task], 1)
-    return same(answers(*task), there.result())
+    ((_, there),) = run_in_workers(estimate_qpos, [task], 1)
+    return require_identical(estimate_qpos(*task), there.result())
 
 
-def is_causal(trial: Trial) -> str:
+def is_causal(trial: ContractCase) -> str:
     """What comes later changes nothing that was said before; answers are read again once all is over."""
     half = FRAMES // 2
     later = [
         replace(
-            turned(moved(frame, np.array([0.3, 0.3, 0.3])), 0.5),
+            rotate_orientations(offset_positions(frame, np.array([0.3, 0.3, 0.3])), 0.5),
             received_s=frame.received_s + 0.1,
             measured_s=frame.measured_s + 0.1,
         )
@@ -90,12 +98,12 @@ def is_causal(trial: Trial) -> str:
     for frame in trial.frames:
         estimates.append(one.step(frame))
         spoken.append(np.array(estimates[-1].qpos))
-    perturbed = qpos_of(told(other, [*trial.frames[:half], *later]))
-    plain = qpos_of(estimates)
-    same(plain[:half], perturbed[:half], "changed by later frames")
-    return same(np.array(spoken), plain, "changed after they were given")
+    perturbed = stack_qpos(run_session(other, [*trial.frames[:half], *later]))
+    plain = stack_qpos(estimates)
+    require_identical(plain[:half], perturbed[:half], "changed by later frames")
+    return require_identical(np.array(spoken), plain, "changed after they were given")
 
 
-def answers(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
+def estimate_qpos(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
     """(F, 55) of a new session."""
-    return qpos_of(told(fitted.begin(calibration), frames))
+    return stack_qpos(run_session(fitted.begin(calibration), frames))

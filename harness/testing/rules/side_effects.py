@@ -5,22 +5,22 @@ import random
 import numpy as np
 
 from harness.core.seeds import generator
-from harness.testing.contract_case import Trial, digest, told
-from harness.testing.rules.assertions import Broken
+from harness.testing.contract_case import ContractCase, hash_motions, run_session
+from harness.testing.rules.assertions import RuleViolation
 
 
-def leaves_examples_alone(trial: Trial) -> str:
+def preserves_examples(trial: ContractCase) -> str:
     """Fitting and following change none of the examples."""
     examples = trial.examples()
-    before = digest(examples)
+    before = hash_motions(examples)
     reconstructor = trial.method.fit(trial.body, examples, generator(1, "fit"))
-    told(reconstructor.begin(trial.calibration), trial.frames[:5])
-    if digest(examples) != before:
-        raise Broken("the examples are others than before")
+    run_session(reconstructor.begin(trial.calibration), trial.frames[:5])
+    if hash_motions(examples) != before:
+        raise RuleViolation("the examples are others than before")
     return f"{len(examples)} takes"
 
 
-def leaves_global_chance_alone(trial: Trial) -> str:
+def preserves_global_random_state(trial: ContractCase) -> str:
     """Chance comes from the generator that `fit` is given: numpy's and Python's own are left alone."""
     numpys = np.random.mtrand._rand
     kept = numpys.get_state(), random.getstate()
@@ -28,9 +28,9 @@ def leaves_global_chance_alone(trial: Trial) -> str:
         numpys.seed(20_110_218)
         random.seed(20_110_218)
         before = repr(numpys.get_state(legacy=False)), random.getstate()
-        told(trial.begun(1)[0], trial.frames[:5])
+        run_session(trial.begun(1)[0], trial.frames[:5])
         if (repr(numpys.get_state(legacy=False)), random.getstate()) != before:
-            raise Broken("a global generator was seeded or drawn from")
+            raise RuleViolation("a global generator was seeded or drawn from")
     finally:
         numpys.set_state(kept[0])
         random.setstate(kept[1])

@@ -10,11 +10,11 @@ import pytest
 
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import Clip
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap.library import MotionLibrary
 from harness.mocap.read import file_checks
-from harness.mocap.read.acclaim import read_amc, read_asf, read_asf_file, read_clip
+from harness.mocap.read.acclaim import read_amc, read_amc_clip, read_asf, read_asf_file
 from tests.mocap.sample_files import UNIT_M, amc_text, asf_text, clip
 
 ASF, AMC = asf_text(standard_skeleton()), amc_text(clip(4))
@@ -37,7 +37,7 @@ def test_a_motion_comes_back(tmp_path: Path, newline: str) -> None:
     motion = clip(wild=True)
     (tmp_path / "91.asf").write_text(ASF)
     (tmp_path / "91_01.amc").write_bytes(amc_text(motion, newline).encode())
-    found = read_clip(tmp_path / "91.asf", tmp_path / "91_01.amc", rate_hz=60.0)
+    found = read_amc_clip(tmp_path / "91.asf", tmp_path / "91_01.amc", rate_hz=60.0)
     _, dofs = found.skeleton.subset(BONES)
     assert (found.name, found.subject, found.rate_hz, len(found)) == ("91_01", "91", 60.0, len(motion))
     np.testing.assert_allclose(found.angles_rad[:, dofs], motion.angles_rad, atol=1e-12)
@@ -242,7 +242,9 @@ def test_every_staged_motion_parses(mocap: Path) -> None:
         assert entry.frames in (None, len(motion)), entry.name
         assert len(motion.skeleton.names) == 30
         some = slice(None, None, 40)
-        pose = forward(motion.skeleton, motion.root_m[some], motion.world_from_root[some], motion.angles_rad[some])
+        pose = forward_kinematics(
+            motion.skeleton, motion.root_m[some], motion.world_from_root[some], motion.angles_rad[some]
+        )
         lowest, highest = pose.end_m[..., 2].min(axis=1), pose.end_m[..., 2].max(axis=1)
         assert -0.2 < float(np.median(lowest)) < 0.7, entry.name
         assert 0.7 < float(np.median(highest - lowest)) < 2.3, entry.name

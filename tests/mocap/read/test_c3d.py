@@ -12,7 +12,7 @@ from harness.core.arrays import Floats
 from harness.errors import BadFile, MissingExtra
 from harness.mocap.library import MotionLibrary
 from harness.mocap.read import c3d, ezc3d_process
-from harness.mocap.read.c3d import marker_spreads, read_c3d
+from harness.mocap.read.c3d import measure_marker_spreads, read_c3d
 
 ezc3d = pytest.importorskip("ezc3d", reason="C3D files need the extra c3d")
 
@@ -104,7 +104,7 @@ def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int) -> None:
 
 def test_a_crash_of_ezc3d_is_an_error_like_any_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _write(tmp_path / "x.c3d", np.ones((3, 3, 3)))
-    for how, found in ((-11, "it crashes"), (ezc3d_process.REFUSED, "ValueError: no")):
+    for how, found in ((-11, "it crashes"), (ezc3d_process.UNREADABLE, "ValueError: no")):
         done = subprocess.CompletedProcess([], how, "", "ValueError: no\n")
         monkeypatch.setattr(subprocess, "run", lambda *args, done=done, **options: done)
         with pytest.raises(BadFile, match=found):
@@ -117,7 +117,7 @@ def test_a_crash_of_ezc3d_is_an_error_like_any_other(tmp_path: Path, monkeypatch
 
 def test_a_file_that_keeps_ezc3d_busy_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     _write(tmp_path / "x.c3d", np.ones((3, 3, 3)))
-    monkeypatch.setattr(c3d, "PATIENCE_S", 0.0)
+    monkeypatch.setattr(c3d, "TIMEOUT_S", 0.0)
     with pytest.raises(BadFile, match="keeps ezc3d busy"):
         read_c3d(tmp_path / "x.c3d")
 
@@ -136,7 +136,7 @@ def test_markers_sit_on_the_bones_of_the_same_take(mocap: Path, name: str) -> No
     markers = read_c3d(mocap / "c3d" / f"{name}.c3d")
     clip = MotionLibrary(mocap).load(name)
     assert (len(markers), markers.rate_hz, markers.unit_m) == (len(clip), clip.rate_hz, 0.001)
-    spreads = marker_spreads(markers, clip)[:41]
+    spreads = measure_marker_spreads(markers, clip)[:41]
     for spread in spreads:
         print(f"{name} {spread.label:<5} {spread.bone:<10} {1000.0 * spread.spread_m:6.1f} mm")
     assert len(spreads) == 41
@@ -154,6 +154,6 @@ def test_the_joints_in_a_c3d_are_those_of_the_amc(mocap: Path) -> None:
     Those of the feet do not: there marker file and AMC of this take disagree by up to 0.1 m.
     """
     markers = read_c3d(mocap / "c3d" / "05_13.c3d")
-    spread = {s.label: s.spread_m for s in marker_spreads(markers, MotionLibrary(mocap).load("05_13"))}
+    spread = {s.label: s.spread_m for s in measure_marker_spreads(markers, MotionLibrary(mocap).load("05_13"))}
     for label in ("LFE0", "RFE0", "LTI0", "RTI0", "LBK0", "TRX0", "HED0", "LHU0", "LHN0"):
         assert spread[label] < 0.001

@@ -8,7 +8,7 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import BONES, standard_skeleton
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap.library import MotionLibrary
 from harness.mocap.read import amass, bvh
@@ -30,7 +30,7 @@ def test_bvh_comes_back_as_angles(tmp_path: Path) -> None:
     assert joint_clip.unit_m == pytest.approx(UNIT_M)
     assert "ASF units" in joint_clip.unit_evidence
     assert bvh.starts_in_t_pose(joint_clip)
-    found = bvh.read_clip(file)
+    found = bvh.read_bvh_clip(file)
     np.testing.assert_allclose(found.angles_rad, motion.angles_rad, atol=1e-6)
     np.testing.assert_allclose(found.root_m, motion.root_m, atol=1e-9)
     kept = [b for b, name in enumerate(BONES) if name not in LEFT_OUT]
@@ -57,7 +57,7 @@ def test_an_unusual_unit_is_not_guessed_but_can_be_given(tmp_path: Path) -> None
 def test_without_a_t_pose_nothing_is_left_out(tmp_path: Path) -> None:
     file = tmp_path / "91_01.bvh"
     file.write_text(bvh_text(clip(), t_pose=False))
-    assert len(bvh.read_clip(file)) == len(clip())
+    assert len(bvh.read_bvh_clip(file)) == len(clip())
 
 
 BVH = bvh_text(clip(3))
@@ -112,7 +112,7 @@ def test_bvh_agrees_with_the_amc_of_the_same_take(mocap: Path, name: str) -> Non
     """Legs to the hundredth of a millimetre; above the upper back nearer to the hips by the thorax's length."""
     amc = MotionLibrary(mocap).load(name)
     joint_clip = bvh.read_bvh(mocap / "bvh" / f"{name}.bvh").cut(1)
-    pose = forward(amc.skeleton, amc.root_m, amc.world_from_root, amc.angles_rad)
+    pose = forward_kinematics(amc.skeleton, amc.root_m, amc.world_from_root, amc.angles_rad)
     at, _ = joint_clip.world()
 
     def apart_m(joint: str, bone: str) -> Floats:
@@ -153,7 +153,7 @@ def test_npz_comes_back_as_angles(tmp_path: Path) -> None:
     motion = clip()
     file = tmp_path / "91_01_poses.npz"
     np.savez(file, allow_pickle=False, **amass_arrays(motion))
-    fit = fit_hinges(amass.read_npz(file), amass.SMPL_MAP)
+    fit = fit_hinges(amass.read_amass(file), amass.SMPL_MAP)
     assert fit.clip.rate_hz == motion.rate_hz
     np.testing.assert_allclose(fit.clip.root_m, motion.root_m, atol=1e-12)
     np.testing.assert_allclose(fit.clip.skeleton.bone_m, standard_skeleton().bone_m)
@@ -163,16 +163,16 @@ def test_npz_comes_back_as_angles(tmp_path: Path) -> None:
         np.testing.assert_allclose(fit.clip.angles_rad[:, where], motion.angles_rad[:, where], atol=1e-6)
     for bone in ("lhand", "rhand", "head"):  # one joint moves two bones there: only the end of the chain is as it was
         assert fit.residual_rad[:, BONES.index(bone)].max() < np.deg2rad(25.0)
-    assert any("mean skeleton" in note for note in amass.read_clip(file).notes)
+    assert any("mean skeleton" in note for note in amass.read_amass_clip(file).notes)
 
 
 def test_smpl_at_rest_is_a_t_with_straight_legs(tmp_path: Path) -> None:
     """Zero pose, facing as SMPL does: arms along the sides' axis, legs straight down, feet forward, no residual."""
     file = tmp_path / "rest.npz"
     np.savez(file, poses=np.zeros((2, 156)), trans=np.zeros((2, 3)), mocap_framerate=60.0)
-    fit = fit_hinges(amass.read_npz(file), amass.SMPL_MAP)
+    fit = fit_hinges(amass.read_amass(file), amass.SMPL_MAP)
     assert fit.residual_rad.max() < np.deg2rad(0.5)
-    pose = forward(fit.clip.skeleton, fit.clip.root_m, fit.clip.world_from_root, fit.clip.angles_rad)
+    pose = forward_kinematics(fit.clip.skeleton, fit.clip.root_m, fit.clip.world_from_root, fit.clip.angles_rad)
     bone = pose.end_m[0] - pose.start_m[0]
     unit = bone / np.linalg.norm(bone, axis=1)[:, None]
     # SMPL's rest pose, turned by no root vector: x left, y up, z forward
@@ -190,7 +190,7 @@ def test_a_bent_elbow_bends_the_elbow(tmp_path: Path) -> None:
     poses[0, 18 * 3 + 1] = -np.deg2rad(80.0)
     file = tmp_path / "bent.npz"
     np.savez(file, poses=poses, trans=np.zeros((1, 3)), mocap_frame_rate=60)
-    fit = fit_hinges(amass.read_npz(file), amass.SMPL_MAP)
+    fit = fit_hinges(amass.read_amass(file), amass.SMPL_MAP)
     elbow = fit.clip.skeleton.dof_of_bone[BONES.index("lradius")]
     np.testing.assert_allclose(np.rad2deg(fit.clip.angles_rad[0, elbow]), 80.0, atol=0.5)
     assert fit.residual_rad.max() < np.deg2rad(0.5)
@@ -216,7 +216,7 @@ def test_a_bad_npz_is_refused(tmp_path: Path, change: dict[str, Floats | None], 
     file = tmp_path / "x.npz"
     np.savez(file, **cast(Any, arrays))  # objects too: what must be refused has to be written first
     with pytest.raises(BadFile) as error:
-        amass.read_npz(file)
+        amass.read_amass(file)
     assert found in str(error.value)
 
 

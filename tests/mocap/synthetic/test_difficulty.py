@@ -6,7 +6,7 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import Clip
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 from harness.mocap import synthetic
 
 STATIONS = {"head": 0.5, "thorax": 0.5, "lhand": 0.5, "rhand": 0.5, "ltibia": 0.9, "rtibia": 0.9}
@@ -18,7 +18,7 @@ def features(clip: Clip, every: int) -> tuple[Floats, Floats]:
     """What six trackers report, relative to the chest's heading (N, 54), and the hinge angles (N, 48) [rad]."""
     frames = slice(None, None, every)
     angles = clip.angles_rad[frames]
-    pose = forward(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], angles)
+    pose = forward_kinematics(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], angles)
     bones = [clip.skeleton.index(bone) for bone in STATIONS]
     share = np.array(list(STATIONS.values()))[:, None]
     position = pose.start_m[:, bones] * (1.0 - share) + pose.end_m[:, bones] * share
@@ -45,7 +45,7 @@ def test_learning_from_other_takes_beats_the_mean_pose_threefold(behaviour: str)
     """Kernel ridge regression from tracker readings to angles, trained on every take but the one it is judged on."""
     takes = {
         (who, take): features(synthetic.generate(behaviour, who, take, seed=7, rate_hz=30.0), 10)
-        for who in synthetic.performers()
+        for who in synthetic.performer_names()
         for take in range(1, 5)
     }
     for judged in JUDGED:

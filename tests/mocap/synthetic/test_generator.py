@@ -10,7 +10,7 @@ import pytest
 from harness.core import humanoid24
 from harness.core.arrays import Bools, Floats
 from harness.core.motion import Clip
-from harness.core.skeleton import Pose, forward
+from harness.core.skeleton import Pose, forward_kinematics
 from harness.errors import BadInput, UnknownName
 from harness.mocap import synthetic
 from harness.mocap.file_inspection import inspect_clip
@@ -27,7 +27,7 @@ on_every_behaviour = pytest.mark.parametrize("behaviour", synthetic.BEHAVIOURS)
 @cache
 def made(behaviour: str, who: str, take: int, seed: int = 7) -> tuple[Clip, Pose]:
     clip = synthetic.generate(behaviour, who, take, seed=seed)
-    return clip, forward(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
+    return clip, forward_kinematics(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
 
 
 def speed_m_s(points: Floats, rate_hz: float) -> Floats:
@@ -98,7 +98,7 @@ def test_unknown_names_are_refused_with_the_choices() -> None:
 
 
 def test_performers_differ_in_proportions_as_people_do() -> None:
-    skeletons = [synthetic.skeleton(who) for who in synthetic.performers()]
+    skeletons = [synthetic.performer_skeleton(who) for who in synthetic.performer_names()]
     standard = humanoid24.standard_skeleton()
     assert len(skeletons) >= 6
     lengths = np.array([s.length_m for s in skeletons])
@@ -112,9 +112,9 @@ def test_performers_differ_in_proportions_as_people_do() -> None:
 
 
 def test_a_population_is_other_people_of_the_same_spread() -> None:
-    many = synthetic.population(400, seed=3)
+    many = synthetic.sample_skeletons(400, seed=3)
     lengths = np.array([person.length_m for person in many])
-    own = np.array([synthetic.skeleton(who).length_m for who in synthetic.performers()])
+    own = np.array([synthetic.performer_skeleton(who).length_m for who in synthetic.performer_names()])
     nearest = np.abs(lengths[:, None] - own).max(axis=-1).min()
     assert nearest > 1e-3, "a performer among them"
     standard = humanoid24.standard_skeleton()
@@ -125,7 +125,7 @@ def test_a_population_is_other_people_of_the_same_spread() -> None:
 
 
 def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
-    few, many, other = (synthetic.population(count, seed) for count, seed in ((3, 5), (9, 5), (3, 6)))
+    few, many, other = (synthetic.sample_skeletons(count, seed) for count, seed in ((3, 5), (9, 5), (3, 6)))
     for one, same in zip(few, many, strict=False):
         np.testing.assert_array_equal(one.bone_m, same.bone_m)
     lengths = np.array([person.length_m for person in (*many, *other)])
@@ -134,7 +134,7 @@ def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
 
 def test_the_performers_are_the_ones_that_results_were_measured_on() -> None:
     """Rounded: the last bit of a sine is the machine's."""
-    bones_m = np.round([synthetic.skeleton(who).bone_m for who in synthetic.performers()], 9) + 0.0
+    bones_m = np.round([synthetic.performer_skeleton(who).bone_m for who in synthetic.performer_names()], 9) + 0.0
     assert blake2b(bones_m.tobytes(), digest_size=8).hexdigest() == "b81940f776d8d094"
 
 
@@ -206,7 +206,9 @@ def test_walkers_turn_both_ways() -> None:
     turned = []
     for who, take in TAKES:
         clip, _ = made("walking", who, take)
-        m = forward(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad).world_from_bone[:, 2, :, 0]
+        m = forward_kinematics(clip.skeleton, clip.root_m, clip.world_from_root, clip.angles_rad).world_from_bone[
+            :, 2, :, 0
+        ]
         heading = np.unwrap(np.arctan2(m[:, 1], m[:, 0]))
         turned += [heading.max() - heading[0], heading.min() - heading[0]]
     assert max(turned) > np.pi / 2

@@ -11,15 +11,15 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
-from harness.core.skeleton import Skeleton, forward
+from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadInput, UnknownName
 from harness.mocap.read.bvh import read_bvh
 from harness.mocap.write.bvh import euler_zyx_deg
 from harness.mocap.write.export import FORMATS, export
 from harness.mocap.write.tum import POINTS
-from harness.score.pair import Pair, posed
+from harness.score.pair import Pair, compute_poses
 from harness.score.positions import root_position_mm
-from harness.testing.score_checks import evo_ape_mean_m, evo_program
+from harness.testing.score_checks import find_evo, run_evo_ape_m
 
 FRAMES, RATE_HZ = 50, 40.0
 SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)
@@ -63,7 +63,7 @@ def cell(rng: np.random.Generator) -> Written:
 
 def joints_m(qpos: Floats, skeleton: Skeleton) -> Floats:
     root_m, quaternion, angles_rad = unpack(qpos)
-    pose = forward(skeleton, root_m, quaternion, angles_rad)
+    pose = forward_kinematics(skeleton, root_m, quaternion, angles_rad)
     return np.concatenate([root_m[:, None], pose.end_m], axis=1)
 
 
@@ -158,22 +158,24 @@ def test_tum_has_a_trajectory_a_point(cell: Written, tmp_path: Path) -> None:
         np.testing.assert_allclose(
             table[:, 1:4], joints_m(cell.estimate_qpos, BELIEVED)[:, NAMES.index(point)], atol=1e-8
         )
-        pose = posed(SKELETON, cell.estimate_qpos)
+        pose = compute_poses(SKELETON, cell.estimate_qpos)
         bone = rotations.from_matrix(pose.world_from_bone[:, SKELETON.index("rfoot")])
         expected = cell.estimate_qpos[:, 3:7] if point == "root" else bone
         assert rotations.angle_between_rad(table[:, [7, 4, 5, 6]], expected).max() < 1e-7
 
 
 def test_evo_finds_our_root_position_error(cell: Written, tmp_path: Path) -> None:
-    program = evo_program()
+    program = find_evo()
     if program is None:
         pytest.skip("evo is not installed (extra dev)")
     files = export([cell], "tum", tmp_path)
     truth, estimate = (next(f for f in files if f.name.endswith(f"{kind}.root.tum")) for kind in ("truth", "estimate"))
-    pair = Pair(posed(SKELETON, cell.truth_qpos), posed(SKELETON, cell.estimate_qpos), cell.frame_index, RATE_HZ)
+    pair = Pair(
+        compute_poses(SKELETON, cell.truth_qpos), compute_poses(SKELETON, cell.estimate_qpos), cell.frame_index, RATE_HZ
+    )
     ours_m = 1e-3 * root_position_mm(pair).mean()
     assert ours_m > 0.1
-    assert evo_ape_mean_m(program, truth, estimate) == pytest.approx(ours_m, abs=6e-7)  # evo prints six digits
+    assert run_evo_ape_m(program, truth, estimate) == pytest.approx(ours_m, abs=6e-7)  # evo prints six digits
 
 
 def test_gaps_and_broken_estimates(cell: Written, tmp_path: Path) -> None:

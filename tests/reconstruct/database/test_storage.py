@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from harness.errors import BadFile
-from harness.reconstruct.database import MotionDatabase, Run
+from harness.reconstruct.database import MotionDatabase, TakeSegment
 
 
 @pytest.fixture
 def database(rng: np.random.Generator) -> MotionDatabase:
-    runs = Run("a", "p1", "here", "walking", 0, 30), Run("b", "p2", "here", "boxing", 30, 50, 7)
+    runs = TakeSegment("a", "p1", "here", "walking", 0, 30), TakeSegment("b", "p2", "here", "boxing", 30, 50, 7)
     return MotionDatabase(
         40.0, rng.normal(size=(50, 52)).astype(np.float32), rng.normal(size=(50, 3)).astype(np.float32), runs
     )

@@ -5,7 +5,7 @@ import pytest
 
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.features.anchor_frame import Bearing
+from harness.reconstruct.features.anchor_frame import HeadingEstimator
 
 EVERY: Bools = np.ones(4, bool)
 
@@ -20,7 +20,7 @@ def stations() -> Floats:
 
 
 def test_a_bearing_tells_the_heading_and_turns_with_the_performer(stations: Floats) -> None:
-    bearing = Bearing.learnt(stations, 3, EVERY)
+    bearing = HeadingEstimator.learnt(stations, 3, EVERY)
     found = bearing.heading_rad(stations)
     assert 0.9 < bearing.told < 1.0
     assert np.sqrt(np.mean(found**2)) < np.deg2rad(15.0)
@@ -29,7 +29,7 @@ def test_a_bearing_tells_the_heading_and_turns_with_the_performer(stations: Floa
 
 
 def test_only_those_asked_count(stations: Floats) -> None:
-    bearing = Bearing.learnt(stations, 3, np.array([True, True, False, True]))
+    bearing = HeadingEstimator.learnt(stations, 3, np.array([True, True, False, True]))
     away = np.array(stations)
     away[:, 2] += 5.0
     np.testing.assert_array_equal(bearing.heading_rad(away), bearing.heading_rad(stations))
@@ -37,4 +37,4 @@ def test_only_those_asked_count(stations: Floats) -> None:
 
 def test_what_lies_all_around_tells_little(stations: Floats) -> None:
     for asked in ([False, False, True, True], [False, False, False, True]):
-        assert Bearing.learnt(stations, 3, np.array(asked)).told < 0.1
+        assert HeadingEstimator.learnt(stations, 3, np.array(asked)).told < 0.1

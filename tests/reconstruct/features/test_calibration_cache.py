@@ -3,13 +3,13 @@
 import threading
 from dataclasses import replace
 
-from harness.reconstruct.features.calibration_cache import WhileWorn
+from harness.reconstruct.features.calibration_cache import CalibrationCache
 
 from .conftest import Scene
 
 
 def test_it_is_made_once_for_each_way_of_wearing(walk: Scene) -> None:
-    kept, made, calibration = WhileWorn[str](), list[str](), walk.calibration
+    kept, made, calibration = CalibrationCache[str](), list[str](), walk.calibration
 
     def make() -> str:
         made.append(f"number {len(made)}")
@@ -22,7 +22,7 @@ def test_it_is_made_once_for_each_way_of_wearing(walk: Scene) -> None:
 
 
 def test_threads_that_wear_them_otherwise_get_their_own(walk: Scene) -> None:
-    kept, together, calibration = WhileWorn[float](), threading.Barrier(2), walk.calibration
+    kept, together, calibration = CalibrationCache[float](), threading.Barrier(2), walk.calibration
     wrong: list[float] = []
 
     def follow(shift_m: float) -> None:

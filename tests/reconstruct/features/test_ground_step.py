@@ -5,10 +5,15 @@ import pytest
 
 from harness.body.kinematics import Kinematics
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import stood
-from harness.reconstruct.features.ground_step import stepped
-from harness.reconstruct.features.station_features import Controls
-from harness.reconstruct.solver.ground_frame import ground_of, moved, posture_of, standing
+from harness.reconstruct.descent import qpos_from_posture
+from harness.reconstruct.features.ground_step import ground_after_step
+from harness.reconstruct.features.station_features import StationFeatures
+from harness.reconstruct.solver.ground_frame import (
+    ground_from_qpos,
+    posture_from_qpos,
+    qpos_from_postures,
+    step_grounds,
+)
 
 from .conftest import Scene
 from .conftest import moved as elsewhere
@@ -18,17 +23,19 @@ from .conftest import moved as elsewhere
 def test_standing_and_stepping(boxing: Scene, yaw_rad: float) -> None:
     qpos = elsewhere(boxing.take.qpos, yaw_rad, (3.0, 1.0, 0.0))[30]
     step = np.array([0.1, -0.2, 0.3])
-    np.testing.assert_allclose(stepped(qpos, step), moved(ground_of(qpos), step), atol=1e-12)
-    posture, ground = posture_of(qpos), ground_of(qpos)
-    np.testing.assert_allclose(stood(posture, ground), standing(posture, ground), atol=1e-12)
+    np.testing.assert_allclose(ground_after_step(qpos, step), step_grounds(ground_from_qpos(qpos), step), atol=1e-12)
+    posture, ground = posture_from_qpos(qpos), ground_from_qpos(qpos)
+    np.testing.assert_allclose(qpos_from_posture(posture, ground), qpos_from_postures(posture, ground), atol=1e-12)
 
 
 def test_readings_of_an_example_are_its_controls(boxing: Scene) -> None:
     """What exact trackers read after a window is what the database says that they would have read."""
     windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, followed=True)
-    controls = Controls(boxing.body, windows, boxing.calibration, 0.3)
+    controls = StationFeatures(boxing.body, windows, boxing.calibration, 0.3)
     qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))
     for row in (0, 40):
         before = int(windows.frames[row])
         placed = controls.worn_at(Kinematics(boxing.body), qpos[before + 1])
-        np.testing.assert_allclose(controls.query(*placed, ground_of(qpos[before])), controls.values[row], atol=1e-5)
+        np.testing.assert_allclose(
+            controls.query(*placed, ground_from_qpos(qpos[before])), controls.values[row], atol=1e-5
+        )

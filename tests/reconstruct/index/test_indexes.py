@@ -7,11 +7,21 @@ import pytest
 
 from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
-from harness.core.workers import call_each
+from harness.core.workers import run_in_workers
 from harness.errors import UnknownName
-from harness.reconstruct.index import Flat, Graph, Index, InvertedFile, KDTree, Table, Vectors, choose, nearest_known
+from harness.reconstruct.index import (
+    ArrayVectors,
+    FlatIndex,
+    Index,
+    InvertedFile,
+    KDTree,
+    NeighbourGraph,
+    Vectors,
+    make_index,
+    nearest_partial,
+)
 
-EXACT: dict[str, Callable[[Vectors], Index]] = {"flat": Flat, "kd_tree": KDTree}
+EXACT: dict[str, Callable[[Vectors], Index]] = {"flat": FlatIndex, "kd_tree": KDTree}
 ALL = EXACT | {"inverted_file": InvertedFile}
 
 
@@ -32,7 +42,7 @@ def truth(values: Singles, query: Singles, count: int) -> tuple[Ints, Singles]:
 @pytest.mark.parametrize("name", EXACT)
 def test_an_exact_index_finds_the_nearest(name: str, rng: np.random.Generator) -> None:
     values = paths(3000, 20)
-    index = EXACT[name](Table(values))
+    index = EXACT[name](ArrayVectors(values))
     for row in rng.integers(0, 3000, 20):
         query = values[row] + rng.normal(0.0, 0.5, 20).astype(np.float32)
         rows, squared = index.nearest(query, 25)
@@ -44,7 +54,7 @@ def test_an_exact_index_finds_the_nearest(name: str, rng: np.random.Generator) -
 @pytest.mark.parametrize("name", ALL)
 def test_most_of_the_nearest_are_found_in_order(name: str, rng: np.random.Generator) -> None:
     values = paths(8000, 30)
-    index, found, spread = ALL[name](Table(values)), [], float(np.sum(np.var(values, axis=0)))
+    index, found, spread = ALL[name](ArrayVectors(values)), [], float(np.sum(np.var(values, axis=0)))
     for row in rng.integers(0, len(values), 50):
         query = values[row] + rng.normal(0.0, 0.05, 30).astype(np.float32)
         rows, squared = index.nearest(query, 50)
@@ -58,7 +68,7 @@ def test_most_of_the_nearest_are_found_in_order(name: str, rng: np.random.Genera
 @pytest.mark.parametrize("name", ALL)
 def test_of_equals_the_lower_row_comes_first(name: str) -> None:
     values = np.repeat(paths(60, 12), 3, axis=0)
-    rows, squared = ALL[name](Table(values)).nearest(values[90], 6)
+    rows, squared = ALL[name](ArrayVectors(values)).nearest(values[90], 6)
     assert rows[:3].tolist() == [90, 91, 92]
     np.testing.assert_array_equal(squared[:3], squared[0])
 
@@ -66,7 +76,7 @@ def test_of_equals_the_lower_row_comes_first(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 def test_a_small_set_is_answered_whole(name: str) -> None:
     values = paths(7, 5)
-    rows, squared = ALL[name](Table(values)).nearest(values[3], 20)
+    rows, squared = ALL[name](ArrayVectors(values)).nearest(values[3], 20)
     assert sorted(rows.tolist()) == list(range(7))
     assert rows[0] == 3
     assert len(squared) == 7
@@ -75,7 +85,7 @@ def test_a_small_set_is_answered_whole(name: str) -> None:
 @pytest.mark.parametrize("name", ALL)
 def test_the_same_vectors_give_the_same_answers(name: str) -> None:
     values = paths(5000, 16)
-    one, other = (ALL[name](Table(values)) for _ in range(2))
+    one, other = (ALL[name](ArrayVectors(values)) for _ in range(2))
     for query in values[::500] + np.float32(0.01):
         for mine, theirs in zip(one.nearest(query, 30), other.nearest(query, 30), strict=True):
             np.testing.assert_array_equal(mine, theirs)
@@ -87,8 +97,8 @@ def answers(index: Index, queries: Singles) -> list[tuple[Ints, Singles]]:
 
 def test_indexes_travel_to_another_process() -> None:
     values = paths(1000, 16)
-    tasks = [(make(Table(values)), values[::250] + np.float32(0.01)) for make in ALL.values()]
-    for which, done in call_each(answers, tasks, 1):
+    tasks = [(make(ArrayVectors(values)), values[::250] + np.float32(0.01)) for make in ALL.values()]
+    for which, done in run_in_workers(answers, tasks, 1):
         for here, there in zip(answers(*tasks[which]), done.result(), strict=True):
             for mine, theirs in zip(here, there, strict=True):
                 np.testing.assert_array_equal(mine, theirs)
@@ -96,18 +106,18 @@ def test_indexes_travel_to_another_process() -> None:
 
 def test_nothing_is_far_away_in_a_set_that_never_varies() -> None:
     values = np.full((500, 9), 3.0, np.float32)
-    rows, _ = Flat(Table(values)).nearest(values[0], 4)
+    rows, _ = FlatIndex(ArrayVectors(values)).nearest(values[0], 4)
     assert rows.tolist() == [0, 1, 2, 3]
     for make in ALL.values():
-        np.testing.assert_allclose(make(Table(values)).nearest(values[0], 4)[1], 0.0, atol=1e-6)
+        np.testing.assert_allclose(make(ArrayVectors(values)).nearest(values[0], 4)[1], 0.0, atol=1e-6)
 
 
 def test_odd_queries_are_answered_or_refused() -> None:
-    same = InvertedFile(Table(np.full((4000, 12), 3.0, np.float32)))
+    same = InvertedFile(ArrayVectors(np.full((4000, 12), 3.0, np.float32)))
     rows, squared = same.nearest(np.full(12, 3.001, np.float32), 8)
     assert len(set(rows.tolist())) == 8
     assert np.all(np.isfinite(squared))
-    index = InvertedFile(Table(paths(4000, 12)))
+    index = InvertedFile(ArrayVectors(paths(4000, 12)))
     rows, squared = index.nearest(np.full(12, 1e20, np.float32), 8)
     assert len(set(rows.tolist())) == 8
     assert np.all(np.isfinite(squared))
@@ -117,11 +127,11 @@ def test_odd_queries_are_answered_or_refused() -> None:
 
 def test_unknown_columns_decide_nothing(rng: np.random.Generator) -> None:
     values = paths(3000, 12)
-    table, known = Table(values), np.array([1.0] * 8 + [0.0] * 4, np.float32)
+    table, known = ArrayVectors(values), np.array([1.0] * 8 + [0.0] * 4, np.float32)
     for row in (10, 1500, 2990):
         query = values[row] + rng.normal(0.0, 0.1, 12).astype(np.float32)
         query[8:] += rng.normal(0.0, 0.5, 4).astype(np.float32)
-        rows, squared = nearest_known(Flat(table), table, query, known, 10)
+        rows, squared = nearest_partial(FlatIndex(table), table, query, known, 10)
         wanted, distances = truth(values[:, :8], query[:8], 10)
         assert len(set(rows.tolist()) & set(wanted.tolist())) >= 8
         assert rows[0] == wanted[0]
@@ -131,27 +141,27 @@ def test_unknown_columns_decide_nothing(rng: np.random.Generator) -> None:
 
 def test_weighing_every_column_alike_is_plain_search() -> None:
     values = paths(2000, 12)
-    index, table = Flat(Table(values)), Table(values)
+    index, table = FlatIndex(ArrayVectors(values)), ArrayVectors(values)
     query = values[700] + np.float32(0.02)
-    weighed = nearest_known(index, table, query, np.ones(12, np.float32), 9)
+    weighed = nearest_partial(index, table, query, np.ones(12, np.float32), 9)
     np.testing.assert_array_equal(weighed[0], index.nearest(query, 9)[0])
 
 
 def test_the_index_is_chosen_by_size_or_by_name() -> None:
-    assert isinstance(choose("auto", Table(paths(500, 107))), Flat)
-    assert isinstance(choose("auto", Table(paths(4000, 12))), KDTree)
-    assert isinstance(choose("auto", Table(paths(4000, 107))), InvertedFile)
-    assert isinstance(choose("auto", Table(paths(4000, 60)), 800), InvertedFile)
-    assert isinstance(choose("flat", Table(paths(4000, 107))), Flat)
+    assert isinstance(make_index("auto", ArrayVectors(paths(500, 107))), FlatIndex)
+    assert isinstance(make_index("auto", ArrayVectors(paths(4000, 12))), KDTree)
+    assert isinstance(make_index("auto", ArrayVectors(paths(4000, 107))), InvertedFile)
+    assert isinstance(make_index("auto", ArrayVectors(paths(4000, 60)), 800), InvertedFile)
+    assert isinstance(make_index("flat", ArrayVectors(paths(4000, 107))), FlatIndex)
     with pytest.raises(UnknownName, match="Did you mean 'kd_tree'"):
-        choose("kdtree", Table(paths(10, 3)))
+        make_index("kdtree", ArrayVectors(paths(10, 3)))
 
 
 def test_a_graph_follows_and_asks_for_everything_when_it_must() -> None:
     values = paths(3000, 12)
     follows = np.append(np.ones(2999, bool), False)
     follows[[999, 1999]] = False
-    graph = Graph(Table(values), follows, Flat(Table(values)))
+    graph = NeighbourGraph(ArrayVectors(values), follows, FlatIndex(ArrayVectors(values)))
     assert graph.links.min() >= 0
     assert graph.links.max() < 3000
     session, found = graph.follow(), []

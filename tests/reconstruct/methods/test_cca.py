@@ -51,41 +51,41 @@ def test_correlations_and_answer_are_those_of_the_problem_as_written(rng: np.ran
     x, y, new = planted(rng)
     h, f, k = grams(x, y, new)
     correlations, answer = as_written(h, f, k, y, 6, held)
-    np.testing.assert_allclose(cca.correlations(h, f, bases=6, kappa=KAPPA), correlations, atol=1e-9)
-    np.testing.assert_allclose(cca.weights(h, f, k, 6, KAPPA, held) @ y, answer, atol=1e-9)
+    np.testing.assert_allclose(cca.canonical_correlations(h, f, bases=6, kappa=KAPPA), correlations, atol=1e-9)
+    np.testing.assert_allclose(cca.weights_from_kernels(h, f, k, 6, KAPPA, held) @ y, answer, atol=1e-9)
 
 
 def test_a_planted_linear_system_comes_back(rng: np.random.Generator) -> None:
     x, new = rng.normal(size=(PAIRS, 4)), rng.normal(size=4)
     linear, offset = rng.normal(size=(4, 6)), rng.normal(size=6)
     y = x @ linear + offset
-    weights = cca.weights(x @ x.T, y @ y.T, x @ new, 4, KAPPA, False)
+    weights = cca.weights_from_kernels(x @ x.T, y @ y.T, x @ new, 4, KAPPA, False)
     np.testing.assert_allclose(weights @ y, new @ linear + offset, atol=1e-9)
 
 
 def test_weights_sum_to_one_and_unite_at_an_example_when_nothing_is_held_back(rng: np.random.Generator) -> None:
     x, y, _ = planted(rng)
     h, f, k = grams(x, y, x[3])
-    np.testing.assert_allclose(cca.weights(h, f, k, 3, KAPPA, True).sum(), 1.0, atol=1e-12)
-    np.testing.assert_allclose(cca.weights(h, f, k, PAIRS, 1e-13, True), np.eye(PAIRS)[3], atol=1e-9)
+    np.testing.assert_allclose(cca.weights_from_kernels(h, f, k, 3, KAPPA, True).sum(), 1.0, atol=1e-12)
+    np.testing.assert_allclose(cca.weights_from_kernels(h, f, k, PAIRS, 1e-13, True), np.eye(PAIRS)[3], atol=1e-9)
 
 
 def test_without_regularisation_every_direction_correlates_fully(rng: np.random.Generator) -> None:
     x, y, new = planted(rng)
     h, f, _ = grams(x, y, new)
-    np.testing.assert_allclose(cca.correlations(h, f, bases=PAIRS, kappa=1e-13), 1.0, atol=1e-9)
-    assert cca.correlations(h, f, bases=PAIRS, kappa=KAPPA)[-1] < 0.9
+    np.testing.assert_allclose(cca.canonical_correlations(h, f, bases=PAIRS, kappa=1e-13), 1.0, atol=1e-9)
+    assert cca.canonical_correlations(h, f, bases=PAIRS, kappa=KAPPA)[-1] < 0.9
 
 
 def test_two_pairs_are_enough() -> None:
     gram = np.array([[1.0, 0.2], [0.2, 1.0]])
-    weights = cca.weights(gram, gram, np.array([1.0, 0.2]), 6, 1e-13, True)
+    weights = cca.weights_from_kernels(gram, gram, np.array([1.0, 0.2]), 6, 1e-13, True)
     np.testing.assert_allclose(weights, [1.0, 0.0], atol=1e-9)
 
 
 def test_pairs_that_are_the_same_are_refused() -> None:
     with pytest.raises(ArithmeticError, match="same"):
-        cca.weights(np.ones((3, 3)), np.eye(3), np.ones(3), 2, KAPPA, True)
+        cca.weights_from_kernels(np.ones((3, 3)), np.eye(3), np.ones(3), 2, KAPPA, True)
 
 
 def test_distances_are_pairwise(rng: np.random.Generator) -> None:
@@ -97,8 +97,8 @@ def test_distances_are_pairwise(rng: np.random.Generator) -> None:
 def test_the_whole_regression_is_that_of_its_kernels(rng: np.random.Generator) -> None:
     x, y, new = planted(rng)
     h, f, k = grams(x, y, new)
-    expected = cca.weights(h, f, k, 6, KAPPA, True)
-    found = cca.regressed(x, new, y, 0.7, 6, KAPPA, True)
+    expected = cca.weights_from_kernels(h, f, k, 6, KAPPA, True)
+    found = cca.regression_weights(x, new, y, 0.7, 6, KAPPA, True)
     np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
@@ -106,7 +106,7 @@ def test_the_whole_regression_is_that_of_its_kernels(rng: np.random.Generator) -
 def test_eigenvectors_are_those_of_the_matrix(rng: np.random.Generator, size: int) -> None:
     half = rng.normal(size=(size, max(size // 2, 1)))  # half of the values are 0
     matrix = half @ half.T
-    values, rows = cca.eigen(matrix.copy())
+    values, rows = cca.symmetric_eigen(matrix.copy())
     np.testing.assert_allclose(np.sort(values), np.linalg.eigvalsh(matrix), atol=1e-12)
     np.testing.assert_allclose(rows @ rows.T, np.eye(size), atol=1e-12)
     np.testing.assert_allclose((rows.T * values) @ rows, matrix, atol=1e-12)
@@ -116,6 +116,6 @@ def test_eigenvectors_are_those_of_the_matrix(rng: np.random.Generator, size: in
 @pytest.mark.parametrize("value", [0.0, 1e-200, 0.3, 1.0])
 def test_eigenvectors_of_next_to_nothing_are_numbers(size: int, value: float) -> None:
     """What reflections leave of a matrix of rank 1 falls below what squares can hold."""
-    values, rows = cca.eigen(np.full((size, size), value))
+    values, rows = cca.symmetric_eigen(np.full((size, size), value))
     np.testing.assert_allclose(np.sort(values)[-1], size * value, rtol=1e-9, atol=1e-140)
     np.testing.assert_allclose(rows @ rows.T, np.eye(size), atol=1e-9)

@@ -7,13 +7,13 @@ import pytest
 
 from harness.core.arrays import Floats
 from harness.core.estimate import Estimate, Status
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods.dynamic_map import LITERAL, DynamicMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.stream.frame import TrackerFrame
-from harness.testing.frames import exact_frames, without
+from harness.testing.frames import drop_stations, exact_frames
 
 from .conftest import Scene, moved
 
@@ -62,7 +62,7 @@ def test_the_same_frames_give_the_same_bytes(walk: Scene, method: Method) -> Non
 
 @pytest.mark.parametrize("method", BOTH)
 def test_examples_of_some_length_are_needed(walk: Scene, method: Method) -> None:
-    short = Take("a", "b", "c", "walking", 40.0, walk.take.qpos[:2])
+    short = BodyMotion("a", "b", "c", "walking", 40.0, walk.take.qpos[:2])
     for examples in ([], [short]):
         with pytest.raises(BadInput, match=r"examples of more than [23] frames"):
             method.fit(walk.body, examples, np.random.default_rng(0))
@@ -71,7 +71,7 @@ def test_examples_of_some_length_are_needed(walk: Scene, method: Method) -> None
 @pytest.mark.parametrize("method", BOTH)
 @pytest.mark.parametrize("lost", [[0], [4], [0, 1, 2, 3, 4, 5]])
 def test_back_after_stations_were_lost(walk: Scene, method: Method, lost: list[int]) -> None:
-    frames = [without(f, lost) if 30 <= i < 60 else f for i, f in enumerate(walk.frames)]
+    frames = [drop_stations(f, lost) if 30 <= i < 60 else f for i, f in enumerate(walk.frames)]
     estimates = walk.run(method, frames)
     plain = walk.off_m(walk.run(method), walk.take.qpos)
     off_m = walk.off_m(estimates, walk.take.qpos)
@@ -156,6 +156,6 @@ def test_the_room_does_not_matter_with_positions_alone(walk: Scene) -> None:
 
 def test_with_positions_alone_the_anchor_may_fall_silent(walk: Scene) -> None:
     torso = walk.calibration.stations.index("torso")
-    frames = [without(f, [torso]) if 40 <= i < 60 else f for i, f in enumerate(walk.only("pos"))]
+    frames = [drop_stations(f, [torso]) if 40 <= i < 60 else f for i, f in enumerate(walk.only("pos"))]
     off_m = walk.off_m(walk.run(DynamicMap(neighbours=30), frames), walk.take.qpos)
     assert off_m[40:60].max() < 0.03

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body.retargeting import to_own_body
+from harness.body.retargeting import retarget_to_own_body
 from harness.core.estimate import Status
 from harness.errors import BadInput
 from harness.mocap.library import MotionLibrary
@@ -15,7 +15,7 @@ from harness.reconstruct.methods.ik import GAUSSIAN, MEAN, PREVIOUS, Ik
 from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.stream.frame import TrackerFrame
-from harness.testing.frames import exact_frames, without, worn
+from harness.testing.frames import drop_stations, exact_calibration, exact_frames
 
 from .conftest import Scene, moved
 
@@ -84,7 +84,7 @@ def test_a_burst_is_bridged(walk: Scene) -> None:
 
 @pytest.mark.parametrize("silent", [[LEFT_WRIST], [TORSO], [2, 3], [0, 1, 5]])
 def test_lost_stations_are_left_out_and_taken_up_again(walk: Scene, silent: list[int]) -> None:
-    frames = [without(f, silent) if 40 <= i < 80 else f for i, f in enumerate(walk.frames)]
+    frames = [drop_stations(f, silent) if 40 <= i < 80 else f for i, f in enumerate(walk.frames)]
     estimates = walk.run(Ik(), frames)
     off_m = walk.off_m(estimates, walk.take.qpos)
     assert {e.status for e in estimates} == {Status.SOLVED}
@@ -95,7 +95,7 @@ def test_lost_stations_are_left_out_and_taken_up_again(walk: Scene, silent: list
 def test_status_follows_what_reports(walk: Scene) -> None:
     two_left, nothing = [0, 1, 2, 3], range(6)
     frames = [
-        without(f, two_left) if 20 <= i < 60 else without(f, nothing) if 60 <= i < 90 else f
+        drop_stations(f, two_left) if 20 <= i < 60 else drop_stations(f, nothing) if 60 <= i < 90 else f
         for i, f in enumerate(walk.frames)
     ]
     estimates = walk.run(Ik(), frames)
@@ -110,14 +110,14 @@ def test_status_follows_what_reports(walk: Scene) -> None:
 
 
 def test_before_anything_reports_the_t_pose_is_held(walk: Scene) -> None:
-    frames = [without(f, range(6)) if i < 30 else f for i, f in enumerate(walk.frames[:40])]
+    frames = [drop_stations(f, range(6)) if i < 30 else f for i, f in enumerate(walk.frames[:40])]
     estimates = walk.run(Ik(), frames)
     assert [estimates[i].status for i in (0, 20, 29, 30)] == [Status.HELD, Status.HELD, Status.LOST, Status.SOLVED]
     assert np.max(walk.off_m(estimates, walk.take.qpos[:40])[30:]) < 0.02
 
 
 def test_one_tracker_is_a_legal_run(walk: Scene) -> None:
-    calibration = worn(walk.body, ["pelvis"])
+    calibration = exact_calibration(walk.body, ["pelvis"])
     frames = exact_frames(walk.body, calibration, walk.take.qpos)
     session = PREVIOUS.fit(walk.body, [], np.random.default_rng(0)).begin(calibration)
     estimates = [session.step(frame) for frame in frames]
@@ -166,8 +166,8 @@ def test_a_mean_needs_examples(walk: Scene) -> None:
 
 @pytest.mark.parametrize("clip", ["13_17", "16_15", "02_04", "49_02"])
 def test_real_motion_is_followed_throughout(mocap: Path, clip: str) -> None:
-    body, take = to_own_body(MotionLibrary(mocap, rate_hz=120.0).load(clip))
-    scene = Scene(body, worn(body), take, exact_frames(body, worn(body), take.qpos[:900:3]))
+    body, take = retarget_to_own_body(MotionLibrary(mocap, rate_hz=120.0).load(clip))
+    scene = Scene(body, exact_calibration(body), take, exact_frames(body, exact_calibration(body), take.qpos[:900:3]))
     estimates = scene.run(Ik())
     position_m, _ = scene.residuals(estimates, scene.frames)
     assert np.mean(position_m) < 5e-4

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats, Singles
-from harness.reconstruct.methods.local_dynamic_model import closeness, forecast
+from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
 
 
 def examples(rng: np.random.Generator, count: int, rank: int, size: int = 20) -> tuple[Floats, Floats]:
@@ -12,7 +12,7 @@ def examples(rng: np.random.Generator, count: int, rank: int, size: int = 20) ->
     away = rng.normal(size=(count, rank)) @ rng.normal(size=(rank, size)) + rng.normal(size=rank) @ np.ones(
         (rank, size)
     )
-    return away, closeness(np.sort(rng.uniform(0.0, 2.0, count)), 0.7)
+    return away, neighbour_weights(np.sort(rng.uniform(0.0, 2.0, count)), 0.7)
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_a_planted_linear_system_is_recovered(
 def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.Generator) -> None:
     """More examples than numbers: the normal equations, with a trace of a ridge."""
     away = rng.normal(size=(400, 12))
-    weight = closeness(np.sort(rng.uniform(0.0, 2.0, 400)), 0.7)
+    weight = neighbour_weights(np.sort(rng.uniform(0.0, 2.0, 400)), 0.7)
     slope, level = rng.normal(size=(12, 7)), rng.normal(size=7)
     found = forecast(away, away @ slope + level, weight, 1.0, 0.0)
     np.testing.assert_allclose(found.mean, level, atol=1e-8)
@@ -44,7 +44,7 @@ def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.
 def test_many_examples_and_few_are_solved_alike(rng: np.random.Generator, ridge: float) -> None:
     """The normal equations give what the K x K space gives: zeros beside the numbers change nothing but the way."""
     away, after = rng.normal(size=(100, 12)), rng.normal(size=(100, 6))
-    weight = closeness(np.sort(rng.uniform(0.0, 2.0, 100)), 0.7)
+    weight = neighbour_weights(np.sort(rng.uniform(0.0, 2.0, 100)), 0.7)
     primal = forecast(away, after, weight, 1.0, ridge)
     dual = forecast(np.concatenate([away, np.zeros((100, 90))], axis=1), after, weight, 1.0, ridge)
     np.testing.assert_allclose(primal.mean, dual.mean, atol=1e-9)
@@ -126,6 +126,6 @@ def test_examples_that_are_all_the_same_answer_what_they_are() -> None:
 def test_weights_are_equation_6_up_to_a_factor(rng: np.random.Generator) -> None:
     squared = np.sort(rng.uniform(3.0, 8.0, 20))
     printed = np.exp(-0.5 * squared / 2.0)
-    np.testing.assert_allclose(closeness(squared, 2.0), printed / printed.sum(), rtol=1e-12)
-    far = closeness(squared + 4000.0, 1.0)  # as printed every weight would be 0
+    np.testing.assert_allclose(neighbour_weights(squared, 2.0), printed / printed.sum(), rtol=1e-12)
+    far = neighbour_weights(squared + 4000.0, 1.0)  # as printed every weight would be 0
     np.testing.assert_allclose(far.sum(), 1.0)

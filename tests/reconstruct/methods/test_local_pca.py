@@ -5,13 +5,20 @@ import pytest
 
 from harness.core.arrays import Floats, Singles
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import Space, cost_within, damped, nearest, refer, stood
+from harness.reconstruct.descent import (
+    Subspace,
+    project_posture,
+    qpos_from_posture,
+    solve_damped,
+    subspace_cost,
+    to_subspace,
+)
 from harness.reconstruct.methods.local_pca import LocalPca
-from harness.reconstruct.solver.ground_frame import ground_of, posture_of
+from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.subspace import Confined, inverted, spanned
+from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
 
 from .conftest import Scene
 
@@ -27,25 +34,27 @@ def scatter_of(postures: Singles) -> Floats:
     return out
 
 
-def space_of(scene: Scene, components: int = 7) -> Space:
-    return spanned(postures_of(scene), components, 0.8, np.zeros(52), 0.0)
+def space_of(scene: Scene, components: int = 7) -> Subspace:
+    return fit_subspace(postures_of(scene), components, 0.8, np.zeros(52), 0.0)
 
 
 @pytest.mark.parametrize("lean_rad", [0.0, 1e-6, 1.2])
 def test_normal_equations_against_differences(walk: Scene, rng: np.random.Generator, lean_rad: float) -> None:
-    space = spanned(postures_of(walk), 40, 0.8, posture_of(walk.take.qpos[33]), 20.0)
+    space = fit_subspace(postures_of(walk), 40, 0.8, posture_from_qpos(walk.take.qpos[33]), 20.0)
     residuals = Residuals(walk.body, walk.calibration, Loss(robust=False))
     residuals.read(walk.frames[30])
-    z = np.concatenate([ground_of(walk.take.qpos[30]) + 0.05, space.mean + 0.1 * rng.normal(size=52)])
+    z = np.concatenate([ground_from_qpos(walk.take.qpos[30]) + 0.05, space.mean + 0.1 * rng.normal(size=52)])
     z[4:7] = [0.6 * lean_rad, 0.8 * lean_rad, 0.0]
 
     def data_cost(z: Floats) -> float:
-        return residuals.place(stood(z[3:], z[:3]))
+        return residuals.place(qpos_from_posture(z[3:], z[:3]))
 
     h, hessian = 1e-6, np.zeros((54, 54))
     steps = h * np.eye(55)
     slopes = [
-        residuals.kinematics.difference(stood((z - step)[3:], (z - step)[:3]), stood((z + step)[3:], (z + step)[:3]))
+        residuals.kinematics.difference(
+            qpos_from_posture((z - step)[3:], (z - step)[:3]), qpos_from_posture((z + step)[3:], (z + step)[:3])
+        )
         for step in steps
     ]
     jacobian = np.array(slopes).T / (2.0 * h)
@@ -56,7 +65,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     expected = jacobian.T @ hessian @ jacobian
     expected[3:, 3:] += space.curvature
     normal, found = np.empty((55, 55)), np.empty(55)
-    refer(space, z, hessian, descent, normal, found)
+    to_subspace(space, z, hessian, descent, normal, found)
     np.testing.assert_allclose(np.tril(normal), np.tril(expected), rtol=1e-6, atol=1e-5 * np.abs(hessian).max())
     np.testing.assert_allclose(-found, gradient, rtol=1e-6, atol=1e-5 * np.abs(descent).max())
 
@@ -70,7 +79,9 @@ def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene,
     normal[3:, 3:] += space.curvature
     within = np.linalg.svd(basis)[0][:, :43]
     step = within @ np.linalg.solve(within.T @ normal @ within, within.T @ gradient)
-    np.testing.assert_allclose(damped(space, np.tril(normal), gradient, 0.0), step, atol=2e-3 * np.abs(step).max())
+    np.testing.assert_allclose(
+        solve_damped(space, np.tril(normal), gradient, 0.0), step, atol=2e-3 * np.abs(step).max()
+    )
 
 
 def test_what_is_left_out_varies_least(walk: Scene) -> None:
@@ -83,34 +94,37 @@ def test_what_is_left_out_varies_least(walk: Scene) -> None:
 
 def test_inverse(rng: np.random.Generator) -> None:
     half = rng.normal(size=(60, 52)) * np.geomspace(1.0, 1e-4, 52)
-    np.testing.assert_allclose(inverted(half.T @ half) @ (half.T @ half), np.eye(52), atol=1e-6)
+    np.testing.assert_allclose(invert_positive_definite(half.T @ half) @ (half.T @ half), np.eye(52), atol=1e-6)
 
 
 def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
     """Up to a constant: alpha/2 (q - p)^T Lambda^-1 (q - p) and beta/2 |q - expected|^2, written out."""
-    postures, expected = postures_of(walk), posture_of(walk.take.qpos[33])
-    space, scatter = spanned(postures, 7, 0.8, expected, 3.0), scatter_of(postures)
+    postures, expected = postures_of(walk), posture_from_qpos(walk.take.qpos[33])
+    space, scatter = fit_subspace(postures, 7, 0.8, expected, 3.0), scatter_of(postures)
 
     def written_out(q: Floats) -> float:
         within = q - space.mean
         return float(0.4 * within @ np.linalg.pinv(scatter, rcond=1e-9) @ within + 1.5 * np.sum((q - expected) ** 2))
 
-    assert cost_within(space, space.mean) == 0.0
+    assert subspace_cost(space, space.mean) == 0.0
     for direction in 0.2 * rng.normal(size=(5, 52)):
-        q = nearest(space, space.mean + direction)
-        np.testing.assert_allclose(cost_within(space, q), written_out(q) - written_out(space.mean), rtol=1e-6)
+        q = project_posture(space, space.mean + direction)
+        np.testing.assert_allclose(subspace_cost(space, q), written_out(q) - written_out(space.mean), rtol=1e-6)
 
 
 def test_the_answer_lies_in_the_subspace_and_is_a_minimum(walk: Scene, rng: np.random.Generator) -> None:
     space, residuals = space_of(walk), Residuals(walk.body, walk.calibration, Loss())
     residuals.read(walk.frames[50])
-    ground, limits = ground_of(walk.take.qpos[50]), HingeLimits(walk.body, keep=False)
-    found = Confined(residuals, limits, Stopping(step=1e-7, decrease=0.0)).solve(space, ground + 0.05, space.mean)
-    posture, ground = posture_of(found.qpos), ground_of(found.qpos)
-    np.testing.assert_allclose(nearest(space, posture), posture, atol=1e-9)
+    ground, limits = ground_from_qpos(walk.take.qpos[50]), HingeLimits(walk.body, keep=False)
+    found = SubspaceSolver(residuals, limits, Stopping(step=1e-7, decrease=0.0)).solve(space, ground + 0.05, space.mean)
+    posture, ground = posture_from_qpos(found.qpos), ground_from_qpos(found.qpos)
+    np.testing.assert_allclose(project_posture(space, posture), posture, atol=1e-9)
     for step in 1e-3 * rng.normal(size=(20, 55)):
-        there = nearest(space, posture + step[3:])
-        assert residuals.place(stood(there, ground + step[:3])) + cost_within(space, there) > found.cost - 1e-9
+        there = project_posture(space, posture + step[3:])
+        assert (
+            residuals.place(qpos_from_posture(there, ground + step[:3])) + subspace_cost(space, there)
+            > found.cost - 1e-9
+        )
 
 
 def test_few_directions_follow_trackers_worse_than_many(walk: Scene, boxing: Scene) -> None:

@@ -10,14 +10,14 @@ from harness.core.humanoid24 import BONES, unpack
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.anchor_frame import anchor_of
-from harness.reconstruct.features.example_features import LocalExamples, Weights
-from harness.reconstruct.features.query_features import Outlook
+from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
+from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.methods.kernel_cca import KernelCca
 from harness.reconstruct.methods.local_regression import LocalRegression
 from harness.reconstruct.methods.weighted_blend import WeightedBlend
 from harness.reconstruct.solver import ground_frame
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.testing.frames import exact_frames, without
+from harness.testing.frames import drop_stations, exact_frames
 
 from .conftest import Scene, moved
 
@@ -70,7 +70,7 @@ def test_a_long_walk_on_part_of_the_readings_does_not_run_away(
 @pytest.mark.parametrize("method", METHODS, ids=IDS)
 def test_a_lost_station_degrades_and_its_return_mends(walk: Scene, method: LocalRegression) -> None:
     anchor = walk.calibration.stations.index("torso")
-    frames = [without(f, [anchor]) if 30 <= k < 70 else f for k, f in enumerate(walk.frames)]
+    frames = [drop_stations(f, [anchor]) if 30 <= k < 70 else f for k, f in enumerate(walk.frames)]
     estimates = walk.run(method, frames)
     off_m, plain_m = walk.off_m(estimates, walk.take.qpos), walk.off_m(walk.run(method), walk.take.qpos)
     assert all(e.status is Status.SOLVED for e in estimates)
@@ -81,7 +81,7 @@ def test_a_lost_station_degrades_and_its_return_mends(walk: Scene, method: Local
 @pytest.mark.parametrize("method", METHODS, ids=IDS)
 def test_when_all_are_lost_it_says_so_and_goes_on_by_itself(walk: Scene, method: LocalRegression) -> None:
     everyone = range(len(walk.calibration.stations))
-    frames = [without(f, list(everyone)) if 30 <= k < 70 else f for k, f in enumerate(walk.frames)]
+    frames = [drop_stations(f, list(everyone)) if 30 <= k < 70 else f for k, f in enumerate(walk.frames)]
     estimates = walk.run(method, frames)
     assert estimates[35].status is Status.HELD
     assert estimates[60].status is Status.LOST
@@ -98,10 +98,10 @@ def test_the_closed_form_meets_every_limb_tracker(walk: Scene, method: LocalRegr
 
 def test_features_tell_what_trackers_read(walk: Scene) -> None:
     database = MotionDatabase.build(walk.body, [walk.take])
-    examples = LocalExamples(walk.body, database, walk.calibration, Weights(), "flat", 8)
+    examples = ExampleFeatures(walk.body, database, walk.calibration, FeatureWeights(), "flat", 8)
     row = 20
     residuals = Residuals(walk.body, walk.calibration, Loss())
-    outlook = Outlook(residuals, walk.calibration, examples, 0.2)
+    outlook = QueryFeatures(residuals, walk.calibration, examples, 0.2)
     for frame in walk.frames[row - 1 : row + 1]:
         residuals.read(frame)
         view, query, trust = outlook.seen(frame, walk.take.qpos[row])
@@ -109,7 +109,7 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     assert examples.nearest(query, trust, 1).tolist() == [row]
     inputs, asked, poses = examples.pairs(np.array([row]), np.array([row]), query, trust)
     np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
-    stood = ground_frame.standing(poses[0, :52], ground_frame.moved(np.array(view), poses[0, 52:]))
+    stood = ground_frame.qpos_from_postures(poses[0, :52], ground_frame.step_grounds(np.array(view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from harness.body.humanoid import build
+from harness.body.humanoid import build_body
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
-from harness.core.skeleton import forward
+from harness.core.skeleton import forward_kinematics
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 
-LIMITS = HingeLimits(build())
-SKELETON = build().skeleton
+LIMITS = HingeLimits(build_body())
+SKELETON = build_body().skeleton
 
 
 def orientations(angles_rad: Floats) -> Floats:
@@ -18,7 +18,7 @@ def orientations(angles_rad: Floats) -> Floats:
     qpos = np.concatenate(
         [np.zeros((len(angles_rad), 3)), np.tile([1.0, 0, 0, 0], (len(angles_rad), 1)), angles_rad], 1
     )
-    return forward(SKELETON, *unpack(qpos)).world_from_bone
+    return forward_kinematics(SKELETON, *unpack(qpos)).world_from_bone
 
 
 def lawful(rng: np.random.Generator, count: int) -> Floats:
@@ -46,16 +46,16 @@ def test_principal_is_the_same_pose_within_limits(rng: np.random.Generator, turn
 
 
 def test_hinges_that_turn_all_round_have_no_limits() -> None:
-    names = [build().model.joint(1 + d).name for d in range(48)]
+    names = [build_body().model.joint(1 + d).name for d in range(48)]
     free = {name for name, low in zip(names, LIMITS.low_rad, strict=True) if np.isinf(low)}
     assert {"rhumerus.rx", "rhumerus.rz", "rwrist.ry"} <= free
     assert not any(name.endswith(("tibia.rx", "radius.rx")) for name in free)
-    assert np.all(np.isinf(HingeLimits(build(), keep=False).high_rad))
+    assert np.all(np.isinf(HingeLimits(build_body(), keep=False).high_rad))
 
 
 def test_past_the_pole_is_noticed_and_mended() -> None:
     angles = np.zeros(48)
-    names = [build().model.joint(1 + d).name for d in range(48)]
+    names = [build_body().model.joint(1 + d).name for d in range(48)]
     assert not LIMITS.past_gimbal(angles)
     angles[names.index("rhumerus.ry")] = np.deg2rad(-120.0)
     assert LIMITS.past_gimbal(angles)
@@ -64,7 +64,7 @@ def test_past_the_pole_is_noticed_and_mended() -> None:
 
 def test_the_mean_is_that_of_directions(rng: np.random.Generator) -> None:
     angles = np.zeros((2, 48))
-    wrist = [build().model.joint(1 + d).name for d in range(48)].index("rwrist.ry")
+    wrist = [build_body().model.joint(1 + d).name for d in range(48)].index("rwrist.ry")
     angles[:, wrist] = np.deg2rad([175.0, -175.0])
     assert abs(np.cos(LIMITS.mean(angles)[wrist]) + 1.0) < 1e-9
     cloud = np.clip(rng.normal(0.0, 0.1, (500, 48)), LIMITS.low_rad, LIMITS.high_rad)

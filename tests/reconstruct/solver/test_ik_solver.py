@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
+from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.testing.frames import without
+from harness.testing.frames import drop_stations
 
 from .conftest import Scene
 
@@ -20,7 +20,7 @@ def precision(sigma_rad: float) -> np.ndarray:
 @pytest.mark.parametrize("robust", [False, True])
 def test_ends_where_no_lawful_step_lowers_the_cost(walk: Scene, rng: np.random.Generator, robust: bool) -> None:
     residuals, limits = Residuals(walk.body, walk.calibration, Loss(robust=robust)), HingeLimits(walk.body)
-    solver = Solver(residuals, limits, Stopping(step=1e-7, decrease=0.0, most_steps=200))
+    solver = IKSolver(residuals, limits, Stopping(step=1e-7, decrease=0.0, most_steps=200))
     prior = Prior(walk.take.qpos[30], precision(0.5))
     start = np.array(walk.take.qpos[30])
     start[7:] += rng.normal(0.0, 0.2, 48)
@@ -43,12 +43,12 @@ def test_limits_hold_even_where_the_prior_lies_beyond(walk: Scene) -> None:
     limits = HingeLimits(walk.body)
     knee = 7 + [walk.body.model.joint(1 + d).name for d in range(48)].index("ltibia.rx")
     residuals = Residuals(walk.body, walk.calibration, Loss())
-    residuals.read(without(walk.frames[0], range(6)))
+    residuals.read(drop_stations(walk.frames[0], range(6)))
     impossible = np.array(walk.take.qpos[0])
     impossible[knee] = limits.low_rad[knee - 7] - 0.5
     prior = Prior(impossible, precision(0.5))
     kept, loose = (
-        Solver(residuals, known, Stopping(step=1e-7, decrease=0.0)).solve(walk.take.qpos[0], prior).qpos
+        IKSolver(residuals, known, Stopping(step=1e-7, decrease=0.0)).solve(walk.take.qpos[0], prior).qpos
         for known in (limits, HingeLimits(walk.body, keep=False))
     )
     assert kept[knee] == pytest.approx(limits.low_rad[knee - 7], abs=1e-9)
@@ -57,7 +57,7 @@ def test_limits_hold_even_where_the_prior_lies_beyond(walk: Scene) -> None:
 
 def test_without_prior_six_trackers_are_met_exactly(walk: Scene) -> None:
     residuals, limits = Residuals(walk.body, walk.calibration, Loss(robust=False)), HingeLimits(walk.body)
-    solver = Solver(residuals, limits, Stopping())
+    solver = IKSolver(residuals, limits, Stopping())
     residuals.read(walk.frames[44])
     solution = solver.solve(walk.take.qpos[40], Prior(walk.take.qpos[40], None))
     assert solution.converged
@@ -66,7 +66,7 @@ def test_without_prior_six_trackers_are_met_exactly(walk: Scene) -> None:
 
 def test_a_solve_leaves_no_trace(walk: Scene) -> None:
     residuals, limits = Residuals(walk.body, walk.calibration, Loss()), HingeLimits(walk.body)
-    solver, prior = Solver(residuals, limits, Stopping()), Prior(walk.take.qpos[10], precision(0.5))
+    solver, prior = IKSolver(residuals, limits, Stopping()), Prior(walk.take.qpos[10], precision(0.5))
     residuals.read(walk.frames[12])
     once = solver.solve(walk.take.qpos[10], prior).qpos
     residuals.read(walk.frames[90])

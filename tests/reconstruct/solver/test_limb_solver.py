@@ -6,11 +6,11 @@ import pytest
 from harness.body import humanoid
 from harness.core.arrays import Floats
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.limb_solver import Limbs
+from harness.reconstruct.solver.limb_solver import LimbSolver
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.testing.frames import exact_frames, without, worn
+from harness.testing.frames import drop_stations, exact_calibration, exact_frames
 
-BODY = humanoid.build()
+BODY = humanoid.build_body()
 JOINTS = [BODY.model.joint(j + 1).name for j in range(48)]
 LIMBS = np.array([any(b in name for b in ("humerus", "radius", "wrist", "hand")) for name in JOINTS])
 LIMBS |= np.array([any(b in name for b in ("femur", "tibia", "foot")) for name in JOINTS])
@@ -27,13 +27,13 @@ class Bench:
     """A body on the trackers of a known pose."""
 
     def __init__(self, stations: tuple[str, ...], keep: bool) -> None:
-        self.calibration = worn(BODY, stations)
+        self.calibration = exact_calibration(BODY, stations)
         self.residuals = Residuals(BODY, self.calibration, Loss())
         self.limits = HingeLimits(BODY, keep=keep)
-        self.limbs = Limbs(BODY, self.calibration.bones, self.residuals, self.limits)
+        self.limbs = LimbSolver(BODY, self.calibration.bones, self.residuals, self.limits)
 
     def reached(self, truth: Floats, guess: Floats, lost: tuple[int, ...] = ()) -> Floats:
-        self.residuals.read(without(exact_frames(BODY, self.calibration, truth[None])[0], lost))
+        self.residuals.read(drop_stations(exact_frames(BODY, self.calibration, truth[None])[0], lost))
         out = self.limbs.reach(guess)
         self.residuals.place(out)
         return out

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Bools, Floats
-from harness.reconstruct.solver.outlier_gate import Gate
+from harness.reconstruct.solver.outlier_gate import OutlierGate
 
 PERIOD_S = 0.025
 SPEED_M_S = np.array([4.0, 0.0, 0.0])
@@ -16,15 +16,15 @@ def at(frame: int) -> Floats:
     return np.arange(4.0)[:, None] + SPEED_M_S * PERIOD_S * frame
 
 
-def watched(frames: int) -> Gate:
-    gate = Gate(4, jump_m=0.15, patience_s=0.25)
+def watched(frames: int) -> OutlierGate:
+    gate = OutlierGate(4, jump_m=0.15, patience_s=0.25)
     for frame in range(frames):
         assert not gate.jumped(frame * PERIOD_S, at(frame), EVERY).any()
         gate.settled(frame * PERIOD_S, at(frame))
     return gate
 
 
-def jumped(gate: Gate, frame: int, by_m: float, stations: list[int], measured: Bools = EVERY) -> list[int]:
+def jumped(gate: OutlierGate, frame: int, by_m: float, stations: list[int], measured: Bools = EVERY) -> list[int]:
     target_m = at(frame)
     target_m[stations, 2] += by_m
     return np.flatnonzero(gate.jumped(frame * PERIOD_S, target_m, measured)).tolist()

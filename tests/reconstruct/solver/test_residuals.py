@@ -7,9 +7,9 @@ import pytest
 
 from harness.errors import ShapeError
 from harness.reconstruct.solver.hinge_limits import HingeLimits
-from harness.reconstruct.solver.ik_solver import Prior, Solver, Stopping
+from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.testing.frames import without
+from harness.testing.frames import drop_stations
 
 from .conftest import Scene
 
@@ -90,7 +90,7 @@ def test_one_lorentzian_for_each_tracker_and_kind(walk: Scene) -> None:
 
 def test_rows_that_were_not_measured_count_nothing(walk: Scene) -> None:
     residuals = Residuals(walk.body, walk.calibration, Loss())
-    residuals.read(without(walk.frames[0], [1, 3]))
+    residuals.read(drop_stations(walk.frames[0], [1, 3]))
     assert not residuals.measured[[1, 3, 7, 9]].any()
     assert residuals.place(walk.take.qpos[0]) == pytest.approx(0.0, abs=1e-9)
     residuals.read(walk.frames[0])
@@ -115,7 +115,7 @@ def test_a_station_of_low_quality_pulls_less(walk: Scene) -> None:
         residuals.read(replace(frame, position_m=frame.position_m + shift, quality=said))
         assert residuals.trust == pytest.approx(np.tile(said, 2))
         assert residuals.place(truth) == pytest.approx(quality * 0.5 * (0.1 / 0.05) ** 2, rel=1e-6)
-        qpos = Solver(residuals, limits, Stopping()).solve(truth, Prior(truth, np.full(54, 30.0))).qpos
+        qpos = IKSolver(residuals, limits, Stopping()).solve(truth, Prior(truth, np.full(54, 30.0))).qpos
         residuals.place(truth)
         at_m = residuals.station_m[5].copy()
         residuals.place(qpos)

@@ -9,9 +9,9 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
 from harness.reconstruct.solver.residuals import Loss, Residuals
-from harness.reconstruct.solver.root_placement import placed, postures
-from harness.stream.inputs import combination
-from harness.testing.frames import exact_frames, worn
+from harness.reconstruct.solver.root_placement import candidate_placements, starting_postures
+from harness.stream.inputs import make_inputs
+from harness.testing.frames import exact_calibration, exact_frames
 
 
 def moved(qpos: Floats, turn: Floats, by_m: Floats) -> Floats:
@@ -24,16 +24,16 @@ def moved(qpos: Floats, turn: Floats, by_m: Floats) -> Floats:
 @pytest.mark.parametrize("inputs", ["pos+ori", "pos", "ori"])
 @pytest.mark.parametrize("tilt_rad", [0.0, 0.4, np.pi - 1e-3])
 def test_a_body_that_was_moved_is_found(inputs: str, tilt_rad: float, rng: np.random.Generator) -> None:
-    body = humanoid.build(standard_skeleton())
-    known = worn(body)
+    body = humanoid.build_body(standard_skeleton())
+    known = exact_calibration(body)
     residuals = Residuals(body, known, Loss())
-    for posture in (tpose(body.skeleton), *postures(body)):
+    for posture in (tpose(body.skeleton), *starting_postures(body)):
         turn = rotations.multiply(
             rotations.about_z(rng.uniform(-np.pi, np.pi)), rotations.exp(np.array([0.0, tilt_rad, 0.0]))
         )
         there = moved(posture, turn, np.array([1.0, -2.0, 0.3]))
-        residuals.read(combination(inputs, known.stations).masked(exact_frames(body, known, there[None])[0]))
-        upright, tilted = placed(residuals, posture)
+        residuals.read(make_inputs(inputs, known.stations).masked(exact_frames(body, known, there[None])[0]))
+        upright, tilted = candidate_placements(residuals, posture)
         found = [tilted] if tilt_rad else [upright, tilted]
         for qpos in found:
             assert rotations.angle_between_rad(qpos[3:7], there[3:7]) < 1e-6

@@ -5,14 +5,14 @@ from typing import Any
 
 import pytest
 
-from harness.report.comparison.writer import write_page
+from harness.report.comparison.writer import write_comparison_page
 from tests.report.fabricate_comparison import comparison
 from tests.report.watching import is_whole_and_quiet
 
 
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_page(comparison(7, ("local_pca",)), tmp_path_factory.mktemp("browser") / "page.html")
+    return write_comparison_page(comparison(7, ("local_pca",)), tmp_path_factory.mktemp("browser") / "page.html")
 
 
 @pytest.mark.parametrize("width", [1280, 390])

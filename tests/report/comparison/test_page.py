@@ -12,24 +12,24 @@ from harness.compare.comparison import Comparison, Difference
 from harness.errors import Outcome
 from harness.report.comparison import writer as report
 from harness.report.comparison.interval_chart import _draw as draw_intervals
-from harness.report.comparison.interval_chart import intervals
-from harness.report.comparison.page import Pictures, comparison_page
-from harness.report.comparison.slope_chart import BETTER, WORSE, slopes
+from harness.report.comparison.interval_chart import interval_charts
+from harness.report.comparison.page import ComparisonCharts, comparison_page
+from harness.report.comparison.slope_chart import BETTER_COLOUR, WORSE_COLOUR, slope_chart
 from harness.report.comparison.slope_chart import _draw as draw_slopes
 from harness.report.comparison.wording import (
-    BIG,
     MARKS,
     MEANINGS,
-    direction,
-    interval,
-    percent,
+    OUTCOME_TITLES,
+    count_directions,
+    count_verdicts,
+    format_interval,
+    format_percent,
+    format_signed,
     sentence,
-    signed,
-    tally,
 )
-from harness.report.comparison.writer import text, write_page
+from harness.report.comparison.writer import text, write_comparison_page
 from harness.report.kit.style import Chart
-from harness.report.run.charts import drawn
+from harness.report.run.charts import draw_chart
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_comparison import CIRCUMSTANCES, GROUP, METRICS, comparison, line, whole
 from tests.report.reading import read, text_of
@@ -44,7 +44,7 @@ def told(lines: Sequence[Difference], **changes: object) -> Comparison:
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_page(comparison(), tmp_path_factory.mktemp("comparison") / "deep" / "page.html")
+    return write_comparison_page(comparison(), tmp_path_factory.mktemp("comparison") / "deep" / "page.html")
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_first_line_is_the_verdict() -> None:
     first, a, b = text(comparison()).splitlines()[:3]
     (worse,) = (found for found in comparison().differences if found.verdict == "worse")
-    share = percent(100.0 * worse.difference / worse.mean_a)
+    share = format_percent(100.0 * worse.difference / worse.mean_a)
     assert first == f"B is worse than A in 1 of 6 gated lines on 24 clips: local_pca mpjpe_mm {share}."
     assert (a, b) == ("A: baseline gate", "B: results/gate")
 
@@ -73,20 +73,20 @@ def test_the_first_line_is_the_verdict() -> None:
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
     assert said in sentence(shown)
-    found = text_of(write_page(shown, tmp_path / "page.html"))
-    assert f"{BIG[shown.outcome]} {sentence(shown)}" in found
+    found = text_of(write_comparison_page(shown, tmp_path / "page.html"))
+    assert f"{OUTCOME_TITLES[shown.outcome]} {sentence(shown)}" in found
     assert "nan" not in found.lower().split()
 
 
 def test_every_outcome_has_its_word() -> None:
-    assert {Outcome.PASS, Outcome.REGRESSED, Outcome.NOT_COMPARABLE, Outcome.INCOMPLETE} == set(BIG)
+    assert {Outcome.PASS, Outcome.REGRESSED, Outcome.NOT_COMPARABLE, Outcome.INCOMPLETE} == set(OUTCOME_TITLES)
 
 
 def test_every_line_has_its_figures_in_both(page: Path) -> None:
     printed, shown = text(comparison()), text_of(page)
     assert {found.verdict for found in comparison().differences} == set(MARKS)
     for found in comparison().differences:
-        for word in (found.method, found.metric, signed(found, found.difference), interval(found)):
+        for word in (found.method, found.metric, format_signed(found, found.difference), format_interval(found)):
             assert word in printed
             assert word in shown
         row = next(row for row in printed.splitlines()[3:] if f" {found.method} " in row and f" {found.metric} " in row)
@@ -110,7 +110,7 @@ def test_the_page_opens_on_the_verdict_then_the_slopes(page: Path) -> None:
     assert places == sorted(places)
     counts = re.findall(r'<li><b>(\d+)</b><span class="verdict (\w+)">', raw)
     assert [(int(count), name) for count, name in counts] == [
-        (count, kind.replace(" ", "_")) for kind, count in tally(comparison().differences[:-1]).items()
+        (count, kind.replace(" ", "_")) for kind, count in count_verdicts(comparison().differences[:-1]).items()
     ]
     assert all(meaning in text_of(page) for meaning in MEANINGS.values())
 
@@ -120,7 +120,7 @@ def test_every_picture_is_told_in_words(page: Path) -> None:
     assert len(images) == 6 + 2 + 1
     for found in comparison().differences[:-1]:
         (alt,) = (str(i["alt"]) for i in images if str(i["alt"]).startswith(f"{found.method} {found.metric}:"))
-        assert f"{signed(found, found.difference)} ({interval(found)})" in alt
+        assert f"{format_signed(found, found.difference)} ({format_interval(found)})" in alt
         assert f": {found.verdict}. 24 clips" in alt
 
 
@@ -137,10 +137,10 @@ def test_a_slope_goes_from_a_to_b_beside_the_margin() -> None:
 def test_a_slope_is_coloured_by_what_it_means() -> None:
     """All clips rise: errors are worse then, frames per second better."""
     rising = line("local_pca", "mpjpe_mm", 8, 0.3)
-    error, speed = slopes(rising, 1).svg, slopes(replace(rising, metric="fps", unit="frames/s"), 1).svg
-    assert direction(rising) == (8, 0, 0)
-    assert [colour in error for colour in (WORSE, BETTER)] == [True, False]
-    assert [colour in speed for colour in (WORSE, BETTER)] == [False, True]
+    error, speed = slope_chart(rising, 1).svg, slope_chart(replace(rising, metric="fps", unit="frames/s"), 1).svg
+    assert count_directions(rising) == (8, 0, 0)
+    assert [colour in error for colour in (WORSE_COLOUR, BETTER_COLOUR)] == [True, False]
+    assert [colour in speed for colour in (WORSE_COLOUR, BETTER_COLOUR)] == [False, True]
 
 
 @pytest.mark.parametrize("clips", [1, 6, 60])
@@ -151,7 +151,7 @@ def test_words_of_a_picture_do_not_meet_and_stay_on_it(clips: int) -> None:
         draw_slopes(figure, line("ik", "mpjpe_mm", clips, 0.3))
         made.append(figure)
 
-    drawn("slopes", "", "", "", draw, 2.5, width_in=3.3, layout=None)
+    draw_chart("slopes", "", "", "", draw, 2.5, width_in=3.3, layout=None)
     texts_apart(made[0])
 
 
@@ -164,14 +164,14 @@ def test_names_of_an_interval_chart_do_not_meet() -> None:
         draw_intervals(figure, lines, names)
         made.append(figure)
 
-    drawn("intervals", "", "", "", draw, 2.2, width_in=4.2)
+    draw_chart("intervals", "", "", "", draw, 2.2, width_in=4.2)
     texts_apart(made[0])
 
 
 @pytest.mark.parametrize("clips", [0, 1, 5])
 def test_too_few_clips_are_shown_and_not_told(clips: int, tmp_path: Path) -> None:
     shown = whole([line("ik", "mpjpe_mm", clips, 0.05)])
-    said = text_of(write_page(shown, tmp_path / "page.html"))
+    said = text_of(write_comparison_page(shown, tmp_path / "page.html"))
     assert f"too few clips: {clips}, of at least 6" in said
     assert f"cannot tell, too few clips: {clips}, of at least 6: ik mpjpe_mm" in text(shown)
     assert "nan" not in said.lower().split()
@@ -179,17 +179,17 @@ def test_too_few_clips_are_shown_and_not_told(clips: int, tmp_path: Path) -> Non
 
 def test_sixty_clips_are_drawn_and_listed(tmp_path: Path) -> None:
     shown = whole([line("ik", "mpjpe_mm", 60, 0.05)])
-    said = text_of(write_page(shown, tmp_path / "page.html"))
+    said = text_of(write_comparison_page(shown, tmp_path / "page.html"))
     assert "60 clips: " in said
     assert all(said.count(clip) for clip in shown.differences[0].clips)
-    assert len(slopes(shown.differences[0], 1).svg) < 80_000
+    assert len(slope_chart(shown.differences[0], 1).svg) < 80_000
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_what_differs_is_named_and_long_lists_are_counted(tmp_path: Path) -> None:
     cells = tuple(f"ik on walking_{n}" for n in range(500))
     shown = told([], only_a=cells, only_b=cells[:2], inputs_that_differ=("tracker.rate_hz: 40 against 60",), why="x")
-    printed, said = text(shown), text_of(write_page(shown, tmp_path / "page.html"))
+    printed, said = text(shown), text_of(write_comparison_page(shown, tmp_path / "page.html"))
     for found in (printed, said):
         assert "tracker.rate_hz: 40 against 60" in found
         assert "ik on walking_0, ik on walking_1" in found
@@ -213,7 +213,7 @@ def test_figures_have_the_decimals_of_their_interval(
     difference: float, low: float | None, high: float | None, margin: float, shown: str
 ) -> None:
     found = replace(ONE, difference=difference, low=low, high=high, margin=margin)
-    assert f"{signed(found, found.difference)} {interval(found)}" == shown
+    assert f"{format_signed(found, found.difference)} {format_interval(found)}" == shown
 
 
 def test_long_values_are_cut_to_where_they_differ() -> None:
@@ -230,8 +230,8 @@ def test_long_values_are_cut_to_where_they_differ() -> None:
 def test_equal_sides_are_the_same_and_nothing_differs(tmp_path: Path) -> None:
     shown = told([line("ik", metric, 6, 0.0) for metric in METRICS], circumstances=())
     assert shown.outcome is Outcome.PASS
-    assert "6 clips: 6 unchanged." in slopes(shown.differences[0], 1).alt
-    said = text_of(write_page(shown, tmp_path / "page.html"))
+    assert "6 clips: 6 unchanged." in slope_chart(shown.differences[0], 1).alt
+    said = text_of(write_comparison_page(shown, tmp_path / "page.html"))
     assert "Nothing: same inputs, same circumstances, the same cells." in said
 
 
@@ -239,21 +239,21 @@ def test_equal_sides_are_the_same_and_nothing_differs(tmp_path: Path) -> None:
 def test_groups_are_told_apart_where_there_are_several(tmp_path: Path) -> None:
     lines = [line("ik", "mpjpe_mm", 6, 0.05, group) for group in (GROUP, "pos, subject, new")]
     assert text(whole(lines)).count("pos, subject, new") == 1
-    assert text_of(write_page(whole(lines), tmp_path / "page.html")).count("pos, subject, new") == 2
+    assert text_of(write_comparison_page(whole(lines), tmp_path / "page.html")).count("pos, subject, new") == 2
     assert "pos, subject, new" not in text(whole(lines[:1]))
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_lines_stand_worst_first(tmp_path: Path) -> None:
     lines = [line(f"m{n}", "mpjpe_mm", 6, 0.0) for n in range(30)] + [line("bad", "mpjpe_mm", 6, 0.4)]
-    raw = write_page(whole(lines), tmp_path / "page.html").read_text(encoding="utf-8")
+    raw = write_comparison_page(whole(lines), tmp_path / "page.html").read_text(encoding="utf-8")
     assert re.findall(r'<th scope="row">(\w+)<', raw)[:2] == ["bad", "m0"]
 
 
 def test_of_many_slopes_the_rest_is_folded() -> None:
     lines = [line(f"m{n}", "mpjpe_mm", 6, 0.0) for n in range(30)]
     charts = [Chart(f"slopes_{n}", "", "", "", "<svg></svg>") for n in range(30)]
-    raw = comparison_page(whole(lines), Pictures(charts), [])
+    raw = comparison_page(whole(lines), ComparisonCharts(charts), [])
     assert raw.index('alt=""') < raw.index("<summary>6 more lines</summary>")
     assert raw.count('class="panel"') == 30
 
@@ -267,7 +267,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
     ]
     lists = dict.fromkeys(("only_a", "only_b", "inputs_that_differ", "allowed", "coverage", "failed"), (HOSTILE,))
     shown = told(lines, a=HOSTILE, b=HOSTILE, why=HOSTILE, circumstances=((HOSTILE,) * 3,), **lists)
-    page = write_page(shown, tmp_path / "page.html")
+    page = write_comparison_page(shown, tmp_path / "page.html")
     raw = page.read_text(encoding="utf-8")
     assert "<script" not in raw
     assert read(page).text.count(HOSTILE) > 20
@@ -277,18 +277,18 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 
 def test_a_mean_of_zero_has_no_share(tmp_path: Path) -> None:
     zero = replace(line("ik", "mpjpe_mm", 6, 0.3), a=(0.0,) * 6, mean_a=0.0)
-    said = text_of(write_page(whole([zero]), tmp_path / "page.html"))
+    said = text_of(write_comparison_page(whole([zero]), tmp_path / "page.html"))
     assert "nan" not in said.lower()
     assert "nan" not in text(whole([zero])).lower()
 
 
 @pytest.mark.usefixtures("undrawn")
 def test_without_matplotlib_the_figures_stay(tmp_path: Path) -> None:
-    page = write_page(comparison(), tmp_path / "page.html")
+    page = write_comparison_page(comparison(), tmp_path / "page.html")
     assert "Charts: matplotlib is not installed; their numbers are in the tables" in text_of(page)
     assert "<img" not in page.read_text(encoding="utf-8")
 
 
 def test_the_same_comparison_gives_the_same_bytes() -> None:
-    assert slopes(ONE, 1) == slopes(ONE, 1)
-    assert intervals(whole([ONE]), True) == intervals(whole([ONE]), True)
+    assert slope_chart(ONE, 1) == slope_chart(ONE, 1)
+    assert interval_charts(whole([ONE]), True) == interval_charts(whole([ONE]), True)

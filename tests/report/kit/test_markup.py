@@ -2,7 +2,7 @@
 
 import pytest
 
-from harness.report.kit.markup import Markup, joined, table, tag
+from harness.report.kit.markup import Markup, join, table, tag
 
 
 def test_children_and_attributes_are_escaped() -> None:
@@ -16,7 +16,7 @@ def test_attribute_names(written: str, read: str) -> None:
 
 def test_absent_things_leave_no_trace() -> None:
     assert tag("img", alt="", hidden=False, src=None, async_=True) == '<img alt="" async>'
-    assert joined(None, "a", Markup("<br>"), 1.5) == "a<br>1.5"
+    assert join(None, "a", Markup("<br>"), 1.5) == "a<br>1.5"
 
 
 def test_a_table_names_its_rows_and_columns() -> None:

@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from harness.report.paper.writer import write_paper
+from harness.report.paper.writer import write_paper_page
 from tests.report.fabricate_paper import liu, write_study
 
 
 @pytest.fixture(scope="module")
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_paper(write_study(tmp_path_factory.mktemp("browser") / "study", liu()))
+    return write_paper_page(write_study(tmp_path_factory.mktemp("browser") / "study", liu()))
 
 
 @pytest.fixture(params=[1280, 390])

@@ -13,30 +13,30 @@ from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
 from harness.report.kit.style import COLOURS
-from harness.report.paper.bar_chart import draw_bars, height_in, lies
+from harness.report.paper.bar_chart import draw_bars, height_in, is_horizontal
 from harness.report.paper.charts import charts
-from harness.report.paper.figure_table import numbers
-from harness.report.paper.line_chart import apart, draw_lines
-from harness.report.run.charts import drawn
-from harness.results.findings import Bars, Experiment, Lines
+from harness.report.paper.figure_table import figure_table
+from harness.report.paper.line_chart import draw_lines, spread_positions
+from harness.report.run.charts import draw_chart
+from harness.results.findings import BarChart, LineChart, PaperExperiment
 from tests.report.fabricate_paper import METHODS, curves, liu, sets
 
-EMPTY = Experiment("empty", "", "", ())
+EMPTY = PaperExperiment("empty", "", "", ())
 PLACES = {name: n for n, name in enumerate(("kernel_cca", "dynamic_map", "local_pca", "ik", "a", "b"))}
 
 
-def figure_of(shown: Bars | Lines, places: Mapping[str, int] = PLACES) -> Figure:
+def figure_of(shown: BarChart | LineChart, places: Mapping[str, int] = PLACES) -> Figure:
     """As it is drawn, laid out."""
     made: list[Figure] = []
 
     def draw(canvas: Figure) -> None:
-        if isinstance(shown, Bars):
+        if isinstance(shown, BarChart):
             draw_bars(canvas, shown, places)
         else:
             draw_lines(canvas, shown, places)
         made.append(canvas)
 
-    drawn("chart", "", "", "", draw, height_in(shown) if isinstance(shown, Bars) else 3.4)
+    draw_chart("chart", "", "", "", draw, height_in(shown) if isinstance(shown, BarChart) else 3.4)
     return made[0]
 
 
@@ -45,10 +45,10 @@ def boxes_of(figure: Figure, texts: Sequence[Any]) -> list[Any]:
 
 
 @pytest.mark.parametrize("shown", [sets("walking"), liu().experiments[0].figures[0], liu().experiments[2].figures[0]])
-def test_names_and_numbers_do_not_overlap_and_stay_on_the_chart(shown: Bars) -> None:
+def test_names_and_numbers_do_not_overlap_and_stay_on_the_chart(shown: BarChart) -> None:
     figure = figure_of(shown)
     axes = figure.axes[0]
-    names = axes.get_yticklabels() if lies(shown) else axes.get_xticklabels()
+    names = axes.get_yticklabels() if is_horizontal(shown) else axes.get_xticklabels()
     assert [name.get_text().replace("\n", " ") for name in names] == list(shown.groups)
     boxes = boxes_of(figure, [*names, *axes.texts])
     assert len(boxes) == len(shown.groups) * (1 + len(shown.series))
@@ -76,15 +76,15 @@ def test_bars_are_as_long_as_their_values() -> None:
     ],
 )
 def test_bars_lie_where_they_could_not_be_read_standing(change: dict[str, Any], lying: bool) -> None:
-    shown = replace(Bars("", "deg", ("a", "b", "c", "d"), {"a": (1.0, None, -3.0, 4.0)}), **change)
-    assert lies(shown) == lying
+    shown = replace(BarChart("", "deg", ("a", "b", "c", "d"), {"a": (1.0, None, -3.0, 4.0)}), **change)
+    assert is_horizontal(shown) == lying
     figure_of(shown)
 
 
 @given(st.lists(st.floats(-2.0, 3.0), max_size=12), st.floats(0.0, 0.2))
 def test_names_are_moved_apart_no_further_than_needed(wanted: list[float], gap: float) -> None:
     wanted = sorted(wanted)
-    found = apart(wanted, gap)
+    found = spread_positions(wanted, gap)
     assert len(found) == len(wanted)
     assert all(np.diff(found) >= gap - 1e-9)
     assert max(found, default=0.0) <= 1.0 + 1e-9
@@ -111,12 +111,14 @@ def test_a_name_has_one_colour_wherever_it_is_drawn(monkeypatch: pytest.MonkeyPa
     """On the whole page, if several figures have it; and no two names of a figure share one."""
     found: list[tuple[set[str], Mapping[str, int]]] = []
 
-    def note(canvas: Figure, shown: Bars | Lines, places: Mapping[str, int]) -> None:
+    def note(canvas: Figure, shown: BarChart | LineChart, places: Mapping[str, int]) -> None:
         found.append((set(shown.series), places))
 
     monkeypatch.setattr("harness.report.paper.charts.draw_bars", note)
     monkeypatch.setattr("harness.report.paper.charts.draw_lines", note)
-    several = [Bars("", "", ("a",), dict.fromkeys(names, (1.0,))) for names in (("x", "ik"), ("y", "z"), ("z", "ik"))]
+    several = [
+        BarChart("", "", ("a",), dict.fromkeys(names, (1.0,))) for names in (("x", "ik"), ("y", "z"), ("z", "ik"))
+    ]
     charts(replace(liu(), experiments=(*liu().experiments, replace(EMPTY, figures=tuple(several)))))
     assert len(found) == 6
     for names, places in found:
@@ -129,7 +131,7 @@ def test_a_name_has_one_colour_wherever_it_is_drawn(monkeypatch: pytest.MonkeyPa
 
 def test_the_table_of_a_figure_has_every_number() -> None:
     shown = sets("boxing")
-    rows = numbers(shown).rows
+    rows = figure_table(shown).rows
     assert len(rows) == 31
     for row, group, value in zip(rows, shown.groups, shown.series["kernel_cca"], strict=True):
         assert value is not None

@@ -11,15 +11,15 @@ import pytest
 from harness.cli import main
 from harness.errors import BadFile
 from harness.report.paper import writer
-from harness.report.paper.page import inside
-from harness.report.paper.verdicts import MARKS, sentence, tally
-from harness.report.paper.writer import write_paper
-from harness.results.findings import Bars, Claim, Experiment, Findings, Lines, Table
+from harness.report.paper.page import run_link
+from harness.report.paper.verdicts import MARKS, count_verdicts, sentence
+from harness.report.paper.writer import write_paper_page
+from harness.results.findings import BarChart, Claim, FindingsTable, LineChart, PaperExperiment, PaperFindings
 from tests.report.fabricate_paper import curves, kim, liu, sets, write_study
 from tests.report.reading import read, text_of
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$ <!-- end of paper --> ```"
-EMPTY = Experiment("empty", "Nothing", "", ())
+EMPTY = PaperExperiment("empty", "Nothing", "", ())
 
 
 @pytest.fixture(scope="module")
@@ -28,13 +28,13 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = write_study(tmp_path_factory.mktemp("paper") / "liu", liu())
     (folder / "leave_one_out").mkdir()
     (folder / "leave_one_out" / "report.html").write_text("a run's page")
-    write_paper(folder)
+    write_paper_page(folder)
     return folder
 
 
-def alone(folder: Path, *experiments: Experiment) -> Path:
+def alone(folder: Path, *experiments: PaperExperiment) -> Path:
     """The page of a study of these experiments."""
-    return write_paper(write_study(folder, replace(liu(), experiments=experiments, tables=())))
+    return write_paper_page(write_study(folder, replace(liu(), experiments=experiments, tables=())))
 
 
 def test_the_page_opens_on_the_verdict(study: Path) -> None:
@@ -100,7 +100,7 @@ def test_no_link_leaves_the_folder(name: str, tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     folder.mkdir()
     (folder / "out").symlink_to(tmp_path / "other")
-    assert inside(folder, name) is None
+    assert run_link(folder, name) is None
 
 
 def test_a_run_s_folder_without_a_page_is_opened_itself(tmp_path: Path) -> None:
@@ -125,13 +125,13 @@ def test_the_same_findings_give_the_same_bytes(study: Path) -> None:
 
 def test_hostile_text_stays_text(tmp_path: Path) -> None:
     claim = Claim(HOSTILE, HOSTILE, HOSTILE, "not run", HOSTILE, 1, 0.5, 0.1, 0.9, HOSTILE)
-    bars = Bars(HOSTILE, HOSTILE, (HOSTILE, "b"), {HOSTILE: (1.0, None)}, caption=HOSTILE)
-    lines = Lines(HOSTILE, HOSTILE, HOSTILE, (0.0, 1.0), {HOSTILE: (1.0, 2.0)}, caption=HOSTILE)
-    table = Table(HOSTILE, (HOSTILE, HOSTILE), ((HOSTILE, HOSTILE),))
-    hostile = Experiment(
+    bars = BarChart(HOSTILE, HOSTILE, (HOSTILE, "b"), {HOSTILE: (1.0, None)}, caption=HOSTILE)
+    lines = LineChart(HOSTILE, HOSTILE, HOSTILE, (0.0, 1.0), {HOSTILE: (1.0, 2.0)}, caption=HOSTILE)
+    table = FindingsTable(HOSTILE, (HOSTILE, HOSTILE), ((HOSTILE, HOSTILE),))
+    hostile = PaperExperiment(
         HOSTILE, HOSTILE, HOSTILE, (HOSTILE,), (claim,), (table,), (bars, lines), (HOSTILE,), (HOSTILE,)
     )
-    findings = Findings(
+    findings = PaperFindings(
         HOSTILE,
         HOSTILE,
         HOSTILE,
@@ -141,7 +141,7 @@ def test_hostile_text_stays_text(tmp_path: Path) -> None:
         {HOSTILE: HOSTILE},
         tables=(table,),
     )
-    page = write_paper(write_study(tmp_path, findings))
+    page = write_paper_page(write_study(tmp_path, findings))
     raw = page.read_text(encoding="utf-8")
     assert "<script" not in raw
     assert read(page).text.count(HOSTILE) > 20
@@ -150,7 +150,9 @@ def test_hostile_text_stays_text(tmp_path: Path) -> None:
 
 
 def test_an_experiment_may_be_empty(tmp_path: Path) -> None:
-    page = alone(tmp_path / "one", EMPTY, replace(EMPTY, name="table", tables=(Table("Errors", ("a", "b"), ()),)))
+    page = alone(
+        tmp_path / "one", EMPTY, replace(EMPTY, name="table", tables=(FindingsTable("Errors", ("a", "b"), ()),))
+    )
     said = text_of(page)
     assert "No published statement was held against a figure of ours." in said
     assert "Errors : nothing was measured." in said
@@ -158,10 +160,10 @@ def test_an_experiment_may_be_empty(tmp_path: Path) -> None:
 
 
 def test_what_was_not_measured_is_said(tmp_path: Path) -> None:
-    bars = Bars("Bars", "deg", ("a", "b"), {"ik": (None, None), "pca": (1.0, None)}, spread={"pca": (None, None)})
-    lines = Lines("Lines", "x", "y", (0.0, 1.0, 2.0), {"ik": (None, None, None), "pca": (1.0, None, 3.0)})
-    none = Bars("No bars", "deg", (), {})
-    page = alone(tmp_path, replace(EMPTY, figures=(bars, lines, none, Lines("No lines", "x", "y", (), {}))))
+    bars = BarChart("Bars", "deg", ("a", "b"), {"ik": (None, None), "pca": (1.0, None)}, spread={"pca": (None, None)})
+    lines = LineChart("Lines", "x", "y", (0.0, 1.0, 2.0), {"ik": (None, None, None), "pca": (1.0, None, 3.0)})
+    none = BarChart("No bars", "deg", (), {})
+    page = alone(tmp_path, replace(EMPTY, figures=(bars, lines, none, LineChart("No lines", "x", "y", (), {}))))
     said = text_of(page)
     assert said.count("not measured") >= 3
     assert "A dash: not measured." in said
@@ -171,7 +173,7 @@ def test_what_was_not_measured_is_said(tmp_path: Path) -> None:
 
 def test_what_has_nothing_to_draw_is_said_and_not_drawn(tmp_path: Path) -> None:
     none: dict[str, tuple[float | None, ...]] = {"ik": (None, None)}
-    bars, lines = Bars("Bars", "deg", ("a", "b"), none), Lines("Lines", "x", "y", (0.0, 1.0), none)
+    bars, lines = BarChart("Bars", "deg", ("a", "b"), none), LineChart("Lines", "x", "y", (0.0, 1.0), none)
     page = alone(tmp_path, replace(EMPTY, figures=(bars, lines, sets("walking"))))
     assert {path.name for path in (tmp_path / "plots").iterdir()} == {"empty_3.svg", "empty_3.png"}
     said = text_of(page)
@@ -182,7 +184,7 @@ def test_what_has_nothing_to_draw_is_said_and_not_drawn(tmp_path: Path) -> None:
 def test_words_stand_on_the_left_of_their_column_and_numbers_on_the_right(tmp_path: Path) -> None:
     """Whatever begins with a number and goes on is words."""
     rows = (("a", "1.2 ± 0.4 (8)", "8: one, two, three, four, five, six, seven"), ("b", "not measured", "none"))
-    page = alone(tmp_path, replace(EMPTY, tables=(Table("Errors", ("a", "b", "c"), rows),)))
+    page = alone(tmp_path, replace(EMPTY, tables=(FindingsTable("Errors", ("a", "b", "c"), rows),)))
     words = re.findall(r'<span class="words"[^>]*>([^<]*)<', page.read_text(encoding="utf-8"))
     assert words == ["a", "c", "a", rows[0][2], "b", "none"]
 
@@ -194,8 +196,8 @@ def test_names_between_backticks_are_code(tmp_path: Path) -> None:
 
 def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
     long = "a_name_without_end_" * 12
-    bars = Bars("Bars", "deg", (long, "b"), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
-    lines = Lines("Lines", "x", "y", (0.0, 1.0), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
+    bars = BarChart("Bars", "deg", (long, "b"), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
+    lines = LineChart("Lines", "x", "y", (0.0, 1.0), {long: (1.0, 2.0), f"{long}2": (1.0, 2.0)})
     claim = Claim(long, long, long, "cannot tell", long, 3)
     page = alone(tmp_path, replace(EMPTY, title=long, claims=(claim,), figures=(bars, lines)))
     assert text_of(page).count(long) >= 8
@@ -203,7 +205,7 @@ def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
 
 def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writer, "find_spec", lambda name: None)
-    said = text_of(write_paper(write_study(tmp_path, kim())))
+    said = text_of(write_paper_page(write_study(tmp_path, kim())))
     assert "Missing here Figures: matplotlib is not installed; their numbers are tables" in said
     assert "RH+LH+RA+LA+PEL" in said
     assert "walking_p1_01: mean joint-angle error [deg]" in said
@@ -226,7 +228,7 @@ def test_old_plots_go(tmp_path: Path) -> None:
 
 def test_a_folder_without_findings_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match=r"findings\.json"):
-        write_paper(tmp_path)
+        write_paper_page(tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -237,7 +239,7 @@ def test_a_table_that_is_none_is_refused(tmp_path: Path) -> None:
     content["tables"][0]["rows"][0].append("one more")
     (folder / "findings.json").write_text(json.dumps(content))
     with pytest.raises(BadFile, match="a row of 3 texts under 2 columns"):
-        write_paper(folder)
+        write_paper_page(folder)
 
 
 def test_the_sentence_counts_every_claim() -> None:
@@ -245,5 +247,5 @@ def test_the_sentence_counts_every_claim() -> None:
     for count in range(len(claims) + 1):
         some = claims[:count]
         numbers = [int(number) for number in re.findall(r"\d+", sentence(some))]
-        assert sum(tally(some).values()) == count
+        assert sum(count_verdicts(some).values()) == count
         assert numbers == [] if not count else numbers[1] == count == sum(numbers) - numbers[1]

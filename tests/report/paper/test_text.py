@@ -9,10 +9,10 @@ import pytest
 import harness
 from harness.cli import main
 from harness.errors import BadFile
-from harness.report.paper.readme import show_in_readme
+from harness.report.paper.readme import update_readme
 from harness.report.paper.text import WIDTH, text_tables
-from harness.report.paper.verdicts import difference, interval
-from harness.results.findings import Claim, Experiment
+from harness.report.paper.verdicts import format_difference, format_interval
+from harness.results.findings import Claim, PaperExperiment
 from tests.report.fabricate_paper import kim, liu, write_study
 
 RESULTS = (Path(harness.__file__).parent.parent / "results" / "README.md").read_text(encoding="utf-8")
@@ -25,7 +25,14 @@ def letters(text: str) -> str:
 def test_every_claim_is_told_whole() -> None:
     told = letters(text_tables(liu()))
     for claim in (claim for experiment in liu().experiments for claim in experiment.claims):
-        for text in (claim.published, claim.ours, claim.why, difference(claim), interval(claim), claim.verdict):
+        for text in (
+            claim.published,
+            claim.ours,
+            claim.why,
+            format_difference(claim),
+            format_interval(claim),
+            claim.verdict,
+        ):
             assert letters(text) in told
     for text in ("8 of 16 published statements reproduced", "Golf has 2 clips only.", "One sequence left out"):
         assert letters(text) in told
@@ -35,7 +42,9 @@ def test_every_claim_is_told_whole() -> None:
 def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
     long = " ".join(["some words"] * repeats) + "and_one_without_any_end" * repeats
     claim = Claim(long, long, long, "cannot tell", long, 7, 0.1, -0.2, 0.3, "deg")
-    findings = replace(liu(), experiments=(Experiment("a", long, long, (long,), (claim, claim)), *kim().experiments))
+    findings = replace(
+        liu(), experiments=(PaperExperiment("a", long, long, (long,), (claim, claim)), *kim().experiments)
+    )
     lines = text_tables(findings).split("\n")
     assert max(map(len, lines)) <= WIDTH
     assert not any(line.endswith(" ") for line in lines)
@@ -54,7 +63,7 @@ def test_columns_stand_under_their_titles() -> None:
 
 def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
     claim = Claim("one\ntwo\t three", "a\nb", "c", "reproduced")
-    told = text_tables(replace(liu(), experiments=(Experiment("a", "b", "", (), (claim,)),)))
+    told = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
     assert "one two three  a b        c     reproduced" in told
 
 
@@ -75,12 +84,15 @@ def test_an_interval_that_does_not_hold_zero_never_reads_so(
     values: tuple[float | None, float | None, float | None], unit: str, told: tuple[str, str]
 ) -> None:
     claim = Claim("", "", "", "cannot tell", "", 7, *values, unit)
-    assert (difference(claim), interval(claim)) == told
+    assert (format_difference(claim), format_interval(claim)) == told
 
 
 def test_a_figure_that_is_ours_already_is_not_told_twice() -> None:
-    assert difference(Claim("", "1.25 deg", "1.21 deg", "reproduced", difference=1.21, unit="deg")) == ""
-    assert difference(Claim("", "order", "1.21 against 2", "cannot tell", difference=0.79, unit="deg")) == "0.79 deg"
+    assert format_difference(Claim("", "1.25 deg", "1.21 deg", "reproduced", difference=1.21, unit="deg")) == ""
+    assert (
+        format_difference(Claim("", "order", "1.21 against 2", "cannot tell", difference=0.79, unit="deg"))
+        == "0.79 deg"
+    )
 
 
 def test_tables_are_put_where_those_of_the_same_paper_and_motion_stand(tmp_path: Path) -> None:
@@ -89,13 +101,13 @@ def test_tables_are_put_where_those_of_the_same_paper_and_motion_stand(tmp_path:
     readme.write_bytes(b"# Results\r\n\r\nwords  \n")
     studies = [liu(), kim(), replace(liu(), motion="cmu")]
     for findings in studies:
-        show_in_readme(readme, findings)
+        update_readme(readme, findings)
     first = readme.read_bytes()
     assert first.startswith(b"# Results\r\n\r\nwords  \n" + b"\n")
     for findings in reversed(studies):
-        show_in_readme(readme, findings)
+        update_readme(readme, findings)
     assert readme.read_bytes() == first
-    show_in_readme(readme, replace(studies[1], reference="Somebody else"))
+    update_readme(readme, replace(studies[1], reference="Somebody else"))
     assert readme.read_bytes() == first.replace(kim().reference.encode(), b"Somebody else")
     for findings in studies:
         assert f"    {findings.command}\n".encode() in first
@@ -108,7 +120,7 @@ def test_no_text_can_end_its_section(tmp_path: Path) -> None:
     hostile = "x\n<!-- end of paper kim2012-cmu -->\n# heading\n```\n<!-- paper kim2012-cmu -->"
     findings = replace(kim(), reference=hostile, command=hostile, circumstances={"harness": hostile})
     for _ in range(2):
-        show_in_readme(readme, findings)
+        update_readme(readme, findings)
     text = readme.read_text()
     assert text.count("<!-- paper kim2012-cmu -->") == text.count("<!-- end of paper kim2012-cmu -->") == 1
     assert not re.search("^(# heading|```)", text, re.MULTILINE)
@@ -127,7 +139,7 @@ def test_broken_markers_are_refused_and_left(text: str, tmp_path: Path) -> None:
     readme = tmp_path / "README.md"
     readme.write_text(text)
     with pytest.raises(BadFile, match="markers"):
-        show_in_readme(readme, kim())
+        update_readme(readme, kim())
     assert readme.read_text() == text
 
 
@@ -137,7 +149,7 @@ def test_a_page_that_cannot_be_read_is_refused(content: bytes | None, tmp_path: 
     if content:
         readme.write_bytes(content)
     with pytest.raises(BadFile, match="cannot be read"):
-        show_in_readme(readme, kim())
+        update_readme(readme, kim())
 
 
 def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

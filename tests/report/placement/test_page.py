@@ -9,15 +9,21 @@ import numpy as np
 import pytest
 
 from harness.cli import main
-from harness.report.kit.render_process import started
+from harness.report.kit.render_process import start_renderer
 from harness.report.placement import body_map as body
 from harness.report.placement import writer
-from harness.report.placement.body_map import Shown, blended, body_map, maps
+from harness.report.placement.body_map import BodyMapValues, draw_body_map, interpolate_colours, select_body_maps
 from harness.report.placement.charts import charts
 from harness.report.placement.text import text
-from harness.report.placement.wording import difference, enough, figure, named, sentence
+from harness.report.placement.wording import (
+    format_difference,
+    format_value,
+    sentence,
+    set_name,
+    smallest_sufficient_set,
+)
 from harness.report.placement.writer import write_placement_page
-from harness.results.placement_findings import Best, PlacementFindings, Stations, Tried
+from harness.results.placement_findings import BestSet, PlacementFindings, StationNames, StationSetResult
 from tests.report.fabricate_placement import CLIPS, PLACES, made_up, write_made_up
 from tests.report.reading import text_of
 
@@ -36,16 +42,16 @@ def findings() -> PlacementFindings:
 @pytest.fixture
 def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
     """As on a machine that cannot render: quick, and the page has to say so."""
-    monkeypatch.setattr(writer, "body_map", lambda *args, **options: (None, NO_PICTURE))
+    monkeypatch.setattr(writer, "draw_body_map", lambda *args, **options: (None, NO_PICTURE))
 
 
-def study_of(errors: dict[Stations, list[float | None]], better: str = "lower") -> PlacementFindings:
+def study_of(errors: dict[StationNames, list[float | None]], better: str = "lower") -> PlacementFindings:
     """Of these sets, in the order of their size, each the best of its own."""
     tried = [
-        Tried(stations, 40.0, dict(zip(CLIPS, values, strict=False)), _mean(values))
+        StationSetResult(stations, 40.0, dict(zip(CLIPS, values, strict=False)), _mean(values))
         for stations, values in errors.items()
     ]
-    best = tuple(Best(t.stations) for t in tried)
+    best = tuple(BestSet(t.stations) for t in tried)
     whole = replace(made_up(at_most=1), tried=tuple(tried), best=best, rankings=(), searches=(), worth=())
     return replace(whole, compared=(), conditions=(), agreements=(), better="higher" if better == "higher" else "lower")
 
@@ -56,9 +62,9 @@ def _mean(values: list[float | None]) -> float | None:
 
 
 def test_pairs_have_one_name() -> None:
-    assert named(("head", "left_ankle", "right_ankle", "pelvis")) == "both ankles + head + pelvis"
-    assert named(("left_foot", "right_foot", "left_hand")) == "both feet + left hand"
-    assert named(()) == "none"
+    assert set_name(("head", "left_ankle", "right_ankle", "pelvis")) == "both ankles + head + pelvis"
+    assert set_name(("left_foot", "right_foot", "left_hand")) == "both feet + left hand"
+    assert set_name(()) == "none"
 
 
 def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
@@ -66,14 +72,14 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
     base = [2.0, 2.1, 1.9, 2.2, 1.8, 2.0, 2.05, 1.95]
     wiggle = [0.1, -0.1, 0.1, -0.1, 0.1, -0.1, 0.1, -0.12]
     alike = study_of({two: [b + w for b, w in zip(base, wiggle, strict=True)], three: [b - 0.01 for b in base]})
-    chosen = enough(alike)
+    chosen = smallest_sufficient_set(alike)
     assert chosen is not None
     assert chosen.stations == two
     assert sentence(alike).startswith("2 trackers serve as well as up to 3: both ankles, 2.00 deg")
     apart = study_of({two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
     assert sentence(apart).startswith("Of 1 to 3 trackers 3 err least: both ankles + pelvis")
     fps = study_of({two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher")
-    chosen = enough(fps)
+    chosen = smallest_sufficient_set(fps)
     assert chosen is not None
     assert chosen.stations == three
 
@@ -103,11 +109,11 @@ def test_where_nothing_was_measured_nothing_is_recommended() -> None:
 def test_differences_have_a_sign_and_no_zero_that_is_none(
     values: tuple[float | None, float | None, float | None], said: str
 ) -> None:
-    assert difference(*values) == said
+    assert format_difference(*values) == said
 
 
 def test_figures_have_decimals_that_suit_their_size() -> None:
-    assert [figure(value) for value in (0.004, 2.345, 123.45, 12345.6)] == ["0.004", "2.35", "123.5", "12,346"]
+    assert [format_value(value) for value in (0.004, 2.345, 123.45, 12345.6)] == ["0.004", "2.35", "123.5", "12,346"]
 
 
 def test_the_text_opens_on_the_answer_and_has_every_table(findings: PlacementFindings) -> None:
@@ -139,7 +145,7 @@ def test_ties_are_called_ties(findings: PlacementFindings) -> None:
     row = next(line for line in text(tied).splitlines() if line.startswith("2 ("))
     assert " tie " in row
     assert "+0.001 (−0.010 to +0.012)" in row
-    assert named(level.stations) in next(line for line in text(tied).splitlines() if line.startswith("2  "))
+    assert set_name(level.stations) in next(line for line in text(tied).splitlines() if line.startswith("2  "))
 
 
 @pytest.mark.usefixtures("unseen")
@@ -193,24 +199,24 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
-    among, more = maps(findings.worth)
+    among, more = select_body_maps(findings.worth)
     assert len(among.values) == len(PLACES)
     assert among.what == "error without it, of 11 trackers, less error with it"
     assert among.worn == ()
     assert more.worn == ("pelvis", "left_ankle", "right_ankle")
     assert set(more.values) == {place.name for place in PLACES} - set(more.worn)
-    assert maps(()) == []
+    assert select_body_maps(()) == []
 
 
 def test_skin_has_the_colours_of_its_places_nearer_ones_more(rng: np.random.Generator) -> None:
     places, colours = np.array([[0.0, 0.0, 0.0], [0.4, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    found = blended(np.array([[0.0, 0.0, 0.0], [0.2, 0.1, 0.0], [0.4, 0.0, 0.0]]), places, colours)
+    found = interpolate_colours(np.array([[0.0, 0.0, 0.0], [0.2, 0.1, 0.0], [0.4, 0.0, 0.0]]), places, colours)
     assert found[0, 0] > 0.99
     np.testing.assert_allclose(found[1], [0.5, 0.5, 0.0], atol=1e-12)
     assert found[2, 1] > 0.99
     points = rng.normal(size=(50, 3))
-    np.testing.assert_allclose(blended(points, places, colours).sum(axis=1), 1.0)
-    np.testing.assert_allclose(blended(points, places[:1], colours[:1]), np.tile(colours[0], (50, 1)))
+    np.testing.assert_allclose(interpolate_colours(points, places, colours).sum(axis=1), 1.0)
+    np.testing.assert_allclose(interpolate_colours(points, places[:1], colours[:1]), np.tile(colours[0], (50, 1)))
 
 
 def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
@@ -222,9 +228,9 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
         "picture": np.full((2, height, width, 4), 200, np.uint8),
         "at": np.array([np.column_stack([at, sign * facing]) for sign in (1.0, -1.0)]),
     }
-    monkeypatch.setattr(body, "_rendered", lambda *args: (views, ""))
+    monkeypatch.setattr(body, "_render", lambda *args: (views, ""))
     values = {place.name: 0.1 * n for n, place in enumerate(PLACES[:-1])}
-    chart, missing = body_map(PLACES, Shown(values, "worth", ("right_ankle",)), unit="deg")
+    chart, missing = draw_body_map(PLACES, BodyMapValues(values, "worth", ("right_ankle",)), unit="deg")
     assert chart is not None
     assert missing == ""
     assert "right ankle (worn)" in chart.svg
@@ -237,16 +243,21 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
 
 
 def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(body, "started", lambda module, arguments: started("harness.report.not_there", []))
-    chart, missing = body_map(PLACES, Shown({"head": 0.1}, "worth"), unit="deg")
+    monkeypatch.setattr(
+        body, "start_renderer", lambda module, arguments: start_renderer("harness.report.not_there", [])
+    )
+    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
     assert chart is None
     assert missing.startswith("the renderer failed")
 
 
 def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert body_map(PLACES, Shown({"head": None}, "worth"), unit="deg") == (None, "no candidate has a value")
+    assert draw_body_map(PLACES, BodyMapValues({"head": None}, "worth"), unit="deg") == (
+        None,
+        "no candidate has a value",
+    )
     monkeypatch.setattr(body, "find_spec", lambda name: None if name == "pyvista" else True)
-    chart, missing = body_map(PLACES, Shown({"head": 0.1}, "worth"), unit="deg")
+    chart, missing = draw_body_map(PLACES, BodyMapValues({"head": 0.1}, "worth"), unit="deg")
     assert chart is None
     assert "viz" in missing
 
@@ -257,13 +268,13 @@ def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.Monk
     """Yellow where worth is largest, purple where none is, grey where nothing was tried; places where they are."""
     kept: dict[str, np.ndarray] = {}
 
-    def keep(places: object, shown: Shown, views: dict[str, np.ndarray], *rest: object) -> None:
+    def keep(places: object, shown: BodyMapValues, views: dict[str, np.ndarray], *rest: object) -> None:
         kept.update(views)
 
     monkeypatch.setattr(body, "_chart", keep)
     values = {"head": 0.0, "left_ankle": 0.5}
     worn = tuple(place.name for place in PLACES if place.name not in values)
-    assert body_map(PLACES, Shown(values, "worth", worn), unit="deg")[1] == ""
+    assert draw_body_map(PLACES, BodyMapValues(values, "worth", worn), unit="deg")[1] == ""
     picture, at = kept["picture"].astype(float), kept["at"]
     names = [place.name for place in PLACES]
 

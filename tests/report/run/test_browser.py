@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from harness.report.run.writer import write_report
+from harness.report.run.writer import write_run_page
 from tests.report.fabricate import Plan, fabricate
 
 HOSTILE = "<script>alert(1)</script>"
@@ -28,7 +28,7 @@ PAUSE_ON_THE_WAY = """() => new Promise((done) => {
 def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run with a hostile clip name; rendered where that is possible."""
     plan = Plan(methods={"ik": 2.0, "mean_pose": 12.0}, clip_name=HOSTILE, behaviours=("walking",), failing=())
-    return write_report(fabricate(tmp_path_factory.mktemp("browser") / "run", plan))
+    return write_run_page(fabricate(tmp_path_factory.mktemp("browser") / "run", plan))
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.experiment.scenario import load_scenario
-from harness.report.run.charts import drawn, legend
+from harness.report.run.charts import add_legend, draw_chart
 
 LONG = load_scenario("boxing_outliers").methods
 ALL = load_scenario("boxing").methods
@@ -21,10 +21,10 @@ def test_a_legend_stays_on_its_chart_and_leaves_the_axes_their_height(names: Seq
         axes = figure.subplots()
         for name in names:
             axes.plot([0.0, 1.0], label=name)
-        legend(figure, axes)
+        add_legend(figure, axes)
         made.append(figure)
 
-    drawn("chart", "", "", "", draw, 3.0)
+    draw_chart("chart", "", "", "", draw, 3.0)
     (figure,) = made
     (box,) = (shown.get_window_extent() for shown in figure.legends)
     assert figure.bbox.x0 <= box.x0 <= box.x1 <= figure.bbox.x1

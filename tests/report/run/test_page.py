@@ -14,8 +14,8 @@ from harness.errors import BadFile
 from harness.report.kit import render_process, skeleton_player
 from harness.report.kit.style import COLOURS
 from harness.report.run.data import WORST_METRICS, read_run
-from harness.report.run.headline import verdict
-from harness.report.run.writer import movie_fps, write_report
+from harness.report.run.headline import build_headline
+from harness.report.run.writer import movie_fps, write_run_page
 from tests.report.fabricate import METHODS, Plan, fabricate
 
 HOSTILE = "<script>alert(1)</script>&\"'$x^2$"
@@ -25,7 +25,7 @@ HOSTILE = "<script>alert(1)</script>&\"'$x^2$"
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two behaviours and four methods, reported on without rendering."""
     out = fabricate(tmp_path_factory.mktemp("report") / "run")
-    write_report(out, rendered=False)
+    write_run_page(out, rendered=False)
     return out
 
 
@@ -49,23 +49,23 @@ def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None
     rows = json.loads((run_folder / "summary.json").read_text())["cells"]
     means = {name: np.mean([row["joint_angle_mean_deg"] for row in rows if row["method"] == name]) for name in METHODS}
     first, second = sorted(means.values())[:2]
-    sentence = verdict(read_run(run_folder)).sentence
+    sentence = build_headline(read_run(run_folder)).sentence
     assert f"{first:.2f}° mean" in sentence
     assert f"{second - first:.2f}° ({100 * (second - first) / second:.0f} %) less than ik, the next" in sentence
 
 
 def test_the_verdict_says_when_positions_tell_another_story(run_folder: Path) -> None:
     run = read_run(run_folder)
-    assert verdict(run).sentence.endswith(" mm off, the least too.")
+    assert build_headline(run).sentence.endswith(" mm off, the least too.")
     cells = [{**row, "mpjpe_mm": 1.0 if row["method"] == "ik" else 60.0} for row in run.cells]
-    told = verdict(replace(run, summary={**run.summary, "cells": cells})).sentence
+    told = build_headline(replace(run, summary={**run.summary, "cells": cells})).sentence
     assert told.endswith("In joint position ik is better: 1 mm off, best_match+ik 60 mm.")
 
 
 def test_methods_without_a_common_sequence_are_not_ranked(run_folder: Path) -> None:
     run = read_run(run_folder)
     cells = [row for row in run.cells if (row["method"] == "ik") == (row["behaviour"] == "walking")]
-    found = verdict(replace(run, summary={**run.summary, "cells": cells}))
+    found = build_headline(replace(run, summary={**run.summary, "cells": cells}))
     assert found.best is None
     assert found.sentence.endswith("share no measured sequence: none is best.")
 
@@ -105,13 +105,13 @@ def test_nothing_in_the_page_points_elsewhere(run_folder: Path) -> None:
 
 def test_the_same_run_gives_the_same_page(run_folder: Path) -> None:
     before = (run_folder / "report.html").read_bytes()
-    write_report(run_folder, rendered=False)
+    write_run_page(run_folder, rendered=False)
     assert (run_folder / "report.html").read_bytes() == before
 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={HOSTILE: 2.0, "ik": 3.0}, duration_s=4.0, clip_name=HOSTILE)
-    page = write_report(fabricate(tmp_path / "run", plan), rendered=False).read_text(encoding="utf-8")
+    page = write_run_page(fabricate(tmp_path / "run", plan), rendered=False).read_text(encoding="utf-8")
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert(1)&lt;/script&gt;&amp;&quot;&#x27;$x^2$" in page
     for chart in (tmp_path / "run" / "plots").glob("*.svg"):
@@ -120,7 +120,7 @@ def test_hostile_names_stay_text(tmp_path: Path) -> None:
 
 def test_what_failed_and_what_was_not_measured_is_said(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), duration_s=4.0, failing=("mean_pose",), covered=0.4)
-    page = write_report(fabricate(tmp_path / "run", plan), rendered=False)
+    page = write_run_page(fabricate(tmp_path / "run", plan), rendered=False)
     said = text_of(page)
     assert "Nothing was measured: 3 of 4 cells finished." in said
     assert "ValueError: &lt;b&gt;no&lt;/b&gt; pose &amp; no plan" in page.read_text(encoding="utf-8")
@@ -132,21 +132,21 @@ def test_what_failed_and_what_was_not_measured_is_said(tmp_path: Path) -> None:
 
 def test_a_run_without_any_finished_cell_has_a_page(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), duration_s=4.0, failing=tuple(METHODS))
-    said = text_of(write_report(fabricate(tmp_path / "run", plan)))
+    said = text_of(write_run_page(fabricate(tmp_path / "run", plan)))
     assert "Nothing was measured: 0 of 4 cells finished." in said
     assert said.count("ValueError") >= 4
 
 
 def test_a_perfect_method_breaks_no_axis(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"oracle": 0.0}, duration_s=4.0)
-    said = text_of(write_report(fabricate(tmp_path / "run", plan), rendered=False))
+    said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
     assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion; no other" in said
     assert "Its joints are 0 mm off." in said
 
 
 def test_inputs_and_several_takes_are_told_apart(tmp_path: Path) -> None:
     plan = Plan(behaviours=("boxing",), methods={"ik": 1.0}, duration_s=3.0, takes=2, inputs=("pos+ori", "pos"))
-    said = text_of(write_report(fabricate(tmp_path / "run", plan), rendered=False))
+    said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
     assert "ik (pos+ori)" in said
     assert "ik (pos)" in said
     assert "of 2 clips the one with the largest error" in said
@@ -158,7 +158,7 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
     varied = tuple({"components.echo.share": share} for share in (0.0, 0.02, 0.1))
     plan = Plan(behaviours=("boxing",), methods={"ik": 1.0, "mean_pose": 9.0}, duration_s=3.0, varied=varied)
     out = fabricate(tmp_path / "run", plan)
-    page = write_report(out, rendered=False)
+    page = write_run_page(out, rendered=False)
     said = text_of(page)
     curve = (out / "plots" / "varied_components_echo_share_boxing.svg").read_text()
     assert "components.echo.share" in curve
@@ -177,7 +177,7 @@ def test_charts_show_no_more_lines_than_look_different(tmp_path: Path, monkeypat
     monkeypatch.setattr("harness.report.run.data.STYLES", 3)
     monkeypatch.setattr("harness.report.run.charts.COLOURS", COLOURS[:3])
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"poor": 20.0, **METHODS}, duration_s=3.0))
-    page = write_report(out, rendered=False).read_text()
+    page = write_run_page(out, rendered=False).read_text()
     for name in ("error_walking", "error_cdf"):
         drawn = (out / "plots" / f"{name}.svg").read_text()
         assert [method for method in ("poor", *METHODS) if f">{method}<" in drawn] == [
@@ -192,7 +192,7 @@ def test_charts_show_no_more_lines_than_look_different(tmp_path: Path, monkeypat
 def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
     varied = ({"noise": "clean"}, {"noise": "default"})
     out = fabricate(tmp_path / "run", Plan(behaviours=("boxing",), methods={"ik": 1.0}, duration_s=3.0, varied=varied))
-    said = text_of(write_report(out, rendered=False))
+    said = text_of(write_run_page(out, rendered=False))
     assert "method noise=clean noise=default ik n 1 " in said
     assert not list((out / "plots").glob("varied*"))
 
@@ -200,7 +200,7 @@ def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
 def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"ik": 1.0, "mean_pose": 9.0}, duration_s=3.0, takes=2)
     said = text_of(
-        write_report(fabricate(tmp_path / "run", replace(plan, performers=("known", "new"))), rendered=False)
+        write_run_page(fabricate(tmp_path / "run", replace(plan, performers=("known", "new"))), rendered=False)
     )
     for kind in ("known", "new"):
         assert f"ik ({kind} performer) is best: " in said
@@ -209,7 +209,7 @@ def test_known_and_new_performers_are_ranked_apart(tmp_path: Path) -> None:
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="manifest"):
-        write_report(tmp_path)
+        write_run_page(tmp_path)
     assert not list(tmp_path.iterdir())
 
 
@@ -219,7 +219,7 @@ def test_a_missing_extra_costs_its_part_alone(
 ) -> None:
     monkeypatch.setattr(module, "find_spec", lambda name: None if name == package else object())
     plan = Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=3.0)
-    page = write_report(fabricate(tmp_path / "run", plan), rendered=package == "pyvista")
+    page = write_run_page(fabricate(tmp_path / "run", plan), rendered=package == "pyvista")
     said = text_of(page)
     assert f"needs {package}; install it with: pip install &#x27;tracker-harness[viz]&#x27;" in said
     assert ('id="stage"' in page.read_text(encoding="utf-8")) == (package != "plotly")
@@ -231,7 +231,7 @@ def test_a_renderer_that_crashes_leaves_the_report(tmp_path: Path, monkeypatch: 
     monkeypatch.setenv("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     monkeypatch.delenv("DISPLAY", raising=False)
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=3.0))
-    said = text_of(write_report(out))
+    said = text_of(write_run_page(out))
     assert "Rendered pictures of the worst two seconds: the renderer" in said
     assert "In 3-D" in said
     assert not list((out / "plots").glob("*.png"))
@@ -241,7 +241,7 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
     from matplotlib.image import imread
 
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 6.0}, duration_s=4.0))
-    page = write_report(out)
+    page = write_run_page(out)
     strips = list((out / "plots").glob("worst_*.png"))
     assert 1 <= len(strips) <= len(WORST_METRICS)
     assert page.read_text(encoding="utf-8").count("data:image/png;base64,") == len(strips)
@@ -255,7 +255,7 @@ def test_the_movie_plays_in_real_time(tmp_path: Path, renders: None) -> None:
     import imageio_ffmpeg
 
     out = fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"a+b": 2.0}, duration_s=1.0))
-    page = write_report(out, movie=True, rendered=False)
+    page = write_run_page(out, movie=True, rendered=False)
     (movie,) = out.glob("movie_*.mp4")
     assert movie.name.startswith("movie_a_b_walking_p1_01_")
     assert f'href="{movie.name}"' in page.read_text(encoding="utf-8")
@@ -272,7 +272,7 @@ def test_movies_take_every_nth_frame_where_they_can(rate_hz: float, fps: float) 
 @pytest.mark.parametrize("silent", [("ik",), ("ik", "mean_pose")])
 def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tuple[str, ...]) -> None:
     plan = Plan(behaviours=("walking",), methods={"ik": 2.0, "mean_pose": 9.0}, duration_s=3.0, silent=silent)
-    said = text_of(write_report(fabricate(tmp_path / "run", plan), rendered=False))
+    said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
     if len(silent) == 2:
         assert "Nothing was measured: 2 of 2 cells finished." in said
         assert "0 of 162 frames matched (0.0 %)" in said

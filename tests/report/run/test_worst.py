@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.report.run.worst_window import Window, together, worst_of, worst_window
+from harness.report.run.worst_window import WorstWindow, find_worst_window, group_overlapping, select_worst
 
 RATE_HZ = 50.0
 
@@ -14,8 +14,10 @@ def bump(start_s: float, end_s: float, height: float = 10.0, length_s: float = 2
     return time_s, np.where((time_s >= start_s - 1e-9) & (time_s < end_s - 1e-9), height, 1.0)
 
 
-def found(time_s: np.ndarray, values: np.ndarray, scored: np.ndarray | None = None) -> Window:
-    window = worst_window("cell", "mpjpe_mm", time_s, values, np.ones(len(values), bool) if scored is None else scored)
+def found(time_s: np.ndarray, values: np.ndarray, scored: np.ndarray | None = None) -> WorstWindow:
+    window = find_worst_window(
+        "cell", "mpjpe_mm", time_s, values, np.ones(len(values), bool) if scored is None else scored
+    )
     assert window is not None
     return window
 
@@ -67,15 +69,15 @@ def test_a_clip_shorter_than_two_seconds_is_its_own_window() -> None:
 @pytest.mark.parametrize("frames", [0, 1, 100])
 def test_nothing_scored_or_defined_has_no_worst(frames: int) -> None:
     time_s, nothing = np.arange(frames) / RATE_HZ, np.full(frames, np.nan)
-    assert worst_window("cell", "mpjpe_mm", time_s, nothing, np.ones(frames, bool)) is None
-    assert worst_window("cell", "mpjpe_mm", time_s, np.ones(frames), np.zeros(frames, bool)) is None
+    assert find_worst_window("cell", "mpjpe_mm", time_s, nothing, np.ones(frames, bool)) is None
+    assert find_worst_window("cell", "mpjpe_mm", time_s, np.ones(frames), np.zeros(frames, bool)) is None
 
 
 def test_the_worst_of_several_and_what_belongs_together() -> None:
-    a = Window("one", "mpjpe_mm", 0, 100, 4.0, 5.98, 3.0)
-    b = Window("one", "mpjre_deg", 25, 125, 4.5, 6.48, 2.0)
-    c = Window("one", "jitter_m_s3", 100, 200, 6.0, 7.98, 5.0)
-    d = Window("two", "mpjre_deg", 0, 100, 4.0, 5.98, 9.0)
-    assert worst_of([a, b]) is a
-    assert worst_of([]) is None
-    assert together([a, b, c, d]) == [(a, b), (c,), (d,)]
+    a = WorstWindow("one", "mpjpe_mm", 0, 100, 4.0, 5.98, 3.0)
+    b = WorstWindow("one", "mpjre_deg", 25, 125, 4.5, 6.48, 2.0)
+    c = WorstWindow("one", "jitter_m_s3", 100, 200, 6.0, 7.98, 5.0)
+    d = WorstWindow("two", "mpjre_deg", 0, 100, 4.0, 5.98, 9.0)
+    assert select_worst([a, b]) is a
+    assert select_worst([]) is None
+    assert group_overlapping([a, b, c, d]) == [(a, b), (c,), (d,)]

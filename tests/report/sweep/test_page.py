@@ -11,16 +11,24 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.cli import main
-from harness.compare.paired_statistics import interval
+from harness.compare.paired_statistics import bootstrap_interval
 from harness.errors import BadFile
-from harness.report.run.charts import drawn
+from harness.report.run.charts import draw_chart
 from harness.report.sweep import page as sweep_page
-from harness.report.sweep.charts import MOST_SERIES, Curve, _dots_in, _draw, curves, shown_of, varying
-from harness.report.sweep.data import HEADLINE, METRICS, Key, Statistic
-from harness.report.sweep.page import write_sweep
-from harness.report.sweep.reader import gathered, read_sweep
+from harness.report.sweep.charts import (
+    MAX_SERIES,
+    Curve,
+    _dot_chart_height_in,
+    _draw,
+    curves,
+    scenarios_varying,
+    select_curves,
+)
+from harness.report.sweep.data import METRICS, PRIMARY_METRIC, Statistic, VariedKey
+from harness.report.sweep.page import write_sweep_page
+from harness.report.sweep.reader import collect_cells, read_sweep
 from harness.report.sweep.text import text
-from harness.report.sweep.wording import effect, faults, sentence
+from harness.report.sweep.wording import describe_effect, group_failures, sentence
 from harness.results.index import CellIndex
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
@@ -36,7 +44,7 @@ VARIED = Plan(vary={RATE: (120, 20, 60), NOISE: ("clean", "default")}, failing=(
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """With its page."""
     out = fabricate_sweep(tmp_path_factory.mktemp("sweep") / "out", VARIED)
-    write_sweep(out)
+    write_sweep_page(out)
     return out
 
 
@@ -62,15 +70,15 @@ def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
     """Whatever is averaged, by hand."""
     sweep = read_sweep(folder)
     with CellIndex(folder, read_only=True) as index:
-        cells = list(index.columns("scenario", "method", "varied", "clip", HEADLINE))
+        cells = list(index.columns("scenario", "method", "varied", "clip", PRIMARY_METRIC))
     rows = [row for row in cells if row[:2] == ("walking", "ik") and json.loads(row[2])[RATE] == 60]
     means = [np.mean([error for *_, name, error in rows if name == clip]) for clip in sorted({row[3] for row in rows})]
     series, value = sweep.series.index("ik"), next(k for k in sweep.keys if k.name == RATE).texts.index("60")
-    found = sweep.statistic(HEADLINE, sweep.where(0, series, **{RATE: value}), ends=True)
+    found = sweep.statistic(PRIMARY_METRIC, sweep.where(0, series, **{RATE: value}), ends=True)
     assert (found.clips, len(rows)) == (7, 14)
     assert found.mean == pytest.approx(np.mean(means))
     assert found.sd == pytest.approx(np.std(means, ddof=1))
-    assert (found.low, found.high) == pytest.approx(interval(np.array(means)))
+    assert (found.low, found.high) == pytest.approx(bootstrap_interval(np.array(means)))
 
 
 def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> None:
@@ -82,16 +90,16 @@ def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> N
 def test_what_a_key_does_is_told(folder: Path) -> None:
     """Errors rise by tenths in the order 120, 20, 60 of the plan."""
     sweep = read_sweep(folder)
-    assert re.fullmatch(r"[\d.]+ deg at 120, [\d.]+ deg at 60 \(\+\d+ %\)", effect(sweep, sweep.keys[0]))
+    assert re.fullmatch(r"[\d.]+ deg at 120, [\d.]+ deg at 60 \(\+\d+ %\)", describe_effect(sweep, sweep.keys[0]))
     for shown in (text_of(folder / "report.html"), text(sweep)):
-        assert effect(sweep, sweep.keys[0]) in shown
+        assert describe_effect(sweep, sweep.keys[0]) in shown
 
 
 def test_each_key_has_a_chart_for_each_scenario_told_in_words(folder: Path) -> None:
     alts = [str(attributes["alt"]) for tag, attributes in read(folder / "report.html").found if tag == "img"]
     assert len(alts) == 4
     for alt, key in zip(alts, (RATE, RATE, NOISE, NOISE), strict=True):
-        assert alt.startswith(f"{HEADLINE} [deg] against {key}: ik ")
+        assert alt.startswith(f"{PRIMARY_METRIC} [deg] against {key}: ik ")
         assert "local_pca" not in alt, "all its cells failed"
 
 
@@ -99,14 +107,14 @@ def test_methods_stand_beside_each_other_in_every_scenario(folder: Path) -> None
     sweep, said = read_sweep(folder), text_of(folder / "report.html")
     for scenario in range(2):
         for series in range(len(sweep.series)):
-            found = sweep.statistic(HEADLINE, sweep.where(scenario, series))
+            found = sweep.statistic(PRIMARY_METRIC, sweep.where(scenario, series))
             assert f"{found.mean:.2f} ± {found.sd:.2f}" in said
             assert f"{found.mean:.2f} ± {found.sd:.2f}" in text(sweep)
     assert "walking n 7 boxing n 7 all n 14" in said.replace("\u00a0", " ").replace("  ", " ")
 
 
 def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folder: Path) -> None:
-    (fault,) = faults(read_sweep(folder))
+    (fault,) = group_failures(read_sweep(folder))
     assert (len(fault.cells), fault.line) == (84, "ValueError: <b>no</b> pose & no plan")
     said = text_of(folder / "report.html")
     assert "84 cells : ValueError: <b>no</b> pose & no plan" in said
@@ -137,7 +145,7 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
     ],
 )
 def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path) -> None:
-    page = write_sweep(fabricate_sweep(tmp_path, plan))
+    page = write_sweep_page(fabricate_sweep(tmp_path, plan))
     shown = text_of(page)
     assert said in shown
     assert said in text(read_sweep(tmp_path))
@@ -153,7 +161,7 @@ def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), seeds=(1, 2, 3))))
     assert len(sweep) == 63
-    assert sweep.statistic(HEADLINE, sweep.where(0, 0)).clips == 7
+    assert sweep.statistic(PRIMARY_METRIC, sweep.where(0, 0)).clips == 7
 
 
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
@@ -175,15 +183,15 @@ def test_a_scenario_that_does_not_vary_a_key_has_no_chart_of_it() -> None:
         for scenario, varied in (("a", '{"n":1}'), ("a", '{"n":2}'), ("b", "{}"), ("c", '{"n":1}')):
             yield (scenario, "clip", "ik", "pos", "none", "", varied, *([1.0] * len(METRICS)))
 
-    sweep = gathered(cells(), name="x", planned=4, failures={})
-    assert varying(sweep, sweep.keys[0]) == [0]
+    sweep = collect_cells(cells(), name="x", planned=4, failures={})
+    assert scenarios_varying(sweep, sweep.keys[0]) == [0]
 
 
 def test_hostile_names_stay_text(tmp_path: Path) -> None:
     plan = Plan(
         scenarios=(HOSTILE,), methods={HOSTILE: 1.0, "ik": 2.0}, vary={HOSTILE: (HOSTILE, "b")}, failing=("ik",)
     )
-    page = write_sweep(fabricate_sweep(tmp_path, plan))
+    page = write_sweep_page(fabricate_sweep(tmp_path, plan))
     raw = page.read_text(encoding="utf-8")
     assert "<script" not in raw
     assert read(page).text.count(HOSTILE) > 5
@@ -197,17 +205,19 @@ def test_names_and_values_on_a_chart_do_not_meet() -> None:
         Curve(name, n, (Statistic(1.0 + 0.1 * n, 7, 0.1, 0.9, 1.3), Statistic(None, 0), Statistic(1.2, 7)))
         for n, name in enumerate(names)
     ]
-    shown = shown_of(found)
-    assert len(shown) == MOST_SERIES
-    words = Key("worn", ("head+torso+left_hand+right_hand+left_ankle+right_ankle+sternum", "a", "b"))
-    for key in (words, Key("n", ("1", "20", "400"), (1.0, 20.0, 400.0))):
+    shown = select_curves(found)
+    assert len(shown) == MAX_SERIES
+    words = VariedKey("worn", ("head+torso+left_hand+right_hand+left_ankle+right_ankle+sternum", "a", "b"))
+    for key in (words, VariedKey("n", ("1", "20", "400"), (1.0, 20.0, 400.0))):
         made: list[Figure] = []
 
-        def draw(figure: Figure, key: Key = key, made: list[Figure] = made) -> None:
+        def draw(figure: Figure, key: VariedKey = key, made: list[Figure] = made) -> None:
             _draw(figure, key, shown)
             made.append(figure)
 
-        drawn("chart", "", "", "", draw, 2.7 if key.numbers else _dots_in(key, len(shown)), width_in=4.2)
+        draw_chart(
+            "chart", "", "", "", draw, 2.7 if key.numbers else _dot_chart_height_in(key, len(shown)), width_in=4.2
+        )
         texts_apart(made[0])
 
 
@@ -221,14 +231,14 @@ def test_many_cells_give_a_page_no_larger_than_few() -> None:
 
     failures = {f"cell {n}": "ValueError: the same" for n in range(1_000)}
     few, many = (
-        sweep_page.sweep_page(gathered(cells(count), name="x", planned=count + 1_000, failures=failures))
+        sweep_page.sweep_page(collect_cells(cells(count), name="x", planned=count + 1_000, failures=failures))
         for count in (600, 6_000)
     )
     assert len(many) < 1.05 * len(few) < 60_000
 
 
 def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    page = write_sweep(fabricate_sweep(tmp_path))
+    page = write_sweep_page(fabricate_sweep(tmp_path))
     before = page.read_bytes()
     assert main(["report", str(tmp_path)]) == 0
     assert page.read_bytes() == before
@@ -238,7 +248,7 @@ def test_the_verb_report_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 
 def test_a_folder_that_is_no_sweep_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="index of a sweep"):
-        write_sweep(tmp_path)
+        write_sweep_page(tmp_path)
     assert not list(tmp_path.iterdir())
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.stream.codec.assembler import Assembler
+from harness.stream.codec.assembler import FrameAssembler
 from harness.stream.codec.readings import Readings
 from harness.stream.frame import TrackerFrame
 from tests.stream.wire import columns
@@ -32,7 +32,7 @@ def rounds(count: int, stations: int = 4) -> list[tuple[float, int]]:
 
 
 def frames(given: Readings, stations: int = 4) -> list[TrackerFrame]:
-    one = Assembler(stations, PERIOD_S)
+    one = FrameAssembler(stations, PERIOD_S)
     return [*one.add(given), *one.finish()]
 
 
@@ -55,7 +55,7 @@ def test_one_round_is_one_frame() -> None:
 
 
 def test_a_full_frame_closes_at_once_and_another_with_the_next_round() -> None:
-    one = Assembler(4, PERIOD_S)
+    one = FrameAssembler(4, PERIOD_S)
     assert len(one.add(told((0, 0), (0, 1), (0, 2)))) == 0
     assert len(one.add(told((0, 3)))) == 1
     assert len(one.add(told((1, 0), (1, 2)))) == 0
@@ -89,7 +89,7 @@ def test_without_stamps_the_host_clock_closes_a_frame_after_one_and_a_half_perio
 
 
 def test_an_unfinished_frame_expires_after_one_and_a_half_periods() -> None:
-    one = Assembler(4, PERIOD_S)
+    one = FrameAssembler(4, PERIOD_S)
     one.add(told((0, 0), (0, 1)))
     assert one.expire(LATE_S + 0.005 + 1.49 * PERIOD_S) == []
     assert came(one.expire(LATE_S + 0.005 + 1.51 * PERIOD_S)) == [[0, 1]]
@@ -98,7 +98,7 @@ def test_an_unfinished_frame_expires_after_one_and_a_half_periods() -> None:
 
 
 def test_the_end_gives_what_is_there() -> None:
-    one = Assembler(4, PERIOD_S)
+    one = FrameAssembler(4, PERIOD_S)
     one.add(told((0, 0), (0, 2)))
     assert came(one.finish()) == [[0, 2]]
     assert one.finish() == []
@@ -115,7 +115,7 @@ def test_pieces_do_not_matter(seed: int, timed: bool) -> None:
     station = np.where(rng.random(len(given)) < 0.03, rng.integers(0, 4, len(given)), given.station)
     given = changed(given, measured_s=measured_s, station=station, doubtful=rng.random(len(given)) < 0.05)
     whole = frames(given)
-    one, out = Assembler(4, PERIOD_S), []
+    one, out = FrameAssembler(4, PERIOD_S), []
     at = 0
     while at < len(given):
         step = int(rng.integers(1, 9))

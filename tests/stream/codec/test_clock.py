@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.stream.codec.clock import Unwrapper
+from harness.stream.codec.clock import ClockUnwrapper
 from tests.stream.wire import stamps_s
 
 HOST_S: Floats = stamps_s(50) + 1000.0
 
 
-def unwrapped(stamp_s: Floats, host_s: Floats = HOST_S, pieces: int = 1) -> tuple[Floats, Unwrapper]:
-    clock = Unwrapper()
+def unwrapped(stamp_s: Floats, host_s: Floats = HOST_S, pieces: int = 1) -> tuple[Floats, ClockUnwrapper]:
+    clock = ClockUnwrapper()
     parts = zip(np.array_split(stamp_s, pieces), np.array_split(host_s, pieces), strict=True)
     return np.concatenate([clock.unwrap(stamp, host) for stamp, host in parts]), clock
 

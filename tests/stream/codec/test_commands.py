@@ -60,8 +60,8 @@ def test_an_endless_line_is_cut_and_the_next_is_read() -> None:
 @pytest.mark.parametrize(
     ("built", "sent"),
     [
-        (commands.output_list("1", (40, 2, 11, 21, 1)), b"O1,40,2,11,21,1\r\n"),
-        (commands.read_list("A"), b"OA\r\n"),
+        (commands.set_output_list("1", (40, 2, 11, 21, 1)), b"O1,40,2,11,21,1\r\n"),
+        (commands.query_output_list("A"), b"OA\r\n"),
         (commands.switch_station("2", active=False), b"l2,0\r\n"),
         (commands.boresight("3"), b"B3\r\n"),
         (commands.undo_boresight("3"), b"b3\r\n"),
@@ -82,7 +82,7 @@ def test_builders_write_what_the_manuals_say(built: bytes, sent: bytes) -> None:
 
 
 def test_immediate_commands_need_no_terminator() -> None:
-    for byte in commands.IMMEDIATE + commands.CONTROL:
+    for byte in commands.IMMEDIATE_LETTERS + commands.CONTROL_CHARACTERS:
         assert CommandReader().feed(bytes([byte])) == [Command(bytes([byte]))]
         assert Command(bytes([byte])).immediate
     assert not Command(b"MZ").immediate

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from harness.stream.codec.continuous_reader import Sessions
+from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.frame import TrackerFrame
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
 
 ROUNDS = 5
 
 
-def fed(sessions: Sessions, begin_s: float) -> list[TrackerFrame]:
+def fed(sessions: ContinuousFrameReader, begin_s: float) -> list[TrackerFrame]:
     """Five rounds of a device whose clock is at 12 s, received record by record from this moment on."""
     stamp_s = stamps_s(ROUNDS)
     data, frames = sent(stamp_s), []
@@ -19,7 +19,7 @@ def fed(sessions: Sessions, begin_s: float) -> list[TrackerFrame]:
 
 
 def test_one_session_is_what_its_reader_says() -> None:
-    sessions = Sessions()
+    sessions = ContinuousFrameReader()
     assert sessions.configured(FOUR, 99.0) == []
     frames = fed(sessions, 100.005) + sessions.finish()
     assert all(same(a, b) for a, b in zip(frames, frames_of(received(sent(stamps_s(5)), stamps_s(5))), strict=True))
@@ -29,7 +29,7 @@ def test_one_session_is_what_its_reader_says() -> None:
 
 
 def test_nothing_is_read_before_a_set_up_or_after_the_end() -> None:
-    sessions = Sessions()
+    sessions = ContinuousFrameReader()
     assert fed(sessions, 1.0) == []
     sessions.configured(FOUR, 2.0)
     sessions.finish()
@@ -37,7 +37,7 @@ def test_nothing_is_read_before_a_set_up_or_after_the_end() -> None:
 
 
 def test_device_time_goes_on_by_the_hosts_clock() -> None:
-    sessions = Sessions()
+    sessions = ContinuousFrameReader()
     sessions.configured(FOUR, 99.0)
     before = fed(sessions, 100.0)
     sessions.configured(FOUR, 109.0)
@@ -51,7 +51,7 @@ def test_device_time_goes_on_by_the_hosts_clock() -> None:
 
 
 def test_a_set_up_gives_what_was_unfinished() -> None:
-    sessions = Sessions()
+    sessions = ContinuousFrameReader()
     sessions.configured(FOUR, 99.0)
     data = sent(stamps_s(1))
     assert sessions.received(data[: 2 * RECORD], 100.0) == []
@@ -61,7 +61,7 @@ def test_a_set_up_gives_what_was_unfinished() -> None:
 
 def test_host_times_rise_from_one_session_to_the_next() -> None:
     """Even if both are read at one moment."""
-    sessions = Sessions()
+    sessions = ContinuousFrameReader()
     frames = []
     for _ in range(3):
         frames += sessions.configured(FOUR, 100.0)
@@ -74,7 +74,7 @@ def test_host_times_rise_from_one_session_to_the_next() -> None:
 
 def test_only_who_sees_silence_gives_up_a_frame() -> None:
     """Bytes that are read late were sent in time: the rest of a frame is still welcome."""
-    sessions = Sessions()
+    sessions = ContinuousFrameReader()
     sessions.configured(FOUR, 99.0)
     data = sent(stamps_s(3))
     sessions.received(data[:RECORD], 100.0)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.stream.codec.datagram import Datagram, parse
+from harness.stream.codec.datagram import Datagram, parse_datagram
 
 EXAMPLE = bytes.fromhex(
     "ff010703 0401ff05 7fff000000000000 0000b442 000020c1 0000b040 0000803f 000000bf 0000c03f 2b874541"
@@ -26,14 +26,14 @@ SAID = Datagram(
 
 def test_the_example_both_ways() -> None:
     assert len(EXAMPLE) == 44
-    assert parse(EXAMPLE) == SAID
+    assert parse_datagram(EXAMPLE) == SAID
     assert SAID.packet() == EXAMPLE
 
 
 def test_the_time_is_there_only_when_asked_for() -> None:
     without = Datagram(*(getattr(SAID, name) for name in list(Datagram.__dataclass_fields__)[:-1]))
     assert len(without.packet()) == 40
-    assert parse(without.packet()) == without
+    assert parse_datagram(without.packet()) == without
 
 
 @pytest.mark.parametrize("at", range(2, 44))
@@ -41,15 +41,15 @@ def test_the_time_is_there_only_when_asked_for() -> None:
 def test_a_flipped_bit_is_caught_but_for_the_sequence(at: int, bit: int) -> None:
     hurt = bytearray(EXAMPLE)
     hurt[at] ^= 1 << bit
-    assert (parse(bytes(hurt)) is None) == (at != 2), "the sum leaves the sequence number out"
+    assert (parse_datagram(bytes(hurt)) is None) == (at != 2), "the sum leaves the sequence number out"
 
 
 @given(st.binary(max_size=60))
 def test_rubbish_is_no_packet_or_is_what_was_read(data: bytes) -> None:
-    said = parse(data)
+    said = parse_datagram(data)
     assert said is None or len(said.packet()) == len(data)
 
 
 @pytest.mark.parametrize("damage", [EXAMPLE[:-1], EXAMPLE + b"\0", b"", b"\xff\x02" + EXAMPLE[2:]])
 def test_other_lengths_and_camera_data_are_refused(damage: bytes) -> None:
-    assert parse(damage) is None
+    assert parse_datagram(damage) is None

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.stream.codec.decoder import LONGEST_REPLY, Decoder, Event, Garbage, Records, Reply, joined
+from harness.stream.codec.decoder import LONGEST_REPLY, Decoder, DecoderEvent, Garbage, RecordRun, Reply, merge_adjacent
 from harness.stream.codec.items import STANDARD_LIST
 from tests.stream.wire import RECORD, sent, stamps_s
 
@@ -29,18 +29,18 @@ def decoder() -> Decoder:
     return Decoder(dict.fromkeys(b"1234", STANDARD_LIST))
 
 
-def decoded(data: bytes, cuts: tuple[int, ...] = ()) -> list[Event]:
+def decoded(data: bytes, cuts: tuple[int, ...] = ()) -> list[DecoderEvent]:
     """Everything in these bytes, fed in pieces that end at the cuts."""
     one, events = decoder(), []
     for start, stop in zip((0, *cuts), (*cuts, len(data)), strict=True):
         events += one.feed(data[start:stop])
-    return joined(events + one.finish())
+    return merge_adjacent(events + one.finish())
 
 
-def records(events: list[Event]) -> list[bytes]:
+def records(events: list[DecoderEvent]) -> list[bytes]:
     out = []
     for event in events:
-        if isinstance(event, Records):
+        if isinstance(event, RecordRun):
             out += [event.table[k : k + 1].tobytes() for k in range(len(event.table))]
     return out
 
@@ -49,9 +49,9 @@ def split(data: bytes) -> list[bytes]:
     return [data[k : k + RECORD] for k in range(0, len(data), RECORD)]
 
 
-def plain(events: list[Event]) -> list[object]:
+def plain(events: list[DecoderEvent]) -> list[object]:
     """Events that can be compared."""
-    return [(e.offset, e.items, e.table.tobytes()) if isinstance(e, Records) else e for e in events]
+    return [(e.offset, e.items, e.table.tobytes()) if isinstance(e, RecordRun) else e for e in events]
 
 
 def test_whole_records_come_out_as_they_went_in() -> None:
@@ -97,7 +97,7 @@ def test_any_pieces_of_anything_give_the_same_events(choose: st.DataObject) -> N
     events = decoded(data, cuts)
     assert plain(events) == plain(decoded(data))
     covered = sum(
-        e.table.nbytes if isinstance(e, Records) else e.size if isinstance(e, Garbage) else len(e.line) + 2
+        e.table.nbytes if isinstance(e, RecordRun) else e.size if isinstance(e, Garbage) else len(e.line) + 2
         for e in events
     )
     assert covered == len(data), "every byte belongs to exactly one event"
@@ -162,8 +162,8 @@ def test_rubbish_is_never_kept(rubbish: bytes, rng: np.random.Generator) -> None
 def test_stations_may_have_lists_of_their_own() -> None:
     short, long = b"01 " + bytes(range(12)) + b" ", split(sent(stamps_s(1)))[1]
     one = Decoder({ord("1"): (2, 0), ord("2"): STANDARD_LIST})
-    events = joined([*one.feed(short + long + long + short + long), *one.finish()])
-    assert [(e.items, len(e.table)) for e in events if isinstance(e, Records)] == [
+    events = merge_adjacent([*one.feed(short + long + long + short + long), *one.finish()])
+    assert [(e.items, len(e.table)) for e in events if isinstance(e, RecordRun)] == [
         ((2, 0), 1),
         (STANDARD_LIST, 2),
         ((2, 0), 1),

@@ -12,13 +12,13 @@ from harness.core.arrays import Bools, Floats
 from harness.mocap import synthetic
 from harness.simulate import noise
 from harness.simulate.disturbance import KINDS, Disturbance, Kind
-from harness.simulate.simulation import TrackerConfig, simulate
-from harness.stream.codec.capture import Capture
+from harness.simulate.simulation import TrackerConfig, simulate_tracker
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import STATION_CHARACTERS
-from harness.stream.codec.plausibility import Motion
+from harness.stream.codec.plausibility import PlausibilityCheck
 from harness.stream.codec.reader import FrameReader, WireFormat
-from harness.stream.codec.readings import Readings, join
-from harness.stream.codec.records import Said, encode
+from harness.stream.codec.readings import Readings, concatenate_readings
+from harness.stream.codec.records import RecordValues, encode_records
 
 RATE_HZ = 40.0
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
@@ -39,7 +39,7 @@ def readings(rounds: int = 40, stations: int = 3, seed: int = 1) -> Readings:
 
 
 def judged(given: Readings, pieces: list[int] | None = None, stations: int = 3) -> Bools:
-    motion, cuts = Motion(stations, 1.0 / RATE_HZ), [0, *(pieces or []), len(given)]
+    motion, cuts = PlausibilityCheck(stations, 1.0 / RATE_HZ), [0, *(pieces or []), len(given)]
     return np.concatenate([motion.judge(given[a:b]).doubtful for a, b in pairwise(cuts) if b > a])
 
 
@@ -122,20 +122,22 @@ def test_orientation_alone_or_place_alone_is_judged_too() -> None:
 
 def test_readings_join_as_they_were() -> None:
     given = readings()
-    np.testing.assert_array_equal(join([given[:7], given[7:]]).position_m, given.position_m)
+    np.testing.assert_array_equal(concatenate_readings([given[:7], given[7:]]).position_m, given.position_m)
 
 
 @pytest.mark.parametrize(("behaviour", "rate_hz"), [("boxing", 120.0), ("jumping", 40.0)])
 def test_no_sound_reading_of_a_simulation_is_marked(behaviour: str, rate_hz: float) -> None:
     """At any level and under any disturbance, and for the 16-bit list too."""
-    body, take = retargeting.to_own_body(synthetic.generate(behaviour, synthetic.performers()[0], 1, seed=1))
-    worn = [mounts.DEFAULTS[station] for station in STATIONS]
+    body, take = retargeting.retarget_to_own_body(
+        synthetic.generate(behaviour, synthetic.performer_names()[0], 1, seed=1)
+    )
+    worn = [mounts.DEFAULT_MOUNTS[station] for station in STATIONS]
     setups: list[tuple[str, Kind]] = [("clean", "none"), ("noise", "none"), *(("default", kind) for kind in KINDS)]
     for level, kind in setups:
         for items in ((40, 2, 11, 21, 1), (40, 18, 19, 21, 1)) if kind == "none" else ((40, 2, 11, 21, 1),):
-            spoilt = Disturbance(kind=kind).added(noise.level(level), STATIONS)
+            spoilt = Disturbance(kind=kind).added(noise.noise_preset(level), STATIONS)
             tracker = TrackerConfig(rate_hz=rate_hz, baud=921600, items=items)
-            seen = simulate(body, take, worn, tracker, spoilt, seed=3)
+            seen = simulate_tracker(body, take, worn, tracker, spoilt, seed=3)
             assert not any(frame.suspect.any() for frame in seen.frames), (level, kind, items)
 
 
@@ -144,11 +146,11 @@ def test_a_damaged_place_is_suspect_in_its_frame_alone() -> None:
     number = np.tile(np.arange(4), 20)
     time_s = np.repeat(np.arange(20), 4) / RATE_HZ + 0.003 * number
     place_m = np.tile([2.0, 0.1, -1.5], (80, 1)) + 0.1 * number[:, None]
-    said = Said(time_s, place_m, np.tile([1.0, 0.0, 0.0, 0.0], (80, 1)), np.ones(80))
+    said = RecordValues(time_s, place_m, np.tile([1.0, 0.0, 0.0, 0.0], (80, 1)), np.ones(80))
     wire = WireFormat(tuple("abcd"), RATE_HZ)
-    table = encode(wire.items, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], said, wire.settings)
+    table = encode_records(wire.items, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], said, wire.settings)
     table["position"][42] *= [-1.0, 1.0, 1.0]
     reader = FrameReader(wire)
-    capture = Capture(table.tobytes(), 38 * np.arange(1, 81), 100.0 + time_s)
+    capture = ByteCapture(table.tobytes(), 38 * np.arange(1, 81), 100.0 + time_s)
     frames = [*reader.feed_all(capture), *reader.finish()]
     assert [(k, s) for k, frame in enumerate(frames) for s in np.flatnonzero(frame.suspect).tolist()] == [(10, 2)]

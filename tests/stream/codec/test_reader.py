@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from harness.core.arrays import Floats
 from harness.errors import BadInput
-from harness.stream.codec.capture import Capture
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.items import STANDARD_LIST, STATION_CHARACTERS
 from harness.stream.codec.reader import CaptureStream, FrameReader, WireFormat
-from harness.stream.codec.records import Said, Settings, encode, to_bytes
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.frame import TrackerFrame
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, columns, frames_of, received, same, sent, stamps_s
@@ -20,7 +20,7 @@ from tests.stream.wire import FOUR, RATE_HZ, RECORD, columns, frames_of, receive
 ROUNDS = 12
 
 
-def clean() -> Capture:
+def clean() -> ByteCapture:
     stamp_s = stamps_s(ROUNDS)
     return received(sent(stamp_s), stamp_s)
 
@@ -241,10 +241,10 @@ def rounds_of(wire: WireFormat, rounds: int = ROUNDS) -> list[bytes]:
     number = np.arange(count) % len(wire.stations)
     place_m: Floats = np.full((count, 3), 0.3)
     place_m *= number[:, None]
-    said = Said(
+    said = RecordValues(
         stamps_s(rounds, len(wire.stations)), place_m, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.ones(count)
     )
-    table = encode(wire.items, np.frombuffer(wire.characters, np.uint8)[number], said, wire.settings)
+    table = encode_records(wire.items, np.frombuffer(wire.characters, np.uint8)[number], said, wire.settings)
     data = to_bytes(wire.items, table, wire.settings)
     return [data[k : k + len(data) // count] for k in range(0, len(data), len(data) // count)]
 
@@ -262,7 +262,7 @@ def fed(wire: WireFormat, chunks: list[bytes]) -> list[TrackerFrame]:
 )
 @pytest.mark.parametrize("binary", [True, False])
 def test_every_format_gives_the_same_frames(items: tuple[int, ...], binary: bool) -> None:
-    wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, items, Settings(binary=binary))
+    wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, items, RecordFormat(binary=binary))
     frames = fed(wire, rounds_of(wire))
     assert len(frames) == ROUNDS
     for number, frame in enumerate(frames):

@@ -6,27 +6,29 @@ import pytest
 from harness.core import rotations
 from harness.errors import BadInput, UnknownName
 from harness.stream.codec import items
-from harness.stream.codec.readings import Readings, readings
-from harness.stream.codec.records import Said, Settings, encode, pack_14_bit, unpack_14_bit
+from harness.stream.codec.readings import Readings, decode_readings
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, pack_14_bit, unpack_14_bit
 
 POSITION_M = np.array([[1.0, -0.5, 1.5]])
-INCHES, CENTIMETRES = Settings(metres_per_unit=0.0254), Settings(metres_per_unit=0.01)
+INCHES, CENTIMETRES = RecordFormat(metres_per_unit=0.0254), RecordFormat(metres_per_unit=0.01)
 YAW_90 = np.array([[np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]])
-SAID = Said(np.array([12.3455]), POSITION_M, YAW_90, np.ones(1))
+SAID = RecordValues(np.array([12.3455]), POSITION_M, YAW_90, np.ones(1))
 A = bytes.fromhex("303120 f67a1d42 f67a9dc1 71386c42 f304353f 00000000 00000000 f304353f 20")
 C = bytes.fromhex("303220 0000c842 000048c2 00001643 0000b442 000020c1 0000b040 207f00 0d0a")
 
 
-def _sent(station: str, codes: tuple[int, ...], settings: Settings, said: Said = SAID, **columns: object) -> bytes:
-    table = encode(codes, np.frombuffer(station.encode(), np.uint8), said, settings)
+def _sent(
+    station: str, codes: tuple[int, ...], settings: RecordFormat, said: RecordValues = SAID, **columns: object
+) -> bytes:
+    table = encode_records(codes, np.frombuffer(station.encode(), np.uint8), said, settings)
     for name, value in columns.items():
         table[name] = value
     return table.tobytes()
 
 
-def _read(data: bytes, codes: tuple[int, ...], settings: Settings, stations: bytes = b"123") -> Readings:
+def _read(data: bytes, codes: tuple[int, ...], settings: RecordFormat, stations: bytes = b"123") -> Readings:
     table = np.frombuffer(data, items.record_type(codes))
-    return readings(table, np.zeros(len(table)), stations, settings)
+    return decode_readings(table, np.zeros(len(table)), stations, settings)
 
 
 def test_example_a_vrpn_in_inches() -> None:
@@ -50,7 +52,7 @@ def test_example_c_vrui_in_centimetres_with_angles() -> None:
     codes, angles = (2, 4, 22, 23, 1), np.array([[90.0, -10.0, 5.5]])
     z, y, x = np.deg2rad(angles[0])[:, None] * np.eye(3)[::-1]
     turned = rotations.multiply(rotations.multiply(rotations.exp(z), rotations.exp(y)), rotations.exp(x))
-    said = Said(np.zeros(1), POSITION_M, turned[None], np.ones(1))
+    said = RecordValues(np.zeros(1), POSITION_M, turned[None], np.ones(1))
     sent = _sent("2", codes, CENTIMETRES, said, buttons=0x20, joystick=[127, 0])
     ours, theirs = (np.frombuffer(data, items.record_type(codes)) for data in (sent, C))
     np.testing.assert_allclose(ours["yaw_pitch_roll_deg"], theirs["yaw_pitch_roll_deg"], rtol=1e-6)
@@ -98,7 +100,7 @@ def test_sixteen_bit_form_is_exact_on_its_own_grid() -> None:
     ],
 )
 def test_lengths_are_those_of_the_table(codes: tuple[int, ...], length: int) -> None:
-    assert items.size(codes) == length
+    assert items.record_size(codes) == length
 
 
 def test_an_item_without_a_known_size_is_refused() -> None:
@@ -125,15 +127,15 @@ def test_an_item_without_a_known_size_is_refused() -> None:
     ],
 )
 def test_numbers_that_cannot_be_are_doubtful(field: str, value: float) -> None:
-    said = Said(np.array([5.0, 6.0]), np.ones((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.ones(2))
-    table = encode(items.STANDARD_LIST, np.frombuffer(b"12", np.uint8), said, CENTIMETRES)
+    said = RecordValues(np.array([5.0, 6.0]), np.ones((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.ones(2))
+    table = encode_records(items.STANDARD_LIST, np.frombuffer(b"12", np.uint8), said, CENTIMETRES)
     table[field][1] = value
-    read = readings(table, np.zeros(2), b"12", CENTIMETRES)
+    read = decode_readings(table, np.zeros(2), b"12", CENTIMETRES)
     assert read.doubtful.tolist() == [False, True]
 
 
 def test_microseconds() -> None:
-    settings = Settings(seconds_per_tick=1e-6)
+    settings = RecordFormat(seconds_per_tick=1e-6)
     assert _read(_sent("1", (21, 1), settings), (21, 1), settings).measured_s.tolist() == [12.3455]
 
 
@@ -141,9 +143,11 @@ def test_microseconds() -> None:
 def test_what_was_said_is_what_is_read(codes: tuple[int, ...], rng: np.random.Generator) -> None:
     turn = rng.normal(size=(200, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
-    said = Said(rng.uniform(0.0, 100.0, 200), rng.uniform(-2.9, 2.9, (200, 3)), turn, rng.uniform(0.0, 1.0, 200))
+    said = RecordValues(
+        rng.uniform(0.0, 100.0, 200), rng.uniform(-2.9, 2.9, (200, 3)), turn, rng.uniform(0.0, 1.0, 200)
+    )
     stations = np.frombuffer(b"123", np.uint8)[rng.integers(0, 3, 200)]
-    read = _read(encode(codes, stations, said, CENTIMETRES).tobytes(), codes, CENTIMETRES)
+    read = _read(encode_records(codes, stations, said, CENTIMETRES).tobytes(), codes, CENTIMETRES)
     coarse = 18 in codes
     assert bytes(b"123"[row] for row in read.station) == stations.tobytes()
     assert np.abs(read.position_m - said.position_m).max() < (3.0 / 8192 if coarse else 1e-6)

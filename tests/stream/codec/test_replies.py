@@ -6,32 +6,32 @@ from hypothesis import strategies as st
 
 from harness.stream.codec.replies import (
     DeviceError,
-    Digits,
     Emitter,
-    Genlock,
-    Numbers,
+    GenlockReply,
+    GeometryReply,
+    IntegerReply,
     OutputList,
-    Prediction,
-    ReplyEvent,
-    Sensitivity,
+    ParsedReply,
+    PredictionReply,
+    SensitivityReply,
     StationRecord,
     StationStates,
-    Status,
+    StatusRecord,
     SystemRecord,
     TrackingStatus,
-    Unknown,
-    parse,
+    UnknownReply,
+    parse_reply,
 )
 
 STATUS = bytes.fromhex("323153334642" + "20" * 9 + "342e32333031" + "20" + "4953393030564554" + "20" * 23 + "0d0a")
-EXAMPLES: list[tuple[bytes, int, ReplyEvent]] = [
-    (STATUS, 55, Status("1", True, True, True, "4.2301", "IS900VET")),
+EXAMPLES: list[tuple[bytes, int, ParsedReply]] = [
+    (STATUS, 55, StatusRecord("1", True, True, True, "4.2301", "IS900VET")),
     (
         b"21S3F0         4.2301 IS900VET" + b" " * 23 + b"\r\n",
         55,
-        Status("1", False, False, False, "4.2301", "IS900VET"),
+        StatusRecord("1", False, False, False, "4.2301", "IS900VET"),
     ),
-    (STATUS[:-3] + b"\r\n", 54, Status("1", True, True, True, "4.2301", "IS900VET", short=True)),
+    (STATUS[:-3] + b"\r\n", 54, StatusRecord("1", True, True, True, "4.2301", "IS900VET", short=True)),
     (bytes.fromhex("32314f20322034 20310d0a"), 11, OutputList("1", (2, 4, 1))),
     (b"2AO40 21121 1\r\n", 15, OutputList("A", (40, 2, 11, 21, 1))),
     (bytes.fromhex("32316c313031300d0a"), 9, StationStates("1", (True, False, True, False))),
@@ -39,13 +39,13 @@ EXAMPLES: list[tuple[bytes, int, ReplyEvent]] = [
     (b"31Sg00\r\n", 8, SystemRecord("g")),
     (b"31Sg1E\r\n", 8, SystemRecord("g", True, True, True, True)),
     (b"32s024\r\n", 8, StationRecord("2", 2, 2)),
-    (b"33p 0\r\n", 7, Prediction("3", 0)),
-    (b"33p50\r\n", 7, Prediction("3", 50)),
-    (b"31Q3\r\n", 6, Sensitivity("1", 3)),
-    (b"31U 5\r\n", 7, Digits("1", "U", 5)),
-    (b"31g3\r\n", 6, Digits("1", "g", 3)),
-    (b"32I12\r\n", 7, Digits("2", "I", 12)),
-    (b"31G0   0.00  0\r\n", 16, Genlock("0", 0.0, 0)),
+    (b"33p 0\r\n", 7, PredictionReply("3", 0)),
+    (b"33p50\r\n", 7, PredictionReply("3", 50)),
+    (b"31Q3\r\n", 6, SensitivityReply("1", 3)),
+    (b"31U 5\r\n", 7, IntegerReply("1", "U", 5)),
+    (b"31g3\r\n", 6, IntegerReply("1", "g", 3)),
+    (b"32I12\r\n", 7, IntegerReply("2", "I", 12)),
+    (b"31G0   0.00  0\r\n", 16, GenlockReply("0", 0.0, 0)),
     (
         b"31F      1    0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n",
         70,
@@ -57,31 +57,31 @@ EXAMPLES: list[tuple[bytes, int, ReplyEvent]] = [
         TrackingStatus("TLXXXXXXXXXX", (8,) + (0,) * 11, (1,) + (0,) * 11, 120.0),
     ),
     (b"2 E*ERROR*O:,40,2,4,1*ERROR* EC -1*PS1  *FL1 *ST0\r\n", 51, DeviceError("O:,40,2,4,1", -1, 1, 1, 0)),
-    (b"21A" + b"   0.00" * 8 + b" -12.50" + b"\r\n", 68, Numbers("1", "A", (0.0,) * 8 + (-12.5,))),
-    (b"21G  90.00 -10.00   5.50\r\n", 26, Numbers("1", "G", (90.0, -10.0, 5.5))),
-    (b"21H   0.00   0.00   0.00\r\n", 26, Numbers("1", "H", (0.0, 0.0, 0.0))),
-    (b"21N   0.000   0.000  -4.500\r\n", 29, Numbers("1", "N", (0.0, 0.0, -4.5))),
-    (b"21V" + b"   3.000" * 3 + b"  -3.000" * 3 + b"\r\n", 53, Numbers("1", "V", (3.0,) * 3 + (-3.0,) * 3)),
+    (b"21A" + b"   0.00" * 8 + b" -12.50" + b"\r\n", 68, GeometryReply("1", "A", (0.0,) * 8 + (-12.5,))),
+    (b"21G  90.00 -10.00   5.50\r\n", 26, GeometryReply("1", "G", (90.0, -10.0, 5.5))),
+    (b"21H   0.00   0.00   0.00\r\n", 26, GeometryReply("1", "H", (0.0, 0.0, 0.0))),
+    (b"21N   0.000   0.000  -4.500\r\n", 29, GeometryReply("1", "N", (0.0, 0.0, -4.5))),
+    (b"21V" + b"   3.000" * 3 + b"  -3.000" * 3 + b"\r\n", 53, GeometryReply("1", "V", (3.0,) * 3 + (-3.0,) * 3)),
 ]
 
 
 @pytest.mark.parametrize(
     ("line", "length", "event"), EXAMPLES, ids=lambda x: x[:4].decode() if isinstance(x, bytes) else ""
 )
-def test_examples_both_ways(line: bytes, length: int, event: ReplyEvent) -> None:
+def test_examples_both_ways(line: bytes, length: int, event: ParsedReply) -> None:
     assert len(line) == length
-    assert parse(line) == event
-    assert parse(line[:-2]) == event
+    assert parse_reply(line) == event
+    assert parse_reply(line[:-2]) == event
     assert event.line() == line
 
 
 def test_an_emitter_whose_number_widens_the_line_is_read_by_blanks() -> None:
-    read = parse(b"31F            1    0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n")
+    read = parse_reply(b"31F            1    0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n")
     assert read == Emitter(1, (0.9144, -0.6096, 0.0), (0.0, 0.0, 1.0), 5001)
 
 
 def test_which_stations_are_active() -> None:
-    of_one, of_all = parse(b"23l1010"), parse(b"21l" + b"110000000001" + b"1" * 20)
+    of_one, of_all = parse_reply(b"23l1010"), parse_reply(b"21l" + b"110000000001" + b"1" * 20)
     assert isinstance(of_one, StationStates)
     assert isinstance(of_all, StationStates)
     assert of_one.stations == ("3",), "the first digit is station 3's; then 2, 3 and 4"
@@ -89,7 +89,7 @@ def test_which_stations_are_active() -> None:
 
 
 def test_which_stations_are_lost() -> None:
-    said = parse(b"31PT81L00XC0X00X00X00X00X00X00X00X00X00  180 G")
+    said = parse_reply(b"31PT81L00XC0X00X00X00X00X00X00X00X00X00  180 G")
     assert isinstance(said, TrackingStatus)
     assert (said.rate_hz, said.genlock, said.received[2]) == (180.0, "G", 12)
     assert said.lost == b"23456789ABC"
@@ -117,26 +117,26 @@ def test_which_stations_are_lost() -> None:
     ],
 )
 def test_what_no_source_describes_is_kept_as_it_is(line: bytes) -> None:
-    assert parse(line + b"\r\n") == Unknown(line)
-    assert Unknown(line).line() == line + b"\r\n"
+    assert parse_reply(line + b"\r\n") == UnknownReply(line)
+    assert UnknownReply(line).line() == line + b"\r\n"
 
 
 @given(st.binary(max_size=80))
 def test_no_line_breaks_the_reader(line: bytes) -> None:
-    parse(line).line()
+    parse_reply(line).line()
 
 
 @given(st.sampled_from([line for line, _, _ in EXAMPLES]), st.integers(0, 68), st.binary(max_size=3))
 def test_no_damage_breaks_the_reader(line: bytes, at: int, put: bytes) -> None:
-    said = parse(line[:at] + put + line[at + len(put) :])
-    again = parse(said.line())  # another value where damage made a number too long for its columns
-    assert parse(again.line()) == again, "what is said anew is what was read"
+    said = parse_reply(line[:at] + put + line[at + len(put) :])
+    again = parse_reply(said.line())  # another value where damage made a number too long for its columns
+    assert parse_reply(again.line()) == again, "what is said anew is what was read"
 
 
 def test_a_damaged_command_is_kept_as_it_is_echoed() -> None:
-    said = parse(b"2 E*ERROR*\x00:,40,2,4,1*ERROR* EC -1*PS1  *FL1 *ST0\r\n")
+    said = parse_reply(b"2 E*ERROR*\x00:,40,2,4,1*ERROR* EC -1*PS1  *FL1 *ST0\r\n")
     assert said == DeviceError("?:,40,2,4,1", -1)
-    assert parse(said.line()) == said
+    assert parse_reply(said.line()) == said
 
 
 def test_what_cannot_be_printed_is_not_echoed() -> None:

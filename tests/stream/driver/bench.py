@@ -8,9 +8,9 @@ import numpy as np
 
 from harness.errors import BadInput
 from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.samples import Samples
-from harness.stream.driver import Is900, LineEvent, Wanted
-from harness.stream.driver.config import Timing
+from harness.stream.codec.samples import DeviceSamples
+from harness.stream.driver import DriverConfig, Is900, LineEvent
+from harness.stream.driver.config import DriverTiming
 from harness.stream.driver.host import Host
 from harness.stream.driver.transport import LineLost, Transport
 from harness.stream.emulator.config import EmulatorConfig
@@ -24,13 +24,13 @@ TICK_S = 2e-4
 """The least step of time on the bench [s]."""
 
 
-def swaying(stations: int, rate_hz: float = 50.0) -> Samples:
+def swaying(stations: int, rate_hz: float = 50.0) -> DeviceSamples:
     """Stations that sway and never are where they were a reading before."""
     count = round(LAP_S * rate_hz)
     taken_s = np.arange(count)[:, None] / rate_hz + np.arange(stations) / (4.0 * stations * rate_hz)
     angle = 2.0 * np.pi * taken_s / LAP_S
     zero = np.zeros_like(angle)
-    return Samples(
+    return DeviceSamples(
         stations=NAMES[:stations],
         rate_hz=rate_hz,
         first_lap=count,
@@ -55,7 +55,7 @@ class Device(Protocol):
 class Played:
     """The emulator as a device."""
 
-    def __init__(self, samples: Samples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
+    def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
         self.emulator = Emulator(samples, config, now_s)
 
     def receive(self, data: bytes, now_s: float) -> None:
@@ -130,7 +130,7 @@ class Bench:
             raise BadInput(f"Port {port}: there is no such port.", "")
         return BenchLine(self)
 
-    def driver(self, wanted: Wanted | None = None, timing: Timing | None = None) -> Is900:
+    def driver(self, wanted: DriverConfig | None = None, timing: DriverTiming | None = None) -> Is900:
         return Is900(self.port, wanted, on_event=self.events.append, timing=timing, host=self.host)
 
     def after(self, delay_s: float, action: Callable[[], None]) -> None:

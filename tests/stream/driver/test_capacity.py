@@ -3,8 +3,8 @@
 import pytest
 
 from harness.errors import BadInput
-from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, size
-from harness.stream.driver.capacity import check_capacity, load
+from harness.stream.codec.items import SHORT_LIST, STANDARD_LIST, record_size
+from harness.stream.driver.capacity import check_capacity, required_bit_rate
 
 BAUD = 115200
 
@@ -15,7 +15,7 @@ BAUD = 115200
 )
 def test_records_per_second_are_those_of_the_protocol(items: tuple[int, ...], records: int) -> None:
     check_capacity("port", BAUD, 1, items, records, 0.0)
-    with pytest.raises(BadInput, match=f"1 stations x {size(items)} bytes"):
+    with pytest.raises(BadInput, match=f"1 stations x {record_size(items)} bytes"):
         check_capacity("port", BAUD, 1, items, records + 1, 0.0)
 
 
@@ -24,11 +24,11 @@ def test_records_per_second_are_those_of_the_protocol(items: tuple[int, ...], re
 )
 def test_what_live_use_needs_fits(stations: int, rate_hz: float, items: tuple[int, ...]) -> None:
     check_capacity("port", BAUD, stations, items, rate_hz, 0.0)
-    assert load(stations, items, rate_hz) > 0.9 * BAUD
+    assert required_bit_rate(stations, items, rate_hz) > 0.9 * BAUD
 
 
 def test_asking_for_mp_takes_its_share() -> None:
-    assert load(1, (2, 11, 1), 100.0, asked_hz=1.0) - load(1, (2, 11, 1), 100.0) == 480.0
+    assert required_bit_rate(1, (2, 11, 1), 100.0, asked_hz=1.0) - required_bit_rate(1, (2, 11, 1), 100.0) == 480.0
 
 
 def test_over_tcp_there_is_no_limit() -> None:

@@ -8,10 +8,10 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.errors import BadInput, UnknownName
-from harness.stream.codec.items import BAUDS, SHORT_LIST, STANDARD_LIST, size
-from harness.stream.codec.replies import Status
-from harness.stream.driver import Is900, Timing, Wanted
-from harness.stream.driver.rate_measurement import rate_of_stamps
+from harness.stream.codec.items import BAUD_RATES, SHORT_LIST, STANDARD_LIST, record_size
+from harness.stream.codec.replies import StatusRecord
+from harness.stream.driver import DriverConfig, DriverTiming, Is900
+from harness.stream.driver.rate_measurement import estimate_rate_hz
 from harness.stream.emulator.config import EmulatorConfig
 from tests.stream.driver.bench import NAMES, Bench, Device, Notes, Played, Scripted, frames_for, swaying
 
@@ -45,7 +45,7 @@ def test_it_says_what_it_must_in_order() -> None:
 
 def test_what_the_device_is() -> None:
     bench = bench_of(3, rate_hz=60.0, status_bytes=54, firmware="4.1402", identification="IS900VWT")
-    stream = bench.driver(Wanted(stations=("head", "left", "right")))
+    stream = bench.driver(DriverConfig(stations=("head", "left", "right")))
     assert (stream.firmware, stream.identification, stream.baud) == ("4.1402", "IS900VWT", 115200)
     assert stream.stations == ("head", "left", "right")
     assert (stream.wire.characters, stream.wire.rate_hz, stream.wire.items) == (b"123", 60.0, STANDARD_LIST)
@@ -54,14 +54,14 @@ def test_what_the_device_is() -> None:
 @pytest.mark.parametrize(
     "wanted",
     [
-        Wanted(),
-        Wanted(centimetres=False),
-        Wanted(milliseconds=False),
-        Wanted(items=SHORT_LIST),
-        Wanted(items=(40, 2, 4, 21, 22, 23, 0), centimetres=False, milliseconds=False),
+        DriverConfig(),
+        DriverConfig(centimetres=False),
+        DriverConfig(milliseconds=False),
+        DriverConfig(items=SHORT_LIST),
+        DriverConfig(items=(40, 2, 4, 21, 22, 23, 0), centimetres=False, milliseconds=False),
     ],
 )
-def test_every_unit_and_list_gives_the_same_motion(wanted: Wanted) -> None:
+def test_every_unit_and_list_gives_the_same_motion(wanted: DriverConfig) -> None:
     bench = bench_of()
     samples = swaying(4)
     with bench.driver(wanted) as stream:
@@ -120,7 +120,7 @@ def test_stations_are_those_of_mp_or_those_named_where_the_device_does_not_answe
     bench = deaf(bench_of(2), b"l*\r\n", b"MP\r\n")
     with pytest.raises(BadInput, match=r"does not answer l\* nor MP.*Name the stations"):
         bench.driver()
-    with bench.driver(Wanted(stations=("head", "hand"))) as stream:
+    with bench.driver(DriverConfig(stations=("head", "hand"))) as stream:
         assert stream.wire.characters == b"12"
         assert len(frames_for(stream, bench, 0.5)) > 20
         bench.plugged = False
@@ -139,7 +139,7 @@ def test_nobody_is_spoken_to_who_was_not_named() -> None:
     assert {port for port, _ in bench.opened} == {"bench"}
 
 
-@pytest.mark.parametrize("baud", BAUDS)
+@pytest.mark.parametrize("baud", BAUD_RATES)
 def test_the_rate_of_the_line_is_found(baud: int) -> None:
     bench = bench_of(1, rate_hz=10.0, baud=baud)
 
@@ -153,9 +153,9 @@ def test_the_rate_of_the_line_is_found(baud: int) -> None:
     bench.spoil = heard
     with bench.driver() as stream:
         assert stream.baud == baud
-    assert [rate for _, rate in bench.opened] == list(BAUDS[: BAUDS.index(baud) + 1])
+    assert [rate for _, rate in bench.opened] == list(BAUD_RATES[: BAUD_RATES.index(baud) + 1])
     with pytest.raises(BadInput, match=r"at 300 baud.*leave it out"):
-        bench.driver(Wanted(baud=300))
+        bench.driver(DriverConfig(baud=300))
     assert bench.open_lines == 0
 
 
@@ -172,7 +172,7 @@ def test_stations_are_the_active_ones_in_order_and_others_are_off_for_as_long() 
     device = emulated(bench)
     for switched_off in (b"l2,0\r\n", b"l5,0\r\n"):
         device.receive(switched_off, bench.now_s)
-    with bench.driver(Wanted(stations=("a", "b", "c"))) as stream:
+    with bench.driver(DriverConfig(stations=("a", "b", "c"))) as stream:
         assert stream.wire.characters == b"134"
         frames = frames_for(stream, bench, 0.5)
         assert [station.active for station in device.settings.stations[:6]] == [True, False, True, True, False, False]
@@ -185,7 +185,7 @@ def test_stations_are_the_active_ones_in_order_and_others_are_off_for_as_long() 
 def test_boresight_and_alignment_are_asked_for_once_each() -> None:
     bench = bench_of(2)
     frame = ((0.0, 0.0, 0.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
-    with bench.driver(Wanted(stations=NAMES[:2], alignment={"torso": frame}, boresight=True)) as stream:
+    with bench.driver(DriverConfig(stations=NAMES[:2], alignment={"torso": frame}, boresight=True)) as stream:
         before = frames_for(stream, bench, 0.2)
     said = bytes(bench.sent)
     assert b"R2\r\nA2,0.00,0.00,0.00,0.00,100.00,0.00,-100.00,0.00,0.00\r\n" in said
@@ -200,17 +200,17 @@ def test_boresight_and_alignment_are_asked_for_once_each() -> None:
 def test_a_frame_that_the_device_refuses_is_told_in_its_words() -> None:
     bench = bench_of(1)
     with pytest.raises(BadInput, match=r"refuses its frame\. It said: A1,.*: error -3"):
-        bench.driver(Wanted(alignment=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))))
+        bench.driver(DriverConfig(alignment=((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))))
     assert bench.open_lines == 0
 
 
 def test_the_rate_is_the_devices_the_users_or_measured() -> None:
     assert bench_of(rate_hz=60.0).driver().wire.rate_hz == 60.0
-    assert bench_of(rate_hz=59.94).driver(Wanted(rate_hz=59.94)).wire.rate_hz == 59.94
+    assert bench_of(rate_hz=59.94).driver(DriverConfig(rate_hz=59.94)).wire.rate_hz == 59.94
     for items in (STANDARD_LIST, (40, 2, 11, 1)):
         bench = bench_of(2, rate_hz=37.5)
         bench.spoil = lambda data: data.replace(b"31P", b"31@")  # an answer that no source describes
-        rate_hz = bench.driver(Wanted(items=items)).wire.rate_hz
+        rate_hz = bench.driver(DriverConfig(items=items)).wire.rate_hz
         assert abs(rate_hz - 37.5) < (0.01 if 21 in items else 1.0)
 
 
@@ -223,9 +223,9 @@ def test_records_are_believed_where_they_say_another_rate_than_the_device() -> N
         return bench
 
     assert boasting().driver().wire.rate_hz == pytest.approx(40.0, rel=1e-3)
-    assert boasting().driver(Wanted(rate_hz=40.0)).wire.rate_hz == 40.0
+    assert boasting().driver(DriverConfig(rate_hz=40.0)).wire.rate_hz == 40.0
     with pytest.raises(BadInput, match="120 Hz is asked for, the device runs at 40 Hz"):
-        boasting().driver(Wanted(rate_hz=120.0))
+        boasting().driver(DriverConfig(rate_hz=120.0))
 
 
 def test_a_rate_that_only_mp_tells_fills_no_line() -> None:
@@ -250,50 +250,50 @@ def test_the_rate_of_stamps_that_jitter_while_rounds_are_missing(missing: float,
         stamps_s = (np.arange(200) + rng.uniform(-jitter, jitter, 200)) / rate_hz
         kept = rng.uniform(size=200) >= missing
         kept[[0, -1]] = True
-        assert rate_of_stamps(stamps_s[kept]) == pytest.approx(rate_hz, rel=3e-3)
+        assert estimate_rate_hz(stamps_s[kept]) == pytest.approx(rate_hz, rel=3e-3)
 
 
 def test_spoilt_stamps_make_no_other_rate() -> None:
     stamps_s = np.arange(50) / 50.0
     stamps_s[[10, 30]] = 1e9, 0.0
-    assert rate_of_stamps(stamps_s) == pytest.approx(50.0, rel=1e-6)
-    assert rate_of_stamps(np.array([0.0, 1.0])) is None
-    assert rate_of_stamps(np.zeros(50)) is None
+    assert estimate_rate_hz(stamps_s) == pytest.approx(50.0, rel=1e-6)
+    assert estimate_rate_hz(np.array([0.0, 1.0])) is None
+    assert estimate_rate_hz(np.zeros(50)) is None
 
 
-OTHER = Status(identification="FASTRAK", firmware="2.10").line()
+OTHER = StatusRecord(identification="FASTRAK", firmware="2.10").line()
 
 
 @pytest.mark.parametrize(
     ("wanted", "config", "says"),
     [
         (
-            Wanted(stations=NAMES),
+            DriverConfig(stations=NAMES),
             {"stations": 4},
             r"6 stations wanted \(head, .*\), the device has 4 active \(1, 2, 3, 4\)",
         ),
         (
-            Wanted(),
+            DriverConfig(),
             {"firmware": "4.1105"},
             r"firmware 4\.1105 does not know item 40.*Take quality 'mp' \(--quality mp\)",
         ),
-        (Wanted(items=(76, 2, 11, 21, 1)), {"firmware": "4.2301"}, r"firmware 4\.2301 does not know item 76"),
-        (Wanted(rate_hz=75.0), {}, r"75 Hz is asked for, the device runs at 50 Hz"),
+        (DriverConfig(items=(76, 2, 11, 21, 1)), {"firmware": "4.2301"}, r"firmware 4\.2301 does not know item 76"),
+        (DriverConfig(rate_hz=75.0), {}, r"75 Hz is asked for, the device runs at 50 Hz"),
         (
-            Wanted(rate_hz=120.0),
+            DriverConfig(rate_hz=120.0),
             {"stations": 6},
             r"x 120 Hz are 273600 bit/s, and the line carries 115200\. Try 2 stations",
         ),
         (
-            Wanted(),
+            DriverConfig(),
             {"stations": 4, "rate_hz": 120.0},
             r"Try 2 stations, or the 22-byte list \(--items 40,18,19,21,1\), or a device .* 75",
         ),
-        (Wanted(baud=9600), {"baud": 9600}, r"the line carries 9600\. Try .*or a device set to 115200 baud"),
+        (DriverConfig(baud=9600), {"baud": 9600}, r"the line carries 9600\. Try .*or a device set to 115200 baud"),
     ],
 )
 def test_what_a_device_cannot_do_is_refused_with_what_to_try(
-    wanted: Wanted, config: Mapping[str, Any], says: str
+    wanted: DriverConfig, config: Mapping[str, Any], says: str
 ) -> None:
     bench = bench_of(**config)
     with pytest.raises(BadInput, match=says) as raised:
@@ -313,18 +313,21 @@ def test_what_a_device_cannot_do_is_refused_with_what_to_try(
         (lambda: Scripted({}, chatter=b"$GPGGA,123519,4807.038,N\r\n"), "no answer of an IS-900"),
         (lambda: Scripted({}, chatter=bytes(range(256))), "no answer of an IS-900"),
         (lambda: Scripted({b"S": OTHER}), "'FASTRAK', firmware 2.10, answers, which is no IS-900"),
-        (lambda: Scripted({b"S": Status().line()}), r"does not answer l\* nor MP"),
+        (lambda: Scripted({b"S": StatusRecord().line()}), r"does not answer l\* nor MP"),
         (
-            lambda: Scripted({b"S": Status().line(), b"l*": b"21l" + b"0" * 32 + b"\r\n"}),
+            lambda: Scripted({b"S": StatusRecord().line(), b"l*": b"21l" + b"0" * 32 + b"\r\n"}),
             "no station of the device is active",
         ),
-        (lambda: Scripted({b"S": Status().line(), b"l*": b"21l1" + b"0" * 31 + b"\r\n"}), "does not do as it is told"),
+        (
+            lambda: Scripted({b"S": StatusRecord().line(), b"l*": b"21l1" + b"0" * 31 + b"\r\n"}),
+            "does not do as it is told",
+        ),
     ],
 )
 def test_what_is_no_is900_is_refused(device: Callable[[], Device | None], says: str) -> None:
     bench = Bench(device())
     with pytest.raises(BadInput, match=says) as raised:
-        bench.driver(Wanted(rate_hz=50.0))
+        bench.driver(DriverConfig(rate_hz=50.0))
     assert "bench" in str(raised.value)
     assert bench.open_lines == 0
     assert bench.now_s < 1030.0
@@ -333,18 +336,18 @@ def test_what_is_no_is900_is_refused(device: Callable[[], Device | None], says: 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Wanted(items=(2, 11, 21, 1)), "has no item 40"),
-        (lambda: Wanted(stations=("head", "head")), "a name twice"),
-        (lambda: Wanted(rate_hz=-1.0), "180 Hz"),
-        (lambda: Wanted(baud=0), "0 baud"),
-        (lambda: Wanted(quality="best"), "Take 'record' or 'mp'"),  # type: ignore[arg-type]  # that is it
+        (lambda: DriverConfig(items=(2, 11, 21, 1)), "has no item 40"),
+        (lambda: DriverConfig(stations=("head", "head")), "a name twice"),
+        (lambda: DriverConfig(rate_hz=-1.0), "180 Hz"),
+        (lambda: DriverConfig(baud=0), "0 baud"),
+        (lambda: DriverConfig(quality="best"), "Take 'record' or 'mp'"),  # type: ignore[arg-type]  # that is it
     ],
 )
-def test_a_wish_that_contradicts_itself_is_refused_at_once(make: Callable[[], Wanted], says: str) -> None:
+def test_a_wish_that_contradicts_itself_is_refused_at_once(make: Callable[[], DriverConfig], says: str) -> None:
     with pytest.raises(BadInput, match=says):
         make()
     with pytest.raises(UnknownName, match="no output item called '99'"):
-        Wanted(items=(40, 99))
+        DriverConfig(items=(40, 99))
 
 
 def test_a_lost_first_word_is_said_again() -> None:
@@ -359,7 +362,7 @@ def test_a_lost_first_word_is_said_again() -> None:
             return data[:-1] + b"\x00" if count - len(data) <= at < count else data
 
         bench.spoil = spoil
-        with bench.driver(Wanted(rate_hz=50.0), Timing(answer_s=0.2)) as stream:
+        with bench.driver(DriverConfig(rate_hz=50.0), DriverTiming(answer_s=0.2)) as stream:
             assert len(frames_for(stream, bench, 0.2)) >= 8
 
 
@@ -371,7 +374,7 @@ def test_a_witness_sees_every_byte_and_the_format_before_data() -> None:
     [(got, said, wire)] = notes.formats
     assert wire == stream.wire
     assert notes.said[said - 4 :] == b"MZ\r\nCc"
-    assert size(wire.items) * 2 * len(frames) <= len(notes.got) - got
+    assert record_size(wire.items) * 2 * len(frames) <= len(notes.got) - got
     assert [event.kind for event in notes.events] == ["connected"]
     assert notes.times_s == sorted(notes.times_s)
     assert stream.wall_s(notes.times_s[0]) == pytest.approx(1.7e9 + notes.times_s[0])

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 
 from harness.errors import BadInput
-from harness.stream.driver import Is900, LineEvent, Timing, Wanted
-from harness.stream.emulator import EmulatorConfig, serving
+from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
+from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.server import Serving
+from harness.stream.emulator.server import RunningEmulator
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
 from tests.interrupts import heeding_interrupts
@@ -26,15 +26,15 @@ from tests.stream.driver.bench import swaying
 PATIENT_S = 120.0
 """A loaded machine gets so long before a test fails."""
 SERVED = ["pty", "tcp"]
-Serve = Callable[..., AbstractContextManager[Serving]]
+Serve = Callable[..., AbstractContextManager[RunningEmulator]]
 
 
 @pytest.fixture(params=SERVED)
 def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Serve:
-    def at(config: EmulatorConfig | None = None) -> AbstractContextManager[Serving]:
+    def at(config: EmulatorConfig | None = None) -> AbstractContextManager[RunningEmulator]:
         if request.param == "pty":
-            return serving(swaying(4), config, pty=tmp_path / "is900")
-        return serving(swaying(4), config, tcp="127.0.0.1:0")
+            return serve_emulator(swaying(4), config, pty=tmp_path / "is900")
+        return serve_emulator(swaying(4), config, tcp="127.0.0.1:0")
 
     return at
 
@@ -101,7 +101,7 @@ def test_nothing_is_left_behind(serve: Serve) -> None:
         for _ in range(3):
             Is900(emulator.name).close()
         with pytest.raises(BadInput):
-            Is900(emulator.name, Wanted(stations=tuple("abcdefgh")))
+            Is900(emulator.name, DriverConfig(stations=tuple("abcdefgh")))
 
 
 @pytest.mark.usefixtures("nothing_left")
@@ -160,7 +160,7 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_leaves_the_device_quiet(tmp_path: Path) -> None:
-    with serving(swaying(2), pty=tmp_path / "is900") as emulator:
+    with serve_emulator(swaying(2), pty=tmp_path / "is900") as emulator:
         client = subprocess.Popen(
             [sys.executable, "-c", CLIENT, emulator.name],
             stdout=subprocess.PIPE,
@@ -185,16 +185,16 @@ def test_a_second_client_is_told_that_the_port_is_taken(serve: Serve) -> None:
 @pytest.mark.parametrize("baud", [9600, 57600])
 def test_the_rate_of_a_real_port_is_found(baud: int, tmp_path: Path) -> None:
     config = EmulatorConfig(baud=baud, check_baud=True)
-    with serving(swaying(1, rate_hz=10.0), config, pty=tmp_path / "is900") as emulator:
+    with serve_emulator(swaying(1, rate_hz=10.0), config, pty=tmp_path / "is900") as emulator:
         with Is900(emulator.name) as stream:
             assert stream.baud == baud
             assert len(list(islice(stream, 3))) == 3
         with pytest.raises(BadInput, match=r"at 19200 baud.*The rate may be wrong"):
-            Is900(emulator.name, Wanted(baud=19200), timing=Timing(answer_s=0.3))
+            Is900(emulator.name, DriverConfig(baud=19200), timing=DriverTiming(answer_s=0.3))
 
 
 def test_stopping_to_iterate_loses_no_frame(tmp_path: Path) -> None:
-    with serving(swaying(2), tcp="127.0.0.1:0") as emulator, Is900(emulator.name) as stream:
+    with serve_emulator(swaying(2), tcp="127.0.0.1:0") as emulator, Is900(emulator.name) as stream:
         parts = [frame for _ in range(10) for frame in islice(stream, 3)]
     periods = [round(50.0 * (b.measured_s[0] - a.measured_s[0])) for a, b in pairwise(parts)]
     assert set(periods) == {1}

@@ -13,7 +13,7 @@ import pytest
 import serial
 
 from harness.errors import BadInput
-from harness.stream.driver.transport import LineLost, PolledPort, Transport, open_transport
+from harness.stream.driver.transport import LineLost, PolledSerialTransport, Transport, open_transport
 
 PATIENT_S = 120.0
 
@@ -78,7 +78,7 @@ def line(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Trans
     """The host's end and the device's; `polled` is what Windows gets."""
     end: End = TcpEnd() if request.param == "tcp" else PtyEnd(tmp_path / "port")
     if request.param == "polled":
-        ours: Transport = PolledPort(end.name, serial.Serial(end.name, 115200, timeout=0, write_timeout=2.0))
+        ours: Transport = PolledSerialTransport(end.name, serial.Serial(end.name, 115200, timeout=0, write_timeout=2.0))
     else:
         ours = open_transport(end.name)
     yield ours, end

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.stream.codec.commands import output_list
-from harness.stream.codec.continuous_reader import Sessions
+from harness.stream.codec.commands import set_output_list
+from harness.stream.codec.continuous_reader import ContinuousFrameReader
 from harness.stream.codec.items import SHORT_LIST
-from harness.stream.driver import Is900, LineEvent, Timing, Wanted
+from harness.stream.driver import DriverConfig, DriverTiming, Is900, LineEvent
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.faults import ByteKind, Fault
+from harness.stream.emulator.faults import ByteFaultKind, Fault
 from harness.stream.frame import TrackerFrame
 from tests.stream.driver.bench import Adapter, Bench, Device, Notes, Played, frames_for, swaying
 
@@ -67,7 +67,7 @@ def test_device_time_goes_on_by_the_hosts_clock_over_a_reset() -> None:
 
 def test_boresight_is_not_set_where_nobody_stands_for_it_and_that_is_told() -> None:
     bench = bench_of(Fault("reset", at_s=(2.0,)))
-    with bench.driver(Wanted(boresight=True)) as stream:
+    with bench.driver(DriverConfig(boresight=True)) as stream:
         frames_for(stream, bench, 4.0)
     assert bytes(bench.sent).count(b"B1\r\n") == 1
     assert any("boresight is lost" in event.text for event in bench.events)
@@ -193,7 +193,7 @@ def test_a_burst_of_garbage_is_told_once(lasts_s: float) -> None:
 
 
 def test_single_damaged_bytes_cost_no_set_up() -> None:
-    kinds: tuple[ByteKind, ...] = get_args(ByteKind)
+    kinds: tuple[ByteFaultKind, ...] = get_args(ByteFaultKind)
     bench = bench_of(*(Fault(kind, share=0.01) for kind in kinds))
     with bench.driver() as stream:
         frames = frames_for(stream, bench, 8.0)
@@ -209,10 +209,10 @@ def somebody_says(said: bytes) -> Callable[[Bench], None]:
 @pytest.mark.parametrize(
     ("said", "told"),
     [
-        (b"".join(output_list(station, (2, 4, 1)) for station in "1234"), "wrong list"),
-        (output_list("3", (40, 2, 11, 21, 22, 1)), "wrong list"),
+        (b"".join(set_output_list(station, (2, 4, 1)) for station in "1234"), "wrong list"),
+        (set_output_list("3", (40, 2, 11, 21, 22, 1)), "wrong list"),
         (b"F", "reset"),
-        (b"F" + b"".join(output_list(station, (2, 4, 1)) for station in "1234"), "reset"),
+        (b"F" + b"".join(set_output_list(station, (2, 4, 1)) for station in "1234"), "reset"),
         (b"c", "reset"),
     ],
 )
@@ -277,7 +277,7 @@ def test_a_station_that_is_not_there_any_more_is_told_and_the_others_go_on() -> 
 def test_bytes_that_an_adapter_holds_back_tear_no_frame() -> None:
     device = Played(swaying(4, 120.0), now_s=1000.0)
     bench = Bench(Adapter(device))
-    with bench.driver(Wanted(items=SHORT_LIST)) as stream:
+    with bench.driver(DriverConfig(items=SHORT_LIST)) as stream:
         frames = frames_for(stream, bench, 4.0)
     assert len(frames) > 4 * 118
     assert all(frame.position_valid.all() for frame in frames)
@@ -295,7 +295,7 @@ def test_a_lost_station_shows_in_item_40() -> None:
 
 def test_a_lost_station_shows_by_mp_where_records_do_not_tell() -> None:
     bench = bench_of(Fault("lost_station", at_s=(3.0,), lasts_s=5.0, station="torso"), firmware="3.1102")
-    with bench.driver(Wanted(quality="mp")) as stream:
+    with bench.driver(DriverConfig(quality="mp")) as stream:
         assert stream.wire.items == (2, 11, 21, 1)
         frames = frames_for(stream, bench, 12.0)
     assert 10 <= bytes(bench.sent).count(b"MP\r\n") <= 14
@@ -308,7 +308,7 @@ def test_a_lost_station_shows_by_mp_where_records_do_not_tell() -> None:
 def test_the_clock_is_zeroed_within_hours_and_no_frame_steps_back() -> None:
     """Two and a half hours of a slow device: the stamps stay exact and device time goes on."""
     bench = bench_of(stations=2, rate_hz=0.1)
-    with bench.driver(Wanted(rate_hz=0.1), Timing(stalled_s=30.0, silent_s=60.0, poll_s=10.0)) as stream:
+    with bench.driver(DriverConfig(rate_hz=0.1), DriverTiming(stalled_s=30.0, silent_s=60.0, poll_s=10.0)) as stream:
         frames = frames_for(stream, bench, 9000.0)
         assert bytes(bench.sent).count(b"MZ\r\n") == 1 + 2
         assert bench.kinds == ["connected"]
@@ -322,7 +322,7 @@ def test_the_clock_is_zeroed_within_hours_and_no_frame_steps_back() -> None:
 
 def test_it_can_be_zeroed_often_at_full_rate() -> None:
     bench = bench_of(rate_hz=75.0)
-    with bench.driver(timing=Timing(rezero_s=2.0)) as stream:
+    with bench.driver(timing=DriverTiming(rezero_s=2.0)) as stream:
         frames = frames_for(stream, bench, 9.0)
         assert stream.counts["clock_resets"] == 4
         assert bench.kinds == ["connected"]
@@ -339,7 +339,7 @@ def test_what_a_witness_wrote_down_gives_the_same_frames() -> None:
         Fault("stall", at_s=(12.0,), lasts_s=1.0),
     )
     bench = bench_of(*faults)
-    sessions, replayed = Sessions(), list[TrackerFrame]()
+    sessions, replayed = ContinuousFrameReader(), list[TrackerFrame]()
 
     class Replaying(Notes):
         def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:

@@ -4,20 +4,20 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.stream.codec.samples import Samples
+from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device import Device
 
 NAMES = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
 
 
-def samples(stations: int = 4, rate_hz: float = 50.0, instants: int = 100, turn: Floats | None = None) -> Samples:
+def samples(stations: int = 4, rate_hz: float = 50.0, instants: int = 100, turn: Floats | None = None) -> DeviceSamples:
     """Station s stands at (1 + s/10, -0.5, 1.5) m and moves 1 mm forward with each instant; 20 ppm fast from 5 s on."""
     taken_s = np.arange(instants)[:, None] / rate_hz + np.arange(stations) / (rate_hz * stations)
     place = np.empty((instants, stations, 3))
     place[..., 0] = 1.0 + 0.1 * np.arange(stations) + 0.001 * np.arange(instants)[:, None]
     place[..., 1:] = -0.5, 1.5
-    return Samples(
+    return DeviceSamples(
         stations=NAMES[:stations],
         rate_hz=rate_hz,
         first_lap=instants,

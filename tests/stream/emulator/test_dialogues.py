@@ -6,14 +6,14 @@ tests/clients.
 
 import pytest
 
-from harness.stream.codec.items import size
+from harness.stream.codec.items import record_size
 from harness.stream.emulator.config import EmulatorConfig
 from tests.stream.emulator.played import Talk
 
 
 def records(data: bytes, items: tuple[int, ...]) -> list[bytes]:
     """Binary records, each of the size of this list."""
-    length = size(items)
+    length = record_size(items)
     assert data
     assert len(data) % length == 0
     found = [data[at : at + length] for at in range(0, len(data), length)]
@@ -51,7 +51,7 @@ def test_vrpn_with_is900time_and_a_wand() -> None:
     assert talk.say(wand + plain + b"x0.2,0.2,0.8,0.8\rv0.2,0.2,0.8,0.8\r", after_s=1.0) == b""
     heard = talk.say(b"fCMT\rMZ\r", after_s=2.0) + talk.wait(0.5)
     assert heard[:3] == b"01 "
-    first, second = size((2, 11, 21, 22, 23, 0)), size((2, 11, 21, 0))
+    first, second = record_size((2, 11, 21, 22, 23, 0)), record_size((2, 11, 21, 0))
     assert len(heard) % (first + second) in (0, first)
     assert heard[first : first + 3] == b"02 "
 

@@ -9,14 +9,16 @@ import pytest
 from harness.errors import BadInput, UnknownName
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
-from harness.stream.emulator.faults import Fault, Faults
-from harness.stream.emulator.message import Sent
+from harness.stream.emulator.faults import Fault, FaultInjector
+from harness.stream.emulator.message import SentMessage
 from tests.stream.emulator.played import samples
 
 SET_UP = b"O1,40,2,11,21,1\rO2,40,2,11,21,1\rO3,40,2,11,21,1\rO4,40,2,11,21,1\rfuMZ\rC"
 
 
-def heard(*faults: Fault, seed: int = 1, seconds: float = 10.0, step_s: float = 0.02) -> tuple[Emulator, list[Sent]]:
+def heard(
+    *faults: Fault, seed: int = 1, seconds: float = 10.0, step_s: float = 0.02
+) -> tuple[Emulator, list[SentMessage]]:
     emulator = Emulator(samples(), EmulatorConfig(faults=faults, seed=seed), 0.0)
     emulator.receive(SET_UP, 0.0)
     sent = [one for k in range(round(seconds / step_s) + 1) for one in emulator.advance(k * step_s)]
@@ -104,7 +106,7 @@ def test_another_firmware_knows_no_quality() -> None:
 
 
 def test_random_spells_come_as_often_as_asked_and_never_two_at_once() -> None:
-    faults = Faults([Fault("stall", per_minute=6.0, lasts_s=2.0)], 1, 100.0)
+    faults = FaultInjector([Fault("stall", per_minute=6.0, lasts_s=2.0)], 1, 100.0)
     spells = faults.begun(100.0 + 3600.0)
     assert 60 * 6 * 0.7 < len(spells) < 60 * 6 * 1.0
     assert all(a.to_s <= b.from_s for a, b in itertools.pairwise(spells))

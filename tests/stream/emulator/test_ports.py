@@ -16,9 +16,9 @@ import pytest
 from harness.errors import BadInput
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
-from harness.stream.emulator.message import Sent
+from harness.stream.emulator.message import SentMessage
 from harness.stream.emulator.pty_port import PtyPort
-from harness.stream.emulator.server import Serving, open_port, serving
+from harness.stream.emulator.server import RunningEmulator, open_port, serve_emulator
 from harness.stream.emulator.tcp_port import TcpPort
 from tests.stream.emulator.played import samples
 
@@ -32,8 +32,8 @@ def link(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def on_pty(link: Path) -> Iterator[Serving]:
-    with serving(samples(), pty=link) as emulator:
+def on_pty(link: Path) -> Iterator[RunningEmulator]:
+    with serve_emulator(samples(), pty=link) as emulator:
         yield emulator
 
 
@@ -62,7 +62,7 @@ def opened(link: Path) -> int:
     return os.open(link, os.O_RDWR | os.O_NOCTTY)
 
 
-def test_a_client_may_close_the_pty_and_open_it_again(on_pty: Serving, link: Path) -> None:
+def test_a_client_may_close_the_pty_and_open_it_again(on_pty: RunningEmulator, link: Path) -> None:
     for _ in range(3):
         client = opened(link)
         os.write(client, b"S")
@@ -70,7 +70,7 @@ def test_a_client_may_close_the_pty_and_open_it_again(on_pty: Serving, link: Pat
         os.close(client)
 
 
-def test_a_pty_is_raw_and_echoes_nothing(on_pty: Serving, link: Path) -> None:
+def test_a_pty_is_raw_and_echoes_nothing(on_pty: RunningEmulator, link: Path) -> None:
     client = opened(link)
     _, output, _, local = termios.tcgetattr(client)[:4]
     assert not local & (termios.ECHO | termios.ICANON | termios.ISIG)
@@ -80,7 +80,7 @@ def test_a_pty_is_raw_and_echoes_nothing(on_pty: Serving, link: Path) -> None:
     os.close(client)
 
 
-def test_a_client_that_does_not_read_costs_whole_records(on_pty: Serving, link: Path) -> None:
+def test_a_client_that_does_not_read_costs_whole_records(on_pty: RunningEmulator, link: Path) -> None:
     client = opened(link)
     os.write(client, SET_UP)
     wait_until(lambda: on_pty.server.counts.unread > 50)
@@ -98,7 +98,7 @@ def test_a_client_that_does_not_read_costs_whole_records(on_pty: Serving, link: 
 
 def test_unplugged_the_pty_goes_dead_and_comes_back(link: Path) -> None:
     config = EmulatorConfig(faults=(Fault("disconnect", at_s=(0.3,), lasts_s=0.3),))
-    with serving(samples(), config, pty=link) as served:
+    with serve_emulator(samples(), config, pty=link) as served:
         client = opened(link)
         wait_until(lambda: not link.is_symlink())
         began_s = time.monotonic()
@@ -114,7 +114,7 @@ def test_unplugged_the_pty_goes_dead_and_comes_back(link: Path) -> None:
     assert not os.path.lexists(link)
 
 
-def test_nothing_that_is_there_is_overwritten(link: Path, on_pty: Serving, tmp_path: Path) -> None:
+def test_nothing_that_is_there_is_overwritten(link: Path, on_pty: RunningEmulator, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="leads to /dev/pts/"):
         PtyPort(link)
     (tmp_path / "file").write_text("mine")
@@ -131,14 +131,14 @@ def test_nothing_that_is_there_is_overwritten(link: Path, on_pty: Serving, tmp_p
 
 def test_a_link_of_a_killed_emulator_is_replaced(link: Path) -> None:
     link.symlink_to("/dev/pts/99999")
-    with serving(samples(), pty=link) as emulator:
+    with serve_emulator(samples(), pty=link) as emulator:
         assert os.path.exists(emulator.name)
     assert not os.path.lexists(link)
 
 
 @pytest.mark.parametrize(("rate", "answered"), [(termios.B9600, False), (termios.B115200, True)])
 def test_the_wrong_rate_is_noise_when_that_is_looked_at(link: Path, rate: int, answered: bool) -> None:
-    with serving(samples(), EmulatorConfig(check_baud=True), pty=link):
+    with serve_emulator(samples(), EmulatorConfig(check_baud=True), pty=link):
         client = opened(link)
         modes = termios.tcgetattr(client)
         modes[4] = modes[5] = rate
@@ -149,7 +149,7 @@ def test_the_wrong_rate_is_noise_when_that_is_looked_at(link: Path, rate: int, a
 
 
 def test_tcp_serves_one_client_after_another(tmp_path: Path) -> None:
-    with serving(samples(), tcp="127.0.0.1:0") as emulator:
+    with serve_emulator(samples(), tcp="127.0.0.1:0") as emulator:
         address = ("127.0.0.1", int(emulator.name.rpartition(":")[2]))
         for _ in range(3):
             with socket.create_connection(address, PATIENT_S) as client:
@@ -172,7 +172,9 @@ def test_a_second_client_is_turned_away_and_told_of(tmp_path: Path) -> None:
 
 
 def test_a_tcp_client_that_does_not_read_neither_blocks_nor_grows() -> None:
-    with serving(samples(rate_hz=900.0, instants=900), EmulatorConfig(paced=False), tcp="127.0.0.1:0") as emulator:
+    with serve_emulator(
+        samples(rate_hz=900.0, instants=900), EmulatorConfig(paced=False), tcp="127.0.0.1:0"
+    ) as emulator:
         client = socket.socket()
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.connect(("127.0.0.1", int(emulator.name.rpartition(":")[2])))
@@ -208,8 +210,8 @@ def test_one_place_is_asked_for(link: Path) -> None:
 
 
 def test_records_are_due_at_the_lines_pace_and_written_no_earlier(link: Path) -> None:
-    sent: list[Sent] = []
-    with serving(samples(), pty=link, on_sent=sent.append) as emulator:
+    sent: list[SentMessage] = []
+    with serve_emulator(samples(), pty=link, on_sent=sent.append) as emulator:
         client = opened(link)
         os.write(client, SET_UP)
         hear(client, 38 * 200)

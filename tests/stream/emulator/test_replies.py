@@ -4,7 +4,7 @@ import pytest
 
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.emulator.config import EmulatorConfig
-from harness.stream.emulator.setters import SETTERS, SILENT
+from harness.stream.emulator.setters import SET_ONLY_COMMANDS, SETTER_COMMANDS
 from tests.stream.emulator.played import Talk
 
 STATES = b"21l" + b"1111" + b"0" * 28 + b"\r\n"
@@ -137,7 +137,9 @@ def test_errors_are_logged_while_that_is_on() -> None:
 
 def test_every_setter_is_tried_here() -> None:
     tried = b" ".join(asked for asked, _ in ANSWERS) + b" ".join(asked for asked, *_ in REFUSALS)
-    assert [name for name in {*SETTERS, *SILENT} - {"ME0", "ME1"} if name.encode() not in tried] == []
+    assert [
+        name for name in {*SETTER_COMMANDS, *SET_ONLY_COMMANDS} - {"ME0", "ME1"} if name.encode() not in tried
+    ] == []
 
 
 @pytest.mark.parametrize("size", [54, 55])

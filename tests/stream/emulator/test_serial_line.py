@@ -5,12 +5,12 @@ import pytest
 
 from harness.simulate.link import TrackerConfig, transmit
 from harness.stream.emulator.message import Message
-from harness.stream.emulator.serial_line import MOST_REPLIES, Line
+from harness.stream.emulator.serial_line import MAX_QUEUED_REPLIES, SerialLine
 
 RECORD = bytes(38)
 
 
-def gone(line: Line, ready_s: list[float], look_s: list[float]) -> list[float]:
+def gone(line: SerialLine, ready_s: list[float], look_s: list[float]) -> list[float]:
     """When records that are ready at these times have left, looked at whenever."""
     out, waiting = [], [Message(at, RECORD, "1") for at in ready_s]
     for now_s in [*look_s, 1e6]:
@@ -25,7 +25,7 @@ def test_records_leave_when_the_simulated_line_delivers_them(rate_hz: float, rng
     tracker = TrackerConfig(rate_hz=rate_hz)
     ready_s = np.sort(np.arange(800) / (4 * rate_hz) + rng.uniform(0.0, 0.002, 800)) + 0.004
     sent, arrived_s = transmit(ready_s, tracker)
-    line = Line(tracker.baud, tracker.queue_records)
+    line = SerialLine(tracker.baud, tracker.queue_records)
     came = gone(line, ready_s.tolist(), np.sort(rng.uniform(0.0, 4.0, 300)).tolist())
     np.testing.assert_allclose(came, arrived_s[sent], atol=1e-9)
     assert line.dropped == np.sum(~sent)
@@ -34,11 +34,13 @@ def test_records_leave_when_the_simulated_line_delivers_them(rate_hz: float, rng
 
 def test_a_late_look_does_not_shift_the_schedule() -> None:
     ready_s = [0.01 * k for k in range(100)]
-    assert gone(Line(115200, 12), ready_s, []) == gone(Line(115200, 12), ready_s, [0.003 * k for k in range(400)])
+    assert gone(SerialLine(115200, 12), ready_s, []) == gone(
+        SerialLine(115200, 12), ready_s, [0.003 * k for k in range(400)]
+    )
 
 
 def test_an_overload_leaves_every_station_its_share() -> None:
-    line = Line(115200, 12)
+    line = SerialLine(115200, 12)
     heard: list[str] = []
     for k in range(4000):
         line.add(Message(k / 480.0, RECORD, "1234"[k % 4]))
@@ -48,7 +50,7 @@ def test_an_overload_leaves_every_station_its_share() -> None:
 
 
 def test_replies_wait_between_records_and_are_not_displaced_by_them() -> None:
-    line = Line(9600, 2)
+    line = SerialLine(9600, 2)
     for k in range(6):
         line.add(Message(0.0, bytes([k]) * 38, "1"))
     line.add(Message(0.0, b"reply\r\n"))
@@ -58,15 +60,15 @@ def test_replies_wait_between_records_and_are_not_displaced_by_them() -> None:
 
 
 def test_the_queue_of_replies_has_an_end() -> None:
-    line = Line(9600, 12)
-    for _ in range(MOST_REPLIES + 10):
+    line = SerialLine(9600, 12)
+    for _ in range(MAX_QUEUED_REPLIES + 10):
         line.add(Message(0.0, b"reply\r\n"))
     assert line.dropped_replies == 10
-    assert len(line.gone(1e6)) == MOST_REPLIES
+    assert len(line.gone(1e6)) == MAX_QUEUED_REPLIES
 
 
 def test_a_halt_drops_what_waits_but_not_what_is_on_its_way() -> None:
-    line = Line(9600, 12)
+    line = SerialLine(9600, 12)
     line.add(Message(0.0, RECORD, "1"))
     line.add(Message(0.0, RECORD, "2"))
     line.add(Message(0.01, b"", halts=True))
@@ -75,7 +77,7 @@ def test_a_halt_drops_what_waits_but_not_what_is_on_its_way() -> None:
 
 
 def test_a_held_line_says_nothing_and_unpaced_all_at_once() -> None:
-    line = Line(115200, 12, paced=False)
+    line = SerialLine(115200, 12, paced=False)
     line.hold(0.0, 1.0)
     for k in range(20):
         line.add(Message(0.1 + k / 100, RECORD, "1"))

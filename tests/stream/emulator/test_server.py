@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.experiment.playback import Rehearsal, rehearse
+from harness.experiment.playback import Playback, prepare_playback
 from harness.stream.codec import commands
 from harness.stream.codec.reader import FrameReader, WireFormat
 from harness.stream.driver.transport import Transport, open_transport
-from harness.stream.emulator import EmulatorConfig, serving
+from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.frame import TrackerFrame
 
 PATIENT_S = 120.0
@@ -18,14 +18,14 @@ PATIENT_S = 120.0
 
 
 @pytest.fixture(scope="module")
-def walk() -> Rehearsal:
-    return rehearse("builtin_walking", noise="default", stations=6)
+def walk() -> Playback:
+    return prepare_playback("builtin_walking", noise="default", stations=6)
 
 
 def set_up(client: Transport, stations: str = "123456") -> None:
     client.write(commands.STOP)
     for station in stations:
-        client.write(commands.output_list(station, (40, 2, 11, 21, 1)))
+        client.write(commands.set_output_list(station, (40, 2, 11, 21, 1)))
     for command in (commands.BINARY, commands.CENTIMETRES, commands.MILLISECONDS, commands.ZERO_CLOCK, commands.STREAM):
         client.write(command)
 
@@ -43,9 +43,9 @@ def same(one: TrackerFrame, other: TrackerFrame) -> bool:
 
 
 @pytest.mark.parametrize("where", ["pty", "tcp"])
-def test_the_frames_are_the_simulations(where: str, walk: Rehearsal, tmp_path: Path) -> None:
+def test_the_frames_are_the_simulations(where: str, walk: Playback, tmp_path: Path) -> None:
     at = {"pty": tmp_path / "is900"} if where == "pty" else {"tcp": "127.0.0.1:0"}
-    with serving(walk.samples, EmulatorConfig(), **at) as emulator:
+    with serve_emulator(walk.samples, EmulatorConfig(), **at) as emulator:
         client = open_transport(emulator.name)
         set_up(client)
         frames = frames_of(client, WireFormat(walk.samples.stations, walk.samples.rate_hz), 40)

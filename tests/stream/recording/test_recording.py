@@ -13,25 +13,36 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile
-from harness.stream.codec.blocks import HEADER, LONGEST, MARKER, RECEIVED, SENT, VERSION, Block, Lost, blocks, encode
+from harness.stream.codec.blocks import (
+    BLOCK_MARKER,
+    FILE_HEADER,
+    MAX_PAYLOAD_BYTES,
+    RECEIVED,
+    SENT,
+    VERSION,
+    DamagedSpan,
+    RecordingBlock,
+    encode_block,
+    read_blocks,
+)
 from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.records import Settings
+from harness.stream.codec.records import RecordFormat
 from harness.stream.line_events import LineEvent
 from harness.stream.recording.recording import Recording, RecordingWriter, read_recording
 from tests.stream.wire import FOUR
 
 ENTRIES = [
-    Block(SENT, 10.0, 1e9, b"C"),
-    Block(RECEIVED, 10.5, 1e9 + 0.5, b"01 some bytes\r\n"),
-    Block(RECEIVED, 11.0, 1e9 + 1.0, MARKER + b"among data" + bytes(range(256))),
-    Block(RECEIVED, 11.5, 1e9 + 1.5, b""),
+    RecordingBlock(SENT, 10.0, 1e9, b"C"),
+    RecordingBlock(RECEIVED, 10.5, 1e9 + 0.5, b"01 some bytes\r\n"),
+    RecordingBlock(RECEIVED, 11.0, 1e9 + 1.0, BLOCK_MARKER + b"among data" + bytes(range(256))),
+    RecordingBlock(RECEIVED, 11.5, 1e9 + 1.5, b""),
 ]
-WHOLE = HEADER + b"".join(map(encode, ENTRIES))
+WHOLE = FILE_HEADER + b"".join(map(encode_block, ENTRIES))
 
 
-def entries(data: bytes) -> tuple[list[Block], list[Lost]]:
-    found = list(blocks(data, 0 if data[: len(HEADER)] != HEADER else len(HEADER)))
-    return [e for e in found if isinstance(e, Block)], [e for e in found if isinstance(e, Lost)]
+def entries(data: bytes) -> tuple[list[RecordingBlock], list[DamagedSpan]]:
+    found = list(read_blocks(data, 0 if data[: len(FILE_HEADER)] != FILE_HEADER else len(FILE_HEADER)))
+    return [e for e in found if isinstance(e, RecordingBlock)], [e for e in found if isinstance(e, DamagedSpan)]
 
 
 def written(path: Path) -> Path:
@@ -54,50 +65,50 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
     assert recording.events == [{"monotonic_s": 1.35, "kind": "unplugged", "text": "the port is gone"}]
     over_the_line = [b for b in recording.blocks() if b.kind in (SENT, RECEIVED)]
     assert over_the_line == [
-        Block(SENT, 1.0, 101.0, b"c"),
-        Block(SENT, 1.2, 101.2, b"C"),
-        Block(RECEIVED, 1.3, 101.3, b"01 "),
-        Block(RECEIVED, 1.4, 101.4, b"02 "),
+        RecordingBlock(SENT, 1.0, 101.0, b"c"),
+        RecordingBlock(SENT, 1.2, 101.2, b"C"),
+        RecordingBlock(RECEIVED, 1.3, 101.3, b"01 "),
+        RecordingBlock(RECEIVED, 1.4, 101.4, b"02 "),
     ]
 
 
 @settings(max_examples=50)
 @given(data=st.binary(max_size=300), monotonic_s=st.floats(0.0, 1e9), wall_s=st.floats(0.0, 1e10))
 def test_any_bytes_at_any_time_come_back(data: bytes, monotonic_s: float, wall_s: float) -> None:
-    block = Block(RECEIVED, monotonic_s, wall_s, data)
-    assert list(blocks(encode(block) * 2, 0)) == [block, block]
+    block = RecordingBlock(RECEIVED, monotonic_s, wall_s, data)
+    assert list(read_blocks(encode_block(block) * 2, 0)) == [block, block]
 
 
 def test_a_format_says_all_that_a_reader_needs(tmp_path: Path) -> None:
-    odd = WireFormat(("head", "torso"), 75.0, (18, 20, 21), Settings(0.0254, 1e-6, binary=False), b"2A")
+    odd = WireFormat(("head", "torso"), 75.0, (18, 20, 21), RecordFormat(0.0254, 1e-6, binary=False), b"2A")
     with RecordingWriter(tmp_path / "a.rec") as writer:
         writer.configured(odd)
     assert read_recording(tmp_path / "a.rec").formats == (odd,)
 
 
 def test_more_than_a_block_holds_is_cut_in_two(tmp_path: Path) -> None:
-    data = os.urandom(LONGEST + 5)
+    data = os.urandom(MAX_PAYLOAD_BYTES + 5)
     with RecordingWriter(tmp_path / "a.rec") as writer:
         writer.configured(FOUR, 1.0, 2.0)
         writer.received(data, 1.0, 2.0)
     read = [b for b in read_recording(tmp_path / "a.rec").blocks() if b.kind == RECEIVED]
-    assert [len(b.payload) for b in read] == [LONGEST, 5]
+    assert [len(b.payload) for b in read] == [MAX_PAYLOAD_BYTES, 5]
     assert b"".join(b.payload for b in read) == data
 
 
 def test_cut_at_any_byte_it_opens_and_says_what_was_lost(tmp_path: Path) -> None:
     whole = written(tmp_path / "a.rec").read_bytes()
     every = list(Recording(tmp_path, whole).blocks())
-    ends = [len(HEADER)]
+    ends = [len(FILE_HEADER)]
     for block in every:
-        ends.append(ends[-1] + len(encode(block)))
+        ends.append(ends[-1] + len(encode_block(block)))
     assert ends[-1] == len(whole)
     for cut in range(1, len(whole)):
         (tmp_path / "cut.rec").write_bytes(whole[:cut])
         recording = read_recording(tmp_path / "cut.rec")
         kept = sum(end <= cut for end in ends[1:])
         assert list(recording.blocks()) == every[:kept]
-        begin = ends[kept] if cut >= len(HEADER) else 0
+        begin = ends[kept] if cut >= len(FILE_HEADER) else 0
         assert [f"the last {cut - begin} bytes" in lost for lost in recording.lost] == [True] * (cut > begin)
 
 
@@ -106,9 +117,9 @@ def test_a_flipped_byte_costs_its_block_and_is_named(at: int, flip: int) -> None
     data = bytearray(WHOLE)
     data[at] ^= flip
     found, lost = entries(bytes(data))
-    end, hit = len(HEADER), 0
+    end, hit = len(FILE_HEADER), 0
     while at >= end:
-        end += len(encode(ENTRIES[hit]))
+        end += len(encode_block(ENTRIES[hit]))
         hit += 1
     expected = [e for i, e in enumerate(ENTRIES) if i != hit - 1]
     assert found == expected
@@ -116,9 +127,11 @@ def test_a_flipped_byte_costs_its_block_and_is_named(at: int, flip: int) -> None
     assert lost[0].begin <= at < lost[0].end
 
 
-@given(pieces=st.lists(st.binary(max_size=80) | st.sampled_from([MARKER, encode(ENTRIES[0])[:20]]), max_size=5))
+@given(
+    pieces=st.lists(st.binary(max_size=80) | st.sampled_from([BLOCK_MARKER, encode_block(ENTRIES[0])[:20]]), max_size=5)
+)
 def test_rubbish_between_blocks_hides_none_of_them(pieces: list[bytes]) -> None:
-    data = HEADER + b"".join(encode(ENTRIES[1]) + piece for piece in pieces) + encode(ENTRIES[2])
+    data = FILE_HEADER + b"".join(encode_block(ENTRIES[1]) + piece for piece in pieces) + encode_block(ENTRIES[2])
     found, lost = entries(data)
     assert found == [*[ENTRIES[1]] * len(pieces), ENTRIES[2]]
     assert sum(e.end - e.begin for e in lost) == sum(map(len, pieces))
@@ -159,13 +172,13 @@ def test_recording_goes_on_behind_what_is_there(tmp_path: Path) -> None:
     assert len(recording.lost) == 1
 
 
-@pytest.mark.parametrize("kept", range(len(HEADER)))
+@pytest.mark.parametrize("kept", range(len(FILE_HEADER)))
 def test_a_header_that_was_cut_is_completed(kept: int, tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
-    path.write_bytes(HEADER[:kept])
+    path.write_bytes(FILE_HEADER[:kept])
     with RecordingWriter(path) as writer:
         writer.sent(b"c", 1.0, 2.0)
-    assert path.read_bytes().startswith(HEADER + MARKER)
+    assert path.read_bytes().startswith(FILE_HEADER + BLOCK_MARKER)
     assert read_recording(path).lost == ()
 
 
@@ -175,7 +188,7 @@ def test_nothing_happens_to_a_file_before_there_is_something_to_write(tmp_path: 
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("content", [b"x", b"# a scenario\nschema = 1\n" * 100, b"\x00" * 5000, HEADER[:7] + b"?"])
+@pytest.mark.parametrize("content", [b"x", b"# a scenario\nschema = 1\n" * 100, b"\x00" * 5000, FILE_HEADER[:7] + b"?"])
 def test_another_file_is_refused_untouched(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_bytes(content)
@@ -189,7 +202,7 @@ def newer(version: int = VERSION + 1) -> bytes:
     import struct
     import zlib
 
-    head = HEADER[:8] + struct.pack("<I", version)
+    head = FILE_HEADER[:8] + struct.pack("<I", version)
     return head + struct.pack("<I", zlib.crc32(head)) + b"what nobody knows yet"
 
 
@@ -309,6 +322,6 @@ def test_blocks_are_json_where_the_layout_says_so(tmp_path: Path) -> None:
     ],
 )
 def test_a_format_that_cannot_be_used_is_refused(payload: bytes, found: str) -> None:
-    data = HEADER + encode(Block("conf", 1.0, 2.0, payload))
+    data = FILE_HEADER + encode_block(RecordingBlock("conf", 1.0, 2.0, payload))
     with pytest.raises(BadFile, match=found):
         _ = Recording(Path("a.rec"), data).formats

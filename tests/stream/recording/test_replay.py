@@ -13,12 +13,12 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, BadInput
-from harness.stream.codec.blocks import HEADER, RECEIVED
-from harness.stream.codec.capture import Capture
+from harness.stream.codec.blocks import FILE_HEADER, RECEIVED
+from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import Recording, RecordingWriter, read_recording, record_capture
-from harness.stream.recording.replay import RecordingStream, Speed, next_line, speed_of
+from harness.stream.recording.replay import RecordingStream, ReplaySpeed, parse_speed, wait_for_enter
 from harness.testing.stream_checks import check_stream
 from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
 
@@ -31,7 +31,7 @@ def alike(one: Sequence[TrackerFrame], other: Sequence[TrackerFrame]) -> bool:
     return len(one) == len(other) and all(same(a, b) for a, b in zip(one, other, strict=True))
 
 
-def recorded(path: Path, capture: Capture | None = None) -> Path:
+def recorded(path: Path, capture: ByteCapture | None = None) -> Path:
     record_capture(path, FOUR, received(DATA, STAMPS_S) if capture is None else capture, {})
     return path
 
@@ -80,7 +80,7 @@ def test_how_bytes_were_cut_changes_nothing_but_when_they_came(
 
 
 @pytest.mark.parametrize("speed", [40.0, 1000.0, "step"])
-def test_frames_are_the_same_at_any_speed(speed: Speed, broken: Path) -> None:
+def test_frames_are_the_same_at_any_speed(speed: ReplaySpeed, broken: Path) -> None:
     assert alike(list(RecordingStream(broken)), list(RecordingStream(broken, 1e6)))
     whole = recorded(broken.with_name("whole.rec"))
     assert alike(list(RecordingStream(whole)), list(RecordingStream(whole, speed, step=lambda: True)))
@@ -126,7 +126,7 @@ def test_closing_ends_a_wait(tmp_path: Path) -> None:
 
 def test_a_step_is_a_line_of_input(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
-    assert len(list(RecordingStream(whole, "step", step=next_line))) == 3
+    assert len(list(RecordingStream(whole, "step", step=wait_for_enter))) == 3
 
 
 def test_a_second_set_up_goes_on_where_the_first_ended(broken: Path) -> None:
@@ -177,7 +177,7 @@ def test_a_lost_block_costs_its_records_alone(whole: Path) -> None:
 
 
 def test_cut_at_any_byte_it_plays_what_is_whole_or_says_why_not(whole: Path) -> None:
-    data = whole.read_bytes()[: 2000 + len(HEADER)]
+    data = whole.read_bytes()[: 2000 + len(FILE_HEADER)]
     most = 0
     for cut in range(1, len(data), 7):
         recording = Recording(whole, data[:cut])
@@ -202,7 +202,7 @@ def test_without_a_set_up_there_is_nothing_to_play(tmp_path: Path) -> None:
 def test_stations_never_change(whole: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.rec"
     record_capture(other, WireFormat(("head",), RATE_HZ), received(DATA, STAMPS_S), {})
-    both = whole.read_bytes() + other.read_bytes()[len(HEADER) :]
+    both = whole.read_bytes() + other.read_bytes()[len(FILE_HEADER) :]
     with pytest.raises(BadFile, match=r"stations head, .* become head; expected the same stations"):
         RecordingStream(Recording(whole, both))
 
@@ -215,11 +215,11 @@ def test_reading_a_file_while_it_grows_gives_what_was_there(whole: Path) -> None
 
 
 @pytest.mark.parametrize(("text", "speed"), [("step", "step"), ("max", "max"), ("1", 1.0), ("0.25", 0.25)])
-def test_speeds(text: str, speed: Speed) -> None:
-    assert speed_of(text) == speed
+def test_speeds(text: str, speed: ReplaySpeed) -> None:
+    assert parse_speed(text) == speed
 
 
 @pytest.mark.parametrize("text", ["", "fast", "0", "-1", "nan", "inf"])
 def test_what_is_no_speed_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="`step`, `max`, or a positive number"):
-        speed_of(text)
+        parse_speed(text)

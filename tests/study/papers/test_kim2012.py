@@ -5,19 +5,19 @@ from pathlib import Path
 
 import pytest
 
-from harness.core.package_data import share_folder
-from harness.core.split import Part, allowed_frames
-from harness.experiment.cells import check_names, source_of
-from harness.experiment.clip_evaluation import Setting
+from harness.core.package_data import data_folder
+from harness.core.split import ClipPart, allowed_frames
+from harness.experiment.cells import check_names, open_scenario_motion
+from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import load_scenario, variants
-from harness.results.findings import Findings, read_findings, write_findings
+from harness.results.findings import PaperFindings, read_findings, write_findings
 from harness.study.papers.kim2012 import PAPER
-from harness.study.papers.paper_study import Study, open_study, run_experiments
+from harness.study.papers.paper_study import PaperStudy, open_study, run_scenarios
 from harness.study.papers.sparse_database import ARM_AND_SPINE
-from harness.study.papers.station_sets import named
-from harness.study.papers.tables import GROUPS
+from harness.study.papers.station_sets import format_station_set
+from harness.study.papers.tables import HINGE_GROUPS
 
-FILES = sorted((share_folder("scenarios") / "papers" / "kim2012").glob("*.toml"))
+FILES = sorted((data_folder("scenarios") / "papers" / "kim2012").glob("*.toml"))
 BUILT_IN = [path for path in FILES if path.stem.startswith("builtin_")]
 CMU = [path for path in FILES if path.stem.startswith("cmu_")]
 DATABASE = {"boxing": 7_233, "table_tennis": 4_271, "walking": 1_317}
@@ -44,7 +44,9 @@ def test_what_is_judged_is_never_learnt_from_and_enough(path: Path) -> None:
     if motion.protocol == "sequence":
         assert not set(motion.test) & set(motion.examples)
     if path.stem.partition("_")[2].startswith("sensors"):
-        assert len({named(made.wearing) for _, made in variants(scenario)}) == len(variants(scenario)) == 31
+        assert (
+            len({format_station_set(made.wearing) for _, made in variants(scenario)}) == len(variants(scenario)) == 31
+        )
 
 
 @pytest.mark.parametrize("path", BUILT_IN, ids=lambda path: path.stem)
@@ -52,7 +54,7 @@ def test_built_in_databases_have_the_papers_size_and_know_the_performer(path: Pa
     """A take has 2,401 frames at 120 Hz; a run of n of them has 1 + (n - 1) // 3 at the tracker's 40."""
     motion = load_scenario(path).motion
     (behaviour,) = motion.behaviours
-    withheld = [Part.parse(text) for text in motion.withheld]
+    withheld = [ClipPart.parse(text) for text in motion.withheld]
     runs = [run for name in motion.examples for run in allowed_frames(withheld, name, 2401, 120.0)]
     assert sum(1 + (len(run) - 1) // 3 for run in runs) == pytest.approx(DATABASE[behaviour], rel=0.01)
     sparse = path.stem.startswith(("builtin_sparse", "builtin_extrapolation"))
@@ -65,21 +67,21 @@ def test_built_in_databases_have_the_papers_size_and_know_the_performer(path: Pa
 @pytest.mark.parametrize("path", CMU, ids=lambda path: path.stem)
 def test_every_clip_of_real_motion_is_there(path: Path, mocap: Path) -> None:
     scenario = load_scenario(path)
-    source = source_of(scenario.motion, mocap, 1)
-    parts = [Part.parse(text) for text in scenario.motion.test]
+    source = open_scenario_motion(scenario.motion, mocap, 1)
+    parts = [ClipPart.parse(text) for text in scenario.motion.test]
     check_names(scenario, source, parts)
-    settings = [Setting(scenario, source, part, scenario.motion.behaviours[0]) for part in parts]
+    settings = [ClipEvaluation(scenario, source, part, scenario.motion.behaviours[0]) for part in parts]
     assert [setting.performer for setting in settings] == ["known"] * 8 + ["new"] * (len(parts) - 8)
 
 
 def test_joint_groups_are_of_different_bones_and_all_of_them() -> None:
-    for groups in (ARM_AND_SPINE, GROUPS):
+    for groups in (ARM_AND_SPINE, HINGE_GROUPS):
         bones = [bone for group in groups.values() for bone in group]
         assert len(bones) == len(set(bones)) == 22
 
 
 def test_what_did_not_run_is_said_not_to_have_run(tmp_path: Path) -> None:
-    study = Study(tmp_path, "cmu", 1, PAPER.plan("cmu", 1), tmp_path)
+    study = PaperStudy(tmp_path, "cmu", 1, PAPER.plan("cmu", 1), tmp_path)
     for name in READ_BACK:
         experiment = PAPER.experiments[name](study)
         assert {claim.verdict for claim in experiment.claims} <= {"not run"}
@@ -100,12 +102,12 @@ def test_experiments_are_judged_from_what_ran(tmp_path: Path) -> None:
         vary = {key: values[::10] for key, values in scenario.vary.items()} if name.startswith("sensors") else None
         runs[name] = replace(scenario, motion=short, vary=scenario.vary if vary is None else vary)
     open_study(tmp_path / "study", {"paper": "kim2012"})
-    assert run_experiments(runs, tmp_path / "study") == {}
-    study = Study(tmp_path / "study", "builtin", 1, runs)
+    assert run_scenarios(runs, tmp_path / "study") == {}
+    study = PaperStudy(tmp_path / "study", "builtin", 1, runs)
     found = tuple(PAPER.experiments[name](study) for name in READ_BACK)
     assert {claim.verdict for experiment in found for claim in experiment.claims} <= {"cannot tell", "not run"}
     assert all(experiment.tables for experiment in found)
     assert all(experiment.runs for experiment in found)
-    whole = Findings("kim2012", PAPER.reference, "built-in performer", "", 1, found, {})
+    whole = PaperFindings("kim2012", PAPER.reference, "built-in performer", "", 1, found, {})
     write_findings(tmp_path / "findings.json", whole)
     assert read_findings(tmp_path / "findings.json") == whole

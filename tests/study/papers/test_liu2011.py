@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.core.split import Part
-from harness.experiment.cells import source_of
+from harness.core.split import ClipPart
+from harness.experiment.cells import open_scenario_motion
 from harness.experiment.scenario import load_scenario, shipped_scenarios
 from harness.results.cell import Cell
-from harness.results.findings import Claim, Experiment
+from harness.results.findings import Claim, PaperExperiment
 from harness.study.papers.frame_by_frame import frame_by_frame
 from harness.study.papers.leave_one_out import BEHAVIOURS, leave_one_out, own_model
 from harness.study.papers.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs
-from harness.study.papers.paper import PAPERS, Motion, paper
-from harness.study.papers.paper_study import Study, check_runs
+from harness.study.papers.paper import PAPERS, Motion, load_paper
+from harness.study.papers.paper_study import PaperStudy, check_run_names
 
 LOW, MIDDLE, HIGH = 1.0, 2.0, 3.0
 THEIRS = {"dynamic_map": LOW, "dynamic_map:window": LOW, "local_pca": MIDDLE, "ik": HIGH}
 
 
 @dataclass(frozen=True)
-class Told(Study):
+class Told(PaperStudy):
     """A study whose rows are made up: every cell errs by what `errors` says of its method or inputs, clip by clip."""
 
     errors: Mapping[str, float] = field(default_factory=dict)
@@ -61,7 +61,7 @@ def told(motion: Motion, errors: Mapping[str, float], new: frozenset[str] = froz
     return Told(Path(), motion, 1, PAPER.plan(motion, 1), errors=errors, new=new)
 
 
-def verdicts(experiment: Experiment, words: str = "") -> Counter[str]:
+def verdicts(experiment: PaperExperiment, words: str = "") -> Counter[str]:
     return Counter(claim.verdict for claim in experiment.claims if words in claim.text)
 
 
@@ -97,13 +97,13 @@ def test_on_real_motion_known_and_new_performers_stand_apart_and_what_is_absent_
 
 
 def test_what_failed_is_not_run() -> None:
-    nothing = Study(Path("nowhere"), "builtin", 1, PAPER.plan("builtin", 1))
+    nothing = PaperStudy(Path("nowhere"), "builtin", 1, PAPER.plan("builtin", 1))
     for experiment in (leave_one_out(nothing), frame_by_frame(nothing), boxing_inputs(nothing)):
         assert set(verdicts(experiment)) == {"not run"}
     assert {claim.why for claim in leave_one_out(nothing).claims} == {"every cell failed"}
 
 
-def claim_of(experiment: Experiment, text: str) -> Claim:
+def claim_of(experiment: PaperExperiment, text: str) -> Claim:
     (found,) = [claim for claim in experiment.claims if claim.text == text]
     return found
 
@@ -133,16 +133,16 @@ def test_figures_are_judged_on_real_motion_within_a_quarter() -> None:
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_built_in_runs_name_what_exists_and_judge_enough(name: str) -> None:
-    runs = paper(name).plan("builtin", 3)
+    runs = load_paper(name).plan("builtin", 3)
     assert runs
-    check_runs(runs, None)
+    check_run_names(runs, None)
     assert {scenario.seed for scenario in runs.values()} == {3}
     for run, scenario in runs.items():
         assert scenario.name == run
         assert scenario.motion.source == "builtin"
-        source = source_of(scenario.motion, None, 3)
+        source = open_scenario_motion(scenario.motion, None, 3)
         shown = scenario.motion.behaviours * (len(scenario.motion.test) // len(scenario.motion.behaviours))
-        assert [source.behaviour(Part.parse(text).clip) for text in scenario.motion.test] == list(shown)
+        assert [source.behaviour(ClipPart.parse(text).clip) for text in scenario.motion.test] == list(shown)
 
 
 def test_five_behaviours_of_eight_takes_learn_from_about_as_many_frames_as_the_paper() -> None:
@@ -164,17 +164,17 @@ def test_five_behaviours_of_eight_takes_learn_from_about_as_many_frames_as_the_p
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_real_runs_name_clips_that_show_what_they_say_and_that_chose_no_constants(name: str, mocap: Path) -> None:
-    runs = paper(name).plan("cmu", 1)
+    runs = load_paper(name).plan("cmu", 1)
     assert runs
-    check_runs(runs, mocap)
+    check_run_names(runs, mocap)
     chosen_on = [p for p in shipped_scenarios() if p.stem.startswith(("tune_", "validate_"))]
-    chose = [Part.parse(text) for path in chosen_on for text in load_scenario(path).motion.test]
+    chose = [ClipPart.parse(text) for path in chosen_on for text in load_scenario(path).motion.test]
     for scenario in runs.values():
         motion = scenario.motion
-        source = source_of(motion, mocap, 1)
+        source = open_scenario_motion(motion, mocap, 1)
         shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
         for text, behaviour in zip(motion.test, shown, strict=True):
-            part = Part.parse(text)
+            part = ClipPart.parse(text)
             assert source.behaviour(part.clip) == behaviour, text
             assert not any(c.clip == part.clip and c.start < part.end and part.start < c.end for c in chose), text
-        assert not {Part.parse(text).clip for text in motion.test} & set(scenario.left_out)
+        assert not {ClipPart.parse(text).clip for text in motion.test} & set(scenario.left_out)

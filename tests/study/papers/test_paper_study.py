@@ -14,10 +14,10 @@ import pytest
 from harness.cli import main
 from harness.core.files import TEMPORARY
 from harness.errors import BadInput, Outcome, UnknownName
-from harness.results.findings import Bars, Experiment, Lines, read_findings
-from harness.study.papers.paper import Paper, rerun
-from harness.study.papers.paper_study import Study, open_study, planned_cells, run_experiments
-from harness.study.papers.tables import by_clip
+from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
+from harness.study.papers.paper import Paper, reproduce
+from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
+from harness.study.papers.tables import errors_by_clip
 from tests.interrupts import heeding_interrupts
 from tests.study.papers.tiny import BOUTS, TINY, WALKS
 
@@ -25,7 +25,7 @@ from tests.study.papers.tiny import BOUTS, TINY, WALKS
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("studies") / "tiny"
-    findings, outcome = rerun(TINY, out, command="harness paper tiny")
+    findings, outcome = reproduce(TINY, out, command="harness paper tiny")
     assert outcome is Outcome.PASS
     assert read_findings(out / "findings.json") == findings
     return out
@@ -34,8 +34,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_findings_hold_what_the_cells_say(finished: Path) -> None:
     findings = read_findings(finished / "findings.json")
     walks, bouts = findings.experiments
-    study = Study(finished, "builtin", 1, TINY.plan("builtin", 1))
-    errors = {method: by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
+    study = PaperStudy(finished, "builtin", 1, TINY.plan("builtin", 1))
+    errors = {method: errors_by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
     assert {clip for each in errors.values() for clip in each} == set(WALKS.motion.test)
     for cell in study.cells("walks"):
         of_frames = float(np.mean(cell.errors["joint_angle_mean_deg"][cell.scores.scored]))
@@ -45,8 +45,8 @@ def test_findings_hold_what_the_cells_say(finished: Path) -> None:
     off = [errors["ik:previous"][clip] - errors["mean_pose"][clip] for clip in WALKS.motion.test]
     assert claim.difference == pytest.approx(np.mean(off))
     bars, lines = walks.figures
-    assert isinstance(bars, Bars)
-    assert isinstance(lines, Lines)
+    assert isinstance(bars, BarChart)
+    assert isinstance(lines, LineChart)
     assert list(bars.series["mean_pose"]) == pytest.approx([np.mean(list(errors["mean_pose"].values()))])
     drawn = np.array(lines.series["mean_pose"], float)
     assert np.mean(drawn) == pytest.approx(errors["mean_pose"]["walking_p1_01"], rel=1e-4)
@@ -77,7 +77,7 @@ def made(out: Path) -> dict[str, int]:
 
 def test_a_finished_study_runs_and_measures_nothing_again(finished: Path) -> None:
     before, measured = made(finished), (finished / "measured" / "count.json").stat().st_mtime_ns
-    assert rerun(TINY, finished)[1] is Outcome.PASS
+    assert reproduce(TINY, finished)[1] is Outcome.PASS
     assert made(finished) == before
     assert (finished / "measured" / "count.json").stat().st_mtime_ns == measured
 
@@ -103,9 +103,9 @@ def test_a_killed_study_keeps_its_cells_and_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "tiny"
     assert stopped(out, signal.SIGKILL)[0] == -signal.SIGKILL
     kept = made(out)
-    assert rerun(TINY, out)[1] is Outcome.PASS
+    assert reproduce(TINY, out)[1] is Outcome.PASS
     assert kept.items() <= made(out).items()
-    assert len(made(out)) == planned_cells(TINY.plan("builtin", 1)) == 6
+    assert len(made(out)) == count_cells(TINY.plan("builtin", 1)) == 6
 
 
 def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path) -> None:
@@ -118,23 +118,23 @@ def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path) -> None:
 
 def test_a_folder_of_another_study_is_refused(finished: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="seed: 1, not 2"):
-        rerun(TINY, finished, seed=2)
+        reproduce(TINY, finished, seed=2)
     with pytest.raises(BadInput, match="paper: tiny, not other"):
-        rerun(replace(TINY, name="other"), finished)
+        reproduce(replace(TINY, name="other"), finished)
     with pytest.raises(BadInput, match="motion: built-in performer, not cmu"):
         open_study(finished, {"paper": "tiny", "motion": "cmu", "seed": 1})
     (tmp_path / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
-        rerun(TINY, tmp_path)
+        reproduce(TINY, tmp_path)
     with pytest.raises(BadInput, match="is a file"):
-        rerun(TINY, tmp_path / "thesis.tex")
+        reproduce(TINY, tmp_path / "thesis.tex")
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
 
 
 def test_names_that_do_not_exist_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     wrong = replace(BOUTS, motion=replace(BOUTS.motion, test=("boxing_p9_01",)))
     with pytest.raises(UnknownName):
-        rerun(replace(TINY, runs=(WALKS, wrong)), tmp_path / "tiny")
+        reproduce(replace(TINY, runs=(WALKS, wrong)), tmp_path / "tiny")
     assert not (tmp_path / "tiny").exists()
 
 
@@ -143,12 +143,12 @@ def test_what_fails_is_told_and_stops_nothing(tmp_path: Path) -> None:
     broken = replace(WALKS, methods=("mean_pose", "tests.experiment.test_engine:Broken"))
     refused = replace(BOUTS, motion=replace(BOUTS.motion, longest_s=0.5))  # all of it warm-up
 
-    def judge(study: Study) -> Experiment:
+    def judge(study: PaperStudy) -> PaperExperiment:
         raise ZeroDivisionError("by nothing")
 
     paper = replace(TINY, runs=(broken, refused), experiments={"judge": judge, "bouts": TINY.experiments["bouts"]})
     seen: list[tuple[int, int]] = []
-    findings, outcome = rerun(
+    findings, outcome = reproduce(
         paper, tmp_path / "tiny", progress=lambda last, done, planned: seen.append((done, planned))
     )
     assert outcome is Outcome.INCOMPLETE
@@ -159,33 +159,33 @@ def test_what_fails_is_told_and_stops_nothing(tmp_path: Path) -> None:
     assert "warm-up" in " ".join(bouts.notes)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     assert seen[-1] == (8, 8)
-    study = Study(tmp_path / "tiny", "builtin", 1, {"walks": broken})
-    assert by_clip(study.rows("walks", method="tests.experiment.test_engine:Broken")) == {}
-    failures = run_experiments({"walks": broken}, tmp_path / "tiny")
+    study = PaperStudy(tmp_path / "tiny", "builtin", 1, {"walks": broken})
+    assert errors_by_clip(study.rows("walks", method="tests.experiment.test_engine:Broken")) == {}
+    failures = run_scenarios({"walks": broken}, tmp_path / "tiny")
     assert len(failures) == 2
     assert all("on purpose" in text for text in failures.values())
 
 
 def test_known_and_new_performers_are_never_pooled(finished: Path) -> None:
-    rows = Study(finished, "builtin", 1, {"walks": WALKS}).rows("walks", method="mean_pose")
-    assert len(by_clip(rows)) == 2
+    rows = PaperStudy(finished, "builtin", 1, {"walks": WALKS}).rows("walks", method="mean_pose")
+    assert len(errors_by_clip(rows)) == 2
     with pytest.raises(BadInput, match="performer"):
-        by_clip([rows[0], {**rows[1], "performer": "new"}])
+        errors_by_clip([rows[0], {**rows[1], "performer": "new"}])
     with pytest.raises(BadInput, match="method"):
-        by_clip([rows[0], {**rows[1], "method": "ik"}])
+        errors_by_clip([rows[0], {**rows[1], "method": "ik"}])
     with pytest.raises(BadInput, match="Two errors"):
-        by_clip([rows[0], rows[0]])
+        errors_by_clip([rows[0], rows[0]])
 
 
 def test_a_paper_without_runs_on_a_motion_says_so(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no runs on builtin"):
-        rerun(Paper("unheard", "", {}), tmp_path / "out")
+        reproduce(Paper("unheard", "", {}), tmp_path / "out")
 
 
 def test_the_verb_prints_claims_and_where_the_report_lies(
     finished: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("harness.study.papers.paper.paper", lambda name: TINY)
+    monkeypatch.setattr("harness.study.papers.paper.load_paper", lambda name: TINY)
     words = ["paper", "liu2011", "--out", str(finished), "--jobs", "1"]
     assert main(words) == 0
     said = capsys.readouterr().out.splitlines()

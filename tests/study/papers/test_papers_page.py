@@ -9,9 +9,9 @@ import pytest
 
 import harness
 from harness.report.paper.verdicts import MARKS
-from harness.results.findings import Experiment
-from harness.study.papers.paper import PAPERS, paper
-from harness.study.papers.paper_study import Study
+from harness.results.findings import PaperExperiment
+from harness.study.papers.paper import PAPERS, load_paper
+from harness.study.papers.paper_study import PaperStudy
 
 ROOT = Path(harness.__file__).parent.parent
 PAGE = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
@@ -20,7 +20,7 @@ PAGE = (ROOT / "docs" / "papers.md").read_text(encoding="utf-8")
 def test_every_experiment_and_no_other_has_a_row() -> None:
     tables = re.findall(r"\| experiment \| the paper \| where \|\n\|---\|---\|---\|\n((?:\|.*\n)+)", PAGE)
     named = [re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) for table in tables]
-    assert named == [list(paper(name).experiments) for name in PAPERS]
+    assert named == [list(load_paper(name).experiments) for name in PAPERS]
 
 
 def test_every_verdict_has_a_row() -> None:
@@ -48,8 +48,8 @@ def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     assert spec.loader is not None
     module: Any = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    found = module.swords(Study(tmp_path, "builtin", 1, {}))
-    assert isinstance(found, Experiment)
+    found = module.swords(PaperStudy(tmp_path, "builtin", 1, {}))
+    assert isinstance(found, PaperExperiment)
     assert [claim.verdict for claim in found.claims] == ["not run"]
 
 
@@ -58,5 +58,5 @@ def test_a_paper_s_runs_are_found_by_their_files(name: str) -> None:
     folder = ROOT / "scenarios" / "papers" / name
     for motion in ("builtin", "cmu"):
         files = {path.stem.removeprefix(f"{motion}_") for path in folder.glob(f"{motion}_*.toml")}
-        assert set(paper(name).plan(motion, 1)) == files
+        assert set(load_paper(name).plan(motion, 1)) == files
         assert files

@@ -5,20 +5,24 @@ from pathlib import Path
 
 import pytest
 
-from harness.results.findings import Bars
+from harness.results.findings import BarChart
 from harness.study.papers import published_speed as module
-from harness.study.papers.method_speed import Pace
-from harness.study.papers.paper_study import Study
-from harness.study.papers.published_speed import KIM2012, LIU2011, Published, judge, speed
+from harness.study.papers.method_speed import MethodSpeed
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.published_speed import KIM2012, LIU2011, PublishedSpeed, compare_speed, make_speed_experiment
 
-TINY = Published("It runs.", "walking", {"golf": {"golf": 850}}, ("weighted_blend", "ik"), ("weighted_blend",), fps=0.1)
-
-
-def pace(method: str, frames: int, fps: float, p99_ms: float = 1.0) -> Pace:
-    return Pace(method, frames, 700, fps, 1e3 / fps, p99_ms, 5.0, 1.0, 0.5, 2.0)
+TINY = PublishedSpeed(
+    "It runs.", "walking", {"golf": {"golf": 850}}, ("weighted_blend", "ik"), ("weighted_blend",), fps=0.1
+)
 
 
-def paces(published: Published, fps: float, p99_ms: float = 1.0, *, share: float = 1.0) -> dict[str, list[Pace]]:
+def pace(method: str, frames: int, fps: float, p99_ms: float = 1.0) -> MethodSpeed:
+    return MethodSpeed(method, frames, 700, fps, 1e3 / fps, p99_ms, 5.0, 1.0, 0.5, 2.0)
+
+
+def paces(
+    published: PublishedSpeed, fps: float, p99_ms: float = 1.0, *, share: float = 1.0
+) -> dict[str, list[MethodSpeed]]:
     """Of every method with every database, the last one a little slower."""
     return {
         database: [pace(m, int(share * sum(frames.values())), fps - 0.1 * n, p99_ms) for m in published.methods]
@@ -41,10 +45,10 @@ def test_the_papers_databases_have_the_frames_that_they_state() -> None:
 
 
 @pytest.mark.parametrize(("published", "claims"), [(LIU2011, 4), (KIM2012, 1)])
-def test_the_slowest_database_decides(published: Published, claims: int) -> None:
+def test_the_slowest_database_decides(published: PublishedSpeed, claims: int) -> None:
     last = list(published.databases)[-1]
-    fast = judge(published, paces(published, published.fps + 1.0), on="this machine", real=False)
-    slow = judge(published, paces(published, published.fps, 26.0), on="this machine", real=False)
+    fast = make_speed_experiment(published, paces(published, published.fps + 1.0), on="this machine", real=False)
+    slow = make_speed_experiment(published, paces(published, published.fps, 26.0), on="this machine", real=False)
     assert len(fast.claims) == len(slow.claims) == claims
     assert {claim.verdict for claim in fast.claims} == {"reproduced"}
     assert {claim.verdict for claim in slow.claims} == {"not reproduced"}
@@ -54,36 +58,36 @@ def test_the_slowest_database_decides(published: Published, claims: int) -> None
 
 
 def test_a_smaller_database_is_not_comparable_and_none_not_run() -> None:
-    small = judge(LIU2011, paces(LIU2011, 1_000.0, share=0.5), on="this machine", real=False)
+    small = make_speed_experiment(LIU2011, paces(LIU2011, 1_000.0, share=0.5), on="this machine", real=False)
     assert {claim.verdict for claim in small.claims} == {"not comparable"}
     assert "walking 9,080 of 18,160" in small.claims[0].why
-    none = judge(LIU2011, {}, on="this machine", real=True, absent=["golf: there is none"])
+    none = make_speed_experiment(LIU2011, {}, on="this machine", real=True, absent=["golf: there is none"])
     assert {claim.verdict for claim in none.claims} == {"not run"}
     assert "golf: there is none" in none.notes[-1]
 
 
 def test_tables_and_bars_have_every_pace() -> None:
-    told = judge(LIU2011, paces(LIU2011, 500.0), on="this machine", real=False)
+    told = make_speed_experiment(LIU2011, paces(LIU2011, 500.0), on="this machine", real=False)
     (table,), (bars,) = told.tables, told.figures
     assert len(table.rows) == len(LIU2011.databases) * len(LIU2011.methods)
     assert all(len(row) == len(table.columns) for row in table.rows)
-    assert isinstance(bars, Bars)
+    assert isinstance(bars, BarChart)
     assert set(bars.series) == set(LIU2011.methods)
     assert {len(values) for values in (*bars.series.values(), *bars.published.values())} == {len(bars.groups)}
 
 
 def test_a_speed_is_measured_once_and_its_database_given_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("harness.study.papers.speed_dataset.SECONDS", 3.2)
-    study = Study(tmp_path, "builtin", 1, {})
-    first = speed(study, TINY)
+    monkeypatch.setattr("harness.study.papers.speed_dataset.MAX_TEST_S", 3.2)
+    study = PaperStudy(tmp_path, "builtin", 1, {})
+    first = compare_speed(study, TINY)
     assert [claim.verdict for claim in first.claims] == ["reproduced"]
     assert "850" in first.tables[0].rows[0]
     assert {path.name for path in (tmp_path / "measured").iterdir()} == {"speed_golf.json"}
 
-    def never(*_: object) -> list[Pace]:
+    def never(*_: object) -> list[MethodSpeed]:
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(module, "frame_rate", never)
-    assert speed(study, TINY) == first
+    monkeypatch.setattr(module, "measure_speed", never)
+    assert compare_speed(study, TINY) == first
     with pytest.raises(AssertionError, match="again"):
-        speed(study, replace(TINY, databases={"swings": {"golf": 850}}))
+        compare_speed(study, replace(TINY, databases={"swings": {"golf": 850}}))

@@ -5,25 +5,25 @@ import itertools
 import numpy as np
 import pytest
 
-from harness.results.findings import Verdict
+from harness.results.findings import ClaimVerdict
 from harness.study.papers.station_sets import (
-    SHORT,
-    averaged,
-    best_of_its_size,
-    better_than_average,
-    by_set,
-    count_lines,
-    falls_with_each,
-    harder,
-    named,
+    STATION_ABBREVIATIONS,
+    average_by_size,
+    claim_best_of_size,
+    claim_better_than_average,
+    claim_error_decreases,
+    claim_harder,
+    count_stations,
+    errors_by_set,
+    format_station_set,
     ranked_bars,
     set_table,
-    size,
+    station_count_lines,
 )
 
 Made = dict[str, dict[str, float]]
 CLIPS = tuple(f"clip_{k}" for k in range(8))
-ALL = tuple(named(worn) for n in range(1, 6) for worn in itertools.combinations(SHORT, n))
+ALL = tuple(format_station_set(worn) for n in range(1, 6) for worn in itertools.combinations(STATION_ABBREVIATIONS, n))
 
 
 def made(rng: np.random.Generator, means: dict[str, float], clips: tuple[str, ...] = CLIPS) -> Made:
@@ -35,8 +35,8 @@ def made(rng: np.random.Generator, means: dict[str, float], clips: tuple[str, ..
 
 def test_a_set_is_named_in_the_papers_order() -> None:
     assert len(set(ALL)) == 31
-    assert named(["pelvis", "left_ankle", "right_hand"]) == "RH+LA+PEL"
-    assert [size(name) for name in ("PEL", "RH+PEL", "RH+LH+RA+LA+PEL")] == [1, 2, 5]
+    assert format_station_set(["pelvis", "left_ankle", "right_hand"]) == "RH+LA+PEL"
+    assert [count_stations(name) for name in ("PEL", "RH+PEL", "RH+LH+RA+LA+PEL")] == [1, 2, 5]
 
 
 def test_rows_are_put_together_by_what_is_worn() -> None:
@@ -46,7 +46,7 @@ def test_rows_are_put_together_by_what_is_worn() -> None:
         {**kind, "varied": {"worn": worn}, "stations": worn, "clip": clip, "joint_angle_mean_deg": error}
         for clip, worn, error in (("a", ["pelvis"], 1.0), ("b", ["pelvis"], 2.0), ("a", ["pelvis", "right_hand"], 3.0))
     ]
-    assert by_set(rows) == {"PEL": {"a": 1.0, "b": 2.0}, "RH+PEL": {"a": 3.0}}
+    assert errors_by_set(rows) == {"PEL": {"a": 1.0, "b": 2.0}, "RH+PEL": {"a": 3.0}}
 
 
 @pytest.mark.parametrize(
@@ -59,27 +59,27 @@ def test_rows_are_put_together_by_what_is_worn() -> None:
     ],
 )
 def test_a_set_is_the_best_of_as_many_trackers_or_it_is_not(
-    others: tuple[float, float], best: Verdict, average: Verdict
+    others: tuple[float, float], best: ClaimVerdict, average: ClaimVerdict
 ) -> None:
     """Larger and smaller sets have no say, however well they do."""
     rng = np.random.default_rng(1)
     means = {"RA+LA+PEL": 0.0, "RH+LH+PEL": others[0], "RH+LH+RA": others[1], "PEL": -2.0, "RH+LH+RA+PEL": -2.0}
     sets = made(rng, means)
-    claim = best_of_its_size("walking", "RA+LA+PEL", sets)
+    claim = claim_best_of_size("walking", "RA+LA+PEL", sets)
     assert claim.verdict == best
     assert "RH+LH+PEL" in claim.text
     assert claim.difference == pytest.approx(others[0], abs=0.02)
-    assert better_than_average("walking", "RA+LA+PEL", sets).verdict == average
+    assert claim_better_than_average("walking", "RA+LA+PEL", sets).verdict == average
 
 
 def test_few_clips_cannot_tell_and_none_were_not_run() -> None:
     few = made(np.random.default_rng(2), {"RA+LA+PEL": 0.0, "RH+LH+PEL": 9.0}, CLIPS[:5])
-    for judge in (best_of_its_size, better_than_average):
+    for judge in (claim_best_of_size, claim_better_than_average):
         assert judge("walking", "RA+LA+PEL", few).verdict == "cannot tell"
         assert judge("walking", "RA+LA+PEL", {}).verdict == "not run"
-    assert falls_with_each("walking", {}).verdict == "not run"
-    assert harder("x", {}, few["RH+LH+PEL"]).verdict == "not run"
-    assert harder("x", few["RH+LH+PEL"], few["RA+LA+PEL"]).verdict == "cannot tell"
+    assert claim_error_decreases("walking", {}).verdict == "not run"
+    assert claim_harder("x", {}, few["RH+LH+PEL"]).verdict == "not run"
+    assert claim_harder("x", few["RH+LH+PEL"], few["RA+LA+PEL"]).verdict == "cannot tell"
 
 
 @pytest.mark.parametrize(
@@ -91,19 +91,19 @@ def test_few_clips_cannot_tell_and_none_were_not_run() -> None:
         ((5.0, 4.0, 4.0, 2.0, 2.5), "not reproduced", "4 to 5"),
     ],
 )
-def test_every_tracker_has_to_lower_the_error(by_count: tuple[float, ...], verdict: Verdict, step: str) -> None:
-    sets = made(np.random.default_rng(3), {name: by_count[size(name) - 1] for name in ALL})
-    for name in (n for n in ALL if size(n) == 5):  # one set is as noisy as the ten of three together are not
+def test_every_tracker_has_to_lower_the_error(by_count: tuple[float, ...], verdict: ClaimVerdict, step: str) -> None:
+    sets = made(np.random.default_rng(3), {name: by_count[count_stations(name) - 1] for name in ALL})
+    for name in (n for n in ALL if count_stations(n) == 5):  # one set is as noisy as the ten of three together are not
         sets[name] = {clip: error + 0.02 * (-1) ** k for k, (clip, error) in enumerate(sets[name].items())}
-    claim = falls_with_each("walking", sets)
+    claim = claim_error_decreases("walking", sets)
     assert claim.verdict == verdict
     assert step in claim.why
 
 
 def test_a_set_that_is_missing_on_a_clip_takes_the_clip_from_its_number() -> None:
     sets = {"RH": {"a": 1.0, "b": 2.0}, "PEL": {"b": 4.0}, "RH+PEL": {"a": 0.5, "b": 1.0}}
-    assert averaged(sets) == {1: {"b": 3.0}, 2: {"a": 0.5, "b": 1.0}}
-    assert falls_with_each("walking", {**sets, "PEL": {}}).verdict == "not run"
+    assert average_by_size(sets) == {1: {"b": 3.0}, 2: {"a": 0.5, "b": 1.0}}
+    assert claim_error_decreases("walking", {**sets, "PEL": {}}).verdict == "not run"
 
 
 def test_harder_clips_need_not_be_the_same() -> None:
@@ -112,11 +112,11 @@ def test_harder_clips_need_not_be_the_same() -> None:
         {f"{what}_{k}": float(x) for k, x in enumerate(rng.normal(mean, 0.3, 8))}
         for what, mean in (("walk", 3.0), ("bout", 2.0))
     )
-    claim = harder("walking is harder", walks, bouts)
+    claim = claim_harder("walking is harder", walks, bouts)
     assert claim.verdict == "reproduced"
     assert (claim.low or 0.0) < (claim.difference or 0.0) < (claim.high or 0.0)
-    assert harder("boxing is harder", bouts, walks).verdict == "not reproduced"
-    assert harder("both", walks, dict(zip(bouts, walks.values(), strict=True))).verdict == "cannot tell"
+    assert claim_harder("boxing is harder", bouts, walks).verdict == "not reproduced"
+    assert claim_harder("both", walks, dict(zip(bouts, walks.values(), strict=True))).verdict == "cannot tell"
 
 
 def test_pictures_and_tables_rank_the_sets() -> None:
@@ -126,10 +126,13 @@ def test_pictures_and_tables_rank_the_sets() -> None:
     assert bars.groups == tuple(reversed(ALL))
     for value, a, b in zip(means, low, high, strict=True):
         assert (a or 0.0) < (value or 0.0) < (b or 0.0)
-    lines = count_lines("lines", {"walking": sets, "boxing": {}}, "")
+    lines = station_count_lines("lines", {"walking": sets, "boxing": {}}, "")
     assert lines.x == (1.0, 2.0, 3.0, 4.0, 5.0)
     assert set(lines.series["boxing"]) == {None}
-    table = set_table("table", sets, sets, named(SHORT))
-    assert [size(row[0]) for row in table.rows] == sorted(map(size, ALL))
+    table = set_table("table", sets, sets, format_station_set(STATION_ABBREVIATIONS))
+    assert [count_stations(row[0]) for row in table.rows] == sorted(map(count_stations, ALL))
     assert table.rows[-1][-1] == "1.00"
-    assert set_table("table", {"PEL": sets["PEL"]}, {}, named(SHORT)).rows[0][2:] == ("not measured", "not measured")
+    assert set_table("table", {"PEL": sets["PEL"]}, {}, format_station_set(STATION_ABBREVIATIONS)).rows[0][2:] == (
+        "not measured",
+        "not measured",
+    )

@@ -5,17 +5,17 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.cli import main
-from harness.experiment.scenario import Motion, Scenario, load_scenario
-from harness.results.findings import Experiment
+from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
+from harness.results.findings import PaperExperiment
 from harness.study.papers import paper as papers
-from harness.study.papers.claims import errs_less
+from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper import Paper
-from harness.study.papers.paper_study import Study
-from harness.study.papers.tables import by_clip, error_lines, joint_groups, mean_bars, mean_table
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.tables import error_lines, errors_by_clip, errors_by_joint_group, mean_bars, mean_table
 
 WALKS = Scenario(
     name="walks",
-    motion=Motion(
+    motion=ScenarioMotion(
         "builtin",
         ("walking_p1_01", "walking_p2_01"),
         ("walking",),
@@ -35,17 +35,17 @@ BOUTS = replace(
 )
 
 
-def walks(study: Study) -> Experiment:
-    errors = {method: by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
+def walks(study: PaperStudy) -> PaperExperiment:
+    errors = {method: errors_by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
     cells = {cell.method: cell for cell in study.cells("walks", clip="walking_p1_01")}
-    groups = {method: joint_groups(study.cells("walks", method=method)) for method in WALKS.methods}
+    groups = {method: errors_by_joint_group(study.cells("walks", method=method)) for method in WALKS.methods}
     kept = study.kept("count", lambda: len(list((study.out / "walks" / "cells").iterdir())))
-    return Experiment(
+    return PaperExperiment(
         name="walks",
         title="Two walks",
         question="Which is less?",
         differences=("It is no paper's.",),
-        claims=(errs_less("mean_pose errs less", errors["mean_pose"], errors["ik:previous"]),),
+        claims=(claim_lower_error("mean_pose errs less", errors["mean_pose"], errors["ik:previous"]),),
         tables=(mean_table("Errors", "walks", {"all": errors}), mean_table("Joints", "method", groups)),
         figures=(mean_bars("Errors", "deg", {"all": errors}), error_lines("First walk", cells)),
         runs=("walks",),
@@ -53,10 +53,10 @@ def walks(study: Study) -> Experiment:
     )
 
 
-def bouts(study: Study) -> Experiment:
-    errors = {method: by_clip(study.rows("bouts", method=method)) for method in ("mean_pose", "ik:previous")}
-    claim = errs_less("mean_pose errs less", errors["mean_pose"], errors["ik:previous"])
-    return Experiment("bouts", "A bout", "Which is less?", (), claims=(claim,), runs=("bouts",))
+def bouts(study: PaperStudy) -> PaperExperiment:
+    errors = {method: errors_by_clip(study.rows("bouts", method=method)) for method in ("mean_pose", "ik:previous")}
+    claim = claim_lower_error("mean_pose errs less", errors["mean_pose"], errors["ik:previous"])
+    return PaperExperiment("bouts", "A bout", "Which is less?", (), claims=(claim,), runs=("bouts",))
 
 
 @dataclass(frozen=True)
@@ -72,5 +72,5 @@ class Tiny(Paper):
 TINY = Tiny("tiny", "Nobody: Nothing, 1900", {"walks": walks, "bouts": bouts})
 
 if __name__ == "__main__":
-    papers.paper = lambda name: TINY
+    papers.load_paper = lambda name: TINY
     sys.exit(main(["paper", "liu2011", "--jobs", "1", *sys.argv[1:]]))

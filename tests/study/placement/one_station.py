@@ -10,7 +10,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
-from harness.core.motion import Take
+from harness.core.motion import BodyMotion
 from harness.stream.frame import TrackerFrame
 
 NEEDED = "pelvis"
@@ -24,7 +24,7 @@ class OneStation:
     summary: str = "reads the pelvis alone"
     needs_examples: bool = False
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Fitted":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "Fitted":
         return Fitted(tpose(body.skeleton))
 
 
@@ -35,7 +35,7 @@ class NoStation(OneStation):
     name: str = "no_station"
     summary: str = "reads nothing"
 
-    def fit(self, body: Body, examples: Sequence[Take], rng: np.random.Generator) -> "Fitted":
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "Fitted":
         return Fitted(tpose(body.skeleton), "")
 
 

@@ -11,19 +11,19 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.results.placement_findings import Place
+from harness.results.placement_findings import StationPlacement
 from harness.study.placement.candidates import (
     Candidate,
-    Grid,
+    CandidateGrid,
     Pair,
-    chosen,
-    mirrored,
-    mount,
-    other_bone,
-    refused,
-    side_of,
-    units_of,
-    worn,
+    body_side,
+    make_candidate_groups,
+    mirror_place,
+    opposite_bone,
+    placement_fault,
+    select_groups,
+    station_set,
+    to_mount,
 )
 
 STANDARD = standard_skeleton()
@@ -40,7 +40,7 @@ def skewed(seed: int) -> Skeleton:
 
 
 def in_a_mirror(skeleton: Skeleton) -> Skeleton:
-    return skeleton.with_bones(skeleton.bone_m[[skeleton.index(other_bone(b)) for b in skeleton.names]] * MIRROR)
+    return skeleton.with_bones(skeleton.bone_m[[skeleton.index(opposite_bone(b)) for b in skeleton.names]] * MIRROR)
 
 
 @pytest.mark.parametrize("body", [STANDARD, skewed(1), skewed(2)], ids=["standard", "skewed", "skewed otherwise"])
@@ -50,14 +50,17 @@ def test_a_mirrored_place_is_the_mirror_image_of_its_place(body: Skeleton, rng: 
     for bone, along, around_deg in zip(
         3 * BONES, rng.uniform(0.0, 1.0, 72), rng.uniform(-180.0, 180.0, 72), strict=True
     ):
-        side = side_of(bone, along)
-        here = Place(f"{side}_one" if side else "one", bone, along, around_deg, 0.02, side)
-        there = mirrored(here)
-        assert mirrored(there) == here
-        if refused(here, body):
-            assert refused(there, image)
+        side = body_side(bone, along)
+        here = StationPlacement(f"{side}_one" if side else "one", bone, along, around_deg, 0.02, side)
+        there = mirror_place(here)
+        assert mirror_place(there) == here
+        if placement_fault(here, body):
+            assert placement_fault(there, image)
             continue
-        (point_m, turn), (image_m, image_turn) = mounts.place(body, mount(here)), mounts.place(image, mount(there))
+        (point_m, turn), (image_m, image_turn) = (
+            mounts.locate_mount(body, to_mount(here)),
+            mounts.locate_mount(image, to_mount(there)),
+        )
         np.testing.assert_allclose(image_m, MIRROR * point_m, atol=1e-9)
         for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)):
             one, other = (rotations.rotate(each, np.array(axis)) for each in (turn, image_turn))
@@ -78,7 +81,7 @@ def test_the_standard_body_is_its_own_mirror_image() -> None:
 )
 def test_a_pair_is_worn_together_or_each_by_itself(pair: Pair, names: list[list[str]]) -> None:
     for bone, around_deg in (("rtibia", 90.0), ("ltibia", -90.0)):  # whichever side the table names
-        units = units_of([Candidate("ankle", bone, 0.9, around_deg, pair=pair)])
+        units = make_candidate_groups([Candidate("ankle", bone, 0.9, around_deg, pair=pair)])
         assert [[place.name for place in unit] for unit in units] == names
         if pair:
             sides = {place.name: (place.bone, place.around_deg, place.side) for unit in units for place in unit}
@@ -86,10 +89,10 @@ def test_a_pair_is_worn_together_or_each_by_itself(pair: Pair, names: list[list[
 
 
 def test_a_grid_has_a_candidate_for_each_combination() -> None:
-    units = units_of([Grid(("rtibia", "head"), (0.5, 0.75), (0.0, 90.0))])
+    units = make_candidate_groups([CandidateGrid(("rtibia", "head"), (0.5, 0.75), (0.0, 90.0))])
     assert [unit[0].name for unit in units[:4]] == ["rtibia_50_0", "rtibia_50_90", "rtibia_75_0", "rtibia_75_90"]
     assert len(units) == 8
-    paired = units_of([Grid(("lfemur",), (0.5,), (-90.0,), pair="together")])
+    paired = make_candidate_groups([CandidateGrid(("lfemur",), (0.5,), (-90.0,), pair="together")])
     assert [place.name for place in paired[0]] == ["right_femur_50_-90", "left_femur_50_-90"]
     assert [(place.bone, place.around_deg) for place in paired[0]] == [("rfemur", 90.0), ("lfemur", -90.0)]
 
@@ -97,13 +100,13 @@ def test_a_grid_has_a_candidate_for_each_combination() -> None:
 def test_places_that_nobody_can_wear_are_named() -> None:
     bone_m = np.array(STANDARD.bone_m)
     bone_m[STANDARD.index("rwrist")] = 0.0
-    tables: list[Candidate | Grid] = [
+    tables: list[Candidate | CandidateGrid] = [
         ANKLE,
-        Grid(("rtibia", "rwrist"), (0.5,), (0.0, 90.0)),
+        CandidateGrid(("rtibia", "rwrist"), (0.5,), (0.0, 90.0)),
         Candidate("far", "head", 1.5),
     ]
     with pytest.raises(BadInput, match="3 of 7 candidates cannot be worn") as refusal:
-        units_of(tables, STANDARD.with_bones(bone_m))
+        make_candidate_groups(tables, STANDARD.with_bones(bone_m))
     for named in ("rwrist_50_0 (Station", "rwrist_50_90 (Station", "which has no length", "far (along = 1.5"):
         assert named in str(refusal.value)
     assert "rtibia_50_0" not in str(refusal.value)
@@ -120,21 +123,21 @@ def test_places_that_nobody_can_wear_are_named() -> None:
 )
 def test_candidates_that_make_no_sense_are_refused(tables: list[Candidate], said: str) -> None:
     with pytest.raises(BadInput, match=said):
-        units_of(tables)
+        make_candidate_groups(tables)
 
 
 def test_a_bone_that_does_not_exist_is_refused_with_a_suggestion() -> None:
     with pytest.raises(UnknownName, match="rtibia"):
-        units_of([Candidate("ankle", "rtibbia")])
+        make_candidate_groups([Candidate("ankle", "rtibbia")])
 
 
 def test_sets_are_named_by_candidates_or_pairs_in_the_order_of_the_candidates() -> None:
-    units = units_of([ANKLE, PELVIS])
-    assert [place.name for place in worn(chosen(["pelvis", "ankle"], units, "x"), units)] == [
+    units = make_candidate_groups([ANKLE, PELVIS])
+    assert [place.name for place in station_set(select_groups(["pelvis", "ankle"], units, "x"), units)] == [
         "right_ankle",
         "left_ankle",
         "pelvis",
     ]
-    assert chosen([], units, "x") == units
+    assert select_groups([], units, "x") == units
     with pytest.raises(BadInput, match=r"greedy.base names 'knee'.*Known: right_ankle, left_ankle, pelvis"):
-        chosen(["knee"], units, "greedy.base")
+        select_groups(["knee"], units, "greedy.base")

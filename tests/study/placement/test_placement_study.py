@@ -15,10 +15,10 @@ from harness.experiment.scenario import load_scenario, shipped_placements
 from harness.results.placement_findings import PlacementFindings, read_placement
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
-from harness.study.placement.cell_cache import rate_hz
-from harness.study.placement.config import load_study
-from harness.study.placement.placement_study import FINDINGS, placement
-from harness.study.placement.plan import plan
+from harness.study.placement.cell_cache import link_rate_hz
+from harness.study.placement.config import load_placement_study
+from harness.study.placement.placement_study import FINDINGS, run_placement
+from harness.study.placement.plan import plan_placement
 
 SCENARIO = """
 schema = 1
@@ -95,9 +95,9 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path, Placemen
     """A study with every mode but `refine`."""
     folder = tmp_path_factory.mktemp("study")
     path = written(folder, "[ablate]", clips=SEVEN, study=STUDY.replace("metric =", "condition_size = 1\nmetric ="))
-    placement(path, folder / "out")  # of one mode first
+    run_placement(path, folder / "out")  # of one mode first
     path.write_text(path.read_text().replace("[ablate]", ALL_MODES))
-    findings, outcome = placement(path, folder / "out")
+    findings, outcome = run_placement(path, folder / "out")
     assert outcome is Outcome.PASS
     return path, folder / "out", findings
 
@@ -137,7 +137,7 @@ def test_modes_share_their_cells(done: tuple[Path, Path, PlacementFindings]) -> 
     path, out, findings = done
     cells = {folder.name: folder.stat().st_mtime_ns for folder in (out / "cells").iterdir()}
     assert len(cells) == 7 * 7 + 7 * 3
-    again, _ = placement(path, out)
+    again, _ = run_placement(path, out)
     assert {folder.name: folder.stat().st_mtime_ns for folder in (out / "cells").iterdir()} == cells
     assert read_placement(out / FINDINGS) == again
     assert replace(again, circumstances={}) == replace(findings, circumstances={})
@@ -149,7 +149,7 @@ def test_a_study_that_was_killed_goes_on_to_the_same_findings(done: tuple[Path, 
     cells = sorted((out / "cells").iterdir())
     for folder in cells[::20]:
         shutil.rmtree(folder)
-    again, outcome = placement(path, out)
+    again, outcome = run_placement(path, out)
     assert outcome is Outcome.PASS
     assert sorted((out / "cells").iterdir()) == cells
     assert replace(again, circumstances={}) == replace(findings, circumstances={})
@@ -174,7 +174,7 @@ def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings
 
 def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
     changes = '[exhaustive]\nmost = 1\n[changes.components]\nslip = [{ station = "pelvis" }]'  # nobody else has it
-    findings, outcome = placement(written(tmp_path, changes), tmp_path / "out")
+    findings, outcome = run_placement(written(tmp_path, changes), tmp_path / "out")
     assert outcome is Outcome.INCOMPLETE
     assert len(findings.failures) == 2 * 2  # sets without a pelvis
     assert [[row.stations for row in ranking.rows] for ranking in findings.rankings] == [[("pelvis",)]]
@@ -204,7 +204,7 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
     tables: list[str], said: str, tmp_path: Path
 ) -> None:
     with pytest.raises(HarnessError, match=said):
-        placement(written(tmp_path, *tables), tmp_path / "out")
+        run_placement(written(tmp_path, *tables), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
@@ -226,21 +226,21 @@ def test_a_wrong_line_is_named(line: str, said: str, tmp_path: Path) -> None:
     key = line.partition(" ")[0]
     lines = [old for old in STUDY.splitlines() if not old.startswith(f"{key} ")]
     with pytest.raises(HarnessError, match=said):
-        placement(written(tmp_path, "[ablate]", study="\n".join([line, *lines])), tmp_path / "out")
+        run_placement(written(tmp_path, "[ablate]", study="\n".join([line, *lines])), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_more_stations_run_at_the_rate_that_the_line_carries() -> None:
     """A record of 38 bytes takes 380 bits: 303.2 of them go through 115200 baud (docs/is900.md 2)."""
     base = replace(load_scenario("demo"), tracker=TrackerConfig(rate_hz=200.0))
-    rates = [rate_hz(base, stations, link=True) for stations in (1, 2, 3, 4, 5)]
+    rates = [link_rate_hz(base, stations, link=True) for stations in (1, 2, 3, 4, 5)]
     assert rates == pytest.approx([180.0, 151.579, 101.053, 75.789, 60.632], abs=1e-3)
-    assert rate_hz(base, 5, link=False) == 200.0
+    assert link_rate_hz(base, 5, link=False) == 200.0
     slow = replace(base, tracker=TrackerConfig(rate_hz=40.0, baud=9600))
-    assert rate_hz(slow, 5, link=True) == pytest.approx(9600 / 380 / 5)
-    assert rate_hz(replace(base, tracker=TrackerConfig(rate_hz=40.0)), 5, link=True) == 40.0
+    assert link_rate_hz(slow, 5, link=True) == pytest.approx(9600 / 380 / 5)
+    assert link_rate_hz(replace(base, tracker=TrackerConfig(rate_hz=40.0)), 5, link=True) == 40.0
     with pytest.raises(BadInput, match=r"carries 12 stations at 0\.26 Hz"):
-        rate_hz(replace(base, tracker=TrackerConfig(baud=1200)), 12, link=True)
+        link_rate_hz(replace(base, tracker=TrackerConfig(baud=1200)), 12, link=True)
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +252,7 @@ def judged_elsewhere(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Pl
         'OneStation"]', 'OneStation", "tests.study.placement.one_station:NoStation"]'
     )
     path = written(folder, "[exhaustive]\nmost = 2\n[changes.tracker]\nbaud = 9600", study=study)
-    findings, outcome = placement(path, folder / "out")
+    findings, outcome = run_placement(path, folder / "out")
     assert outcome is Outcome.PASS
     return folder, findings
 
@@ -294,8 +294,8 @@ def test_methods_count_alike_and_rank_for_themselves(judged_elsewhere: tuple[Pat
 
 @pytest.mark.parametrize("path", shipped_placements(), ids=lambda path: path.stem)
 def test_every_shipped_study_is_ready_to_be_done(path: Path) -> None:
-    ready = plan(path.stem, None)
-    assert ready.study == load_study(path)
+    ready = plan_placement(path.stem, None)
+    assert ready.study == load_placement_study(path)
     assert ready.held_out is not None
     assert len(ready.held_out.motion.test) >= 6
     with pytest.raises(BadFile, match="a placement study; expected a scenario"):
@@ -306,7 +306,7 @@ def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
     page = Path(harness.__file__).parent.parent / "docs" / "studies.md"
     (text,) = re.findall(r"```toml\n(schema = 1\nkind = \"placement\".*?)```", page.read_text(), re.DOTALL)
     (tmp_path / "mine.toml").write_text(text)
-    ready = plan(tmp_path / "mine.toml", None)
+    ready = plan_placement(tmp_path / "mine.toml", None)
     assert ready.scenario.components == {"wobble": {}, "loose": {"share": 0.2}}
     assert len(ready.units) == 2 + 1 + 12
     assert ready.rate_hz(5) == 40.0
@@ -314,18 +314,18 @@ def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
 
 def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'placement_walking'"):
-        load_study("placement_walkin")
+        load_placement_study("placement_walkin")
     with pytest.raises(BadFile, match="no such file"):
-        load_study(tmp_path / "none.toml")
+        load_placement_study(tmp_path / "none.toml")
     with pytest.raises(BadFile, match="kind = 'scenario'"):
-        load_study("scenarios/demo.toml")
+        load_placement_study("scenarios/demo.toml")
 
 
 def test_a_folder_of_another_study_is_left_alone(tmp_path: Path) -> None:
     open_study(tmp_path / "out", {"placement": "another", "motion": "x", "seed": 1})
     before = (tmp_path / "out" / "study.json").read_bytes()
     with pytest.raises(BadInput, match="holds another study"):
-        placement(written(tmp_path, "[ablate]"), tmp_path / "out")
+        run_placement(written(tmp_path, "[ablate]"), tmp_path / "out")
     assert (tmp_path / "out" / "study.json").read_bytes() == before
 
 

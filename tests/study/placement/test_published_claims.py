@@ -3,14 +3,14 @@
 import pytest
 
 from harness.results.findings import Claim
-from harness.results.placement_findings import Stations
-from harness.study.placement.candidates import Candidate, units_of
-from harness.study.placement.config import Published
-from harness.study.placement.published_claims import judged, rival, sets_of
+from harness.results.placement_findings import StationNames
+from harness.study.placement.candidates import Candidate, make_candidate_groups
+from harness.study.placement.config import PublishedClaim
+from harness.study.placement.published_claims import best_alternative, evaluate_claim, sets_of_claim
 from harness.study.placement.ranking import Costs
-from harness.study.placement.search import stations
+from harness.study.placement.search import names_of_places
 
-UNITS = units_of(
+UNITS = make_candidate_groups(
     [
         Candidate("ankle", "rtibia", 0.9, 90.0, pair="each"),
         Candidate("pelvis", "lhipjoint", 0.0, 165.0),
@@ -18,7 +18,7 @@ UNITS = units_of(
         Candidate("torso", "thorax"),
     ]
 )
-CLAIM = Published("they suffice", "somebody", ("ankle", "pelvis"), among=("ankle", "pelvis", "head"), margin=0.1)
+CLAIM = PublishedClaim("they suffice", "somebody", ("ankle", "pelvis"), among=("ankle", "pelvis", "head"), margin=0.1)
 SUITED, OTHER, WHOLE = ("right_ankle", "left_ankle", "pelvis"), ("left_ankle", "pelvis", "head"), ("all",)
 
 
@@ -26,25 +26,25 @@ def costs(level: float, jitter: float = 0.01, clips: int = 8) -> Costs:
     return {f"clip_{n}": level + jitter * (-1) ** n for n in range(clips)}
 
 
-def verdicts(found: dict[Stations, Costs]) -> tuple[Claim, Claim]:
-    return judged(CLAIM, SUITED, OTHER, WHOLE, found, unit="deg", judged_on="on some clips")
+def verdicts(found: dict[StationNames, Costs]) -> tuple[Claim, Claim]:
+    return evaluate_claim(CLAIM, SUITED, OTHER, WHOLE, found, unit="deg", judged_on="on some clips")
 
 
 def test_a_set_is_held_against_all_others_of_its_size_among_the_papers_trackers() -> None:
-    suited, others, whole = sets_of(CLAIM, UNITS)
-    assert stations(suited) == SUITED
-    assert [stations(one) for one in others] == [
+    suited, others, whole = sets_of_claim(CLAIM, UNITS)
+    assert names_of_places(suited) == SUITED
+    assert [names_of_places(one) for one in others] == [
         ("right_ankle", "left_ankle", "head"),
         ("right_ankle", "pelvis", "head"),
         ("left_ankle", "pelvis", "head"),
     ]
-    assert stations(whole) == ("right_ankle", "left_ankle", "pelvis", "head")  # the paper knows no torso
+    assert names_of_places(whole) == ("right_ankle", "left_ankle", "pelvis", "head")  # the paper knows no torso
 
 
 def test_the_rival_is_the_best_of_those_that_were_measured() -> None:
-    found: dict[Stations, Costs] = {("a",): costs(2.0), ("b",): costs(1.0), ("c",): {}}
-    assert rival([("a",), ("b",), ("c",)], found) == ("b",)
-    assert rival([("c",)], found) == ()
+    found: dict[StationNames, Costs] = {("a",): costs(2.0), ("b",): costs(1.0), ("c",): {}}
+    assert best_alternative([("a",), ("b",), ("c",)], found) == ("b",)
+    assert best_alternative([("c",)], found) == ()
 
 
 @pytest.mark.parametrize(

@@ -6,22 +6,22 @@ import numpy as np
 import pytest
 
 from harness.core.seeds import generator
-from harness.results.placement_findings import Stations
+from harness.results.placement_findings import StationNames
 from harness.study.placement.ranking import (
-    best_of_sizes,
-    complete,
-    crossed,
-    fewest_clips,
-    in_order,
-    mean,
-    rank,
-    stays,
-    surely,
-    tried,
+    best_by_size,
+    complete_sets,
+    cross_validated_cost,
+    mean_cost,
+    min_clips,
+    rank_sets,
+    selection_stability,
+    significant_differences,
+    sort_by_cost,
+    summarise_set,
 )
 
 CLIPS = tuple(f"clip_{n:02}" for n in range(12))
-Sets = dict[Stations, dict[str, float | None]]
+Sets = dict[StationNames, dict[str, float | None]]
 
 
 def study(means: Mapping[str, float], spread: float, seed: int, clips: tuple[str, ...] = CLIPS) -> Sets:
@@ -35,7 +35,7 @@ def study(means: Mapping[str, float], spread: float, seed: int, clips: tuple[str
 
 
 def test_clear_differences_leave_no_doubt_about_ranks() -> None:
-    ranking = rank("exhaustive", "three", study({"b": 2.0, "c": 3.0, "a": 1.0}, 0.05, 1))
+    ranking = rank_sets("exhaustive", "three", study({"b": 2.0, "c": 3.0, "a": 1.0}, 0.05, 1))
     assert [row.stations for row in ranking.rows] == [("a",), ("b",), ("c",)]
     assert [(row.rank, row.rank_low, row.rank_high, row.tied) for row in ranking.rows] == [
         (1, 1, 1, True),
@@ -52,7 +52,7 @@ def test_clear_differences_leave_no_doubt_about_ranks() -> None:
 
 
 def test_sets_that_differ_by_chance_alone_are_ties() -> None:
-    rows = rank("exhaustive", "alike", study(dict.fromkeys("abcd", 1.0), 1.0, 3)).rows
+    rows = rank_sets("exhaustive", "alike", study(dict.fromkeys("abcd", 1.0), 1.0, 3)).rows
     assert all(row.tied and (row.rank_low, row.rank_high) == (1, 4) for row in rows)
 
 
@@ -60,9 +60,9 @@ def test_true_ranks_lie_within_their_ranges() -> None:
     """In 19 of 20 for each set: 100 studies of five sets a third of their spread apart."""
     names, missed = "abcde", 0
     for seed in range(100):
-        whole, _ = complete(study({name: 0.3 * at for at, name in enumerate(names)}, 1.0, seed))
-        order = in_order(whole)
-        better, worse = surely(order, whole)
+        whole, _ = complete_sets(study({name: 0.3 * at for at, name in enumerate(names)}, 1.0, seed))
+        order = sort_by_cost(whole)
+        better, worse = significant_differences(order, whole)
         for at, worn in enumerate(order):
             true = 1 + names.index(worn[0])
             missed += not 1 + len(better[at]) <= true <= len(order) - len(worse[at])
@@ -73,17 +73,17 @@ def test_choosing_flatters_and_the_other_clips_say_by_how_much() -> None:
     """Of ten sets that are equally good one looks better than it is; judged where it was not chosen, it does not."""
     flattered, honest = [], []
     for seed in range(200):
-        whole, _ = complete(study(dict.fromkeys("abcdefghij", 5.0), 1.0, seed))
-        level = float(np.mean([mean(costs) for costs in whole.values()]))
-        flattered.append(mean(whole[in_order(whole)[0]]) - level)
-        honest.append(crossed(whole) - level)
+        whole, _ = complete_sets(study(dict.fromkeys("abcdefghij", 5.0), 1.0, seed))
+        level = float(np.mean([mean_cost(costs) for costs in whole.values()]))
+        flattered.append(mean_cost(whole[sort_by_cost(whole)[0]]) - level)
+        honest.append(cross_validated_cost(whole) - level)
     assert np.mean(flattered) < -0.3
     assert abs(np.mean(honest)) < 0.05
 
 
 def test_the_best_stays_the_best_or_does_not() -> None:
-    assert stays(complete(study({"a": 1.0, "b": 2.0}, 0.01, 1))[0]) == 1.0
-    assert stays(complete(study(dict.fromkeys("abcdefgh", 1.0), 1.0, 1))[0]) < 0.8
+    assert selection_stability(complete_sets(study({"a": 1.0, "b": 2.0}, 0.01, 1))[0]) == 1.0
+    assert selection_stability(complete_sets(study(dict.fromkeys("abcdefgh", 1.0), 1.0, 1))[0]) < 0.8
 
 
 def test_a_set_that_misses_a_clip_is_not_ranked_but_named() -> None:
@@ -91,22 +91,22 @@ def test_a_set_that_misses_a_clip_is_not_ranked_but_named() -> None:
     for costs in sets.values():
         costs["clip_00"] = None  # on which nothing was measured
     sets["a",]["clip_05"] = None
-    whole, left_out = complete(sets)
+    whole, left_out = complete_sets(sets)
     assert list(whole) == [("b",), ("c",)]
     assert left_out == ["not ranked: a was measured on 10 of 11 clips"]
-    assert [row.stations for row in rank("add", "", sets).rows] == [("b",), ("c",)]
+    assert [row.stations for row in rank_sets("add", "", sets).rows] == [("b",), ("c",)]
     nothing: Sets = {("a",): {"clip": None}}
-    assert complete(nothing)[0] == {}
-    assert rank("add", "", nothing).rows == ()
+    assert complete_sets(nothing)[0] == {}
+    assert rank_sets("add", "", nothing).rows == ()
 
 
 @pytest.mark.parametrize("comparisons", [1, 2, 9, 30])
 def test_so_many_clips_can_tell_and_one_less_cannot(comparisons: int) -> None:
     sets = {name: 1.0 + at for at, name in enumerate("abcdefghijklmnopqrstuvwxyzABCDE"[: comparisons + 1])}
-    enough = fewest_clips(comparisons)
+    enough = min_clips(comparisons)
     for clips, told in ((enough, True), (enough - 1, enough == 6)):  # fewer than 6 never have intervals
-        whole, _ = complete(study(sets, 0.0, 1, CLIPS[:clips]))
-        better, _ = surely(in_order(whole), whole)
+        whole, _ = complete_sets(study(sets, 0.0, 1, CLIPS[:clips]))
+        better, _ = significant_differences(sort_by_cost(whole), whole)
         assert bool(better[-1]) is told or clips < 6
 
 
@@ -115,21 +115,21 @@ def test_the_front_is_of_sets_that_no_smaller_one_beats() -> None:
         worn: dict.fromkeys(CLIPS, cost)
         for worn, cost in {("a",): 3.0, ("b",): 4.0, ("a", "b"): 3.5, ("a", "c"): 3.2, ("a", "b", "c"): 1.0}.items()
     }
-    found = best_of_sizes(sets)
+    found = best_by_size(sets)
     assert [(best.stations, best.on_front, best.of) for best in found] == [
         (("a",), True, 2),
         (("a", "c"), False, 2),
         (("a", "b", "c"), True, 1),
     ]
-    assert [best.crossed for best in best_of_sizes(sets, -1.0)] == pytest.approx([-3.0, -3.2, -1.0])
+    assert [best.crossed for best in best_by_size(sets, -1.0)] == pytest.approx([-3.0, -3.2, -1.0])
 
 
 def test_a_mean_has_an_interval_where_clips_suffice() -> None:
     (worn, errors), *_ = study({"a": 2.0}, 0.1, 1).items()
-    found = tried(worn, 40.0, errors)
+    found = summarise_set(worn, 40.0, errors)
     assert found.low is not None
     assert found.mean is not None
     assert found.high is not None
     assert found.low < found.mean < found.high
-    assert tried(worn, 40.0, dict(list(errors.items())[:5])).low is None
-    assert tried(worn, 40.0, {"clip": None}).mean is None
+    assert summarise_set(worn, 40.0, dict(list(errors.items())[:5])).low is None
+    assert summarise_set(worn, 40.0, {"clip": None}).mean is None

@@ -5,17 +5,17 @@ import pytest
 from scipy import stats
 
 from harness.core.arrays import Floats
-from harness.results.placement_findings import Stations
-from harness.study.placement.stability import Elsewhere, agreements, conditions, tau_b
+from harness.results.placement_findings import StationNames
+from harness.study.placement.stability import ConditionCosts, rank_agreements, rank_by_condition, tau_b
 
 CLIPS = tuple(f"clip_{n}" for n in range(8))
-SETS: tuple[Stations, ...] = tuple((name,) for name in "abcdef")
+SETS: tuple[StationNames, ...] = tuple((name,) for name in "abcdef")
 
 
-def elsewhere(name: str, means: Floats, noise: Floats | float = 0.0, clips: tuple[str, ...] = CLIPS) -> Elsewhere:
+def elsewhere(name: str, means: Floats, noise: Floats | float = 0.0, clips: tuple[str, ...] = CLIPS) -> ConditionCosts:
     table = np.asarray(means)[:, None] + noise * np.ones((1, len(clips)))
     rows = zip(SETS, table.tolist(), strict=True)
-    return Elsewhere(name, "noise", {worn: dict(zip(clips, row, strict=True)) for worn, row in rows})
+    return ConditionCosts(name, "noise", {worn: dict(zip(clips, row, strict=True)) for worn, row in rows})
 
 
 def test_it_is_kendalls_tau_b(rng: np.random.Generator) -> None:
@@ -27,20 +27,20 @@ def test_it_is_kendalls_tau_b(rng: np.random.Generator) -> None:
 def test_the_same_order_agrees_and_the_reverse_disagrees() -> None:
     up = np.arange(6.0)
     each = [elsewhere("own", up), elsewhere("alike", 10.0 + 3.0 * up), elsewhere("reversed", -up, clips=CLIPS[:7])]
-    found = {(pair.a, pair.b): pair for pair in agreements(each, SETS)}
+    found = {(pair.a, pair.b): pair for pair in rank_agreements(each, SETS)}
     assert {names: pair.tau for names, pair in found.items()} == pytest.approx(
         {("own", "alike"): 1.0, ("own", "reversed"): -1.0, ("alike", "reversed"): -1.0}
     )
     assert all(pair.low == pair.tau == pair.high for pair in found.values())
     assert all(pair.sets == 6 for pair in found.values())
-    best = {each.name: each.best for each in conditions(each, SETS, 1.0)}
+    best = {each.name: each.best for each in rank_by_condition(each, SETS, 1.0)}
     assert best == {"own": {"1": ("a",)}, "alike": {"1": ("a",)}, "reversed": {"1": ("f",)}}
 
 
 def test_noise_widens_the_interval(rng: np.random.Generator) -> None:
     up = np.arange(6.0)
     each = [elsewhere("own", up, 3.0 * rng.normal(size=(6, 8))), elsewhere("other", up, 3.0 * rng.normal(size=(6, 8)))]
-    (pair,) = agreements(each, SETS)
+    (pair,) = rank_agreements(each, SETS)
     assert pair.tau is not None
     assert pair.low is not None
     assert pair.high is not None
@@ -50,18 +50,18 @@ def test_noise_widens_the_interval(rng: np.random.Generator) -> None:
 
 def test_what_cannot_be_told_is_not(rng: np.random.Generator) -> None:
     few = [elsewhere(name, np.arange(6.0), clips=CLIPS[:3]) for name in ("own", "other")]
-    (pair,) = agreements(few, SETS)
+    (pair,) = rank_agreements(few, SETS)
     assert (pair.tau, pair.low, pair.high) == (1.0, None, None)
     alike = [elsewhere("own", np.zeros(6)), elsewhere("other", np.arange(6.0))]
-    (pair,) = agreements(alike, SETS)
+    (pair,) = rank_agreements(alike, SETS)
     assert (pair.tau, pair.low) == (None, None)
-    nothing = [elsewhere("own", np.arange(6.0)), Elsewhere("failed", "noise", {})]
-    (pair,) = agreements(nothing, SETS)
+    nothing = [elsewhere("own", np.arange(6.0)), ConditionCosts("failed", "noise", {})]
+    (pair,) = rank_agreements(nothing, SETS)
     assert (pair.tau, pair.sets) == (None, 0)
-    assert conditions(nothing, SETS, 1.0)[1].means == (None,) * 6
+    assert rank_by_condition(nothing, SETS, 1.0)[1].means == (None,) * 6
 
 
 def test_means_are_told_as_the_metric_has_them() -> None:
-    (found,) = conditions([elsewhere("own", -np.arange(6.0))], SETS, -1.0)
+    (found,) = rank_by_condition([elsewhere("own", -np.arange(6.0))], SETS, -1.0)
     assert found.means == tuple(range(6))
     assert found.best == {"1": ("f",)}
