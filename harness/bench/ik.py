@@ -172,7 +172,7 @@ def mink_solver(setting: IKBenchmarkCase) -> TimedSolver:
     def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         configuration.update(start)
         judge.read(frame)
-        cost = judge.place(start)
+        cost = judge.evaluate(start)
         begin = time.perf_counter()
         for task, at_m, turned in zip(tasks, frame.position_m, frame.tracker_from_station, strict=True):
             task.set_target(mink.SE3(np.concatenate([turned, at_m])))
@@ -183,7 +183,7 @@ def mink_solver(setting: IKBenchmarkCase) -> TimedSolver:
             velocity = mink.solve_ik(configuration, tasks, 1.0, "daqp", damping=MINK_DAMPING, limits=kept)
             configuration.integrate_inplace(velocity, 1.0)
             seconds += time.perf_counter() - begin
-            before, cost = cost, judge.place(configuration.q)
+            before, cost = cost, judge.evaluate(configuration.q)
             if abs(velocity).max() < STOPPING.step or min(cost, abs(before - cost)) < STOPPING.decrease:
                 break
         return configuration.q.copy(), seconds
@@ -196,7 +196,7 @@ def residual_errors(setting: IKBenchmarkCase, poses: Floats) -> tuple[float, flo
     judge, costs, distances = Residuals(setting.body, setting.calibration, LEAST_SQUARES), [], []
     for frame, qpos in zip(setting.frames, poses, strict=True):
         judge.read(frame)
-        costs.append(judge.place(qpos))
+        costs.append(judge.evaluate(qpos))
         distances.append(judge.distance)
     position, orientation = np.split(np.sqrt(np.mean(np.square(distances), axis=0)), 2)
     rms_m, rms_rad = (float(np.sqrt(np.mean(part**2))) for part in (position, orientation))

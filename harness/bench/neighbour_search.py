@@ -72,7 +72,7 @@ def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMo
     queries = [
         _single_motion_database(body, take).windows(POSES, followed=True).gather(_QUERY_FRAMES) for take in held_out
     ]
-    return SearchProblem(f"{POSES} poses", windows, queries, EXAMPLES, windows.follows)
+    return SearchProblem(f"{POSES} poses", windows, queries, EXAMPLES, windows.consecutive)
 
 
 def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
@@ -96,7 +96,7 @@ def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Seq
     method, worn = LocalPca(), _exact_calibration(body)
 
     def vectors(learnt: MotionDatabase) -> Vectors:
-        return method.fit_database(body, learnt, generator(0, "bench")).seen_through(worn)[1]
+        return method.fit_database(body, learnt, generator(0, "bench")).station_features(worn)[1]
 
     queries = [vectors(_single_motion_database(body, take)).gather(_QUERY_FRAMES) for take in held_out]
     return SearchProblem("poses and stations", vectors(database), queries, method.neighbours, None)
@@ -105,8 +105,8 @@ def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Seq
 def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """What both lead to expect: `dynamic_map`."""
     method = DynamicMap()
-    known = method.fit_database(body, database, generator(0, "bench")).evidence(_exact_calibration(body))
-    vectors = known.expectation(np.ones(known.size, bool), method.index, method.neighbours).vectors
+    known = method.fit_database(body, database, generator(0, "bench")).regression(_exact_calibration(body))
+    vectors = known.search(np.ones(known.size, bool), method.index, method.neighbours).vectors
     asked = [
         replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, followed=True))
         for take in held_out
@@ -145,7 +145,7 @@ def _compare_indexes(search: SearchProblem) -> list[BenchmarkRow]:
     if len(search.vectors) > FLAT_MAX_VECTORS:
         begin["faiss"] = partial(_stateless_lookup, FaissInvertedFile(search.vectors, search.count))
     if search.follows is not None:
-        begin["graph"] = NeighbourGraph(search.vectors, search.follows, indexes["inverted_file"]).follow
+        begin["graph"] = NeighbourGraph(search.vectors, search.follows, indexes["inverted_file"]).begin_search
     seconds: dict[str, list[float]] = {name: [] for name in begin}
     hits: dict[str, list[float]] = {name: [] for name in begin}
     for queries in search.queries:

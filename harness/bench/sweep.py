@@ -111,7 +111,7 @@ def _time_scoring(scenario: Scenario) -> Floats:
         if setting is None:
             source = open_scenario_motion(cell.scenario.motion, None, scenario.seed)
             setting = ClipEvaluation(cell.scenario, source, job.part, job.behaviour)
-        setting = setting.under(cell.scenario) or setting
+        setting = setting.with_conditions(cell.scenario) or setting
         evaluate_cell(setting, method, cell, "key", "")
         if place == 0:
             start = _process_times()
@@ -180,7 +180,7 @@ def _fabricate_cells(real: Path, out: Path, count: int) -> None:
         index.note(**facts)
         index.expect([key for key, _ in made])
         index.add({**row, "key": key} for key, row in made)
-        index.ended((key, key, "") for key, _ in made)
+        index.record_outcomes((key, key, "") for key, _ in made)
     for n, (key, _) in enumerate(made):
         folder = out / "cells" / key
         folder.mkdir()

@@ -56,7 +56,7 @@ class Kinematics:
         for bone, at_m, slope, turn in zip(bones, point_m, linear, angular, strict=True):
             mujoco.mj_jac(model, data, slope, turn, at_m, bodies[bone])
 
-    def moved(self, qpos: Floats, step: Floats) -> Floats:
+    def integrate(self, qpos: Floats, step: Floats) -> Floats:
         """The configuration (55,) one tangent step (54,) from `qpos`."""
         out = np.array(qpos, dtype=float)
         mujoco.mj_integratePos(self.body.model, out, step, 1.0)

@@ -37,9 +37,9 @@ class Mount:
     """Angle around the bone [rad]."""
     stand_off_m: float = 0.01
     """Distance of the tracker's origin from the skin [m]."""
-    beside_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """How far from that place it really sits, along its axes there [m]."""
-    turned_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """How far it is really turned from those axes, a rotation vector in them [rad]: straps are put on anyhow."""
 
 
@@ -89,8 +89,8 @@ def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
             "Choose another place along the bone or another angle around it.",
         )
     nominal = rotations.from_matrix(np.stack([along, np.cross(outward, along), outward], axis=1))
-    beside_m = rotations.rotate(nominal, np.array(mount.beside_m))
-    turned = rotations.multiply(nominal, rotations.exp(np.array(mount.turned_rad)))
+    beside_m = rotations.rotate(nominal, np.array(mount.offset_m))
+    turned = rotations.multiply(nominal, rotations.exp(np.array(mount.rotation_rad)))
     return axis_m + (skin_m + mount.stand_off_m) * outward + beside_m, turned
 
 

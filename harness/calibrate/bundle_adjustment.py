@@ -19,9 +19,9 @@ from harness.core.arrays import Floats, Ints
 class ResidualScales:
     """What residuals are from, and the standard deviations by which they are measured."""
 
-    miss_rad: float
+    pose_error_rad: float
     """Of each hinge, and of the lean of the body, from the pose that was asked for."""
-    beside: float
+    mount_spread: float
     """Of trackers from their nominal mounts, in units of `unknowns.ALONG_M` and `ACROSS_M`."""
     flesh_m: Floats
     """(S, 3) of the nominal mounts, as `SharedUnknowns.nominal_m` takes it."""
@@ -77,13 +77,13 @@ class BundleAdjustment:
 
     def __init__(self, shared: SharedUnknowns, asked_rad: Floats, place_m: Floats, turn: Floats) -> None:
         self.shared, self.asked_rad, self.place_m, self.turn = shared, asked_rad, place_m, turn
-        self.chain = StationKinematics(shared.like, shared.carriers)
+        self.chain = StationKinematics(shared.template, shared.carriers)
         self.hinges: Ints = np.flatnonzero(self.chain.turns.any(axis=0))
         """(H,) those that turn a station. Of the others nothing is told: they are as asked."""
 
     def start(self) -> CalibrationSolution:
         """Mean bones and nominal mounts, poses as asked, where stations are and however straps then fit best."""
-        skeleton = self.shared.space.mean_skeleton(self.shared.like)
+        skeleton = self.shared.space.mean_skeleton(self.shared.template)
         mount_m = self.shared.nominal_m(skeleton.bone_m, self.shared.flesh_m(skeleton.bone_m))
         poses, stations = self.place_m.shape[:2]
         upright = np.tile(np.eye(3), (poses, 1, 1))
@@ -110,28 +110,31 @@ class BundleAdjustment:
             at.bone_m, at.root_m, at.world_from_root, at.angles_rad, at.mount_m, at.bone_from_station
         )
 
-    def off(self, reached: StationPoses) -> tuple[Floats, Floats]:
+    def residuals(self, reached: StationPoses) -> tuple[Floats, Floats]:
         """From where stations should be to where they were: (P, S, 3) [m], and turns (P, S, 3) in world axes [rad]."""
         turn = self.turn @ np.swapaxes(reached.world_from_station, -1, -2)
         return self.place_m - reached.place_m, rotations.log(rotations.from_matrix(turn))
 
-    def missed(self, at: CalibrationSolution) -> Floats:
+    def pose_errors(self, at: CalibrationSolution) -> Floats:
         """(P, 2 + H) lean, as its sine, and hinges from what was asked [rad]."""
         return np.concatenate([_tilt(at)[0], (at.angles_rad - self.asked_rad)[:, self.hinges]], axis=1)
 
     def cost(self, at: CalibrationSolution, given: ResidualScales, weight: Floats) -> float:
         """Sum of squared residuals; `weight` (P, S, 2) of each place and turn."""
-        place_m, turn_rad = self.off(self.reach(at))
+        place_m, turn_rad = self.residuals(self.reach(at))
         read = weight[..., 0] * np.sum((place_m / given.place_m) ** 2, axis=2)
         read = read + weight[..., 1] * np.sum((turn_rad / given.turn_rad) ** 2, axis=2)
-        expected, _ = self.shared.expected(at, given.beside, given.flesh_m)
-        return float(np.sum(read) + np.sum((self.missed(at) / given.miss_rad) ** 2) + expected @ expected)
+        expected, _ = self.shared.prior_residuals(at, given.mount_spread, given.flesh_m)
+        return float(np.sum(read) + np.sum((self.pose_errors(at) / given.pose_error_rad) ** 2) + expected @ expected)
 
     def normal(self, at: CalibrationSolution, given: ResidualScales, weight: Floats) -> NormalEquations:
         """About a solution; arguments as of `cost`."""
         residual, shared, own = self._readings(at, np.sqrt(weight) / [given.place_m, given.turn_rad])
-        expected, slope = self.shared.expected(at, given.beside, given.flesh_m)
-        missed, missed_slope = self.missed(at) / given.miss_rad, self._missed_slope(at) / given.miss_rad
+        expected, slope = self.shared.prior_residuals(at, given.mount_spread, given.flesh_m)
+        missed, missed_slope = (
+            self.pose_errors(at) / given.pose_error_rad,
+            self._missed_slope(at) / given.pose_error_rad,
+        )
         flipped, missed_flipped = np.swapaxes(own, 1, 2), np.swapaxes(missed_slope, 1, 2)
         return NormalEquations(
             shared=_summed_product(shared, shared) + slope.T @ slope,
@@ -145,15 +148,15 @@ class BundleAdjustment:
         """Residuals (P, 6 S) of places and turns times `scale` (P, S, 2), and how what is predicted changes with
         shared (P, 6 S, X) and own unknowns (P, 6 S, 6 + H)."""
         layout, reached = self.shared, self.reach(at)
-        residual = np.stack(self.off(reached), axis=2)
+        residual = np.stack(self.residuals(reached), axis=2)
         shared = np.zeros((*residual.shape, layout.count))
-        shared[:, :, 0, :, layout.bones] = self.chain.of_bones(reached, layout.bone_of, layout.vector)
-        mounts = self.chain.of_mounts(reached)
+        shared[:, :, 0, :, layout.bones] = self.chain.bone_jacobian(reached, layout.bone_of, layout.vector)
+        mounts = self.chain.mount_jacobian(reached)
         for j in range(residual.shape[1]):
             own_three = slice(3 * j, 3 * j + 3)
             shared[:, j, 0, :, layout.mount][..., own_three] = mounts[:, j]
             shared[:, j, 1, :, layout.turn][..., own_three] = reached.world_from_station[:, j]
-        roots, hinges = self.chain.of_roots(reached), self.chain.of_hinges(reached)
+        roots, hinges = self.chain.root_jacobian(reached), self.chain.hinge_jacobian(reached)
         own = np.stack(
             [np.concatenate([r, h[..., self.hinges]], axis=3) for r, h in zip(roots, hinges, strict=True)], axis=2
         )

@@ -29,7 +29,7 @@ class BundleFit:
     """The solution, what it was measured by, and its normal equations."""
 
     solution: CalibrationSolution
-    expected: ResidualScales
+    scales: ResidualScales
     weight: Floats
     """(P, S, 2) of each place and turn; small for what does not fit."""
     normal: NormalEquations
@@ -55,7 +55,9 @@ def fit_bundle(bundle: BundleAdjustment, place_m: float, turn_rad: float) -> Bun
         if rounds <= _LEAST_ROUNDS:  # the body's size hardly changes any more
             given = replace(given, flesh_m=bundle.shared.flesh_m(at.bone_m))
         weight = _weights(bundle, at, given)
-        change = abs(np.log(given.miss_rad / before.miss_rad)) + abs(np.log(given.beside / before.beside))
+        change = abs(np.log(given.pose_error_rad / before.pose_error_rad)) + abs(
+            np.log(given.mount_spread / before.mount_spread)
+        )
         if rounds > _LEAST_ROUNDS and change < _TOLERANCE and gained < _TOLERANCE:
             break
     normal = bundle.normal(at, given, weight)
@@ -87,30 +89,30 @@ def _likeliest_scales(
     bundle: BundleAdjustment, at: CalibrationSolution, given: ResidualScales, covariance: Floats, own: Floats
 ) -> ResidualScales:
     """Those under which the solution and its uncertainty are likeliest."""
-    missed = bundle.missed(at)[:, 2:] ** 2
+    missed = bundle.pose_errors(at)[:, 2:] ** 2
     miss_rad = float(np.sqrt(np.sum(missed) / np.sum(_effective_hinges(given, own))))
-    residual, slope = bundle.shared.expected_mounts(at, given.beside, given.flesh_m)
+    residual, slope = bundle.shared.mount_prior_residuals(at, given.mount_spread, given.flesh_m)
     told = max(len(residual) - float(np.sum((slope @ covariance) * slope)), 1.0)
-    beside = given.beside * float(np.sqrt(residual @ residual / told))
+    beside = given.mount_spread * float(np.sqrt(residual @ residual / told))
     return replace(
         given,
-        miss_rad=float(np.clip(miss_rad, LEAST_POSE_ERROR_RAD, MOST_POSE_ERROR_RAD)),
-        beside=float(np.clip(beside, LEAST_MOUNT_SPREAD, MOST_MOUNT_SPREAD)),
+        pose_error_rad=float(np.clip(miss_rad, LEAST_POSE_ERROR_RAD, MOST_POSE_ERROR_RAD)),
+        mount_spread=float(np.clip(beside, LEAST_MOUNT_SPREAD, MOST_MOUNT_SPREAD)),
     )
 
 
 def _pose_error_rad(bundle: BundleAdjustment, at: CalibrationSolution, given: ResidualScales, own: Floats) -> Floats:
-    missed = bundle.missed(at)[:, 2:] ** 2
+    missed = bundle.pose_errors(at)[:, 2:] ** 2
     return np.asarray(np.sqrt(np.sum(missed, axis=1) / _effective_hinges(given, own)))
 
 
 def _effective_hinges(given: ResidualScales, own: Floats) -> Floats:
     """(P,) how many hinges' worth the readings tell of each pose, given variances (P, 6 + H)."""
-    return np.asarray(np.maximum(np.sum(1.0 - own[:, 6:] / given.miss_rad**2, axis=1), 1.0))
+    return np.asarray(np.maximum(np.sum(1.0 - own[:, 6:] / given.pose_error_rad**2, axis=1), 1.0))
 
 
 def _weights(bundle: BundleAdjustment, at: CalibrationSolution, given: ResidualScales) -> Floats:
     """(P, S, 2) of readings that are t-distributed about the prediction."""
-    off = np.stack(bundle.off(bundle.reach(at)), axis=2) / np.array([given.place_m, given.turn_rad])[:, None]
+    off = np.stack(bundle.residuals(bundle.reach(at)), axis=2) / np.array([given.place_m, given.turn_rad])[:, None]
     counts = (T_DEGREES_OF_FREEDOM + 3.0) / (T_DEGREES_OF_FREEDOM + np.sum(off**2, axis=3))
     return np.asarray(np.minimum(counts, 1.0))

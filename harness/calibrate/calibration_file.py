@@ -45,10 +45,10 @@ class CalibrationFile:
     calibration: Calibration
     skeleton: Skeleton | None
     """The performer's, with the standard body's hinges; None leaves the body to the scenario."""
-    told: Mapping[str, Any] = field(default_factory=dict)
+    diagnostics: Mapping[str, Any] = field(default_factory=dict)
     """How it was come by: texts, numbers, truth values, and lists and mappings of them."""
 
-    def of(self, stations: Sequence[str]) -> "CalibrationFile":
+    def select(self, stations: Sequence[str]) -> "CalibrationFile":
         """The same for these stations, in this order; BadInput names the first that is not in it."""
         known = self.calibration
         for name in stations:
@@ -203,7 +203,7 @@ def _lines(kept: CalibrationFile) -> Iterator[str]:
         for bone, vector_m in zip(BONES, kept.skeleton.bone_m.tolist(), strict=True):
             yield f"{bone} = {_value(vector_m)}"
         yield ""
-    yield from (_DIAGNOSTICS_COMMENT, *_table("told", kept.told))
+    yield from (_DIAGNOSTICS_COMMENT, *_table("told", kept.diagnostics))
 
 
 def _table(name: str, content: Mapping[str, Any]) -> Iterator[str]:

@@ -42,7 +42,7 @@ def report_pose_calibration(found: PoseCalibration) -> CalibrationReport:
     told = {
         "seconds": found.seconds,
         "miss_deg": float(np.rad2deg(found.miss_rad)),
-        "beside": found.beside,
+        "beside": found.mount_spread,
         "condition": found.condition,
         "hints": list(found.hints),
         "miss_deg_of_pose": miss_deg,
@@ -81,7 +81,7 @@ def _fit_lines(found: PoseCalibration, miss_deg: Mapping[str, float]) -> list[st
     return [
         "bound alone: the Cramér-Rao bound of whoever knows nothing of people's bones and of where trackers are worn",
         f"hinges missed the poses by {np.rad2deg(found.miss_rad):.1f} deg, {worst!r} by {miss_deg[worst]:.1f} deg",
-        f"trackers sit {found.beside:.1f} times as far from their nominal places as is usual",
+        f"trackers sit {found.mount_spread:.1f} times as far from their nominal places as is usual",
         f"condition number {found.condition:.3g}; poses held for {found.seconds:.1f} s all together",
         *(f"hint: {hint}" for hint in found.hints),
     ]

@@ -82,24 +82,24 @@ class PoseGuide:
         self.collector, self._poses, self._shown, self._show = collector, poses, shown, show
         self._passed = 0
 
-    def lead(self, frames: Iterable[TrackerFrame], say: Notifier, watch: Notifier = lambda text: None) -> None:
+    def run(self, frames: Iterable[TrackerFrame], say: Notifier, watch: Notifier = lambda text: None) -> None:
         """Until the last pose is taken; NotStanding when the stream ends before. `watch` is told of every moment."""
-        self._wanted(say)
+        self._announce_pose(say)
         for frame in frames:
             taken = self.collector.add(frame)
-            watch(self.collector.told)
-            for passed in self.collector.passed[self._passed :]:
+            watch(self.collector.message)
+            for passed in self.collector.rejected[self._passed :]:
                 say(str(passed))
-            self._passed = len(self.collector.passed)
+            self._passed = len(self.collector.rejected)
             if taken is not None:
                 say(f"pose {taken} of {len(self._poses)} taken, held from {self.collector.began_s[-1]:.1f} s on")
                 if self.collector.done:
                     return
-                self._wanted(say)
+                self._announce_pose(say)
         raise incomplete_poses_error(self.collector, self._poses)
 
-    def _wanted(self, say: Notifier) -> None:
-        number = len(self.collector.held)
+    def _announce_pose(self, say: Notifier) -> None:
+        number = len(self.collector.holds)
         pose = self._poses[number]
         say(f"pose {number + 1} of {len(self._poses)}, {pose.name}: {pose.instruction}")
         if self._show is not None:
@@ -113,9 +113,9 @@ class PoseGuide:
 def incomplete_poses_error(collector: PoseCollector, poses: "Sequence[CalibrationPose]") -> UnusableHold:
     """What was held, of a stream that ended before all poses were."""
     taken = ", ".join(f"{at_s:.1f} s" for at_s in collector.began_s)
-    held = f"{len(collector.held)} of {len(poses)} poses were held" + (f", at {taken}" if taken else "")
-    passed = "; ".join(map(str, collector.passed))
-    wanted = poses[len(collector.held)]
+    held = f"{len(collector.holds)} of {len(poses)} poses were held" + (f", at {taken}" if taken else "")
+    passed = "; ".join(map(str, collector.rejected))
+    wanted = poses[len(collector.holds)]
     return UnusableHold(
         f"The stream ended before calibration was done: {held}{f'; {passed}' if passed else ''}.",
         f"Hold each pose still for {HOLD_S:g} s, in order; the next was {wanted.name!r}.",

@@ -101,7 +101,7 @@ class HeldPoseModel:
             chi_square=float(residual @ self._precision @ residual),
         )
 
-    def explained(self, residual_m: Floats) -> tuple[Floats, Floats]:
+    def decompose_residual(self, residual_m: Floats) -> tuple[Floats, Floats]:
         """Of residuals (S, 3): how far each tracker sits beside its mount (S, 3) [m], and how far its bone is turned
         from the pose (S, 3), a rotation vector [rad]; in world axes."""
         white = self._precision @ residual_m.ravel()

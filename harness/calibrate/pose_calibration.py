@@ -69,7 +69,7 @@ class PoseCalibration:
     """How far the performer missed the poses, standard deviation of a hinge."""
     pose_miss_rad: Floats
     """(P,) likewise of each pose."""
-    beside: float
+    mount_spread: float
     """How far trackers sit from their nominal mounts, in units of `unknowns.ALONG_M` and `ACROSS_M`."""
     condition: float
     """Of the whitened normal matrix: the best known combination against the least known one."""
@@ -125,10 +125,10 @@ def _assemble(
     bundle: BundleAdjustment, found: BundleFit, known: CalibrationUncertainty, seconds: float
 ) -> PoseCalibration:
     at, mounts = found.solution, bundle.shared.mounts
-    skeleton = bundle.shared.like.with_bones(at.bone_m)
+    skeleton = bundle.shared.template.with_bones(at.bone_m)
     bone_from_station = rotations.from_matrix(at.bone_from_station)
     world_from_level, shift_m = _world_from_level(skeleton, found)
-    off_m, off_rad = bundle.off(bundle.reach(at))
+    off_m, off_rad = bundle.residuals(bundle.reach(at))
     return PoseCalibration(
         calibration=Calibration(
             kind="poses",
@@ -143,17 +143,17 @@ def _assemble(
         mean_m=bundle.shared.space.mean_m,
         length_sd_m=known.length_sd_m,
         length_bound_m=known.length_bound_m,
-        known=known.share,
-        from_prior=known.share < LEAST_VARIANCE_REDUCTION,
+        known=known.variance_reduction,
+        from_prior=known.variance_reduction < LEAST_VARIANCE_REDUCTION,
         mount_sd_m=known.mount_sd_m,
         mount_sd_rad=known.mount_sd_rad,
         mount_bound_m=known.mount_bound_m,
         mount_bound_rad=known.mount_bound_rad,
         residual_m=np.sqrt(np.mean(np.sum(off_m**2, axis=2), axis=0)),
         residual_rad=np.sqrt(np.mean(np.sum(off_rad**2, axis=2), axis=0)),
-        miss_rad=found.expected.miss_rad,
+        miss_rad=found.scales.pose_error_rad,
         pose_miss_rad=found.pose_miss_rad,
-        beside=found.expected.beside,
+        mount_spread=found.scales.mount_spread,
         condition=known.condition,
         hints=station_orientation.strap_hints(skeleton, mounts, bone_from_station),
         seconds=seconds,

@@ -95,7 +95,7 @@ def _require_no_exchange(bundle: BundleAdjustment, found: BundleFit) -> None:
     everyone = list(range(len(mounts)))
     bones = [mount.bone for mount in mounts]
     sides = [(bones.index(b), bones.index(f"r{b[1:]}")) for b in bones if b[0] == "l" and f"r{b[1:]}" in bones]
-    given = ResidualScales(MOST_POSE_ERROR_RAD / 2.0, 1.0, found.expected.flesh_m, 0.005, np.deg2rad(1.0))
+    given = ResidualScales(MOST_POSE_ERROR_RAD / 2.0, 1.0, found.scales.flesh_m, 0.005, np.deg2rad(1.0))
     plain = _ExchangedFit(bundle, everyone, given)
     tried = []
     for exchange in [*([pair] for pair in combinations(everyone, 2)), sides]:

@@ -53,7 +53,7 @@ class PoseClassifier:
         anywhere and is of any size; by their turns too, once it is known how they were in the first pose."""
         return np.array([self._off_m(now, first, pose) for pose in range(len(self._place_m))])
 
-    def held(self, pose: int, now: HoldReadings, first: HoldReadings | None = None) -> bool:
+    def matches(self, pose: int, now: HoldReadings, first: HoldReadings | None = None) -> bool:
         """Whether it may be this pose."""
         off_m = self.off_m(now, first)
         return bool(off_m[pose] <= min(float(off_m.min()) + AMBIGUITY_M, _distance_limit_m(first)))

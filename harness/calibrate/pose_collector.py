@@ -48,13 +48,13 @@ class PoseCollector:
 
     def __init__(self, stations: Sequence[str], poses: int = 8, likeness: PoseClassifier | None = None) -> None:
         self.stations, self.poses = tuple(stations), poses
-        self.held: list[list[TrackerFrame]] = []
+        self.holds: list[list[TrackerFrame]] = []
         """Frames of each pose taken, without the edges."""
         self.began_s: list[float] = []
         """When each of them began, since the first frame [s]."""
-        self.passed: list[RejectedHold] = []
+        self.rejected: list[RejectedHold] = []
         """Holds that were not taken, and why."""
-        self.told = ""
+        self.message = ""
         """What is going on, for the performer."""
         self._likeness = likeness
         self._window: deque[TrackerFrame] = deque()
@@ -65,7 +65,7 @@ class PoseCollector:
 
     @property
     def done(self) -> bool:
-        return len(self.held) >= self.poses
+        return len(self.holds) >= self.poses
 
     def add(self, frame: TrackerFrame) -> int | None:
         """How many poses are complete, when one just was."""
@@ -84,7 +84,7 @@ class PoseCollector:
     def _look(self, frames: list[TrackerFrame]) -> int | None:
         stance, time_s = _hold_statistics(frames), np.array([frame.received_s for frame in frames])
         if (moving := self._moving(stance.strays, time_s)) is not None:
-            self.told = f"hold still: station {moving!r} moves"
+            self.message = f"hold still: station {moving!r} moves"
             return None
         if self._last is not None and not stance.elsewhere(self._last):
             self._last = stance  # whoever drifts while standing has not moved
@@ -94,7 +94,7 @@ class PoseCollector:
         try:
             still = measure_hold(kept, self.stations)
         except UnusableHold as error:
-            self.told = f"hold still: {error.what}"
+            self.message = f"hold still: {error.what}"
             return None
         self._last = stance
         return self._held(kept, still)
@@ -114,21 +114,21 @@ class PoseCollector:
     def _held(self, frames: list[TrackerFrame], still: HoldReadings) -> int | None:
         """A hold that is none of those before."""
         began_s = frames[0].received_s - (self._began_s or 0.0)
-        wanted = len(self.held)
+        wanted = len(self.holds)
         if self.done:
             why = f"all {self.poses} poses were taken before"
-        elif self._likeness is None or self._likeness.held(wanted, still, self._first):
+        elif self._likeness is None or self._likeness.matches(wanted, still, self._first):
             self._first = self._first or still
-            self.held.append(frames)
+            self.holds.append(frames)
             self.began_s.append(began_s)
-            self.told = f"pose {wanted + 1} of {self.poses} taken"
+            self.message = f"pose {wanted + 1} of {self.poses} taken"
             return wanted + 1
         else:
             nearest = self._likeness.nearest(still, self._first)
             looks = "none of the poses" if nearest is None else f"pose {nearest + 1}"
             why = f"that looks like {looks}, and pose {wanted + 1} is wanted"
-        self.passed.append(RejectedHold(began_s, why))
-        self.told = str(self.passed[-1])
+        self.rejected.append(RejectedHold(began_s, why))
+        self.message = str(self.rejected[-1])
         return None
 
 

@@ -50,7 +50,7 @@ class SkeletonPrior:
         out: Floats = (self.modes.T * self.spread_m**2) @ self.modes + np.diag(self.rest_m**2)
         return out
 
-    def kept(self) -> float:
+    def explained_variance(self) -> float:
         """Share of the variance of lengths that the modes keep."""
         modes = float(np.sum(self.spread_m**2))
         return modes / (modes + float(np.sum(self.rest_m**2)))

@@ -79,18 +79,18 @@ class StationKinematics:
         place = joint[:, self.bones] + (carried @ mount_m[:, :, None])[..., 0]
         return StationPoses(place, carried @ bone_from_station, turned, joint, axis, root_m)
 
-    def of_bones(self, at: StationPoses, bones: Ints, vectors: Floats) -> Floats:
+    def bone_jacobian(self, at: StationPoses, bones: Ints, vectors: Floats) -> Floats:
         """(P, S, 3, G) how places change with what is added to these bones (G,) along these vectors (G, 3); turns of
         stations do not."""
         along = (at.world_from_bone[:, bones] @ vectors[:, :, None])[:, None, :, :, 0]
         return np.swapaxes(along * self.passes[:, bones, None], -1, -2)
 
-    def of_mounts(self, at: StationPoses) -> Floats:
+    def mount_jacobian(self, at: StationPoses) -> Floats:
         """(P, S, 3, 3) how places change with the station's own mount."""
         out: Floats = at.world_from_bone[:, self.bones]
         return out
 
-    def of_roots(self, at: StationPoses) -> tuple[Floats, Floats]:
+    def root_jacobian(self, at: StationPoses) -> tuple[Floats, Floats]:
         """(P, S, 3, 6) how places and turns change with shifts and small turns of the root in world axes."""
         place, turn = np.zeros((2, *at.place_m.shape, 6))
         place[..., :3] = turn[..., 3:] = np.eye(3)
@@ -98,7 +98,7 @@ class StationKinematics:
         place[..., 3:] = np.swapaxes(np.cross(np.eye(3), reach_m[..., None, :]), -1, -2)
         return place, turn
 
-    def of_hinges(self, at: StationPoses) -> tuple[Floats, Floats]:
+    def hinge_jacobian(self, at: StationPoses) -> tuple[Floats, Floats]:
         """(P, S, 3, D) how places and turns change with hinge angles."""
         reach_m = at.place_m[:, :, None] - at.joint_m[:, None, self._hinge_bone]
         turn = at.hinge_axis[:, None] * self.turns[:, :, None]

@@ -75,7 +75,7 @@ def calibrate_tpose(
         )
     _require_no_exchange(stance, level_m, fit, mounts)
     _require_pose(fit, names, body)
-    beside_m, turned = stance.explained(fit.residual_m)
+    beside_m, turned = stance.decompose_residual(fit.residual_m)
     world_from_tracker = rotations.multiply(rotations.about_z(fit.heading_rad), LEVEL_FROM_TRACKER)
     bone_from_world = rotations.inverse(rotations.multiply(rotations.exp(turned), stance.world_from_bone))
     world_from_station = rotations.multiply(world_from_tracker, still.tracker_from_station)

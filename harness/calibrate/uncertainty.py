@@ -21,7 +21,7 @@ class CalibrationUncertainty:
 
     length_sd_m: Floats
     length_bound_m: Floats
-    share: Floats
+    variance_reduction: Floats
     """(N,) of the variance among people that readings take away when nominal mounts are not believed."""
     mount_sd_m: Floats
     mount_sd_rad: Floats
@@ -32,11 +32,11 @@ class CalibrationUncertainty:
 
 def estimate_uncertainty(bundle: BundleAdjustment, found: BundleFit) -> CalibrationUncertainty:
     """By the normal equations at the solution: misses of the poses are unknown and marginalised."""
-    shared, at, given = bundle.shared, found.solution, found.expected
-    _, slope = shared.expected(at, given.beside, given.flesh_m)
+    shared, at, given = bundle.shared, found.solution, found.scales
+    _, slope = shared.prior_residuals(at, given.mount_spread, given.flesh_m)
     whole = found.normal.information()
     readings = whole - slope.T @ slope
-    _, wide = shared.expected(at, _UNKNOWN_MOUNT_SPREAD, given.flesh_m)
+    _, wide = shared.prior_residuals(at, _UNKNOWN_MOUNT_SPREAD, given.flesh_m)
     lengths = shared.length_slope(at)
     prior_m2 = np.diag(shared.space.covariance_m2)
     scale = _prior_sd(slope)
@@ -45,7 +45,7 @@ def estimate_uncertainty(bundle: BundleAdjustment, found: BundleFit) -> Calibrat
     return CalibrationUncertainty(
         length_sd_m=np.sqrt(np.diag(lengths @ sd @ lengths.T)),
         length_bound_m=np.sqrt(_variance(lengths, alone, scale)),
-        share=1.0 - np.diag(strange) / prior_m2,
+        variance_reduction=1.0 - np.diag(strange) / prior_m2,
         mount_sd_m=_total_sd(np.diag(sd)[shared.mount]),
         mount_sd_rad=_total_sd(np.diag(sd)[shared.turn]),
         mount_bound_m=_total_sd(_variance(np.eye(shared.count)[shared.mount], alone, scale)),

@@ -51,7 +51,7 @@ class SharedUnknowns:
     people differ), B mode weights, then S mounts and S small turns of stations in their own axes."""
 
     def __init__(self, like: Skeleton, space: SkeletonPrior, mounts: Sequence[Mount]) -> None:
-        self.like, self.space, self.mounts = like, space, tuple(mounts)
+        self.template, self.space, self.mounts = like, space, tuple(mounts)
         self.carriers: Ints = np.array([like.index(mount.bone) for mount in mounts], dtype=np.int64)
         vectors = np.concatenate([space.direction[:, None], space.across], axis=1)
         spread_m = np.concatenate([np.full((like.bone_count, 1), np.inf), space.across_m], axis=1)
@@ -68,7 +68,7 @@ class SharedUnknowns:
 
     def flesh_m(self, bone_m: Floats) -> Floats:
         """(S, 3) from the bones (N, 3) to the nominal mounts on the skin: of a body with these bones."""
-        skeleton = self.like.with_bones(bone_m)
+        skeleton = self.template.with_bones(bone_m)
         nominal_m = np.array([locate_mount(skeleton, mount)[0] for mount in self.mounts])
         return nominal_m - self._along[:, None] * bone_m[self.carriers]
 
@@ -77,12 +77,12 @@ class SharedUnknowns:
         out: Floats = self._along[:, None] * bone_m[self.carriers] + flesh_m
         return out
 
-    def expected(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
+    def prior_residuals(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
         """Residuals (R,) in units of what is expected beforehand, and slopes (R, X).
 
         `beside` is the trackers' spread about the nominal mounts in units of ALONG_M and ACROSS_M.
         """
-        parts = self._lengths(at), self._weights(at), self._across(at), self.expected_mounts(at, beside, flesh_m)
+        parts = self._lengths(at), self._weights(at), self._across(at), self.mount_prior_residuals(at, beside, flesh_m)
         residuals, slopes = zip(*parts, strict=True)
         return np.concatenate(residuals), np.concatenate(slopes)
 
@@ -111,7 +111,7 @@ class SharedUnknowns:
         slope[:, self.bones] = np.diag(1.0 / self._coordinate_m)
         return np.sum(at.bone_m[self.bone_of] * self.vector, axis=1) / self._coordinate_m, slope
 
-    def expected_mounts(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
+    def mount_prior_residuals(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
         """How far trackers sit from their nominal mounts on these bones, along bones as they point on average, and
         across."""
         along = self.space.direction[self.carriers]

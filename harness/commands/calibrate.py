@@ -130,8 +130,8 @@ def _calibrate_performer(args: argparse.Namespace) -> Outcome:
         raise BadInput("--pictures without --view frames.", "Say both, or neither.")
     require_writable(args.out, force=args.force)
     found = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
-    write_calibration(args.out, found.kept, force=args.force)
-    content = {"file": str(args.out), **found.kept.told}
+    write_calibration(args.out, found.file, force=args.force)
+    content = {"file": str(args.out), **found.file.diagnostics}
     return print_result(args, content, *found.lines, "", f"{args.out}: written")
 
 
@@ -152,7 +152,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
         if args.view is not None:
             view = ViewerOutput(args.view, posing.body.skeleton, args.pictures, force=args.force)
             opened.callback(view.close)
-            print_status(view.told)
+            print_status(view.description)
             show = view.show
         wanted = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
         device = opened.enter_context(
@@ -160,9 +160,9 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
         )
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
         print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {worn}; Ctrl-C ends it")
-        collector = posing.held(device, print_status, show, show_progress)
+        collector = posing.collect_poses(device, print_status, show, show_progress)
     print_status("solving")
-    return posing.found(collector.held, f"the tracker at {args.port}")
+    return posing.solve(collector.holds, f"the tracker at {args.port}")
 
 
 def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
@@ -171,7 +171,7 @@ def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
     from harness.stream.recording.replay import RecordingStream
 
     stream = RecordingStream(args.recording)
-    for lost in stream.recording.lost:
+    for lost in stream.recording.damage:
         print_status(f"lost: {lost}")
     note = stream.recording.note
     scenario, clip = args.scenario or note.get("scenario"), args.clip or note.get("clip")
@@ -184,11 +184,11 @@ def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
         scenario, name_recorded_stations(stream, scenario, names), args.kind or "poses", clip, args.mocap
     )
     frames = iter(stream)
-    collector = posing.held(frames, print_status)
+    collector = posing.collect_poses(frames, print_status)
     if args.kind != "tpose":  # one more is one too many, or one before it was none
-        before = len(collector.passed)
+        before = len(collector.rejected)
         for frame in frames:
             collector.add(frame)
-        for passed in collector.passed[before:]:
+        for passed in collector.rejected[before:]:
             print_status(str(passed))
-    return posing.found(collector.held, str(args.recording))
+    return posing.solve(collector.holds, str(args.recording))

@@ -45,7 +45,7 @@ def _describe_scenario(name: str) -> str:
     motion = scenario.motion
     return (
         f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
-        f"{len(scenario.wearing)} stations, {_describe_noise(scenario)}; {len(scenario.methods)} methods"
+        f"{len(scenario.worn_stations)} stations, {_describe_noise(scenario)}; {len(scenario.methods)} methods"
     )
 
 

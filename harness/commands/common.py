@@ -90,7 +90,7 @@ def parse_stations(args: argparse.Namespace) -> int | list[str]:
     from harness.experiment.scenario import load_scenario
 
     if args.stations is None:
-        return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).wearing))
+        return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).worn_stations))
     return int(args.stations) if is_whole_number(args.stations) else parse_names(args.stations)
 
 

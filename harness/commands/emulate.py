@@ -85,7 +85,11 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     with closing(port), sigterm_as_interrupt():
         worn = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
-        played = f"the poses of {rehearsal.setting.part}'s performer" if args.poses else rehearsal.setting.part
+        played = (
+            f"the poses of {rehearsal.clip_evaluation.part}'s performer"
+            if args.poses
+            else rehearsal.clip_evaluation.part
+        )
         print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
         counts = play_samples(samples, config, port)

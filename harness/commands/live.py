@@ -94,27 +94,27 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     if args.calibration not in _CALIBRATION_KINDS:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
-        rehearsal = rehearsal.going_by(read_calibration(args.calibration))
+        rehearsal = rehearsal.with_calibration(read_calibration(args.calibration))
     method = registry.resolve(args.method)
     events: list[LineEvent] = []
     if args.calibration == "poses":
-        rehearsal = rehearsal.going_by(_calibrate_by_poses(args, rehearsal, events))
+        rehearsal = rehearsal.with_calibration(_calibrate_by_poses(args, rehearsal, events))
     with ExitStack() as opened:
         outputs = _open_outputs(args, rehearsal, opened)
         device = opened.enter_context(_open_device(args, rehearsal, events))
         rate_hz = rehearsal.tracker.rate_hz
         print_status(
-            f"learning {args.method} from {len(rehearsal.setting.example_names)} clips of {rehearsal.scenario.name}"
+            f"learning {args.method} from {len(rehearsal.clip_evaluation.example_names)} clips of {rehearsal.scenario.name}"
         )
         with redirect_stdout(sys.stderr):  # what a method prints is talk
-            reconstructor = rehearsal.setting.fitted(method, args.method)
+            reconstructor = rehearsal.clip_evaluation.fit_method(method, args.method)
             warm_up(reconstructor, rehearsal.calibration, rehearsal.simulation.frames[:_WARM_UP_FRAMES])
             floor = opened.enter_context(JitterProbe())
             print_status("Ctrl-C ends it")
             plan = LiveOptions(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
             done = run_session(
                 device,
-                rehearsal.calibrated.body,
+                rehearsal.performer_calibration.body,
                 reconstructor,
                 _initial_calibration(args, rehearsal),
                 outputs,
@@ -173,7 +173,7 @@ def _open_outputs(args: argparse.Namespace, rehearsal: "Playback", opened: ExitS
         raise BadInput("--out without --view frames.", "Say both, or neither.")
     if args.lsl_network and args.lsl is None:
         raise BadInput("--lsl-network without --lsl.", "Name the streams with --lsl.")
-    own, rate_hz = rehearsal.calibrated.body.skeleton, rehearsal.tracker.rate_hz
+    own, rate_hz = rehearsal.performer_calibration.body.skeleton, rehearsal.tracker.rate_hz
     stations = tuple(rehearsal.scenario.stations)
     wanted: dict[str, Any] = {
         "vmc": lambda: VmcOutput(args.vmc, own),
@@ -187,7 +187,7 @@ def _open_outputs(args: argparse.Namespace, rehearsal: "Playback", opened: ExitS
         if getattr(args, name) is not None:
             outputs.append(make())
             opened.callback(outputs[-1].close)
-            print_status(outputs[-1].told)
+            print_status(outputs[-1].description)
     return outputs
 
 
@@ -199,11 +199,11 @@ def _calibrate_by_poses(
 
     posing = CalibrationSession(args.scenario, tuple(rehearsal.scenario.stations), folder=args.mocap)
     with _open_device(args, rehearsal, events) as device:
-        held = posing.held(device, print_status, watch=show_progress).held
-    found = posing.found(held, args.port)
+        held = posing.collect_poses(device, print_status, watch=show_progress).holds
+    found = posing.solve(held, args.port)
     for line in found.lines:
         print_status(line)
-    return found.kept
+    return found.file
 
 
 def _initial_calibration(args: argparse.Namespace, rehearsal: "Playback") -> "Calibration | Calibrator":

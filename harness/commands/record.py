@@ -92,7 +92,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
     note = {
         "source": "simulation",
         "scenario": scenario,
-        "clip": str(rehearsal.setting.part),
+        "clip": str(rehearsal.clip_evaluation.part),
         "seed": asked.seed,
         "noise": asked.noise,
         "stations": list(asked.stations),
@@ -148,7 +148,7 @@ def run_replay(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording.replay import RecordingStream, parse_speed
 
     stream = RecordingStream(args.file, parse_speed(args.speed))
-    for lost in stream.recording.lost:
+    for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
     told = (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed, args.calibration)
     if any(value is not None for value in told):
@@ -170,7 +170,7 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
         if args.frames:
             sys.stdout.flush()
     recording = stream.recording
-    content = {**summary.as_dict(), **stream.counts, "lost": recording.lost, "events": recording.events}
+    content = {**summary.as_dict(), **stream.counts, "lost": recording.damage, "events": recording.events}
     lines = [
         str(summary),
         "",
@@ -199,7 +199,7 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     told = {"scenario": args.scenario, "clip": args.clip, "rate_hz": args.rate, "noise": args.noise, "seed": args.seed}
     rehearsal = score_recording.find_playback(stream, **told, folder=args.mocap)
     if args.calibration is not None:
-        rehearsal = rehearsal.going_by(read_calibration(args.calibration))
+        rehearsal = rehearsal.with_calibration(read_calibration(args.calibration))
     methods = rehearsal.scenario.methods
     if args.methods is not None:
         methods = tuple(
@@ -207,9 +207,9 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
         )
     with redirect_stdout(sys.stderr):  # what a method prints is talk
         judged = score_recording.score_methods(stream, rehearsal, methods)
-    played = f"{rehearsal.scenario.name}, {rehearsal.setting.part}"
-    content = {"scenario": rehearsal.scenario.name, "clip": str(rehearsal.setting.part), **stream.counts}
-    content |= {"lost": stream.recording.lost, "methods": [one.as_dict() for one in judged]}
+    played = f"{rehearsal.scenario.name}, {rehearsal.clip_evaluation.part}"
+    content = {"scenario": rehearsal.scenario.name, "clip": str(rehearsal.clip_evaluation.part), **stream.counts}
+    content |= {"lost": stream.recording.damage, "methods": [one.as_dict() for one in judged]}
     measured = any(one.metrics["joint_angle_mean_deg"] is not None for one in judged)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
     return print_result(

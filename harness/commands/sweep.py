@@ -105,7 +105,7 @@ def run_status(args: argparse.Namespace) -> Outcome:
 
 def _status_lines(found: "RunStatus", out: Path) -> list[str]:
     counted = f"{found.finished:,} of {found.planned:,} cells finished, {len(found.failures):,} failed"
-    state = "running" if found.running else "finished" if not found.left else "not running"
+    state = "running" if found.running else "finished" if not found.remaining else "not running"
     left = f", about {_format_duration(found.left_s)} left" if found.left_s is not None else ""
     lines = [f"{found.kind} {found.name}: {state}, {counted}{left}"]
     lines += [f"FAILED {cell}: {text.strip().splitlines()[-1]}" for cell, text in found.failures.items()][

@@ -195,7 +195,7 @@ def simulate_pose_holds(session: TrackerSession, miss_rad: float) -> list[list[T
     configurations = [configuration(pose, session.body.skeleton) for pose in POSES]
     rng = generator(session.seed, "calibration trial", session.name)
     take = hold_poses(session.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=HOLD_S, move_s=MOVE_S)
-    seen = simulate_tracker(session.body, take, session.strapped, session.tracker, session.noise, seed=session.seed)
+    seen = simulate_tracker(session.body, take, session.true_mounts, session.tracker, session.noise, seed=session.seed)
     # By the host's clock, which hears of everything a little late.
     holds = hold_times_s(len(POSES), HOLD_S, MOVE_S)
     return [[f for f in seen.frames if a + HOLD_MARGIN_S <= f.received_s <= b - HOLD_MARGIN_S + 0.1] for a, b in holds]
@@ -232,7 +232,7 @@ def _session(
 
 
 def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> CalibrationErrors:
-    true, own, known = session.exact, session.body.skeleton, found.calibration
+    true, own, known = session.true_calibration, session.body.skeleton, found.calibration
     off_m = known.mount_m - true.mount_m
     elbow_m = np.array(off_m)
     for row, bone in enumerate(known.bones):

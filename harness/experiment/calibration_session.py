@@ -34,7 +34,7 @@ CalibrationKind = Literal["poses", "tpose"]
 class CalibrationOutcome:
     """A calibration, and what there is to say of it."""
 
-    kept: CalibrationFile
+    file: CalibrationFile
     lines: list[str]
 
 
@@ -53,7 +53,7 @@ class CalibrationSession:
     """Library of real motion, where the scenario needs one."""
 
     @cached_property
-    def asked(self) -> Scenario:
+    def resolved_scenario(self) -> Scenario:
         """With no other stations, in this order."""
         scenario = load_scenario(self.scenario)
         worn = select_stations(scenario, self.stations)
@@ -66,7 +66,7 @@ class CalibrationSession:
     @property
     def mounts(self) -> tuple[Mount, ...]:
         """Where the stations are said to be worn."""
-        return mounts_of(self.asked)
+        return mounts_of(self.resolved_scenario)
 
     @cached_property
     def body(self) -> Body:
@@ -76,19 +76,19 @@ class CalibrationSession:
         return prepare_playback(self.scenario, clip=self.clip, folder=self.folder).body
 
     @cached_property
-    def shown(self) -> list[Floats]:
+    def pose_qpos(self) -> list[Floats]:
         """The poses (55,) of that body."""
         return [configuration(pose, self.body.skeleton) for pose in self.poses]
 
     @cached_property
     def space(self) -> SkeletonPrior:
         """What people's bones are like: the scenario's source knows some."""
-        motion = self.asked.motion
-        source = open_scenario_motion(motion, self.folder, self.asked.seed)
-        people = source.people(without=source.subject(ClipPart.parse(self.clip).clip) if self.clip else "")
+        motion = self.resolved_scenario.motion
+        source = open_scenario_motion(motion, self.folder, self.resolved_scenario.seed)
+        people = source.other_skeletons(without=source.subject(ClipPart.parse(self.clip).clip) if self.clip else "")
         return fit_skeleton_prior(list(people.values()), source=f"{len(people)} people ({source.title})")
 
-    def held(
+    def collect_poses(
         self,
         frames: Iterable[TrackerFrame],
         say: Notifier,
@@ -96,12 +96,12 @@ class CalibrationSession:
         watch: Notifier = lambda text: None,
     ) -> PoseCollector:
         """Lead the performer through the poses; NotStanding when the stream ends before the last."""
-        likeness = PoseClassifier(self.body, self.mounts, self.shown)
+        likeness = PoseClassifier(self.body, self.mounts, self.pose_qpos)
         collector = PoseCollector(self.stations, len(self.poses), likeness)
-        PoseGuide(collector, self.poses, self.shown, show).lead(frames, say, watch)
+        PoseGuide(collector, self.poses, self.pose_qpos, show).run(frames, say, watch)
         return collector
 
-    def found(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:
+    def solve(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:
         """Solve for what the poses tell; `source` is where the frames come from, in words. NotStanding, BadInput."""
         if self.kind == "poses":
             eight = calibrate_poses(held, self.space, self.mounts)
@@ -118,6 +118,6 @@ class CalibrationSession:
                 calibration_report.report_tpose_calibration(tpose),
             )
         made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {__version__}"}
-        made |= {"source": source, "scenario": self.asked.name}
+        made |= {"source": source, "scenario": self.resolved_scenario.name}
         made |= {"others": self.space.source} if self.kind == "poses" else {}
         return CalibrationOutcome(CalibrationFile(calibration, skeleton, {**made, **words}), lines)

@@ -49,12 +49,12 @@ class CellResults:
 class CellTask:
     """What a worker is given at once: some variants of a scenario on one clip, with some of its methods."""
 
-    called: str
+    label: str
     """Goes before the names of its cells."""
     job: ClipTask
 
     def cells(self) -> list[str]:
-        return [f"{self.called}: {cell}" for cell in self.job.cells()]
+        return [f"{self.label}: {cell}" for cell in self.job.cells()]
 
 
 def run_cells(
@@ -165,9 +165,9 @@ def _record_results(
     progress: ProgressCallback,
     planned: int,
 ) -> None:
-    found = {f"{task.called}: {cell.cell}": cell for cell in cells}
+    found = {f"{task.label}: {cell.cell}": cell for cell in cells}
     index.add((c.row for c in cells if c.row is not None), (c.seconds or None for c in cells if c.row is not None))
-    index.ended((name, cell.key, cell.failure) for name, cell in found.items())
+    index.record_outcomes((name, cell.key, cell.failure) for name, cell in found.items())
     for name, cell in found.items():
         ended[name] = replace(cell, row=None)  # it is in the index
         progress(name, len(ended), planned)

@@ -130,7 +130,7 @@ def _clip_evaluation(job: ClipTask, scenario: Scenario) -> ClipEvaluation:
     source, now = open_scenario_motion(scenario.motion, job.folder, scenario.seed), None
     for last in _recent_evaluations:
         if last.source is source and (last.part, last.behaviour) == (job.part, job.behaviour):
-            now = last if last.scenario == scenario else last.under(scenario)
+            now = last if last.scenario == scenario else last.with_conditions(scenario)
     _recent_evaluations[:] = [now or ClipEvaluation(scenario, source, job.part, job.behaviour)]
     return _recent_evaluations[0]
 
@@ -147,7 +147,7 @@ def evaluate_cell(
     """Fit, run causally over the stream, score."""
     scenario, simulation = setting.scenario, setting.simulation
     seen = make_inputs(planned.inputs, simulation.stations)
-    known, fitted = setting.calibrated, setting.fitted(method, planned.method)
+    known, fitted = setting.performer_calibration, setting.fit_method(method, planned.method)
     qpos, status, step_ms, cpu_ms = run_method(fitted, known.calibration, simulation, seen)
     scores = score_estimate(
         setting.body.skeleton,
@@ -178,7 +178,7 @@ def evaluate_cell(
         performer=setting.performer,
         varied=planned.varied,
         scenario=scenario.name,
-        defined_by=setting.inputs_of(method, planned.inputs),
+        defined_by=setting.conditions_of(method, planned.inputs),
         scores=scores,
         health=simulation.health,
         calibration_errors=known.errors,
@@ -213,7 +213,7 @@ def run_method(
     session, work = reconstructor.begin(calibration), ReferenceWorkload()
     qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
     for index, frame in enumerate(simulation.frames):
-        shown = inputs.masked(frame)
+        shown = inputs.mask(frame)
         start_cpu, start = time.process_time(), time.perf_counter()
         estimate = session.step(shown)
         step_ms.append(1e3 * (time.perf_counter() - start))
@@ -252,8 +252,8 @@ def check_names(scenario: Scenario, source: MotionSource, parts: list[ClipPart])
     for name in scenario.methods:
         _resolve_method(name)
     for name in scenario.inputs:
-        make_inputs(name, tuple(scenario.wearing))
-    WireFormat(tuple(scenario.wearing), scenario.tracker.rate_hz, scenario.tracker.items)
+        make_inputs(name, tuple(scenario.worn_stations))
+    WireFormat(tuple(scenario.worn_stations), scenario.tracker.rate_hz, scenario.tracker.items)
     for mount in mounts_of(scenario):
         locate_mount(standard_skeleton(), mount)
-    scenario.disturbance.added(noise_of(scenario), tuple(scenario.wearing))
+    scenario.disturbance.add_to(noise_of(scenario), tuple(scenario.worn_stations))

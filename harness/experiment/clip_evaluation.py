@@ -42,7 +42,7 @@ def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
     """Where the stations are said to be worn."""
     return tuple(
         Mount(name, s.bone, s.along, float(np.deg2rad(s.around_deg)), s.stand_off_m)
-        for name, s in scenario.wearing.items()
+        for name, s in scenario.worn_stations.items()
     )
 
 
@@ -72,7 +72,7 @@ class ClipEvaluation:
         self._fitted: dict[str, Reconstructor] = {}
         self._sources: dict[str, str] = {}
 
-    def under(self, scenario: Scenario) -> "ClipEvaluation | None":
+    def with_conditions(self, scenario: Scenario) -> "ClipEvaluation | None":
         """The same under other errors of the tracker, with other stations, calibrated otherwise or for other methods,
         sharing motion and, on the same body, what was learnt, which knows of none of these; None if more differs."""
         world = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
@@ -89,7 +89,7 @@ class ClipEvaluation:
             other.__dict__.pop(own, None)
         return other
 
-    def going_by(self, calibrated: PerformerCalibration) -> "ClipEvaluation":
+    def with_calibration(self, calibrated: PerformerCalibration) -> "ClipEvaluation":
         """The same with methods told this of trackers, room and body; what was learnt on another body is not shared."""
         other = copy.copy(self)
         other.__dict__.pop("examples", None)
@@ -97,12 +97,12 @@ class ClipEvaluation:
         other._fitted, other._retargeted = {}, {}
         return other
 
-    def fitted(self, method: Method, name: str) -> Reconstructor:
+    def fit_method(self, method: Method, name: str) -> Reconstructor:
         """The method of that name, trained once on what the protocol lets it see."""
         if name not in self._fitted:
             rng = generator(self.scenario.seed, "method", registry.without_options(name))
             examples = self.examples if method.needs_examples else []
-            self._fitted[name] = method.fit(self.calibrated.body, examples, rng)
+            self._fitted[name] = method.fit(self.performer_calibration.body, examples, rng)
         return self._fitted[name]
 
     @cached_property
@@ -115,7 +115,7 @@ class ClipEvaluation:
         return TrackerSession(name, scenario.seed, self.body, nominal, worn, tracker, noise)
 
     @cached_property
-    def calibrated(self) -> PerformerCalibration:
+    def performer_calibration(self) -> PerformerCalibration:
         """What methods go by; NotStanding when the performer's model cannot be calibrated from."""
         how = self.scenario.calibrating
         model = {"miss_rad": float(np.deg2rad(how.miss_deg)), "hold_s": how.hold_s}
@@ -133,7 +133,7 @@ class ClipEvaluation:
     @cached_property
     def people(self) -> dict[str, Skeleton]:
         """Of whose bones something is known before eight poses are held: never the performer's own."""
-        return self.source.people(without=self.source.subject(self.part.clip))
+        return self.source.other_skeletons(without=self.source.subject(self.part.clip))
 
     @cached_property
     def body(self) -> humanoid.Body:
@@ -143,31 +143,31 @@ class ClipEvaluation:
         return humanoid.build_body(standard_skeleton())
 
     @cached_property
-    def whole(self) -> BodyMotion:
+    def full_take(self) -> BodyMotion:
         """The test clip on the performer's body."""
         return self._on_body(self.clip, self.body)
 
     @cached_property
     def take(self) -> BodyMotion:
         """The part of it that is judged, and before a part the second of warm-up, which is nobody's example either."""
-        frames, rate_hz = self.part.frames(len(self.whole)), self.whole.rate_hz
+        frames, rate_hz = self.part.frames(len(self.full_take)), self.full_take.rate_hz
         start = max(frames.start - round(WARM_UP_S * rate_hz), 0)
         longest_s = self.scenario.motion.longest_s
         stop = min(frames.stop, start + round(longest_s * rate_hz) + 1) if longest_s else frames.stop
-        return _cut_take(self.whole, range(start, stop), str(self.part))
+        return _cut_take(self.full_take, range(start, stop), str(self.part))
 
     @cached_property
     def simulation(self) -> Simulation:
         scenario, tracker = self.scenario, self.session.tracker
-        noise = scenario.disturbance.added(self.session.noise, tuple(scenario.wearing))
-        seen = simulate_tracker(self.body, self.take, self.session.strapped, tracker, noise, seed=scenario.seed)
+        noise = scenario.disturbance.add_to(self.session.noise, tuple(scenario.worn_stations))
+        seen = simulate_tracker(self.body, self.take, self.session.true_mounts, tracker, noise, seed=scenario.seed)
         if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
             found = f"{self.part} is judged for {len(seen.truth_s) / tracker.rate_hz:.2f} s"
             raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
         return seen
 
     @cached_property
-    def closed(self) -> tuple[ClipPart, ...]:
+    def held_out_parts(self) -> tuple[ClipPart, ...]:
         """What nothing is learnt from: the part that is judged, and what the scenario withholds."""
         return (self.part, *map(ClipPart.parse, self.scenario.motion.withheld))
 
@@ -179,7 +179,7 @@ class ClipEvaluation:
         names = select_examples(test, motion.examples, motion.protocol, subjects)
         if motion.database == "behaviour":
             names = [name for name in names if self.source.behaviour(name) == self.behaviour]
-        return [name for name in names if ClipPart(name) not in self.closed]
+        return [name for name in names if ClipPart(name) not in self.held_out_parts]
 
     @cached_property
     def performer(self) -> str:
@@ -201,15 +201,15 @@ class ClipEvaluation:
     @cached_property
     def examples(self) -> list[BodyMotion]:
         """What the protocol lets a method learn from, on the body that it goes by and at the tracker's rate."""
-        takes, body = [], self.calibrated.body
+        takes, body = [], self.performer_calibration.body
         for clip in self.example_clips:
-            runs = allowed_frames(self.closed, clip.name, len(clip), clip.rate_hz)
-            refuse_leak(self.closed, clip.name, runs, len(clip), clip.rate_hz)
+            runs = allowed_frames(self.held_out_parts, clip.name, len(clip), clip.rate_hz)
+            refuse_leak(self.held_out_parts, clip.name, runs, len(clip), clip.rate_hz)
             whole = self._on_body(clip, body)
             takes += [_resample(body, _cut_take(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
         return thin_takes(takes, self.scenario.motion.thin_to)
 
-    def inputs_of(self, method: Method, inputs: str) -> dict[str, object]:
+    def conditions_of(self, method: Method, inputs: str) -> dict[str, object]:
         """Everything that defines a cell; two results with other inputs are not comparable.
 
         Device and noise stand as numbers, motion, body and mounts as digests of theirs: names and defaults mean
@@ -219,7 +219,7 @@ class ClipEvaluation:
         return {
             **self._same_for_all,
             "examples": learnt,
-            "withheld": sorted(str(part) for part in self.closed[1:] if part.clip in learnt),
+            "withheld": sorted(str(part) for part in self.held_out_parts[1:] if part.clip in learnt),
             "inputs": inputs,
         }
 
@@ -230,7 +230,7 @@ class ClipEvaluation:
         content = asdict(scenario)
         for many in ("methods", "inputs", "name", "components", "vary", "order", "left_out", "fault", "worn"):
             del content[many]
-        content["stations"] = {name: asdict(station) for name, station in scenario.wearing.items()}
+        content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
         del content["motion"]["withheld"]
         if scenario.calibration == "exact":
@@ -251,7 +251,7 @@ class ClipEvaluation:
     def _worn(self) -> dict[str, str]:
         """Digests of the body and of where the stations really sit on it."""
         skeleton = self.body.skeleton
-        worn = [array for mount in self.session.strapped for array in locate_mount(skeleton, mount)]
+        worn = [array for mount in self.session.true_mounts for array in locate_mount(skeleton, mount)]
         body = storage.digest(skeleton.bone_m, skeleton.axes, self.body.limits_rad)
         return {"body_digest": body, "mounts_digest": storage.digest(*worn)}
 
@@ -263,7 +263,7 @@ class ClipEvaluation:
         """What a reader should know: notes of the clip, what was calibrated, what retargeting to another body cost."""
         used = [self.clip, *(self.example_clips if method.needs_examples else [])]
         reports = [self._retargeted[clip.name] for clip in used if clip.name in self._retargeted]
-        told = (*self.clip.notes, *self.calibrated.notes)
+        told = (*self.clip.notes, *self.performer_calibration.notes)
         if not reports:
             return told
         deviation_mm = np.mean([report.deviation_mm for report in reports])
@@ -283,7 +283,7 @@ class ClipEvaluation:
         if name not in self._sources:
             self._sources[name] = registry.source_hash(method)
         described = {"name": name, "options": repr(method), "source": self._sources[name]}
-        content = {**self.inputs_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
+        content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
         return storage.cell_key(content, described, manifest.source_hash())
 
     def _on_body(self, clip: Clip, body: humanoid.Body) -> BodyMotion:

@@ -153,7 +153,7 @@ def _run_on_dask(
         return _to_future(client.submit(_run_on_worker, source, folder, function, *tasks[which], pure=False))
 
     try:
-        for which, future in schedule_tasks(submit, len(tasks), room.places, look_s=POLL_INTERVAL_S):
+        for which, future in schedule_tasks(submit, len(tasks), room.capacity, look_s=POLL_INTERVAL_S):
             if isinstance(future.exception(), CancelledError):  # by no one here: the connection was lost
                 raise OSError("lost")
             yield which, future
@@ -169,7 +169,7 @@ class _DaskCapacity:
     def __init__(self, client: Any) -> None:
         self._client, self._asked_s, self._places = client, -POLL_INTERVAL_S, 1
 
-    def places(self) -> int:
+    def capacity(self) -> int:
         """OSError when the scheduler is gone."""
         if self._client.status != "running":
             raise OSError(self._client.status)

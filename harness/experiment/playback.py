@@ -31,12 +31,12 @@ class Playback:
     the same session of the tracker; each part is made when it is first asked for."""
 
     def __init__(self, setting: ClipEvaluation, *, posing: bool = False) -> None:
-        self.setting, self.posing = setting, posing
+        self.clip_evaluation, self.posing = setting, posing
 
     @property
     def scenario(self) -> Scenario:
         """As asked for: stations, rate and noise are put in."""
-        return self.setting.scenario
+        return self.clip_evaluation.scenario
 
     @property
     def tracker(self) -> TrackerConfig:
@@ -45,7 +45,7 @@ class Playback:
     @property
     def body(self) -> Body:
         """The performer's, in truth."""
-        return self.setting.body
+        return self.clip_evaluation.body
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
@@ -53,47 +53,49 @@ class Playback:
         return mounts_of(self.scenario)
 
     @property
-    def calibrated(self) -> PerformerCalibration:
+    def performer_calibration(self) -> PerformerCalibration:
         """What methods are told of trackers, room and body: the truth, until somebody calibrates."""
-        return self.setting.calibrated
+        return self.clip_evaluation.performer_calibration
 
     @property
     def calibration(self) -> Calibration:
         """Of the trackers and the room, as methods are told."""
-        return self.calibrated.calibration
+        return self.performer_calibration.calibration
 
-    def going_by(self, kept: CalibrationFile) -> "Playback":
+    def with_calibration(self, kept: CalibrationFile) -> "Playback":
         """The same with methods told what a calibration found, for these stations; BadInput when it lacks one.
 
         Where it has no skeleton the body is the scenario's.
         """
-        chosen = kept.of(tuple(self.scenario.stations))
+        chosen = kept.select(tuple(self.scenario.stations))
         body = self.body if chosen.skeleton is None else humanoid.build_body(chosen.skeleton)
         calibrated = PerformerCalibration(chosen.calibration, body, {})
-        return Playback(self.setting.going_by(calibrated), posing=self.posing)
+        return Playback(self.clip_evaluation.with_calibration(calibrated), posing=self.posing)
 
     @cached_property
     def take(self) -> BodyMotion:
         """What the performer does."""
         if not self.posing:
-            return self.setting.take
+            return self.clip_evaluation.take
         how = self.scenario.calibrating
         poses = [configuration(pose, self.body.skeleton) for pose in POSES]
-        return self.setting.session.model(poses, miss_rad=float(np.deg2rad(how.miss_deg)), hold_s=how.hold_s)
+        return self.clip_evaluation.session.make_pose_take(
+            poses, miss_rad=float(np.deg2rad(how.miss_deg)), hold_s=how.hold_s
+        )
 
     @cached_property
     def simulation(self) -> Simulation:
         """The first lap as a run of the scenario sees it, with the truth."""
-        return self.setting.session.seen(self.take) if self.posing else self.setting.simulation
+        return self.clip_evaluation.session.observe(self.take) if self.posing else self.clip_evaluation.simulation
 
     @cached_property
     def samples(self) -> DeviceSamples:
         """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
-        session, scenario = self.setting.session, self.scenario
-        noise = scenario.disturbance.added(noise_of(scenario), tuple(scenario.stations))
-        noise, name = (session.lasting, session.name) if self.posing else (noise, "")
+        session, scenario = self.clip_evaluation.session, self.scenario
+        noise = scenario.disturbance.add_to(noise_of(scenario), tuple(scenario.stations))
+        noise, name = (session.calibration_noise, session.name) if self.posing else (noise, "")
         return simulate_loop(
-            self.body, self.take, session.strapped, self.tracker, noise, seed=scenario.seed, session=name
+            self.body, self.take, session.true_mounts, self.tracker, noise, seed=scenario.seed, session=name
         )
 
 
@@ -114,7 +116,7 @@ def prepare_playback(
     UnknownName, BadFile and BadInput as for a run of the scenario.
     """
     asked = load_scenario(scenario)
-    asked = replace(asked, stations=asked.wearing, worn=())
+    asked = replace(asked, stations=asked.worn_stations, worn=())
     if stations is not None:
         asked = replace(asked, stations={name: asked.stations[name] for name in select_stations(asked, stations)})
     if rate_hz is not None:
@@ -134,7 +136,7 @@ def prepare_playback(
 
 def select_stations(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
     """Names of the first so many stations of a scenario, or of those named; BadInput, UnknownName."""
-    names = list(scenario.wearing)
+    names = list(scenario.worn_stations)
     if isinstance(stations, int):
         if not 1 <= stations <= len(names):
             raise BadInput(f"{stations} stations of {len(names)}.", f"{scenario.name} has: {', '.join(names)}.")

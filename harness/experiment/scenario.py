@@ -124,7 +124,7 @@ class Scenario:
     """What goes wrong where an emulator plays the scenario (see `harness.stream.emulator`); runs know nothing of it."""
 
     @property
-    def wearing(self) -> dict[str, Station]:
+    def worn_stations(self) -> dict[str, Station]:
         """The stations that are worn, in the order of the table."""
         return {name: self.stations[name] for name in self.stations if not self.worn or name in self.worn}
 

@@ -76,7 +76,7 @@ def find_playback(
         )
     its_own = load_scenario(played)
     stations: int | Sequence[str] = stream.stations
-    if not set(stream.stations) & set(its_own.wearing) and set("".join(stream.stations).encode()) <= set(
+    if not set(stream.stations) & set(its_own.worn_stations) and set("".join(stream.stations).encode()) <= set(
         STATION_CHARACTERS
     ):
         stations = len(stream.stations)  # the driver was told no names: the first so many were played
@@ -108,7 +108,7 @@ def name_recorded_stations(
             )
         return tuple(select_stations(known, names))
     unnamed = set("".join(stream.stations).encode()) <= set(STATION_CHARACTERS)
-    if unnamed and not set(stream.stations) & set(known.wearing):
+    if unnamed and not set(stream.stations) & set(known.worn_stations):
         return tuple(select_stations(known, count))
     return tuple(select_stations(known, stream.stations))
 
@@ -138,7 +138,8 @@ class _MethodOutput:
 def score_methods(stream: RecordingStream, rehearsal: Playback, methods: Sequence[str]) -> list[RecordingScore]:
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     sessions = {
-        name: rehearsal.setting.fitted(registry.resolve(name), name).begin(rehearsal.calibration) for name in methods
+        name: rehearsal.clip_evaluation.fit_method(registry.resolve(name), name).begin(rehearsal.calibration)
+        for name in methods
     }
     frames, zero_s, made = _run_methods(stream, sessions)
     laps = _split_into_loops(frames, zero_s, rehearsal.samples)
@@ -174,11 +175,11 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
     stamp_s = np.array([f.measured_s for f in frames]).reshape(shape) - zero_s[:, None]
-    since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_lap_s)
+    since = (stamp_s - samples.device_s[0]) * (len(samples) / samples.device_loop_s)
     number = np.round(_row_medians(np.where(sound, since, np.nan)))
     timed = number >= 0.0
     lap, index = np.divmod(np.where(timed, number, 0.0).astype(np.int64), len(samples))
-    judged = timed & (index < samples.first_lap)
+    judged = timed & (index < samples.take_frames)
     position_m = np.array([f.position_m for f in frames]).reshape(*shape, 3)
     off_m = _row_medians(np.where(sound, np.linalg.norm(position_m - samples.position_m[index], axis=2), np.nan))
     played = judged & ~(off_m > POSITION_TOLERANCE_M)  # NaN: the list has no positions, or all stations are lost
@@ -226,7 +227,7 @@ def _score_method(name: str, made: _MethodOutput, laps: Sequence[_LoopFrames], r
                 lap.index,
                 status,
                 step_ms,
-                estimate_skeleton=rehearsal.calibrated.body.skeleton,
+                estimate_skeleton=rehearsal.performer_calibration.body.skeleton,
                 warm_up_s=warm_s,
             )
         )

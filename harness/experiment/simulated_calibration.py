@@ -38,23 +38,23 @@ class TrackerSession:
     """The performer's."""
     nominal: tuple[Mount, ...]
     """Where trackers are said to be worn."""
-    strapped: tuple[Mount, ...]
+    true_mounts: tuple[Mount, ...]
     """Where they really are."""
     tracker: TrackerConfig
     noise: Noise
     """What goes wrong; what happens at one moment of the take does not happen while calibrating."""
 
     @property
-    def exact(self) -> Calibration:
+    def true_calibration(self) -> Calibration:
         """The truth."""
-        return exact_calibration(self.body, self.strapped, self.tracker)
+        return exact_calibration(self.body, self.true_mounts, self.tracker)
 
     @property
-    def lasting(self) -> Noise:
+    def calibration_noise(self) -> Noise:
         """What goes wrong while calibrating too."""
         return replace(self.noise, slip=(), displaced=(), turned=(), lost=())
 
-    def model(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> BodyMotion:
+    def make_pose_take(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> BodyMotion:
         """The performer holding configurations (55,), at the world's origin and facing x to begin with.
 
         How the n-th is missed does not depend on those after it.
@@ -63,17 +63,17 @@ class TrackerSession:
         take = hold_poses(self.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=hold_s)
         return replace(take, name=f"{self.name} calibration")
 
-    def seen(self, take: BodyMotion) -> Simulation:
+    def observe(self, take: BodyMotion) -> Simulation:
         """A take for calibration as the tracker sees it."""
         return simulate_tracker(
-            self.body, take, self.strapped, self.tracker, self.lasting, seed=self.seed, session=self.name
+            self.body, take, self.true_mounts, self.tracker, self.calibration_noise, seed=self.seed, session=self.name
         )
 
-    def standing_model(
+    def observe_poses(
         self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float
     ) -> tuple[TrackerFrame, ...]:
         """The stream of `model`."""
-        return self.seen(self.model(configurations, miss_rad=miss_rad, hold_s=hold_s)).frames
+        return self.observe(self.make_pose_take(configurations, miss_rad=miss_rad, hold_s=hold_s)).frames
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,13 +90,13 @@ class PerformerCalibration:
 
 def use_exact_calibration(session: TrackerSession) -> PerformerCalibration:
     """Nothing had to be found."""
-    return PerformerCalibration(session.exact, session.body, {})
+    return PerformerCalibration(session.true_calibration, session.body, {})
 
 
 def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
     """Mounts and room from a T-pose; bone lengths are known from elsewhere. NotStanding says what was wrong with it."""
     pose = tpose(session.body.skeleton)
-    frames = session.standing_model([pose], miss_rad=miss_rad, hold_s=hold_s)
+    frames = session.observe_poses([pose], miss_rad=miss_rad, hold_s=hold_s)
     found = calibrate_tpose(frames, session.body, session.nominal)
     errors = measure_calibration_errors(found.calibration, session.body.skeleton, session)
     return PerformerCalibration(
@@ -110,13 +110,13 @@ def simulate_poses_calibration(
     """Bone lengths, mounts and room from eight poses and from what other people's bones are like: of the performer,
     nothing is known but the stream. NotStanding when the poses cannot be found in it, or not be calibrated from."""
     poses = [configuration(pose, session.body.skeleton) for pose in POSES]
-    frames = session.standing_model(poses, miss_rad=miss_rad, hold_s=hold_s)
+    frames = session.observe_poses(poses, miss_rad=miss_rad, hold_s=hold_s)
     nobody = build_body()
     shown = [configuration(pose, nobody.skeleton) for pose in POSES]
     stations = [mount.station for mount in session.nominal]
     collector = PoseCollector(stations, len(POSES), PoseClassifier(nobody, session.nominal, shown))
-    PoseGuide(collector, POSES).lead(frames, say=lambda text: None)
-    found = calibrate_poses(collector.held, space, session.nominal)
+    PoseGuide(collector, POSES).run(frames, say=lambda text: None)
+    found = calibrate_poses(collector.holds, space, session.nominal)
     errors = measure_calibration_errors(found.calibration, found.skeleton, session)
     notes = (_error_note(f"eight poses, other bones learnt from {space.source}", errors),)
     return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
@@ -125,7 +125,7 @@ def simulate_poses_calibration(
 def measure_calibration_errors(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:
     """Of mounts, root mean square over stations [mm] and [deg]; of bone lengths, root mean square [mm]; of the room's
     frame, its turn about the vertical [deg] and its origin [mm]."""
-    true = session.exact
+    true = session.true_calibration
     beside_m = np.linalg.norm(found.mount_m - true.mount_m, axis=1)
     turned_rad = rotations.angle_between_rad(found.bone_from_station, true.bone_from_station)
     room = rotations.multiply(found.world_from_tracker, rotations.inverse(true.world_from_tracker))

@@ -33,7 +33,7 @@ class RunStatus:
     """At the pace of now, or of the last time [s]; None where there is none to tell it from."""
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         """Cells that are neither finished nor failed."""
         return max(self.planned - self.finished - len(self.failures), 0)
 
@@ -62,7 +62,7 @@ def _index_status(out: Path) -> RunStatus:
     found = RunStatus(kind, str(facts.get("name", out.name)), counts.planned, finished, failures, running)
     made = facts.get("made", 0) + (unwritten if running else 0)
     took_s = (now if running else facts.get("seen_s", now)) - facts.get("started_s", now)
-    return replace(found, left_s=took_s / made * found.left if made and found.left and took_s > 0.0 else None)
+    return replace(found, left_s=took_s / made * found.remaining if made and found.remaining and took_s > 0.0 else None)
 
 
 def _run_status(out: Path) -> RunStatus:
@@ -85,7 +85,7 @@ def _run_status(out: Path) -> RunStatus:
     made = [at for at in written_s if at >= since_s]
     found = RunStatus("run", out.name, planned, min(len(written_s), planned), {}, running)
     took_s = (time.time() if running else max(made, default=since_s)) - since_s
-    return replace(found, left_s=took_s / len(made) * found.left if made and found.left else None)
+    return replace(found, left_s=took_s / len(made) * found.remaining if made and found.remaining else None)
 
 
 def _count_planned(inputs: Mapping[str, Any], circumstances: Mapping[str, Any]) -> int:

@@ -56,7 +56,7 @@ def run_sweep(
     storage.open_run(out, _sweep_manifest(sweep, scenarios, folder, command))
     with folder_lock(out), CellIndex(out) as index:
         write_json(out / "study.json", {"kind": "sweep", **asdict(sweep), "command": command})
-        index.gather()
+        index.add_from_folders()
         index.plan(names)
         index.note(name=sweep.name, command=command)
         try:

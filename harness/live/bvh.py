@@ -25,7 +25,7 @@ class BvhOutput:
 
     def __init__(self, path: Path, own: Skeleton, rate_hz: float, *, force: bool = False) -> None:
         """BadFile when there is one and it is not to be written over, or when it cannot be written."""
-        self.name, self.told = f"--bvh {path}", f"BVH: {path}"
+        self.name, self.description = f"--bvh {path}", f"BVH: {path}"
         self._skeleton, self._rate_hz = own, rate_hz
         head = "\n".join([*hierarchy_lines(own), "MOTION", ""])
         self._count_at = len(head)

@@ -64,7 +64,7 @@ class StageLatencies:
         self.to_pose.add(ready_s - received_s)
         self.missed += ready_s - received_s > self.deadline_s
 
-    def named(self) -> dict[str, DurationHistogram]:
+    def by_name(self) -> dict[str, DurationHistogram]:
         """In the order of the way."""
         return {
             "last byte to taken": self.waiting,

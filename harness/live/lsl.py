@@ -46,8 +46,8 @@ class LslOutput:
             pylsl.set_config_content(
                 _LOOPBACK_CONFIG
             )  # counts until the first stream is made, and for the whole program
-        self.told = f"LSL: {name}-qpos and {name}-joints, {where}"
-        self._late_s = pylsl.local_clock() - time.monotonic()
+        self.description = f"LSL: {name}-qpos and {name}-joints, {where}"
+        self._clock_offset_s = pylsl.local_clock() - time.monotonic()
         root = [(f"root.{axis}", "metres") for axis in "xyz"] + [
             (f"root.q{axis}", "unit quaternion") for axis in "wxyz"
         ]
@@ -59,7 +59,7 @@ class LslOutput:
         self._joints = _make_outlet(pylsl, f"{name}-joints", joints, rate_hz)
 
     def send(self, pose: LivePose) -> None:
-        stamp_s = pose.measured_s + self._late_s
+        stamp_s = pose.measured_s + self._clock_offset_s
         self._qpos.push_sample(pose.estimate.qpos, stamp_s)
         self._joints.push_sample(pose.joints_m.ravel(), stamp_s)
 

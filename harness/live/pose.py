@@ -76,7 +76,7 @@ class Output(Protocol):
         ...
 
     @property
-    def told(self) -> str:
+    def description(self) -> str:
         """Where it goes, in a line for the user."""
         ...
 

@@ -16,7 +16,7 @@ class PoseTableOutput:
 
     def __init__(self, path: Path, own: Skeleton, stations: tuple[str, ...], *, force: bool = False) -> None:
         """BadFile when there is one and it is not to be written over, or when it cannot be written."""
-        self.name, self.told = f"--poses {path}", f"table of poses: {path}"
+        self.name, self.description = f"--poses {path}", f"table of poses: {path}"
         root = [f"root.{axis}_m" for axis in "xyz"] + [f"root.q{axis}" for axis in "wxyz"]
         hinges = [f"{own.dof_names[d]}_rad" for d in _hinges_in_qpos_order(own)]
         times = ["received_s", "taken_s", "ready_s", *(f"device_s.{name}" for name in stations)]

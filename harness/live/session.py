@@ -42,7 +42,7 @@ class LiveOptions:
     seconds: float | None = None
     """After so long it ends by itself, calibration not counted."""
     queue_frames: int = QUEUE_FRAMES
-    stamped_here: bool = True
+    host_timestamps: bool = True
     """Whether frames are stamped by this computer's monotonic clock as they come. Those of a recording are not, and
     their way is timed from where they leave the stream."""
 
@@ -53,7 +53,7 @@ class LiveResult:
 
     captured: int
     """Frames that the stream gave."""
-    before: int
+    frames_before: int
     """Those that went by until the trackers were calibrated and the method ready for them."""
     dropped: int
     """Those that waited too long for their turn and were never solved."""
@@ -115,7 +115,7 @@ def run_session(
         solver.close()
     if error := solver.error or capture.error:
         raise error
-    return solver.performed(capture.frames)
+    return solver.result(capture.frames)
 
 
 class _SolverThread:
@@ -132,7 +132,7 @@ class _SolverThread:
         say: Notifier,
         clock: Callable[[], float],
     ) -> None:
-        self._queue, self._reconstructor, self._worn = queue, reconstructor, worn
+        self._queue, self._reconstructor, self._calibration = queue, reconstructor, worn
         self._outputs, self._plan, self._say, self._clock = list(outputs), plan, say, clock
         self._kinematics = Kinematics(body)
         self._host_time = HostClockEstimator()
@@ -140,7 +140,7 @@ class _SolverThread:
         self._status: Counter[str] = Counter()
         self._failed: dict[str, str] = {}
         self._session: Session | None = None
-        self._calibrating = self._let_go = 0
+        self._frames_calibrated = self._frames_discarded = 0
         """Frames that were calibrated from, and that went by meanwhile."""
         self._first_s = self._last_s = 0.0
         self.began_s = float("inf")
@@ -150,14 +150,14 @@ class _SolverThread:
 
     def prepare(self) -> None:
         """What can be done before the first frame."""
-        if isinstance(self._worn, Calibration):
-            self._session = self._reconstructor.begin(self._worn)
+        if isinstance(self._calibration, Calibration):
+            self._session = self._reconstructor.begin(self._calibration)
 
     def run(self) -> None:
         try:
             session = self._session
-            if not isinstance(self._worn, Calibration):
-                session = self._calibrated(self._worn)
+            if not isinstance(self._calibration, Calibration):
+                session = self._calibrate(self._calibration)
             if session is not None:
                 self.began_s = self._clock()
                 self._solve(session)
@@ -177,18 +177,18 @@ class _SolverThread:
         except Exception as error:  # whatever it is, the others are closed too
             self._failed.setdefault(output.name, _error_text(error))
 
-    def performed(self, captured: int) -> LiveResult:
+    def result(self, captured: int) -> LiveResult:
         return LiveResult(
             captured=captured,
-            before=self._calibrating + self._let_go,
-            dropped=self._queue.dropped - self._let_go,
+            frames_before=self._frames_calibrated + self._frames_discarded,
+            dropped=self._queue.dropped - self._frames_discarded,
             status={state.name.lower(): self._status[state.name] for state in Status},
             seconds=self._last_s - self._first_s,
             stages=self._stages,
             failed=self._failed,
         )
 
-    def _calibrated(self, calibrator: Calibrator) -> Session | None:
+    def _calibrate(self, calibrator: Calibrator) -> Session | None:
         """A session for trackers as the stream shows them to be worn; None when it ended before."""
         calibrator.begin(self._say)
         found: Calibration | None = None
@@ -196,11 +196,11 @@ class _SolverThread:
             if (captured := self._queue.take()) is None:
                 self._say("calibration: the stream ended before it was done")
                 return None
-            self._calibrating += 1
+            self._frames_calibrated += 1
             found = calibrator.add(captured.frame, self._say)
         session = self._reconstructor.begin(found)  # a method may take its time to learn how trackers are worn
         self._queue.drop_all()
-        self._let_go = self._queue.dropped
+        self._frames_discarded = self._queue.dropped
         return session
 
     def _solve(self, session: Session) -> None:
@@ -214,7 +214,7 @@ class _SolverThread:
             pose = LivePose(number, frame, taken_s, ready_s, measured_s, estimate, self._kinematics)
             self._send(pose)
             sent_s = self._clock()
-            came_s = frame.received_s if self._plan.stamped_here else captured.captured_s
+            came_s = frame.received_s if self._plan.host_timestamps else captured.captured_s
             self._stages.add(came_s, taken_s, ready_s, sent_s)
             self._status[estimate.status.name] += 1
             self._first_s, self._last_s = self._first_s or ready_s, ready_s

@@ -81,7 +81,10 @@ class ViewerOutput:
 
     def __init__(self, kind: ViewerKind, own: Skeleton, out: Path | None = None, *, force: bool) -> None:
         """Returns when a first picture, of the T-pose, was drawn; BadInput, BadFile, MissingExtra when it cannot be."""
-        self.name, self.told = f"--view {kind}", f"view: {'a window' if kind == 'window' else f'pictures in {out}'}"
+        self.name, self.description = (
+            f"--view {kind}",
+            f"view: {'a window' if kind == 'window' else f'pictures in {out}'}",
+        )
         if find_spec("pyvista") is None:
             raise MissingExtra(self.name, "pyvista", "viz")
         screenless = sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))

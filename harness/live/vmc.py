@@ -34,7 +34,7 @@ class VmcOutput:
         if find_spec("pythonosc") is None:
             raise MissingExtra("--vmc", "python-osc", "live")
         host, port = parse_address(address)
-        self.name, self.told = f"--vmc {host}:{port}", f"VMC protocol: to UDP port {port} of {host}"
+        self.name, self.description = f"--vmc {host}:{port}", f"VMC protocol: to UDP port {port} of {host}"
         self._pose = UnityPose(own)
         self._datagrams = _VmcDatagrams(self._pose.names)
         self._to: Any
@@ -50,7 +50,7 @@ class VmcOutput:
         if self._began_s is None:
             self._began_s = pose.measured_s
         seen = pose.estimate.status is not Status.LOST
-        for datagram in self._datagrams.filled(seen, pose.measured_s - self._began_s, self._pose.local(pose)):
+        for datagram in self._datagrams.fill(seen, pose.measured_s - self._began_s, self._pose.local(pose)):
             with suppress(BlockingIOError):  # the line is full: the next pose is better than an old one
                 self._socket.sendto(datagram, self._to)
 
@@ -86,7 +86,7 @@ class _VmcDatagrams:
             self._numbers.append(ends[len(before) :, None] + np.arange(-_POSE_BYTES, 0))
         self._tracked, self._time = (int(end) - 4 for end in _bundle(first)[1][:2])
 
-    def filled(self, tracked: bool, time_s: float, bones: Floats) -> list[bytes]:
+    def fill(self, tracked: bool, time_s: float, bones: Floats) -> list[bytes]:
         """The datagrams of a pose: whether trackers are seen, time since the start [s], bones (B, 7)."""
         first, at = self._bundles[0], 0
         first[self._tracked : self._tracked + 4] = np.frombuffer(int(tracked).to_bytes(4, "big"), np.uint8)

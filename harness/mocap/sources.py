@@ -39,7 +39,7 @@ class MotionSource(Protocol):
         """The same object each time."""
         ...
 
-    def people(self, without: str) -> dict[str, Skeleton]:
+    def other_skeletons(self, without: str) -> dict[str, Skeleton]:
         """Skeletons by subject, to learn from what people's bones are like: of all whom the source knows but one."""
         ...
 
@@ -81,7 +81,7 @@ class SyntheticSource:
             self._made[name] = synthetic.generate(behaviour, who, take, seed=self._seed)
         return self._made[name]
 
-    def people(self, without: str) -> dict[str, Skeleton]:
+    def other_skeletons(self, without: str) -> dict[str, Skeleton]:
         """Drawn from the performers' spread, whatever the seed; no performer is among them."""
         return _synthetic_population()
 
@@ -127,7 +127,7 @@ class LibrarySource:
             self._read[name] = self._library.load(name)
         return self._read[name]
 
-    def people(self, without: str) -> dict[str, Skeleton]:
+    def other_skeletons(self, without: str) -> dict[str, Skeleton]:
         """The library's ASF skeletons; BadInput when there is none."""
         if self._people is None:
             self._people = read_skeletons(self._library.folder)

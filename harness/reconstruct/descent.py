@@ -27,21 +27,21 @@ class KinematicTree(NamedTuple):
 
     parent: Ints
     """(B,)"""
-    start_m: Floats
+    joint_m: Floats
     """(B, 3) where each joint lies in its parent's frame."""
-    first_hinge: Ints
+    first_dof: Ints
     """(B + 1,) where each body's run of hinges begins among the V."""
     axis: Floats
     """(V, 3) of hinges, in the body's frame; rows 0 to 5, the root's, mean nothing."""
-    body: Ints
+    dof_body: Ints
     """(V,) that each direction moves."""
     depth: Ints
     """(V,) how many directions lie inwards of each."""
-    inwards: Ints
+    ancestors: Ints
     """(V, D) which those are, by their depth, and then the direction itself."""
     station_body: Ints
     """(S,)"""
-    last: Ints
+    station_dof: Ints
     """(S,) the outermost direction that moves each station."""
     mount_m: Floats
     """(S, 3)"""
@@ -63,11 +63,11 @@ class StationTargets(NamedTuple):
 class MeasurementModel(NamedTuple):
     """How readings become targets."""
 
-    turn: Floats
+    world_from_tracker: Floats
     """(3, 3) `world_from_tracker`."""
     origin_m: Floats
     """(3,)"""
-    to_bone: Floats
+    bone_from_reading: Floats
     """(S, 4, 4) from a station's quaternion to that of its bone in the world."""
     precision: Floats
     """(2S,) of readings that are fully trusted: one over variance."""
@@ -82,9 +82,9 @@ class MeasurementModel(NamedTuple):
 class KinematicState(NamedTuple):
     """Where a configuration puts the body."""
 
-    at_m: Floats
+    body_m: Floats
     """(B, 3)"""
-    turned: Floats
+    world_from_body: Floats
     """(B, 4)"""
     axis: Floats
     """(V, 3) of turning, in the world."""
@@ -96,7 +96,7 @@ class KinematicState(NamedTuple):
     """(2S,) of the errors' lengths."""
     weight: Floats
     """(2S,) precision as the Lorentzian leaves it."""
-    slope: Floats
+    jacobian: Floats
     """(6, D) of the station at hand by directions of each depth: how it moves, then how it turns."""
 
 
@@ -119,14 +119,14 @@ def build_tree(body: Body, bones: Sequence[int], mount_m: Floats) -> KinematicTr
         last.append(model.body_dofadr[station] + model.body_dofnum[station] - 1)
     return KinematicTree(
         parent=np.array(model.body_parentid[1:] - 1, dtype=np.int64),
-        start_m=np.array(model.body_pos[1:]),
-        first_hinge=np.concatenate([[6], np.cumsum(hinges)]),
+        joint_m=np.array(model.body_pos[1:]),
+        first_dof=np.concatenate([[6], np.cumsum(hinges)]),
         axis=np.concatenate([np.zeros((6, 3)), model.jnt_axis[1:]]),
-        body=np.array(model.dof_bodyid - 1, dtype=np.int64),
+        dof_body=np.array(model.dof_bodyid - 1, dtype=np.int64),
         depth=depth,
-        inwards=inwards,
+        ancestors=inwards,
         station_body=stations - 1,
-        last=np.array(last, dtype=np.int64),
+        station_dof=np.array(last, dtype=np.int64),
         mount_m=np.array(mount_m, dtype=float),
     )
 
@@ -135,14 +135,14 @@ def new_state(chain: KinematicTree) -> KinematicState:
     """Arrays for one session."""
     bodies, directions, stations = len(chain.parent), len(chain.depth), len(chain.station_body)
     return KinematicState(
-        at_m=np.zeros((bodies, 3)),
-        turned=np.zeros((bodies, 4)),
+        body_m=np.zeros((bodies, 3)),
+        world_from_body=np.zeros((bodies, 4)),
         axis=np.zeros((directions, 3)),
         station_m=np.zeros((stations, 3)),
         error=np.zeros((2 * stations, 3)),
         squared=np.zeros(2 * stations),
         weight=np.zeros(2 * stations),
-        slope=np.zeros((6, chain.inwards.shape[1])),
+        jacobian=np.zeros((6, chain.ancestors.shape[1])),
     )
 
 
@@ -177,12 +177,12 @@ def update_targets(
             readings.target_m[s] = tracker.origin_m
             for i in range(3):
                 for j in range(3):
-                    readings.target_m[s, i] += tracker.turn[i, j] * position_m[s, j]
+                    readings.target_m[s, i] += tracker.world_from_tracker[i, j] * position_m[s, j]
         if orientation_valid[s]:
             readings.world_from_target[s] = 0.0
             for i in range(4):
                 for j in range(4):
-                    readings.world_from_target[s, i] += tracker.to_bone[s, i, j] * turned[s, j]
+                    readings.world_from_target[s, i] += tracker.bone_from_reading[s, i, j] * turned[s, j]
     for row in range(2 * count):
         readings.precision[row] = tracker.precision[row] * trust[row]
         readings.twice_scale_squared[row] = tracker.twice_scale_squared[row]
@@ -191,7 +191,7 @@ def update_targets(
 @compiled
 def forward_kinematics(chain: KinematicTree, placed: KinematicState, qpos: Floats) -> None:
     """Forward kinematics of a configuration (V + 1,)."""
-    at_m, turned, axis = placed.at_m, placed.turned, placed.axis
+    at_m, turned, axis = placed.body_m, placed.world_from_body, placed.axis
     length = np.sqrt(qpos[3] ** 2 + qpos[4] ** 2 + qpos[5] ** 2 + qpos[6] ** 2)
     for i in range(3):
         at_m[0, i] = qpos[i]
@@ -200,11 +200,11 @@ def forward_kinematics(chain: KinematicTree, placed: KinematicState, qpos: Float
     q = as_tuple(turned[0])
     axis[3], axis[4], axis[5] = rotate(q, 1.0, 0.0, 0.0), rotate(q, 0.0, 1.0, 0.0), rotate(q, 0.0, 0.0, 1.0)
     for body in range(1, len(chain.parent)):
-        parent, start = chain.parent[body], chain.start_m[body]
+        parent, start = chain.parent[body], chain.joint_m[body]
         q = as_tuple(turned[parent])
         x, y, z = rotate(q, start[0], start[1], start[2])
         at_m[body, 0], at_m[body, 1], at_m[body, 2] = at_m[parent, 0] + x, at_m[parent, 1] + y, at_m[parent, 2] + z
-        for hinge in range(chain.first_hinge[body], chain.first_hinge[body + 1]):
+        for hinge in range(chain.first_dof[body], chain.first_dof[body + 1]):
             own, half = chain.axis[hinge], 0.5 * qpos[hinge + 1]
             axis[hinge, 0], axis[hinge, 1], axis[hinge, 2] = rotate(q, own[0], own[1], own[2])
             sine = np.sin(half)
@@ -225,7 +225,7 @@ def forward_kinematics_batch(
         forward_kinematics(chain, placed, qpos[t])
         station_m[t] = placed.station_m
         for s in range(len(chain.station_body)):
-            turned[t, s] = placed.turned[chain.station_body[s]]
+            turned[t, s] = placed.world_from_body[chain.station_body[s]]
 
 
 @compiled
@@ -235,7 +235,7 @@ def evaluate(chain: KinematicTree, readings: StationTargets, placed: KinematicSt
     count, cost = len(chain.station_body), 0.0
     for s in range(count):
         placed.error[s] = readings.target_m[s] - placed.station_m[s]
-        q = placed.turned[chain.station_body[s]]
+        q = placed.world_from_body[chain.station_body[s]]
         placed.error[count + s] = rotation_vector(
             *quaternion_product(as_tuple(readings.world_from_target[s]), q[0], -q[1], -q[2], -q[3])
         )
@@ -256,14 +256,14 @@ def normal_equations(
     chain: KinematicTree, placed: KinematicState, hessian: Floats, descent: Floats, bent: bool = False
 ) -> None:
     """Gauss and Newton's matrix (V, V), lower triangle, zero elsewhere, the curvature added if asked; the descent."""
-    rows = np.empty(chain.inwards.shape)
+    rows = np.empty(chain.ancestors.shape)
     normal_rows(chain, placed, rows, descent)
     if bent:
         add_curvature(chain, placed, rows)
     hessian[:] = 0.0
     for i in range(len(rows)):
         for d in range(chain.depth[i] + 1):
-            hessian[i, chain.inwards[i, d]] = rows[i, d]
+            hessian[i, chain.ancestors[i, d]] = rows[i, d]
 
 
 @compiled
@@ -271,15 +271,15 @@ def normal_rows(chain: KinematicTree, placed: KinematicState, rows: Floats, desc
     """The same as rows (V, D)."""
     rows[:], descent[:] = 0.0, 0.0
     count = len(chain.station_body)
-    m0, m1, m2, t0, t1, t2 = _jacobian_rows(placed.slope)
+    m0, m1, m2, t0, t1, t2 = _jacobian_rows(placed.jacobian)
     for s in range(count):
         moving, turning = placed.weight[s], placed.weight[count + s]
         if moving == 0.0 and turning == 0.0:
             continue
         _station_jacobian(chain, placed, s)
         off, twist = placed.error[s], placed.error[count + s]
-        for d in range(chain.depth[chain.last[s]] + 1):
-            i = chain.inwards[chain.last[s], d]
+        for d in range(chain.depth[chain.station_dof[s]] + 1):
+            i = chain.ancestors[chain.station_dof[s], d]
             a0, a1, a2 = moving * m0[d], moving * m1[d], moving * m2[d]
             b0, b1, b2 = turning * t0[d], turning * t1[d], turning * t2[d]
             descent[i] += a0 * off[0] + a1 * off[1] + a2 * off[2] + b0 * twist[0] + b1 * twist[1] + b2 * twist[2]
@@ -297,7 +297,7 @@ def add_curvature(chain: KinematicTree, placed: KinematicState, rows: Floats) ->
     beyond j, half of it between axes of orientations. Trackers pin a pose so stiffly against so weak a prior that
     this term outweighs the prior as soon as residuals reach 1 mm.
     """
-    count, slope = len(chain.station_body), placed.slope
+    count, slope = len(chain.station_body), placed.jacobian
     _, _, _, t0, t1, t2 = _jacobian_rows(slope)
     for s in range(count):
         moving, turning = placed.weight[s], 0.5 * placed.weight[count + s]
@@ -309,9 +309,9 @@ def add_curvature(chain: KinematicTree, placed: KinematicState, rows: Floats) ->
             *(moving * off[0], moving * off[1], moving * off[2]),
             *(turning * twist[0], turning * twist[1], turning * twist[2]),
         )
-        for d in range(3, chain.depth[chain.last[s]] + 1):
+        for d in range(3, chain.depth[chain.station_dof[s]] + 1):
             x, y, z = _wrench_cross(pull, slope, d)
-            row = rows[chain.inwards[chain.last[s], d]]
+            row = rows[chain.ancestors[chain.station_dof[s], d]]
             if d >= 6:
                 for e in range(3, d + 1):
                     row[e] += x * t0[e] + y * t1[e] + z * t2[e]
@@ -342,12 +342,12 @@ def _wrench_cross(pull: Wrench, slope: Floats, d: int) -> Vector:
 @compiled
 def _station_jacobian(chain: KinematicTree, placed: KinematicState, station: int) -> None:
     """How the station moves and turns by every direction that moves it."""
-    slope, at, last = placed.slope, placed.station_m[station], chain.last[station]
+    slope, at, last = placed.jacobian, placed.station_m[station], chain.station_dof[station]
     slope[:, :3] = 0.0
     slope[0, 0] = slope[1, 1] = slope[2, 2] = 1.0
     for d in range(3, chain.depth[last] + 1):
-        i = chain.inwards[last, d]
-        a, start = placed.axis[i], placed.at_m[chain.body[i]]
+        i = chain.ancestors[last, d]
+        a, start = placed.axis[i], placed.body_m[chain.dof_body[i]]
         x, y, z = at[0] - start[0], at[1] - start[1], at[2] - start[2]
         slope[0, d], slope[1, d], slope[2, d] = a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x
         slope[3, d], slope[4, d], slope[5, d] = a[0], a[1], a[2]
@@ -358,33 +358,33 @@ class QuadraticModel(NamedTuple):
 
     hessian: Floats
     """(V, D) Gauss and Newton's with prior and damping."""
-    bent: Floats
+    full_hessian: Floats
     """(V, D) the same with the full curvature."""
     gradient: Floats
     low: Floats
     high: Floats
     step: Floats
     """The minimum."""
-    away: Floats
+    to_mean: Floats
     """From the configuration to the prior's mean."""
-    moved: Floats
+    next_qpos: Floats
     """(V + 1,) the configuration after the step."""
     factor: Floats
     """(V, D)"""
     clamped: Bools
     """Which lie at a bound."""
-    slope: Floats
-    toward: Floats
-    there: Floats
-    gone: Floats
-    bend: Floats
+    residual_gradient: Floats
+    direction: Floats
+    trial: Floats
+    change: Floats
+    hessian_change: Floats
 
 
 def new_quadratic_model(chain: KinematicTree) -> QuadraticModel:
     """Arrays for one solver."""
     directions = len(chain.depth)
     gradient, step, away, slope, toward, there, gone, bend = np.zeros((8, directions))
-    hessian, bent, factor = np.zeros((3, *chain.inwards.shape))
+    hessian, bent, factor = np.zeros((3, *chain.ancestors.shape))
     return QuadraticModel(
         hessian,
         bent,
@@ -446,14 +446,14 @@ def minimise(
     """
     for i in range(7, len(qpos)):
         qpos[i] = min(max(qpos[i], trust.low_rad[i - 7]), trust.high_rad[i - 7])
-    hessian, gradient, step, moved = model.hessian, model.gradient, model.step, model.moved
-    cost = evaluate(chain, readings, placed, qpos) + _prior_cost(trust, qpos, model.away)
+    hessian, gradient, step, moved = model.hessian, model.gradient, model.step, model.next_qpos
+    cost = evaluate(chain, readings, placed, qpos) + _prior_cost(trust, qpos, model.to_mean)
     damping, kept, fresh = _INITIAL_DAMPING, 1.0, False
     for steps in range(1, trust.most_steps + 1):
         if not fresh:
             normal_rows(chain, placed, hessian, gradient)
             for i in range(len(step)):
-                gradient[i] = -gradient[i] - trust.precision[i] * model.away[i]
+                gradient[i] = -gradient[i] - trust.precision[i] * model.to_mean[i]
                 hessian[i, chain.depth[i]] += trust.precision[i] + damping
             for i in range(6, len(step)):
                 model.low[i] = min(trust.low_rad[i - 6] - qpos[i + 1], 0.0)
@@ -461,9 +461,9 @@ def minimise(
             fresh = True
         solved = False
         if kept < _GOOD_GAIN_RATIO:
-            model.bent[:] = hessian
-            add_curvature(chain, placed, model.bent)
-            solved = solve_box_qp(chain, model, model.bent)
+            model.full_hessian[:] = hessian
+            add_curvature(chain, placed, model.full_hessian)
+            solved = solve_box_qp(chain, model, model.full_hessian)
         if not solved and not solve_box_qp(chain, model, hessian):
             return cost, -1, False
         promised, longest = -0.5 * dot(gradient, step), np.abs(step).max()
@@ -474,7 +474,7 @@ def minimise(
             if longest < _MAX_FINAL_STEP:
                 qpos[:] = moved
             return cost, steps, True
-        new_cost = evaluate(chain, readings, placed, moved) + _prior_cost(trust, moved, model.away)
+        new_cost = evaluate(chain, readings, placed, moved) + _prior_cost(trust, moved, model.to_mean)
         kept = (cost - new_cost) / promised
         if new_cost < cost:
             qpos[:] = moved
@@ -525,8 +525,8 @@ def solve_box_qp(chain: KinematicTree, model: QuadraticModel, hessian: Floats) -
     False unless H is positive definite on the directions that the bounds leave free.
     """
     x, slope, toward, there, gone, bend = (
-        *(model.step, model.slope, model.toward),
-        *(model.there, model.gone, model.bend),
+        *(model.step, model.residual_gradient, model.direction),
+        *(model.trial, model.change, model.hessian_change),
     )
     x[:] = 0.0
     slope[:] = model.gradient
@@ -573,7 +573,7 @@ def _factorise(chain: KinematicTree, hessian: Floats, clamped: Bools, factor: Fl
     """L^T D L of the free directions, D last in each row; False unless positive definite (Featherstone 2008, 6.5)."""
     for k in range(len(factor)):
         for d in range(chain.depth[k] + 1):
-            factor[k, d] = 0.0 if clamped[k] or clamped[chain.inwards[k, d]] else hessian[k, d]
+            factor[k, d] = 0.0 if clamped[k] or clamped[chain.ancestors[k, d]] else hessian[k, d]
         if clamped[k]:
             factor[k, chain.depth[k]] = 1.0
     for k in range(len(factor) - 1, -1, -1):
@@ -583,7 +583,7 @@ def _factorise(chain: KinematicTree, hessian: Floats, clamped: Bools, factor: Fl
         for d in range(depth - 1, -1, -1):
             share = row[d] / row[depth]
             if share != 0.0:
-                other = factor[chain.inwards[k, d]]
+                other = factor[chain.ancestors[k, d]]
                 for e in range(d + 1):
                     other[e] -= share * row[e]
                 row[d] = share
@@ -595,11 +595,11 @@ def _solve_factorised(chain: KinematicTree, factor: Floats, x: Floats) -> None:
     """x := (L^T D L)^-1 x"""
     for k in range(len(x) - 1, -1, -1):
         for d in range(chain.depth[k]):
-            x[chain.inwards[k, d]] -= factor[k, d] * x[k]
+            x[chain.ancestors[k, d]] -= factor[k, d] * x[k]
     for k in range(len(x)):
         x[k] /= factor[k, chain.depth[k]]
         for d in range(chain.depth[k]):
-            x[k] -= factor[k, d] * x[chain.inwards[k, d]]
+            x[k] -= factor[k, d] * x[chain.ancestors[k, d]]
 
 
 @compiled
@@ -608,7 +608,7 @@ def _multiply_symmetric(chain: KinematicTree, hessian: Floats, x: Floats, out: F
     for k in range(len(x)):
         out[k] = hessian[k, chain.depth[k]] * x[k]
         for d in range(chain.depth[k]):
-            i = chain.inwards[k, d]
+            i = chain.ancestors[k, d]
             out[k] += hessian[k, d] * x[i]
             out[i] += hessian[k, d] * x[k]
 
@@ -662,11 +662,11 @@ class Subspace(NamedTuple):
 
     mean: Floats
     """(P,) p."""
-    across: Floats
+    normals: Floats
     """(D, P) N, orthonormal."""
     curvature: Floats
     """(P, P) A, and a stiff spring along N."""
-    pull: Floats
+    linear: Floats
     """(P,) b."""
     spring: Floats
     """(P,) what of the diagonal of A is the spring's."""
@@ -722,7 +722,7 @@ def minimise_in_subspace(
 @compiled
 def project_posture(space: Subspace, posture: Floats) -> Floats:
     """The posture (P,) of the space that is nearest to one."""
-    out: Floats = posture - np.dot(np.dot(space.across, posture - space.mean), space.across)
+    out: Floats = posture - np.dot(np.dot(space.normals, posture - space.mean), space.normals)
     return out
 
 
@@ -730,7 +730,7 @@ def project_posture(space: Subspace, posture: Floats) -> Floats:
 def subspace_cost(space: Subspace, posture: Floats) -> float:
     """Of a posture (P,)."""
     away = posture - space.mean
-    return dot(away, 0.5 * np.dot(space.curvature, away) - space.pull)
+    return dot(away, 0.5 * np.dot(space.curvature, away) - space.linear)
 
 
 @compiled
@@ -793,7 +793,7 @@ def to_subspace(space: Subspace, z: Floats, hessian: Floats, descent: Floats, no
             row[c + 1] = was[c] + more[c - 2]
     gradient[:7] = np.dot(slope, descent[:6])
     gradient[7:] = descent[6:]
-    gradient[3:] += space.pull - np.dot(curvature, z[3:] - space.mean)
+    gradient[3:] += space.linear - np.dot(curvature, z[3:] - space.mean)
 
 
 @compiled
@@ -819,5 +819,5 @@ def solve_damped(space: Subspace, normal: Floats, gradient: Floats, damping: flo
         for i in range(k):
             step[k] -= factor[k, i] * step[i]
         step[k] /= factor[k, k]
-    step[3:] -= np.dot(np.dot(space.across, step[3:]), space.across)
+    step[3:] -= np.dot(np.dot(space.normals, step[3:]), space.normals)
     return step

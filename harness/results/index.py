@@ -70,7 +70,7 @@ class CellIndex:
         with self._db:
             self._db.executemany(f"INSERT OR IGNORE INTO cells VALUES ({holes})", columns)  # noqa: S608  # holes alone
 
-    def gather(self) -> int:
+    def add_from_folders(self) -> int:
         """Add the finished cells that lie in the folder and are not here; how many. Those of older versions, which
         nobody can ask for any more, are left out."""
         known = {key for (key,) in self._db.execute("SELECT key FROM cells")}
@@ -113,7 +113,7 @@ class CellIndex:
                 ((cell, *known.get(cell, (None, None))) for cell in cells),
             )
 
-    def ended(self, what: Iterable[tuple[str, str, str]]) -> None:
+    def record_outcomes(self, what: Iterable[tuple[str, str, str]]) -> None:
         """(cell, key, failure) of cells of the plan; one of the two is empty."""
         with self._db:
             self._db.executemany(

@@ -54,7 +54,7 @@ class Disturbance:
         """With the time of its beginning and end, so that a reader need not know how they are found."""
         return {**asdict(self), "begins_s": self.begins_s, "ends_s": self.ends_s}
 
-    def added(self, noise: Noise, stations: tuple[str, ...]) -> Noise:
+    def add_to(self, noise: Noise, stations: tuple[str, ...]) -> Noise:
         """The noise and this on top of it; UnknownName when nobody wears the one station."""
         if self.station and self.station not in stations:
             raise UnknownName("station", self.station, stations)

@@ -63,7 +63,7 @@ def simulate_loop(
     return DeviceSamples(
         stations=seen[0].stations,
         rate_hz=tracker.rate_hz,
-        first_lap=first,
+        take_frames=first,
         taken_s=np.concatenate([sensed.time_s for sensed in seen]),
         ready_s=tracker.latency_s,
         device_s=np.concatenate([sensed.device_s for sensed in seen]),

@@ -21,4 +21,4 @@ def perturb_mounts(
 def _perturb_mount(mount: Mount, beside_m: float, turned_rad: float, seed: int, session: str) -> Mount:
     off = generator(seed, "strapped", session, mount.station).normal(size=6)
     (x, y, z), (a, b, c) = (beside_m * off[:3]).tolist(), (turned_rad * off[3:]).tolist()
-    return replace(mount, beside_m=(x, y, z), turned_rad=(a, b, c))
+    return replace(mount, offset_m=(x, y, z), rotation_rad=(a, b, c))

@@ -42,7 +42,7 @@ class Noise:
     lost: tuple[LostStation, ...] = ()
     clock: Clock | None = None
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         """Let every component do its work, in the order of the fields: from the body outwards to the device."""
         for component in (
             self.wobble,
@@ -62,7 +62,7 @@ class Noise:
             self.clock,
         ):
             if component is not None:
-                component.spoil(sensed)
+                component.apply(sensed)
 
 
 def noise_preset(name: str) -> Noise:

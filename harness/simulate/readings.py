@@ -41,17 +41,17 @@ class SimulatedReadings:
     """(N, S) 0 lost to 1 best."""
     device_s: Floats
     """(N, S) what the device's clock says [s]."""
-    hits: dict[str, Bools] = field(default_factory=dict)
+    affected: dict[str, Bools] = field(default_factory=dict)
     """(N, S) readings that a component of this name was at work on, for the record."""
     session: str = ""
     """Name of the session, which may have more takes than this one: what lasts for a session is the same in all of
     them. Without one the take is its own session."""
 
-    def draw(self, component: str, station: str) -> np.random.Generator:
+    def take_rng(self, component: str, station: str) -> np.random.Generator:
         """The generator of one component at one station in one take, independent of all others."""
         return generator(self.seed, "noise", self.take, component, station)
 
-    def draw_of_session(self, component: str, station: str) -> np.random.Generator:
+    def session_rng(self, component: str, station: str) -> np.random.Generator:
         """The generator of what a component does to a station for a whole session."""
         return generator(self.seed, "noise", self.session or self.take, component, station)
 
@@ -78,4 +78,4 @@ class SimulatedReadings:
         known = np.where(lost, 0, np.arange(len(lost))[:, None])
         last, row = np.maximum.accumulate(known, axis=0), np.arange(len(self.stations))
         self.position_m, self.turn = self.position_m[last, row], self.turn[last, row]
-        self.hits["lost"] = self.hits.get("lost", np.zeros_like(lost)) | lost
+        self.affected["lost"] = self.affected.get("lost", np.zeros_like(lost)) | lost

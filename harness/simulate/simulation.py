@@ -158,7 +158,7 @@ def simulate_readings(
         device_s=time_s + begins_s,
         session=session,
     )
-    noise.spoil(sensed)
+    noise.apply(sensed)
     return sensed
 
 
@@ -198,7 +198,7 @@ def _health(
     sensed: SimulatedReadings, sent: Bools, wire: ByteCapture, frames: Sequence[TrackerFrame]
 ) -> dict[str, float]:
     delay_s = wire.received_s - sensed.time_s.ravel()[sent]
-    counts = {f"{name}_share": float(np.mean(hit)) for name, hit in sensed.hits.items()}
+    counts = {f"{name}_share": float(np.mean(hit)) for name, hit in sensed.affected.items()}
     return {
         "frames_sampled": float(len(sensed.time_s)),
         "frames_received": float(len(frames)),

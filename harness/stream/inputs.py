@@ -32,7 +32,7 @@ class Inputs:
     def __post_init__(self) -> None:
         freeze(self, bool, position=("S",), orientation=("S",))
 
-    def masked(self, frame: TrackerFrame) -> TrackerFrame:
+    def mask(self, frame: TrackerFrame) -> TrackerFrame:
         """The frame with everything else marked invalid and set to NaN."""
         if self.position.all() and self.orientation.all():
             return frame

@@ -49,22 +49,22 @@ class ContractCase:
             for n in (2, 3, 4)
         ]
 
-    def fitted(self) -> Reconstructor:
+    def fit(self) -> Reconstructor:
         """`generator(1, "fit")` is its chance."""
         return self.method.fit(self.body, self.examples(), generator(1, "fit"))
 
     @cached_property
     def reconstructor(self) -> Reconstructor:
         """One for all rules that look at single sessions."""
-        return self.fitted()
+        return self.fit()
 
     @cached_property
-    def long(self) -> Frames:
+    def long_frames(self) -> Frames:
         return exact_frames(self.body, self.calibration, self.truth, RATE_HZ)
 
     @property
     def frames(self) -> Frames:
-        return self.long[:FRAMES]
+        return self.long_frames[:FRAMES]
 
     @cached_property
     def bounds(self) -> Floats:
@@ -76,9 +76,9 @@ class ContractCase:
         """Answers of a new session."""
         return run_session(self.reconstructor.begin(self.calibration), frames)
 
-    def begun(self, count: int) -> list[Session]:
+    def begin_sessions(self, count: int) -> list[Session]:
         """So many sessions of one new reconstructor."""
-        reconstructor = self.fitted()
+        reconstructor = self.fit()
         return [reconstructor.begin(self.calibration) for _ in range(count)]
 
 

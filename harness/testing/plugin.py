@@ -55,7 +55,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
             sys.path.append(str(root))  # methods may lie there, as where the command line is used
         try:
             if options.harness_save:
-                kept = gate.keep(method, baseline, scenario=scenario)
+                kept = gate.save_baseline(method, baseline, scenario=scenario)
                 pytest.skip(f"kept as baseline {kept}: nothing was compared")
             checked = gate.check(method, baseline, against=baseline_method, metrics=metrics)
         except HarnessError as error:

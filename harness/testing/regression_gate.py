@@ -33,7 +33,7 @@ class GateResult:
     """What a comparison with a baseline came to."""
 
     comparison: Comparison
-    trouble: str = ""
+    first_traceback: str = ""
     """Traceback of the first cell that failed."""
 
     @property
@@ -42,7 +42,7 @@ class GateResult:
 
     def __str__(self) -> str:
         """As `harness compare` prints it."""
-        return "\n\n".join(filter(None, (text(self.comparison), self.trouble)))
+        return "\n\n".join(filter(None, (text(self.comparison), self.first_traceback)))
 
     def properties(self) -> Iterator[tuple[str, str]]:
         """For a test report: the outcome, then the difference, interval and verdict of each gated line."""
@@ -92,7 +92,7 @@ class RegressionGate:
         comparison = compare_results(reference, now, methods=(held_to, method), metrics=metrics)
         return GateResult(comparison, next(iter(read_summary(run)["failures"].values()), ""))
 
-    def keep(self, method: str, name: str, *, scenario: str | None = None) -> Path:
+    def save_baseline(self, method: str, name: str, *, scenario: str | None = None) -> Path:
         """Run `method` and keep what it measures as baseline `name`; returns its folder.
 
         On the `scenario`, a shipped one or a file; by default that of the baseline which is replaced, or `DEFAULT_SCENARIO`.

@@ -49,7 +49,7 @@ def test_jacobians_are_the_slopes_of_station_poses(worn: Worn, rng: np.random.Ge
         for dof in range(kin.nv):
             ends = []
             for sign in (-1.0, 1.0):
-                kin.set(kin.moved(qpos, sign * step * np.eye(kin.nv)[dof]))
+                kin.set(kin.integrate(qpos, sign * step * np.eye(kin.nv)[dof]))
                 ends.append(kin.station_poses(bones, mount_m, bone_from_station))
             (low_m, low), (high_m, high) = ends
             np.testing.assert_allclose((high_m - low_m) / (2 * step), linear[:, :, dof], atol=1e-8)
@@ -61,7 +61,7 @@ def test_difference_undoes_moved(worn: Worn, rng: np.random.Generator) -> None:
     kin = worn[0]
     for qpos in random_qpos(rng, 10):
         step = rng.normal(scale=0.3, size=kin.nv)
-        np.testing.assert_allclose(kin.difference(qpos, kin.moved(qpos, step)), step, atol=1e-9)
+        np.testing.assert_allclose(kin.difference(qpos, kin.integrate(qpos, step)), step, atol=1e-9)
 
 
 def test_whole_takes_agree_with_single_poses(worn: Worn, rng: np.random.Generator) -> None:

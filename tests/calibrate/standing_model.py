@@ -98,7 +98,7 @@ class Model:
         step[5] = rng.normal(0.0, 0.1)
         if number == 0:
             step[[0, 1, 5]] = 0.0
-        return kinematics.moved(configuration(POSES[number], self.skeleton), step)
+        return kinematics.integrate(configuration(POSES[number], self.skeleton), step)
 
     def _frames(self, qpos: Floats, number: int) -> list[TrackerFrame]:
         truth, kinematics = self.truth, Kinematics(build_body(self.skeleton))

@@ -65,12 +65,12 @@ def test_the_slope_of_the_cost(rng: np.random.Generator) -> None:
 def test_expectations_against_differences(rng: np.random.Generator) -> None:
     bundle, at, given = setting(rng)
     shared = bundle.shared
-    _, slope = shared.expected(at, given.beside, given.flesh_m)
+    _, slope = shared.prior_residuals(at, given.mount_spread, given.flesh_m)
     own = np.zeros((8, 6 + len(bundle.hinges)))
     for k in range(shared.count):
         step = STEP * np.eye(shared.count)[k]
         ahead, behind = (
-            shared.expected(bundle.moved(at, (sign * step, own)), given.beside, given.flesh_m)[0]
+            shared.prior_residuals(bundle.moved(at, (sign * step, own)), given.mount_spread, given.flesh_m)[0]
             for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(slope[:, k], (ahead - behind) / (2.0 * STEP), atol=1e-4 * np.abs(slope).max())

@@ -39,7 +39,12 @@ def same(one: CalibrationFile, other: CalibrationFile) -> bool:
     arrays = ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m")
     assert (one.skeleton is None) == (other.skeleton is None)
     bones = one.skeleton is None or other.skeleton is None or np.array_equal(one.skeleton.bone_m, other.skeleton.bone_m)
-    names = (a.kind, a.stations, a.bones, dict(one.told)) == (b.kind, b.stations, b.bones, dict(other.told))
+    names = (a.kind, a.stations, a.bones, dict(one.diagnostics)) == (
+        b.kind,
+        b.stations,
+        b.bones,
+        dict(other.diagnostics),
+    )
     return names and bones and all(np.array_equal(getattr(a, name), getattr(b, name)) for name in arrays)
 
 
@@ -170,15 +175,15 @@ def test_what_cannot_be_true_is_refused(
 
 def test_stations_are_found_by_name(rng: np.random.Generator) -> None:
     one = kept(rng, ("head", "torso", "left_wrist"))
-    two = one.of(["left_wrist", "head"])
+    two = one.select(["left_wrist", "head"])
     assert two.calibration.stations == ("left_wrist", "head")
     assert two.calibration.bones == (one.calibration.bones[2], one.calibration.bones[0])
     np.testing.assert_array_equal(two.calibration.mount_m, one.calibration.mount_m[[2, 0]])
     np.testing.assert_array_equal(two.calibration.bone_from_station, one.calibration.bone_from_station[[2, 0]])
     assert two.skeleton is one.skeleton
-    assert same(one.of(one.calibration.stations), one)
+    assert same(one.select(one.calibration.stations), one)
     with pytest.raises(BadInput, match="Station 'pelvis' is not in the calibration, which has head, torso, left_wrist"):
-        one.of(["head", "pelvis"])
+        one.select(["head", "pelvis"])
 
 
 def test_what_toml_has_no_word_for_is_not_written(tmp_path: Path, rng: np.random.Generator) -> None:

@@ -89,9 +89,9 @@ def test_all_are_found_when_they_are_held(noise: str, blind: bool) -> None:
     collector, said = collected(eight(noise), blind=blind)
     assert said == list(range(1, 9))
     assert collector.done
-    assert not collector.passed
+    assert not collector.rejected
     first_s = eight(noise)[0].received_s
-    for held, began_s, (from_s, to_s) in zip(collector.held, collector.began_s, hold_times_s(8), strict=True):
+    for held, began_s, (from_s, to_s) in zip(collector.holds, collector.began_s, hold_times_s(8), strict=True):
         assert from_s - 0.3 < began_s < from_s + 0.6  # before it, the last bit of a movement is slow
         assert held[-1].received_s - first_s < to_s + 0.1
         still = measure_hold(held, SIX)  # which is what it is for
@@ -117,9 +117,9 @@ def test_a_rest_is_no_pose(place: int) -> None:
     frames = stream([*poses[:place], arms_down(), *poses[place:]])
     collector, said = collected(frames)
     assert said == list(range(1, 9))
-    (passed,) = collector.passed
+    (passed,) = collector.rejected
     assert passed.began_s == pytest.approx(4.5 * place, abs=0.6)
-    stills = [measure_hold(held, SIX) for held in collector.held]
+    stills = [measure_hold(held, SIX) for held in collector.holds]
     assert [likeness().nearest(still, stills[0]) for still in stills] == list(range(8))
     wanted = "all 8 poses were taken before" if place == 8 else f"pose {place + 1} is wanted"
     assert wanted in passed.why
@@ -129,7 +129,7 @@ def test_a_repeated_pose_and_one_too_early_are_told() -> None:
     order = [0, 1, 2, 1, 4, 3, 4, 5, 6, 7]
     collector, said = collected(stream([pose(n) for n in order]))
     assert said == list(range(1, 9))
-    assert [passed.why for passed in collector.passed] == [
+    assert [passed.why for passed in collector.rejected] == [
         "that looks like pose 2, and pose 4 is wanted",
         "that looks like pose 5, and pose 4 is wanted",
     ]
@@ -140,10 +140,10 @@ def test_another_number_of_holds(count: int) -> None:
     poses = [pose(n % 8) for n in range(count)]
     collector, _ = collected(stream(poses), blind=True)
     assert collector.done == (count == 9)
-    assert len(collector.passed) == count - len(collector.held)
+    assert len(collector.rejected) == count - len(collector.holds)
     if count == 9:
-        assert collector.passed[0].began_s == pytest.approx(36.0, abs=0.6)
-        assert str(collector.passed[0]).endswith("s on: all 8 poses were taken before")
+        assert collector.rejected[0].began_s == pytest.approx(36.0, abs=0.6)
+        assert str(collector.rejected[0]).endswith("s on: all 8 poses were taken before")
 
 
 def test_whoever_stops_early_is_told_what_there_was() -> None:
@@ -151,7 +151,7 @@ def test_whoever_stops_early_is_told_what_there_was() -> None:
     told: list[str] = []
     leading = PoseGuide(PoseCollector(SIX, 8, likeness()), POSES)
     with pytest.raises(Exception, match="3 of 8 poses were held") as caught:
-        leading.lead(frames, told.append)
+        leading.run(frames, told.append)
     assert repr(POSES[3].name) in str(caught.value)
     assert next(line for line in told if "taken" in line) == "pose 1 of 8 taken, held from 0.3 s on"
     assert POSES[0].instruction in told[0]
@@ -163,8 +163,8 @@ def test_whoever_walks_holds_nothing() -> None:
     frames = simulate_tracker(who, take, mounts, TrackerConfig(rate_hz=RATE_HZ), noise_preset("default"), seed=1).frames
     collector, said = collected(frames, blind=True)
     assert not said
-    assert not collector.passed
-    assert collector.told.startswith("hold still: ")
+    assert not collector.rejected
+    assert collector.message.startswith("hold still: ")
 
 
 def between(frames: Sequence[TrackerFrame], from_s: float, to_s: float) -> list[int]:
@@ -180,9 +180,9 @@ def test_a_station_that_is_not_seen_is_named_and_waited_for() -> None:
     collector, told = PoseCollector(SIX, 8, likeness()), set()
     for frame in frames:
         collector.add(frame)
-        told.add(collector.told)
-    assert len(collector.held) == 1
-    assert "pose 3, and pose 2 is wanted" in collector.passed[0].why
+        told.add(collector.message)
+    assert len(collector.holds) == 1
+    assert "pose 3, and pose 2 is wanted" in collector.rejected[0].why
     assert any("'left_ankle' was silent or lost" in line for line in told)
 
 
@@ -201,4 +201,4 @@ def test_nothing_is_held_across_a_gap() -> None:
     later = [replace(frame, received_s=frame.received_s + 60.0) for frame in frames]
     collector, said = collected([*frames, *later])
     assert not said
-    assert not collector.held
+    assert not collector.holds

@@ -32,11 +32,11 @@ def test_modes_and_rest_make_up_the_spread(modes: int) -> None:
     expected = np.maximum((whole - kept) * len(PEOPLE) / (len(PEOPLE) - modes), LEAST_RESIDUAL_SD_M**2)
     np.testing.assert_allclose(found.rest_m**2, expected, atol=1e-12)
     np.testing.assert_allclose(found.modes @ found.modes.T, np.eye(modes), atol=1e-12)
-    assert 0.0 <= found.kept() <= 1.0
+    assert 0.0 <= found.explained_variance() <= 1.0
 
 
 def test_more_modes_keep_more() -> None:
-    kept = [fit_skeleton_prior(PEOPLE, modes).kept() for modes in range(8)]
+    kept = [fit_skeleton_prior(PEOPLE, modes).explained_variance() for modes in range(8)]
     assert kept[0] == 0.0
     assert all(np.diff(kept) > 0.0)
     assert kept[5] > 0.85

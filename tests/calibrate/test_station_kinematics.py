@@ -72,7 +72,7 @@ def test_bones_are_where_plain_kinematics_has_them(rng: np.random.Generator) -> 
 @pytest.mark.parametrize("dof", range(48))
 def test_hinges(dof: int, rng: np.random.Generator) -> None:
     state = State.random(rng)
-    place, turn = (slope[..., dof] for slope in CHAIN.of_hinges(reach(state)))
+    place, turn = (slope[..., dof] for slope in CHAIN.hinge_jacobian(reach(state)))
 
     def change(step: float) -> State:
         return State(**{**vars(state), "angles_rad": state.angles_rad + step * np.eye(48)[dof]})
@@ -85,7 +85,7 @@ def test_hinges(dof: int, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("axis", range(6))
 def test_roots(axis: int, rng: np.random.Generator) -> None:
     state, unit = State.random(rng), np.eye(6)[axis]
-    place, turn = (slope[..., axis] for slope in CHAIN.of_roots(reach(state)))
+    place, turn = (slope[..., axis] for slope in CHAIN.root_jacobian(reach(state)))
 
     def change(step: float) -> State:
         root = rotations.multiply(rotations.exp(step * unit[3:]), state.root)
@@ -98,7 +98,7 @@ def test_roots(axis: int, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("bone", range(24))
 def test_bones(bone: int, rng: np.random.Generator) -> None:
     state, along = State.random(rng), rng.normal(size=3)
-    place = CHAIN.of_bones(reach(state), np.array([bone]), along[None])[..., 0]
+    place = CHAIN.bone_jacobian(reach(state), np.array([bone]), along[None])[..., 0]
 
     def change(step: float) -> State:
         return State(**{**vars(state), "bone_m": state.bone_m + step * np.eye(24)[bone][:, None] * along})
@@ -114,4 +114,4 @@ def test_mounts(axis: int, rng: np.random.Generator) -> None:
     def change(step: float) -> State:
         return State(**{**vars(state), "mount_m": state.mount_m + step * np.eye(3)[axis]})
 
-    np.testing.assert_allclose(CHAIN.of_mounts(reach(state))[..., axis], slopes(change)[0], atol=1e-8)
+    np.testing.assert_allclose(CHAIN.mount_jacobian(reach(state))[..., axis], slopes(change)[0], atol=1e-8)

@@ -110,7 +110,7 @@ def missed(body: Body, miss_deg: float, seed: int) -> Floats:
     """T-pose as someone holds it whose every hinge, and whole body, is off by so much."""
     step = np.deg2rad(miss_deg) * generator(seed, "missed").normal(size=54)
     step[[0, 1, 2, 5]] = 0.0
-    return Kinematics(body).moved(humanoid.tpose(body.skeleton), step)
+    return Kinematics(body).integrate(humanoid.tpose(body.skeleton), step)
 
 
 def arms(body: Body, down_deg: float) -> Floats:
@@ -124,7 +124,7 @@ def arms(body: Body, down_deg: float) -> Floats:
         names = [name for name in body.skeleton.dof_names if name.startswith(f"{side}humerus")]
         columns = [int(body.model.joint(name).dofadr[0]) for name in names]
         step[columns] = np.linalg.solve(angular[0][:, columns], [sign * np.deg2rad(down_deg), 0.0, 0.0])
-    return kinematics.moved(pose, step)
+    return kinematics.integrate(pose, step)
 
 
 @pytest.mark.parametrize("yaw_deg", [0.0, 75.0, 180.0, -179.9])

@@ -50,7 +50,7 @@ def circling(stations: int, rate_hz: float) -> DeviceSamples:
     return DeviceSamples(
         stations=tuple(f"station {k}" for k in number),
         rate_hz=rate_hz,
-        first_lap=instants,
+        take_frames=instants,
         taken_s=taken_s,
         ready_s=0.002,
         device_s=taken_s,

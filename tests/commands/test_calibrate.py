@@ -75,7 +75,7 @@ def test_eight_poses_of_a_recording(
         assert f"pose {number} of 8 taken" in said.err
     kept, truth = read_calibration(path), model.calibration
     assert kept.skeleton is not None
-    assert kept.told["scenario"] == "demo"
+    assert kept.diagnostics["scenario"] == "demo"
     off_m = kept.skeleton.length_m - model.body.skeleton.length_m
     mean_m = np.array([content["bones"][name]["mean_m"] for name in BONES]) - model.body.skeleton.length_m
     assert np.sqrt(np.mean(off_m**2)) < 0.015 < np.sqrt(np.mean(mean_m**2))
@@ -258,7 +258,7 @@ class Noted:
 def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """On its skeleton, with its mounts in the order of the stream: bit by bit what Python gives for the same frames."""
     kept, reordered, table = read_calibration(calibrated), tmp_path / "other.toml", tmp_path / "poses.csv"
-    write_calibration(reordered, kept.of(STATIONS[::-1]))
+    write_calibration(reordered, kept.select(STATIONS[::-1]))
     witness = Witness()
     monkeypatch.setattr(registry, "resolve", lambda name: witness)
     rehearsal = prepare_playback("demo", clip=CLIP, stations=4)
@@ -300,7 +300,7 @@ def test_a_station_that_was_not_calibrated_is_named(
 ) -> None:
     three = tmp_path / "three.toml"
     kept = read_calibration(calibrated)
-    write_calibration(three, CalibrationFile(kept.of(STATIONS[:3]).calibration, kept.skeleton))
+    write_calibration(three, CalibrationFile(kept.select(STATIONS[:3]).calibration, kept.skeleton))
     words = {"live": ["--port", "no_such_port", "--scenario", "demo"], "replay": [str(recording)]}[verb]
     assert main([verb, *words, "--calibration", str(three)]) == 2
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("harness:")]
@@ -325,7 +325,7 @@ def test_simulated_performers(capsys: pytest.CaptureFixture[str]) -> None:
 def test_what_is_recorded_is_what_is_played(model: Playback, recording: Path) -> None:
     """The same frames, in the session of the clip: where trackers sit is the same as in the clip itself."""
     frames = list(RecordingStream(recording))
-    assert len(frames) == model.samples.first_lap
+    assert len(frames) == model.samples.take_frames
     np.testing.assert_array_equal(
         [frame.position_m for frame in frames], [frame.position_m for frame in model.simulation.frames]
     )
@@ -342,7 +342,7 @@ def test_a_performer_is_told_what_to_do_and_may_stop(recording: Path) -> None:
         shown.append(number)
         raise OSError("its window was closed")
 
-    collector = posing.held(RecordingStream(recording), told.append, show)
+    collector = posing.collect_poses(RecordingStream(recording), told.append, show)
     assert shown == [1]
     assert told[1] == "its window was closed; the poses are told in words from here on"
-    assert len(collector.held) == 1
+    assert len(collector.holds) == 1

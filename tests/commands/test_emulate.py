@@ -114,7 +114,7 @@ def test_runs_know_nothing_of_faults() -> None:
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
 
     def inputs(of: Scenario) -> dict[str, object]:
-        return ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
+        return ClipEvaluation(of, source, ClipPart("walking_p1_01"), "walking").conditions_of(PREVIOUS, "pos+ori")
 
     assert scenario.fault
     assert inputs(scenario) == inputs(replace(scenario, fault=()))

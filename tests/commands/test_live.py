@@ -95,9 +95,9 @@ def test_ctrl_c_before_it_begins_is_no_failure(tmp_path: Path, rehearsal: Playba
 def _same_as_a_run(rehearsal: Playback, rows: list[dict[str, str]]) -> None:
     """Poses of the first lap are those of a run over the simulation."""
     frames = rehearsal.simulation.frames
-    session = rehearsal.setting.fitted(registry.resolve("ik"), "ik").begin(rehearsal.calibration)
+    session = rehearsal.clip_evaluation.fit_method(registry.resolve("ik"), "ik").begin(rehearsal.calibration)
     stations = list(rehearsal.scenario.stations)
-    for frame, row in zip(frames[: rehearsal.samples.first_lap], rows, strict=False):
+    for frame, row in zip(frames[: rehearsal.samples.take_frames], rows, strict=False):
         estimate = session.step(frame)
         stamps_s = [float(row[f"device_s.{name}"]) for name in stations]
         if not np.array_equal(stamps_s, frame.measured_s):

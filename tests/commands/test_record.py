@@ -265,7 +265,7 @@ def test_ctrl_c_is_the_normal_end_of_a_recording(port: str, tmp_path: Path, stop
     assert out.splitlines()[-1] == "pass"
     assert "Traceback" not in err
     read = read_recording(tmp_path / "a.rec")
-    assert read.lost == ()
+    assert read.damage == ()
     assert [block.payload for block in read.blocks() if block.kind == "sent"][-1] == b"c"
 
 
@@ -273,7 +273,7 @@ def test_a_killed_recording_keeps_what_came(port: str, tmp_path: Path) -> None:
     with recording(port, tmp_path / "a.rec", begun=6000) as process:
         process.kill()
     stream = RecordingStream(tmp_path / "a.rec")
-    assert len(stream.recording.lost) <= 1
+    assert len(stream.recording.damage) <= 1
     received = sum(len(block.payload) for block in stream.recording.blocks() if block.kind == RECEIVED)
     assert received > 2000
     assert len(list(stream)) > 5

@@ -81,13 +81,13 @@ def test_a_sweep_is_a_side_and_makes_a_baseline(run: Path, baselines: Path) -> N
     with CellIndex(run) as index:
         index.add({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **row} for row in rows)
         index.expect([f"demo seed 1: {row['method']} on {row['clip']}" for row in rows])
-        index.ended((f"demo seed 1: {row['method']} on {row['clip']}", row["key"], "") for row in rows)
+        index.record_outcomes((f"demo seed 1: {row['method']} on {row['clip']}", row["key"], "") for row in rows)
     changed(run / "summary.json", cells=None, groups=[{"method": "ik"}])
     assert kept(load_results(run)) == kept(side(methods=METHODS))
     summary = json.loads((write_baseline(run, "main") / "summary.json").read_text())
     assert (summary["groups"], kept(load_results("main"))) == ([{"method": "ik"}], kept(load_results(run)))
     with CellIndex(run) as index:
-        index.ended([("demo seed 1: ik on walk_00", "", "no pose")])
+        index.record_outcomes([("demo seed 1: ik on walk_00", "", "no pose")])
     found = load_results(run)
     assert (found.planned, len(found.cells), found.failed) == (16, 15, ("demo seed 1: ik on walk_00",))
     run_itself = compare_results(found, found, methods=("mean_pose", "mean_pose"), metrics=["mpjpe_mm"])

@@ -34,7 +34,7 @@ SCENARIO = Scenario(
 
 def inputs(scenario: Scenario = SCENARIO) -> dict[str, object]:
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
-    return ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking").inputs_of(PREVIOUS, "pos+ori")
+    return ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking").conditions_of(PREVIOUS, "pos+ori")
 
 
 def test_what_retargeting_cost_is_told() -> None:
@@ -56,7 +56,7 @@ def test_the_common_body_keeps_the_angles_of_test_clip_and_examples() -> None:
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
     setting = ClipEvaluation(replace(SCENARIO, motion=motion), source, ClipPart("walking_p1_01"), "walking")
     np.testing.assert_array_equal(setting.body.skeleton.bone_m, standard_skeleton().bone_m)
-    np.testing.assert_array_equal(unpack(setting.whole.qpos)[2], _angles(setting.clip))
+    np.testing.assert_array_equal(unpack(setting.full_take.qpos)[2], _angles(setting.clip))
     for clip, take in zip(setting.example_clips, setting.examples, strict=True):
         np.testing.assert_allclose(unpack(take.qpos)[2][0], _angles(clip)[0], atol=1e-12)
     assert "every angle kept" in setting.notes(MeanPose())[0]
@@ -81,8 +81,8 @@ def test_what_is_withheld_is_in_no_example() -> None:
     assert (len(before) - 1) / 40.0 == pytest.approx((block.start - guard - 1) / clip.rate_hz, abs=1 / 40.0)
     assert (len(after) - 1) / 40.0 == pytest.approx((len(clip) - block.stop - guard - 1) / clip.rate_hz, abs=1 / 40.0)
     np.testing.assert_array_equal(other.qpos, free.examples[1].qpos)
-    assert closed.inputs_of(MeanPose(), "pos+ori")["withheld"] == ["walking_p1_02@0.40-0.60"]
-    assert closed.inputs_of(PREVIOUS, "pos+ori") == free.inputs_of(PREVIOUS, "pos+ori")
+    assert closed.conditions_of(MeanPose(), "pos+ori")["withheld"] == ["walking_p1_02@0.40-0.60"]
+    assert closed.conditions_of(PREVIOUS, "pos+ori") == free.conditions_of(PREVIOUS, "pos+ori")
 
 
 def _angles(clip: Clip) -> Floats:
@@ -145,10 +145,10 @@ def test_a_part_is_warmed_up_on_what_comes_before_it() -> None:
     scenario = replace(SCENARIO, motion=replace(SCENARIO.motion, longest_s=0.0, protocol="block"))
     part = ClipPart("walking_p1_01", 0.4, 0.6)
     setting = ClipEvaluation(scenario, source, part, "walking")
-    block = part.frames(len(setting.whole))
-    rate_hz = setting.whole.rate_hz
+    block = part.frames(len(setting.full_take))
+    rate_hz = setting.full_take.rate_hz
     assert len(setting.take) == len(block) + round(rate_hz)
-    assert (setting.take.qpos[-1] == setting.whole.qpos[block.stop - 1]).all()
+    assert (setting.take.qpos[-1] == setting.full_take.qpos[block.stop - 1]).all()
 
 
 def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
@@ -159,18 +159,18 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
     source, method = open_motion_source("builtin", None, seed=1, rate_hz=None), registry.resolve("dynamic_map")
     first = ClipEvaluation(scenario, source, ClipPart("walking_p1_01"), "walking")
     results = [_estimated(first, method)]
-    shared = first.under(elsewhere)
+    shared = first.with_conditions(elsewhere)
     assert shared is not None
-    assert shared.whole is first.whole
-    assert shared.fitted(method, "dynamic_map") is first.fitted(method, "dynamic_map")
+    assert shared.full_take is first.full_take
+    assert shared.fit_method(method, "dynamic_map") is first.fit_method(method, "dynamic_map")
     results.append(_estimated(shared, method))
     anew = ClipEvaluation(elsewhere, source, ClipPart("walking_p1_01"), "walking")
     np.testing.assert_array_equal(results[1], _estimated(anew, method))
-    assert shared.inputs_of(method, "pos+ori") == anew.inputs_of(method, "pos+ori")
+    assert shared.conditions_of(method, "pos+ori") == anew.conditions_of(method, "pos+ori")
     assert np.abs(results[0] - results[1]).max() > 1e-3
 
 
 def _estimated(setting: ClipEvaluation, method: Method) -> Floats:
     seen = make_inputs("pos+ori", setting.simulation.stations)
-    fitted = setting.fitted(method, "dynamic_map")
-    return run_method(fitted, setting.calibrated.calibration, setting.simulation, seen)[0]
+    fitted = setting.fit_method(method, "dynamic_map")
+    return run_method(fitted, setting.performer_calibration.calibration, setting.simulation, seen)[0]

@@ -11,10 +11,10 @@ from harness.experiment.scenario import find_scenario
 
 def test_what_is_not_asked_for_is_as_the_scenario_has_it() -> None:
     made = prepare_playback("demo")
-    assert str(made.setting.part) == "walking_p1_01"
-    assert made.setting.behaviour == "walking"
+    assert str(made.clip_evaluation.part) == "walking_p1_01"
+    assert made.clip_evaluation.behaviour == "walking"
     assert made.samples.stations == made.calibration.stations == tuple(made.scenario.stations)
-    assert made.samples.first_lap == made.simulation.expected
+    assert made.samples.take_frames == made.simulation.expected
 
 
 def test_clip_stations_rate_and_noise_are_put_in() -> None:
@@ -22,7 +22,7 @@ def test_clip_stations_rate_and_noise_are_put_in() -> None:
     assert made.samples.stations == ("left_hand", "right_hand", "left_ankle", "right_ankle")
     assert made.samples.rate_hz == made.tracker.rate_hz == 75.0
     assert made.tracker.slot_s == 0.0
-    assert made.setting.behaviour == "boxing"
+    assert made.clip_evaluation.behaviour == "boxing"
     assert prepare_playback("demo", stations=["head", "torso"]).calibration.stations == ("head", "torso")
 
 

@@ -207,7 +207,7 @@ def test_every_combination_of_varied_values_is_a_scenario(tmp_path: Path) -> Non
 def test_what_is_worn_is_taken_from_the_stations_in_their_order(tmp_path: Path) -> None:
     two = MINIMAL + 'torso = { bone = "thorax" }\n'
     scenario = load_scenario(written(tmp_path, two + "[vary]\nworn = [[], ['torso'], ['torso', 'head']]\n"))
-    found = {varied_text(varied): tuple(made.wearing) for varied, made in variants(scenario)}
+    found = {varied_text(varied): tuple(made.worn_stations) for varied, made in variants(scenario)}
     assert found == {"worn=[]": ("head", "torso"), "worn=torso": ("torso",), "worn=torso+head": ("head", "torso")}
 
 

@@ -56,11 +56,11 @@ def emulated(played: Playback, path: Path, turns_s: Sequence[float], names: Sequ
                 device.receive(commands.set_output_list(station, wire.items), now_s)
             device.receive(commands.BINARY + commands.CENTIMETRES + commands.ZERO_CLOCK, now_s)
             device.advance(now_s)
-            writer.configured(wire, now_s, now_s)
+            writer.on_configured(wire, now_s, now_s)
             device.receive(commands.STREAM, now_s)
             for at_s in (now_s + 0.01 * np.arange(1, round(100.0 * turn_s))).tolist():
                 if data := device.advance(at_s):
-                    writer.received(data, at_s, at_s)
+                    writer.on_received(data, at_s, at_s)
             now_s += turn_s + 1.0
     return path
 
@@ -86,7 +86,7 @@ def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: 
     judged = score_methods(RecordingStream(simulated), played, METHODS)
     simulation = played.simulation
     for one in judged:
-        fitted = played.setting.fitted(registry.resolve(one.method), one.method)
+        fitted = played.clip_evaluation.fit_method(registry.resolve(one.method), one.method)
         qpos, status, step_ms, _ = run_method(
             fitted, simulation.calibration, simulation, make_inputs("pos+ori", simulation.stations)
         )
@@ -110,13 +110,13 @@ def test_scores_at_1x_and_max_are_equal(played: Playback, tmp_path: Path) -> Non
 
 def test_later_laps_fold_back_and_the_way_back_is_not_judged(played: Playback, tmp_path: Path) -> None:
     samples = played.samples
-    path = emulated(played, tmp_path / "a.rec", [2.2 * samples.lap_s])
+    path = emulated(played, tmp_path / "a.rec", [2.2 * samples.loop_s])
     (judged,) = score_methods(RecordingStream(path), played, ["best_match"])
     warm_up, rest = round(played.tracker.rate_hz), round(0.2 * len(samples))
-    assert judged.frames_expected == pytest.approx(2 * samples.first_lap - warm_up + rest, abs=2)
+    assert judged.frames_expected == pytest.approx(2 * samples.take_frames - warm_up + rest, abs=2)
     assert judged.frames_matched == judged.frames_expected
     (once,) = score_methods(
-        RecordingStream(emulated(played, tmp_path / "b.rec", [samples.lap_s])), played, ["best_match"]
+        RecordingStream(emulated(played, tmp_path / "b.rec", [samples.loop_s])), played, ["best_match"]
     )
     assert judged.metrics["mpjpe_mm"] == pytest.approx(once.metrics["mpjpe_mm"], rel=0.1)
 

@@ -76,23 +76,23 @@ def test_without_calibrating_everything_is_as_it_was(noise: str) -> None:
     scenario = replace(SMALL, noise=noise)  # type: ignore[arg-type]
     made = setting(scenario)
     assert same_frames(made.simulation.frames, plainly(scenario).frames)
-    assert made.calibrated.body is made.body
-    assert made.calibrated.notes == ()
-    assert made.calibrated.errors == {}
+    assert made.performer_calibration.body is made.body
+    assert made.performer_calibration.notes == ()
+    assert made.performer_calibration.errors == {}
     for name in ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m"):
-        exact, known = (getattr(c, name) for c in (made.simulation.calibration, made.calibrated.calibration))
+        exact, known = (getattr(c, name) for c in (made.simulation.calibration, made.performer_calibration.calibration))
         np.testing.assert_array_equal(exact, known)
-    assert "calibrating" not in made.inputs_of(PREVIOUS, "pos+ori")
+    assert "calibrating" not in made.conditions_of(PREVIOUS, "pos+ori")
 
 
 def test_who_stands_model_how_is_no_input_where_nobody_does() -> None:
     told = [
-        setting(replace(SMALL, calibrating=CalibrationSettings(miss_deg=deg))).inputs_of(PREVIOUS, "pos+ori")
+        setting(replace(SMALL, calibrating=CalibrationSettings(miss_deg=deg))).conditions_of(PREVIOUS, "pos+ori")
         for deg in (1, 5)
     ]
     assert told[0] == told[1]
     found = [
-        setting(replace(SMALL, calibration="tpose", calibrating=CalibrationSettings(miss_deg=deg))).inputs_of(
+        setting(replace(SMALL, calibration="tpose", calibrating=CalibrationSettings(miss_deg=deg))).conditions_of(
             PREVIOUS, ""
         )
         for deg in (1, 5)
@@ -102,7 +102,7 @@ def test_who_stands_model_how_is_no_input_where_nobody_does() -> None:
 
 def test_where_trackers_really_sit_is_an_input() -> None:
     plain, beside = (
-        setting(replace(SMALL, calibrating=how)).inputs_of(PREVIOUS, "") for how in (CalibrationSettings(), BESIDE)
+        setting(replace(SMALL, calibrating=how)).conditions_of(PREVIOUS, "") for how in (CalibrationSettings(), BESIDE)
     )
     assert {key for key in plain if plain[key] != beside[key]} == {"mounts_digest"}
 
@@ -120,10 +120,10 @@ def test_exact_knows_where_trackers_really_sit() -> None:
     """Whatever the straps, perfect trackers are where the exact calibration says."""
     scenario = replace(SMALL, noise="clean", calibrating=BESIDE)
     made = setting(scenario)
-    known = made.calibrated.calibration
-    off_m = np.linalg.norm(known.mount_m - setting().calibrated.calibration.mount_m, axis=1)
+    known = made.performer_calibration.calibration
+    off_m = np.linalg.norm(known.mount_m - setting().performer_calibration.calibration.mount_m, axis=1)
     assert off_m.min() > 0.002
-    fitted = made.fitted(PREVIOUS, "ik:previous")
+    fitted = made.fit_method(PREVIOUS, "ik:previous")
     qpos, *_ = run_method(fitted, known, made.simulation, make_inputs("pos+ori", known.stations))
     there_m = made.simulation.truth_qpos[made.simulation.frame_index][:, :3]
     assert np.linalg.norm(qpos[40:, :3] - there_m[40:], axis=1).mean() < 0.02
@@ -137,7 +137,7 @@ def test_a_perfect_model_of_perfect_trackers_is_calibrated_exactly() -> None:
     scenario = replace(
         SMALL, noise="clean", calibration="tpose", calibrating=CalibrationSettings(miss_deg=0.0, turned_deg=180.0)
     )
-    errors = setting(scenario).calibrated.errors
+    errors = setting(scenario).performer_calibration.errors
     assert errors["mount_deg"] < 0.01
     assert all(errors[name] < 0.1 for name in ("mount_mm", "room_origin_mm"))
     assert errors["room_heading_deg"] < 0.01
@@ -145,7 +145,7 @@ def test_a_perfect_model_of_perfect_trackers_is_calibrated_exactly() -> None:
 
 def test_errors_are_what_they_say() -> None:
     worn = session()
-    true, skeleton = worn.exact, worn.body.skeleton
+    true, skeleton = worn.true_calibration, worn.body.skeleton
     turn = rotations.exp(np.array([0.0, np.deg2rad(5.0), 0.0]))
     wrong = replace(
         true,
@@ -227,11 +227,11 @@ def test_one_worker_or_two_are_told_the_same(tmp_path: Path, kinds: tuple[str, .
 
 def test_what_was_learnt_is_shared_while_the_body_is_the_same() -> None:
     exact = setting()
-    tpose = exact.under(replace(SMALL, calibration="tpose"))
+    tpose = exact.with_conditions(replace(SMALL, calibration="tpose"))
     assert tpose is not None
-    assert tpose.fitted(PREVIOUS, "ik:previous") is exact.fitted(PREVIOUS, "ik:previous")
-    assert tpose.calibrated.calibration.kind == "tpose"
-    assert exact.calibrated.calibration.kind == "exact"
+    assert tpose.fit_method(PREVIOUS, "ik:previous") is exact.fit_method(PREVIOUS, "ik:previous")
+    assert tpose.performer_calibration.calibration.kind == "tpose"
+    assert exact.performer_calibration.calibration.kind == "exact"
 
 
 @pytest.fixture(scope="module")
@@ -239,7 +239,7 @@ def found() -> tuple[TrackerSession, PerformerCalibration, SkeletonPrior]:
     """What eight poses of p2 told."""
     scenario = replace(SMALL, calibration="poses", calibrating=BESIDE)
     made = setting(scenario, "walking_p2_01")
-    return made.session, made.calibrated, fit_skeleton_prior(list(made.people.values()))
+    return made.session, made.performer_calibration, fit_skeleton_prior(list(made.people.values()))
 
 
 def test_eight_poses_find_bones_mounts_and_room(
@@ -261,7 +261,7 @@ def test_nothing_of_the_performer_but_the_stream_is_told(
     """Where p1 stands but the stream of p2 is heard, what is found is p2's to the bit; its errors alone are others."""
     worn, calibrated, space = found
     poses = [configuration(pose, worn.body.skeleton) for pose in POSES]
-    heard = worn.standing_model(poses, miss_rad=np.deg2rad(BESIDE.miss_deg), hold_s=BESIDE.hold_s)
+    heard = worn.observe_poses(poses, miss_rad=np.deg2rad(BESIDE.miss_deg), hold_s=BESIDE.hold_s)
     other = session(replace(SMALL, calibrating=CalibrationSettings(beside_m=0.3)))
     assert other.body is not worn.body
     monkeypatch.setattr(TrackerSession, "standing_model", lambda *_, **__: heard)
@@ -283,11 +283,11 @@ def test_methods_and_their_examples_stand_on_the_body_that_was_found(
             bodies.append((body, [example.qpos for example in examples]))
             return super().fit(body, examples, rng)
 
-    made.fitted(Watching(), "watching")
-    other = made.under(replace(SMALL, calibration="poses"))
+    made.fit_method(Watching(), "watching")
+    other = made.with_conditions(replace(SMALL, calibration="poses"))
     assert other is not None
     other.__dict__["calibrated"] = found[1]
-    other.fitted(Watching(), "watching")
+    other.fit_method(Watching(), "watching")
     assert [body for body, _ in bodies] == [made.body, found[1].body]
     (own,), (calibrated,) = (examples for _, examples in bodies)
     reach_m = [
@@ -300,7 +300,7 @@ def test_methods_and_their_examples_stand_on_the_body_that_was_found(
 def test_the_people_whose_bones_are_learnt_from_are_not_the_performer() -> None:
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
     performers = [synthetic.performer_skeleton(name).length_m for name in synthetic.performer_names()]
-    for skeleton in source.people("p1").values():
+    for skeleton in source.other_skeletons("p1").values():
         assert min(np.abs(skeleton.length_m - own).max() for own in performers) > 0.002
 
 
@@ -317,6 +317,6 @@ def test_nobody_s_own_skeleton_is_learnt_from_a_library(mocap: Path) -> None:
         made = ClipEvaluation(scenario, source, ClipPart(clip), "walking")
         own = made.body.skeleton.length_m
         assert source.subject(clip) not in made.people
-        assert len(made.people) == len(source.people("")) - 1 >= 19
+        assert len(made.people) == len(source.other_skeletons("")) - 1 >= 19
         assert min(np.abs(skeleton.length_m - own).max() for skeleton in made.people.values()) > 0.002
         assert source.subject(clip) not in {source.subject(name) for name in scenario.motion.examples}

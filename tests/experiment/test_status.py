@@ -46,8 +46,8 @@ def index(out: Path, rows: list[dict[str, Any]], planned: int, **facts: Any) -> 
     with CellIndex(out) as found:
         found.expect([f"cell {n}" for n in range(planned)])
         found.add(rows)
-        found.ended((f"cell {n}", row["key"], "") for n, row in enumerate(rows))
-        found.ended([(f"cell {planned - 1}", "", "Traceback\nValueError: on purpose")])
+        found.record_outcomes((f"cell {n}", row["key"], "") for n, row in enumerate(rows))
+        found.record_outcomes([(f"cell {planned - 1}", "", "Traceback\nValueError: on purpose")])
         found.note(name="tiny", **facts)
 
 

@@ -35,7 +35,7 @@ def test_stages_add_up_and_only_the_late_are_late() -> None:
     stages.add(1.000, 1.001, 1.004, 1.006)
     stages.add(2.000, 2.003, 2.0101, 2.011)
     assert stages.missed == 1
-    maxima_ms = {name: durations.as_dict()["max_ms"] for name, durations in stages.named().items()}
+    maxima_ms = {name: durations.as_dict()["max_ms"] for name, durations in stages.by_name().items()}
     wanted_ms = {"last byte to taken": 3.0, "taken to pose": 7.1, "pose to outputs": 2.0, "last byte to pose": 10.1}
     assert maxima_ms == pytest.approx(wanted_ms, abs=1e-6)
 

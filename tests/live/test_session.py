@@ -58,7 +58,7 @@ class Counting:
 class Kept:
     """An output that keeps poses and fails when told."""
 
-    name = told = "kept"
+    name = description = "kept"
 
     def __init__(self, fails_at: int | None = None, error: BaseException | None = None) -> None:
         self.fails_at, self.error = fails_at, error or OSError("no room")
@@ -93,7 +93,7 @@ def frames(count: int) -> list[TrackerFrame]:
 def test_every_frame_becomes_a_pose_when_there_is_time() -> None:
     stream, method, output = Paced(frames(20), 0.005), Counting(), Kept()
     done = performed(stream, method, output, plan=LiveOptions(100.0, queue_frames=100))
-    assert (done.captured, done.poses, done.dropped, done.before) == (20, 20, 0, 0)
+    assert (done.captured, done.poses, done.dropped, done.frames_before) == (20, 20, 0, 0)
     assert [float(f.measured_s[0]) for f in method.seen] == [n / 100.0 for n in range(20)]
     assert [pose.number for pose in output.poses] == list(range(20))
     assert all(p.frame.received_s <= p.taken_s <= p.ready_s for p in output.poses)
@@ -202,8 +202,8 @@ def test_calibration_comes_before_the_first_pose() -> None:
     )
     assert said == ["stand still"]
     assert method.worn is WORN
-    assert done.before >= 2
-    assert done.before + done.poses == 10
+    assert done.frames_before >= 2
+    assert done.frames_before + done.poses == 10
     assert run_session(Paced(frames(1)), BODY, Counting(), AfterTwo(), [], PLAN, say=said.append).poses == 0
     assert said[-1] == "calibration: the stream ended before it was done"
 
@@ -217,7 +217,7 @@ def test_nobody_in_t_pose_is_told_so(worn: Playback) -> None:
     said: list[str] = []
     boxing = worn.simulation.frames
     standing = TPoseCalibrator(worn.body, mounts_of(worn.scenario), attempts=2)
-    recorded, plan = Paced(boxing, stamped=False), LiveOptions(40.0, queue_frames=9999, stamped_here=False)
+    recorded, plan = Paced(boxing, stamped=False), LiveOptions(40.0, queue_frames=9999, host_timestamps=False)
     with pytest.raises(UnusableHold):
         run_session(recorded, worn.body, Counting(), standing, [], plan, say=said.append)
     assert said[0].startswith("calibration: stand in T-pose")
@@ -246,10 +246,10 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     run_session(
         Paced(stands(), 0.005, stamped=False),
         worn.body,
-        worn.setting.fitted(registry.resolve("ik"), "ik"),
+        worn.clip_evaluation.fit_method(registry.resolve("ik"), "ik"),
         TPoseCalibrator(worn.body, mounts_of(worn.scenario)),
         [output],
-        LiveOptions(40.0, queue_frames=999, stamped_here=False),
+        LiveOptions(40.0, queue_frames=999, host_timestamps=False),
         say=said.append,
     )
     assert said[1].startswith("calibration: done")
@@ -262,7 +262,7 @@ def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
     from harness.reconstruct import registry
 
     boxing = worn.simulation.frames[:60]
-    reconstructor = worn.setting.fitted(registry.resolve("ik"), "ik")
+    reconstructor = worn.clip_evaluation.fit_method(registry.resolve("ik"), "ik")
     warm_up(reconstructor, worn.calibration, boxing[:3])
     session = reconstructor.begin(worn.calibration)
     offline = [session.step(frame) for frame in boxing]

@@ -38,7 +38,7 @@ class Scene:
     def only(self, inputs: str) -> list[TrackerFrame]:
         """The frames with nothing but these inputs."""
         kept = make_inputs(inputs, self.calibration.stations)
-        return [kept.masked(frame) for frame in self.frames]
+        return [kept.mask(frame) for frame in self.frames]
 
     def off_m(self, estimates: list[Estimate], truth: Floats) -> Floats:
         """(T,) mean distance over the joint centres [m]."""
@@ -51,7 +51,7 @@ class Scene:
         judge, rows = Residuals(self.body, self.calibration, Loss()), []
         for frame, estimate in zip(frames, estimates, strict=True):
             judge.read(frame)
-            judge.place(estimate.qpos)
+            judge.evaluate(estimate.qpos)
             rows.append(np.where(judge.measured, judge.distance, 0.0))
         position, orientation = np.split(np.array(rows), 2, axis=1)
         return position, orientation

@@ -26,8 +26,7 @@ from harness.testing.method_checks import check_method
 from harness.testing.rules import RULES
 from harness.testing.rules.assertions import require_identical
 from harness.testing.rules.reproducibility import estimate_qpos, works_in_another_process
-
-from .conftest import Scene, moved, scene
+from tests.reconstruct.conftest import Scene, moved, scene
 
 NAMES = sorted(registry.methods())
 ALSO = ("mean_pose+ik", "best_match+ik")
@@ -125,7 +124,7 @@ def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
 def test_what_was_fitted_may_go_to_another_process() -> None:
     """One for all methods, as a process takes seconds to start."""
     trials = [make_case(registry.resolve(name)) for name in (*NAMES, *ALSO)]
-    tasks = [(trial.fitted(), trial.calibration, trial.frames) for trial in trials]
+    tasks = [(trial.fit(), trial.calibration, trial.frames) for trial in trials]
     there = {which: future.result() for which, future in run_in_workers(estimate_qpos, tasks, 1)}
     for which, task in enumerate(tasks):
         require_identical(estimate_qpos(*task), there[which])

@@ -12,8 +12,7 @@ from harness.errors import BadInput
 from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.mean_pose import MeanPose, mean_posture
 from harness.testing.frames import drop_stations, exact_frames
-
-from .conftest import Scene, moved
+from tests.reconstruct.conftest import Scene, moved
 
 
 @pytest.mark.parametrize("method", [MeanPose(), BestMatch()])

@@ -56,8 +56,8 @@ def fabricate_sweep(out: Path, plan: Plan | None = None) -> Path:
         index.expect([*named, *(f"to come {n}" for n in range(plan.to_come))])
         index.add(rows)
         finished = [name for name in named if name not in {cell for cell, *_ in failed}]
-        index.ended([(name, row["key"], "") for name, row in zip(finished, rows, strict=True)])
-        index.ended(failed)
+        index.record_outcomes([(name, row["key"], "") for name, row in zip(finished, rows, strict=True)])
+        index.record_outcomes(failed)
         index.note(name="made_up", command=COMMAND)
     return out
 

@@ -36,7 +36,7 @@ def filled(out: Path, rows: list[dict[str, Any]]) -> None:
     with CellIndex(out) as index:
         index.expect([named(row) for row in rows])
         index.add(reversed(rows), [0.5] * len(rows))
-        index.ended((named(row), row["key"], "") for row in rows)
+        index.record_outcomes((named(row), row["key"], "") for row in rows)
 
 
 def test_rows_come_out_as_they_went_in_and_in_planned_order(run: Path, tmp_path: Path) -> None:
@@ -58,7 +58,7 @@ def test_rows_come_out_as_they_went_in_and_in_planned_order(run: Path, tmp_path:
 def test_what_failed_is_counted_and_kept_until_it_is_made_again(tmp_path: Path) -> None:
     with CellIndex(tmp_path) as index:
         index.expect(["a", "b", "c"])
-        index.ended([("a", "key", ""), ("c", "", "Traceback"), ("b", "", "no such clip")])
+        index.record_outcomes([("a", "key", ""), ("c", "", "Traceback"), ("b", "", "no such clip")])
         assert index.counts() == CellCounts(3, 1, 2)
         assert list(index.failures().items()) == [("b", "no such clip"), ("c", "Traceback")]
         index.expect(["c", "d"])
@@ -75,8 +75,8 @@ def test_cells_that_the_index_lacks_are_gathered_from_their_folders(run: Path) -
     (run / "cells" / "of_an_older_version" / "cell.json").write_text("{}")
     with CellIndex(run) as index:
         assert index.unwritten() == 9
-        assert index.gather() == 8
-        assert index.gather() == 0
+        assert index.add_from_folders() == 8
+        assert index.add_from_folders() == 0
         rows = rows_of(run)
         assert list(index.rows_of([row["key"] for row in rows])) == [{**row, "seconds": None} for row in rows]
 
@@ -111,7 +111,7 @@ def test_the_table_is_the_same_in_whatever_order_cells_ended(run: Path, tmp_path
         with CellIndex(tmp_path / name) as index:
             index.expect([named(row) for row in rows])
             index.add(order)
-            index.ended((named(row), row["key"], "") for row in order)
+            index.record_outcomes((named(row), row["key"], "") for row in order)
             write_table(index, tmp_path / name / "table.csv")
             (tmp_path / name / "groups.json").write_text(json.dumps(compute_group_statistics(index)))
     for file in ("table.csv", "groups.json"):
@@ -132,7 +132,7 @@ def test_groups_average_each_clip_first(run: Path, tmp_path: Path) -> None:
     with CellIndex(tmp_path) as index:
         index.expect(["0", "1", "2", "3"])
         index.add(rows)
-        index.ended((row["key"], row["key"], "") for row in rows)
+        index.record_outcomes((row["key"], row["key"], "") for row in rows)
         (group,) = compute_group_statistics(index)
     assert (group["cells"], group["clips"], group["varied"]) == (4, 2, {"noise": "clean"})
     assert group["metrics"]["mpjpe_mm"] == {"mean": 4.0, "sd": pytest.approx(8.0**0.5), "clips": 2}

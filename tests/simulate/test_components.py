@@ -77,7 +77,7 @@ def runs(busy: Bools) -> list[tuple[int, int, int]]:
 
 def test_white(still: Still) -> None:
     true, seen = still(300.0), still(300.0)
-    WhiteNoise(position_m=0.00075, orientation_rad=0.001).spoil(seen)
+    WhiteNoise(position_m=0.00075, orientation_rad=0.001).apply(seen)
     shift, turn = errors(true, seen)
     for axis in range(3):
         assert_sd(shift[..., axis], 0.00075)
@@ -93,7 +93,7 @@ def test_slow(still: Still, correlation_s: float) -> None:
     """Its innovations are white and of the right size, and neighbours are as alike as exp(-dt/tau)."""
     true, seen = still(600.0), still(600.0)
     slow = DriftNoise(position_m=0.0015, pitch_roll_rad=0.004, yaw_rad=0.008, correlation_s=correlation_s)
-    slow.spoil(seen)
+    slow.apply(seen)
     shift, turn = errors(true, seen)
     a = np.exp(-1.0 / (40.0 * correlation_s))
     unit = np.concatenate([shift / 0.0015, turn / [0.004, 0.004, 0.008]], axis=2)
@@ -108,7 +108,7 @@ def test_slow_is_stationary_from_the_start(still: Still) -> None:
     first = []
     for seed in range(60):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
-        DriftNoise().spoil(seen)
+        DriftNoise().apply(seen)
         first.append(shifted(true, seen)[0])
     assert_sd(np.array(first), DriftNoise().position_m)
 
@@ -117,12 +117,12 @@ def test_session(still: Still) -> None:
     scales, offsets = [], []
     for seed in range(300):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
-        SessionBias(scale=0.002, station_offset_m=0.0).spoil(seen)
+        SessionBias(scale=0.002, station_offset_m=0.0).apply(seen)
         ratio = seen.position_m / true.position_m - 1.0
         assert np.ptp(ratio) < 1e-12, "one scale for all stations and moments"
         scales.append(ratio[0, 0, 0])
         seen = still(0.1, seed=seed)
-        SessionBias(scale=0.0, station_offset_m=0.001).spoil(seen)
+        SessionBias(scale=0.0, station_offset_m=0.001).apply(seen)
         moved = rotations.rotate(rotations.inverse(true.turn), shifted(true, seen))
         assert np.ptp(moved, axis=0).max() < 1e-12
         offsets.append(moved[0])
@@ -134,10 +134,10 @@ def test_excursion(still: Still) -> None:
     """Onsets by Poisson's law; a busy period begins at rate r exp(-r d) for excursions of mean length d."""
     hours, stations, ramp_s = 0.5, 8, 0.2
     true, seen = still(3600.0 * hours, stations), still(3600.0 * hours, stations)
-    Excursion(onsets_per_min=2.0, size_m=(0.005, 0.03), stay_s=(1.0, 5.0), ramp_s=ramp_s).spoil(seen)
+    Excursion(onsets_per_min=2.0, size_m=(0.005, 0.03), stay_s=(1.0, 5.0), ramp_s=ramp_s).apply(seen)
     shift, turn = errors(true, seen)
     size = np.linalg.norm(shift, axis=2)
-    np.testing.assert_array_equal(size > 0.0, seen.hits["excursion"])
+    np.testing.assert_array_equal(size > 0.0, seen.affected["excursion"])
     assert np.abs(turn).max() < 1e-12
     found = runs(size > 0.0)
     expected = hours * stations * 120.0 * np.exp(-2.0 * 3.2 / 60.0)
@@ -164,7 +164,7 @@ def test_excursion(still: Still) -> None:
 
 def test_excursions_that_meet_stay_below_the_largest_size(still: Still) -> None:
     true, seen = still(600.0), still(600.0)
-    Excursion(onsets_per_min=60.0).spoil(seen)
+    Excursion(onsets_per_min=60.0).apply(seen)
     size_m = np.linalg.norm(shifted(true, seen), axis=2)
     assert 0.0299 < size_m.max() <= 0.03 + 1e-12
 
@@ -173,8 +173,8 @@ def test_excursions_may_be_under_way_when_the_take_begins(still: Still) -> None:
     begun = []
     for seed in range(100):
         seen = still(0.1, 8, seed=seed)
-        Excursion(onsets_per_min=4.0).spoil(seen)
-        begun.append(seen.hits["excursion"][0])
+        Excursion(onsets_per_min=4.0).apply(seen)
+        begun.append(seen.affected["excursion"][0])
     share = 1.0 - np.exp(-4.0 / 60.0 * 3.2)
     low, high = stats.binom.interval(1.0 - ODDS, 800, share)
     assert low <= np.sum(begun) <= high
@@ -183,10 +183,10 @@ def test_excursions_may_be_under_way_when_the_take_begins(still: Still) -> None:
 @pytest.mark.parametrize("share", [0.03, 0.2])
 def test_echo(still: Still, share: float) -> None:
     true, seen = still(1500.0), still(1500.0)
-    Echo(share=share, burst_records=(1, 8), size_m=(0.05, 0.30)).spoil(seen)
+    Echo(share=share, burst_records=(1, 8), size_m=(0.05, 0.30)).apply(seen)
     shift, turn = errors(true, seen)
     size = np.linalg.norm(shift, axis=2)
-    np.testing.assert_array_equal(size > 0.0, seen.hits["echo"])
+    np.testing.assert_array_equal(size > 0.0, seen.affected["echo"])
     assert np.abs(turn).max() < 1e-12
     clean = 4.5 * (1.0 - share) / share
     found, sd = renewal_share(size > 0.0, 4.5, 63.0 / 12.0, clean, clean * (1.0 + clean))
@@ -210,8 +210,8 @@ def test_echoes_have_their_share_from_the_first_reading_on(still: Still) -> None
     first = []
     for seed in range(150):
         seen = still(0.1, 8, seed=seed)
-        Echo(share=0.1).spoil(seen)
-        first.append(seen.hits["echo"][0])
+        Echo(share=0.1).apply(seen)
+        first.append(seen.affected["echo"][0])
     low, high = stats.binom.interval(1.0 - ODDS, 1200, 0.1)
     assert low <= np.sum(first) <= high
 
@@ -219,9 +219,9 @@ def test_echoes_have_their_share_from_the_first_reading_on(still: Still) -> None
 def test_dropout(still: Still) -> None:
     share, rate_hz = 0.02, 40.0
     true, seen = still(3600.0), still(3600.0)
-    Dropout(share=share, gap_s=(0.1, 0.5), coast_s=0.5, tilt_rad=0.004).spoil(seen)
+    Dropout(share=share, gap_s=(0.1, 0.5), coast_s=0.5, tilt_rad=0.004).apply(seen)
     lost = seen.quality == 0.0
-    np.testing.assert_array_equal(lost, seen.hits["lost"])
+    np.testing.assert_array_equal(lost, seen.affected["lost"])
     free = rate_hz * 0.3 * (1.0 - share) / share
     found, sd = renewal_share(lost, rate_hz * 0.3, (rate_hz * 0.4) ** 2 / 12.0, free, free**2)
     assert abs(found - share) < Z * sd
@@ -244,7 +244,7 @@ def test_dropout(still: Still) -> None:
             assert since_s[-1] <= 0.5
             coasts += 1
     assert coasts > 0.8 * len(gaps)
-    known = ~lost & ~seen.hits["coast"]
+    known = ~lost & ~seen.affected["coast"]
     assert np.abs(shift[known]).max() == 0.0
     assert seen.quality[known].min() == 1.0
     frozen = lost[1:] & lost[:-1]
@@ -258,8 +258,8 @@ def test_dropout(still: Still) -> None:
 def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coast_s: float, error_cm: float) -> None:
     """The table of docs/is900.md 13.4, to the digits it has."""
     true, seen = still(400.0, 2), still(400.0, 2)
-    Dropout(share=0.005, coast_s=coast_s, tilt_rad=np.deg2rad(tilt_deg)).spoil(seen)
-    alone = ~seen.hits["lost"]
+    Dropout(share=0.005, coast_s=coast_s, tilt_rad=np.deg2rad(tilt_deg)).apply(seen)
+    alone = ~seen.affected["lost"]
     worst_cm = 100.0 * np.linalg.norm(shifted(true, seen), axis=2)[alone].max()
     law_cm = 100.0 * 0.5 * 9.81 * np.sin(np.deg2rad(tilt_deg)) * coast_s**2
     assert law_cm == pytest.approx(error_cm, abs=0.5 if error_cm > 10.0 else 0.05)
@@ -268,9 +268,9 @@ def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coas
 
 def test_a_lost_station_keeps_sending_what_it_said_last(still: Still) -> None:
     seen = still(10.0)
-    WhiteNoise().spoil(seen)
+    WhiteNoise().apply(seen)
     before = seen.position_m.copy()
-    LostStation("s2", from_s=2.0, to_s=5.0).spoil(seen)
+    LostStation("s2", from_s=2.0, to_s=5.0).apply(seen)
     lost = (seen.time_s[:, 2] >= 2.0) & (seen.time_s[:, 2] < 5.0)
     np.testing.assert_array_equal(seen.quality[:, 2] == 0.0, lost)
     assert seen.quality[:, [0, 1, 3]].min() == 1.0
@@ -278,12 +278,12 @@ def test_a_lost_station_keeps_sending_what_it_said_last(still: Still) -> None:
     assert np.abs(seen.position_m[lost, 2] - before[last, 2]).max() == 0.0
     np.testing.assert_array_equal(seen.position_m[~lost], before[~lost])
     with pytest.raises(UnknownName, match="'s9'"):
-        LostStation("s9").spoil(seen)
+        LostStation("s9").apply(seen)
 
 
 def test_quality_falls_before_a_station_is_lost(still: Still) -> None:
     seen = still(10.0)
-    LostStation("s2", from_s=4.0, fade_s=2.0).spoil(seen)
+    LostStation("s2", from_s=4.0, fade_s=2.0).apply(seen)
     time_s, quality = seen.time_s[:, 2], seen.quality[:, 2]
     assert (quality[time_s <= 2.0] == 1.0).all()
     falling = (time_s > 2.0) & (time_s < 3.9)
@@ -294,36 +294,36 @@ def test_quality_falls_before_a_station_is_lost(still: Still) -> None:
 
 def test_displaced_stations_are_off_for_a_while_and_by_so_much(still: Still) -> None:
     true, seen = still(6.0), still(6.0)
-    PositionOffset(("s1", "s3"), from_s=2.0, to_s=4.0, offset_m=(0.0, -0.3, 0.1)).spoil(seen)
+    PositionOffset(("s1", "s3"), from_s=2.0, to_s=4.0, offset_m=(0.0, -0.3, 0.1)).apply(seen)
     off = (true.time_s >= 2.0) & (true.time_s < 4.0) & np.array([False, True, False, True])
     moved_m, turned_rad = errors(true, seen)
     np.testing.assert_allclose(moved_m[off], np.tile([0.0, -0.3, 0.1], (off.sum(), 1)), atol=1e-12)
     assert np.abs(moved_m[~off]).max() == np.abs(turned_rad).max() == 0.0
     assert (seen.quality == 1.0).all()  # it does not know
-    np.testing.assert_array_equal(seen.hits["displaced"], off)
+    np.testing.assert_array_equal(seen.affected["displaced"], off)
     with pytest.raises(UnknownName, match="'s9'"):
-        PositionOffset(("s9",)).spoil(seen)
+        PositionOffset(("s9",)).apply(seen)
     with pytest.raises(BadInput, match="to_s"):
         PositionOffset((), from_s=2.0, to_s=1.0)
 
 
 def test_turned_stations_face_elsewhere_for_a_while_and_stay_in_place(still: Still) -> None:
     true, seen = still(6.0), still(6.0)
-    OrientationOffset((), from_s=1.0, to_s=3.0, angle_rad=0.5).spoil(seen)
+    OrientationOffset((), from_s=1.0, to_s=3.0, angle_rad=0.5).apply(seen)
     off = (true.time_s >= 1.0) & (true.time_s < 3.0)
     moved_m, turned_rad = errors(true, seen)
     np.testing.assert_allclose(turned_rad[off], np.tile([0.0, 0.0, 0.5], (off.sum(), 1)), atol=1e-12)
     assert np.abs(turned_rad[~off]).max() < 1e-12
     assert np.abs(moved_m).max() == 0.0
-    np.testing.assert_array_equal(seen.hits["turned"], off)
+    np.testing.assert_array_equal(seen.affected["turned"], off)
     with pytest.raises(UnknownName, match="'s9'"):
-        OrientationOffset(("s9",)).spoil(seen)
+        OrientationOffset(("s9",)).apply(seen)
 
 
 def test_speed(still: Still, rng: np.random.Generator) -> None:
     true, seen = still(1.0), still(1.0)
     seen.velocity_m_s = rng.normal(size=seen.velocity_m_s.shape)
-    SpeedError(ahead_s=0.002).spoil(seen)
+    SpeedError(ahead_s=0.002).apply(seen)
     np.testing.assert_allclose(shifted(true, seen), 0.002 * seen.velocity_m_s, atol=1e-15)
 
 
@@ -331,7 +331,7 @@ def test_mount_offset(still: Still) -> None:
     moved, turned = [], []
     for seed in range(200):
         true, seen = still(0.1, seed=seed), still(0.1, seed=seed)
-        MountOffset(position_m=0.004, orientation_rad=0.03).spoil(seen)
+        MountOffset(position_m=0.004, orientation_rad=0.03).apply(seen)
         shift = rotations.rotate(rotations.inverse(true.turn), shifted(true, seen))
         turn = rotations.log(rotations.multiply(rotations.inverse(true.turn), seen.turn))
         assert max(np.ptp(shift, axis=0).max(), np.ptp(turn, axis=0).max()) < 1e-12
@@ -344,7 +344,7 @@ def test_mount_offset(still: Still) -> None:
 @pytest.mark.parametrize("over_s", [0.0, 2.0])
 def test_mount_slip_takes_its_time_and_stays(still: Still, over_s: float) -> None:
     true, seen = still(10.0), still(10.0)
-    MountSlip("s1", from_s=3.0, over_s=over_s, around_rad=0.4, along_m=-0.02).spoil(seen)
+    MountSlip("s1", from_s=3.0, over_s=over_s, around_rad=0.4, along_m=-0.02).apply(seen)
     own = rotations.log(rotations.multiply(rotations.inverse(true.turn), seen.turn))
     time_s = seen.time_s[:, 1]
     share = np.where(time_s < 3.0, 0.0, np.minimum((time_s - 3.0) / over_s, 1.0) if over_s else 1.0)
@@ -357,7 +357,7 @@ def test_mount_slip_takes_its_time_and_stays(still: Still, over_s: float) -> Non
 
 def test_clock(still: Still) -> None:
     seen = still(100.0)
-    Clock(offset_s=7.0, drift_ppm=-35.0).spoil(seen)
+    Clock(offset_s=7.0, drift_ppm=-35.0).apply(seen)
     fit = np.polynomial.polynomial.polyfit(seen.time_s.ravel(), seen.device_s.ravel(), 1)
     np.testing.assert_allclose(fit, [7.0, 1.0 - 35e-6], atol=1e-9)
 
@@ -366,7 +366,7 @@ def test_more_stations_leave_the_draws_of_the_others_alone(still: Still) -> None
     few, many = still(60.0, 2), still(60.0, 5)
     many.position_m[:, :2], many.turn[:, :2] = few.position_m, few.turn
     for sensed in (few, many):
-        noise_preset("default").spoil(sensed)
+        noise_preset("default").apply(sensed)
     for name in ("position_m", "turn", "quality", "device_s"):
         np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[:, :2])
 
@@ -377,7 +377,7 @@ def test_one_component_less_leaves_the_draws_of_the_others_alone(still: Still, l
 
     def offset(noise: Noise) -> Floats:
         true, seen = still(30.0), still(30.0)
-        noise.spoil(seen)
+        noise.apply(seen)
         shift: Floats = seen.position_m - true.position_m
         shift[seen.quality == 0.0] = 0.0
         return shift
@@ -393,7 +393,7 @@ def test_noise_differs_by_seed_take_and_station(still: Still) -> None:
     one, other, next_take = still(1.0), still(1.0, seed=2), still(1.0)
     next_take.take = "another"
     for sensed in (one, other, next_take):
-        WhiteNoise().spoil(sensed)
+        WhiteNoise().apply(sensed)
     shifts = [s.position_m - still(1.0).position_m for s in (one, other, next_take)]
     assert len({float(x) for shift in shifts for x in shift[0].ravel()}) == 3 * 4 * 3
 

@@ -19,7 +19,7 @@ def seen(boxer: tuple[Body, BodyMotion]) -> dict[Kind, Simulation]:
     """The same take with the same noise under every disturbance, at moments clear of the edges."""
     found: dict[Kind, Simulation] = {}
     for kind in KINDS:
-        noise = Disturbance(kind, station="right_wrist", from_s=BEGIN_S).added(noise_preset("default"), SIX)
+        noise = Disturbance(kind, station="right_wrist", from_s=BEGIN_S).add_to(noise_preset("default"), SIX)
         found[kind] = simulate_tracker(*boxer, worn(), TrackerConfig(slot_s=0.0), noise, seed=4)
     return found
 

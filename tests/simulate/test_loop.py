@@ -19,7 +19,7 @@ def test_the_first_lap_is_what_the_simulation_says(boxer: tuple[Body, BodyMotion
     body, take = boxer
     played = simulate_loop(body, take, worn(), TRACKER, noise_preset(noise), seed=3)
     seen = simulate_tracker(body, take, worn(), TRACKER, noise_preset(noise), seed=3)
-    assert played.first_lap == len(seen.frames)
+    assert played.take_frames == len(seen.frames)
     for row, frame in enumerate(seen.frames):
         np.testing.assert_allclose(frame.measured_s, played.device_s[row], atol=1e-6)
         sound = frame.position_valid
@@ -29,14 +29,14 @@ def test_the_first_lap_is_what_the_simulation_says(boxer: tuple[Body, BodyMotion
 def test_the_way_back_goes_on_from_the_end_to_the_beginning(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
     played = simulate_loop(body, take, worn(), TRACKER, noise_preset("clean"), seed=3)
-    assert len(played) >= played.first_lap + TRACKER.rate_hz
+    assert len(played) >= played.take_frames + TRACKER.rate_hz
     steps_m = np.linalg.norm(np.diff(played.position_m, axis=0, append=played.position_m[:1]), axis=2)
-    assert steps_m[played.first_lap - 1 :].max() <= steps_m[: played.first_lap - 1].max()
+    assert steps_m[played.take_frames - 1 :].max() <= steps_m[: played.take_frames - 1].max()
     after = np.roll(played.tracker_from_station, -1, axis=0)
     steps_rad = rotations.angle_between_rad(played.tracker_from_station, after)
-    assert steps_rad[played.first_lap - 1 :].max() <= max(steps_rad[: played.first_lap - 1].max(), 0.1)
+    assert steps_rad[played.take_frames - 1 :].max() <= max(steps_rad[: played.take_frames - 1].max(), 0.1)
     np.testing.assert_allclose(np.diff(played.taken_s[:, 0]), 1.0 / TRACKER.rate_hz)
-    assert played.lap_s == pytest.approx(played.taken_s[-1, 0] + 1.0 / TRACKER.rate_hz)
+    assert played.loop_s == pytest.approx(played.taken_s[-1, 0] + 1.0 / TRACKER.rate_hz)
 
 
 def test_the_clock_runs_on_through_the_lap(boxer: tuple[Body, BodyMotion]) -> None:
@@ -44,5 +44,5 @@ def test_the_clock_runs_on_through_the_lap(boxer: tuple[Body, BodyMotion]) -> No
     played = simulate_loop(body, take, worn(), TRACKER, noise_preset("noise"), seed=3)
     pace_s = np.diff(played.device_s[:, 0])
     np.testing.assert_allclose(pace_s, (1.0 + 20e-6) / TRACKER.rate_hz, rtol=1e-9)
-    assert played.device_lap_s == pytest.approx((1.0 + 20e-6) * played.lap_s)
+    assert played.device_loop_s == pytest.approx((1.0 + 20e-6) * played.loop_s)
     assert played.device_s[0, 0] == 0.0

@@ -95,7 +95,7 @@ def test_every_source_gives_the_frames_of_the_simulation(played: Playback, seen:
 @pytest.mark.parametrize("name", sorted(registry.methods()))
 def test_every_method_answers_alike_whatever_the_source(played: Playback, seen: Sources, name: str) -> None:
     """Bit by bit, although a busy host receives the frames of ports at other times than the simulation says."""
-    fitted = played.setting.fitted(registry.resolve(name), name)
+    fitted = played.clip_evaluation.fit_method(registry.resolve(name), name)
     sources = {"simulation": list(played.simulation.frames), **seen}
     first_s = max(frames[0].measured_s[0] for frames in sources.values())
 

@@ -34,7 +34,7 @@ def frame(stations: int) -> TrackerFrame:
     ],
 )
 def test_a_combination_keeps_what_it_names(name: str, position: set[str], orientation: set[str]) -> None:
-    masked = make_inputs(name, SIX).masked(frame(6))
+    masked = make_inputs(name, SIX).mask(frame(6))
     assert {s for s, v in zip(SIX, masked.position_valid, strict=True) if v} == position
     assert {s for s, v in zip(SIX, masked.orientation_valid, strict=True) if v} == orientation
     assert np.array_equal(np.isnan(masked.position_m).any(1), ~masked.position_valid)

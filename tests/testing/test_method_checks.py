@@ -65,7 +65,7 @@ class StandingSession:
     def start(self) -> None: ...
 
     def step(self, frame: TrackerFrame) -> Any:
-        status, _ = self.coverage.seen(frame)
+        status, _ = self.coverage.update(frame)
         return Estimate(self.answer(frame), status)
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
@@ -201,7 +201,7 @@ class Rewriting(StandingSession):
 
     def step(self, frame: TrackerFrame) -> Any:
         self.live[7] += 1e-6
-        return SimpleNamespace(qpos=self.live, status=self.coverage.seen(frame)[0])
+        return SimpleNamespace(qpos=self.live, status=self.coverage.update(frame)[0])
 
 
 class Foreseeing(StandingSession):
@@ -212,7 +212,7 @@ class Foreseeing(StandingSession):
 
     def step(self, frame: TrackerFrame) -> Any:
         self.seen.append(frame)
-        return Late(self, len(self.seen), self.coverage.seen(frame)[0])
+        return Late(self, len(self.seen), self.coverage.update(frame)[0])
 
 
 @dataclass
@@ -265,7 +265,7 @@ class Hasty(StandingSession):
     """Gives up at once."""
 
     def step(self, frame: TrackerFrame) -> Any:
-        status, _ = self.coverage.seen(frame)
+        status, _ = self.coverage.update(frame)
         return Estimate(self.qpos, Status.LOST if status is Status.HELD else status)
 
 
@@ -276,7 +276,7 @@ class Despairing(StandingSession):
         self.worst = Status.SOLVED
 
     def step(self, frame: TrackerFrame) -> Any:
-        self.worst = max(self.worst, self.coverage.seen(frame)[0])
+        self.worst = max(self.worst, self.coverage.update(frame)[0])
         return Estimate(self.qpos, self.worst)
 
 
@@ -285,7 +285,7 @@ class Undemanding(StandingSession):
 
     def step(self, frame: TrackerFrame) -> Any:
         some = frame.position_valid.any() or frame.orientation_valid.any()
-        return Estimate(self.qpos, Status.SOLVED if some else self.coverage.seen(frame)[0])
+        return Estimate(self.qpos, Status.SOLVED if some else self.coverage.update(frame)[0])
 
 
 class Offended(StandingSession):

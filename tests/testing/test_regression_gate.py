@@ -160,9 +160,11 @@ def test_a_first_baseline_is_kept_and_then_held_to(project: pytest.Pytester) -> 
 
 def test_a_baseline_is_renewed_on_its_own_scenario_but_loses_no_method(project: pytest.Pytester) -> None:
     alone = RegressionGate(project.path / "out", project.path / "results/baselines")
-    alone.keep("mine:Mine", "own", scenario="demo")
+    alone.save_baseline("mine:Mine", "own", scenario="demo")
     CHANGE["now"] = 1.1
-    replaced = RegressionGate(project.path / "again", project.path / "results/baselines").keep("mine:Mine", "own")
+    replaced = RegressionGate(project.path / "again", project.path / "results/baselines").save_baseline(
+        "mine:Mine", "own"
+    )
     assert load_results(replaced).manifest.inputs["name"] == "demo"
     result = gated(project, ONE.format(""), "--harness-save")
     result.assert_outcomes(failed=1)

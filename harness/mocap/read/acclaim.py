@@ -3,4 +3,4 @@
 from harness.mocap.read.amc import read_amc, read_amc_clip
 from harness.mocap.read.asf import AsfFile, read_asf, read_asf_file
 
-__all__ = ["AsfFile", "read_amc", "read_asf", "read_asf_file", "read_amc_clip"]
+__all__ = ["AsfFile", "read_amc", "read_amc_clip", "read_asf", "read_asf_file"]

@@ -92,12 +92,12 @@ class _TokenReader:
     def expect(self, *wanted: str) -> None:
         for want in wanted:
             if self.next() != want:
-                raise self.unlike(want)
+                raise self.unexpected(want)
 
     def triple(self, what: str) -> tuple[float, ...]:
         return tuple(parse_number(self.path, self.next(), what, self.line) for _ in range(3))
 
-    def unlike(self, expected: str) -> BadFile:
+    def unexpected(self, expected: str) -> BadFile:
         """The error that the word read last is not what was expected."""
         return BadFile(self.path, f"{self.word[:40]!r}", expected, "Is the file whole, and BVH?", self.line)
 
@@ -114,12 +114,12 @@ def _parse_joints(words: _TokenReader) -> tuple[BvhJoint, ...]:
             continue
         root = kind == "ROOT" and not joints
         if not root and not (kind in ("JOINT", "End") and inside and joints[inside[-1]].channels):
-            raise words.unlike("JOINT, End Site or }" if inside else "one ROOT with its joints, then MOTION")
+            raise words.unexpected("JOINT, End Site or }" if inside else "one ROOT with its joints, then MOTION")
         name = words.next() if kind != "End" else f"{joints[inside[-1]].name}_end"
         if kind == "End":
             words.expect("Site")
         if name in names or name in ("{", "}", "MOTION") or len(joints) == MAX_JOINTS:
-            raise words.unlike(f"a new name, and at most {MAX_JOINTS} joints")
+            raise words.unexpected(f"a new name, and at most {MAX_JOINTS} joints")
         names.add(name)
         words.expect("{", "OFFSET")
         offset = words.triple(f"the offset of {name}")
@@ -136,7 +136,7 @@ def _parse_channels(words: _TokenReader, root: bool) -> tuple[str, ...]:
     channels = tuple(words.next() for _ in range(count))
     if set(channels[-3:]) != _ROTATIONS or (root and set(channels[:3]) != _POSITIONS):
         words.word = " ".join(channels)
-        raise words.unlike("each rotation once" + (" after each position once" if root else ""))
+        raise words.unexpected("each rotation once" + (" after each position once" if root else ""))
     return channels
 
 

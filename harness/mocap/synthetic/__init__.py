@@ -8,7 +8,7 @@ __all__ = [
     "SOURCE",
     "generate",
     "performer_names",
-    "sample_skeletons",
     "performer_skeleton",
+    "sample_skeletons",
     "take_names",
 ]

@@ -58,22 +58,24 @@ class ArticulatedFigure:
         `gaze` (T, 3) yaw, pitch and roll of the head in the world [rad]; `shoulders` lift and reach (T,) [rad];
         `manner` what back, neck and hands do on top.
         """
-        self.skeleton, self.root_m, self._manner = skeleton, root_m, manner
+        self.skeleton, self.root_m, self._posture_offsets = skeleton, root_m, manner
         self.angles_rad = np.zeros((len(root_m), len(skeleton.axes)))
         self.pelvis = axis_rotation(2, pelvis[:, 0]) @ axis_rotation(1, pelvis[:, 1]) @ axis_rotation(0, pelvis[:, 2])
         self._world: dict[str, Floats] = {}
         self._end: dict[str, Floats] = {}
         above, at = self.pelvis, root_m
         for bone, share in _SPINE_SHARES.items():
-            above, at = self._put(bone, above, at, spine * share + manner[bone])
+            above, at = self._pose_trunk_bone(bone, above, at, spine * share + manner[bone])
         self.chest, self.chest_m = above, at
         self._neck(gaze)
         for side in SIDES:
             lift, reach = (_CLAVICLE_RAD * np.tanh(x / _CLAVICLE_RAD) for x in shoulders[side])
             sign = SIDE_SIGN[side]
-            self._put(f"{side}clavicle", self.chest, self.chest_m, np.stack([-sign * reach, sign * lift], axis=-1))
+            self._pose_trunk_bone(
+                f"{side}clavicle", self.chest, self.chest_m, np.stack([-sign * reach, sign * lift], axis=-1)
+            )
 
-    def _put(self, bone: str, above: Floats, at: Floats, angles: Floats) -> tuple[Floats, Floats]:
+    def _pose_trunk_bone(self, bone: str, above: Floats, at: Floats, angles: Floats) -> tuple[Floats, Floats]:
         """Set a trunk bone's hinges; returns its world rotation and far end."""
         b = self.skeleton.index(bone)
         where = self.skeleton.dof_of_bone[b]
@@ -91,13 +93,13 @@ class ArticulatedFigure:
         wanted = limb_ik.euler_xyz(rest.T @ np.swapaxes(self.chest, -1, -2) @ head @ rest)
         for bone, share in _NECK_SHARES.items():
             where = self.skeleton.dof_of_bone[self.skeleton.index(bone)]
-            self.angles_rad[:, where] = wanted * share + self._manner[bone] + [_NECK_BIAS_RAD[bone], 0.0, 0.0]
+            self.angles_rad[:, where] = wanted * share + self._posture_offsets[bone] + [_NECK_BIAS_RAD[bone], 0.0, 0.0]
 
     def shoulder_m(self, side: str) -> Floats:
         """(T, 3) where the upper arm starts."""
         return self._end[f"{side}clavicle"]
 
-    def around_m(self, yaw: Floats, ahead: Floats, left: Floats, up: Floats) -> Floats:
+    def point_near_chest_m(self, yaw: Floats, ahead: Floats, left: Floats, up: Floats) -> Floats:
         """(T, 3) the point so far ahead, left and above the top of the chest, as seen when facing `yaw` (T,) [rad]."""
         c, s = np.cos(yaw), np.sin(yaw)
         return self.chest_m + np.stack(
@@ -119,7 +121,7 @@ class ArticulatedFigure:
     def _set(self, bone: str, *angles: Floats) -> None:
         self.angles_rad[:, self.skeleton.dof_of_bone[self.skeleton.index(bone)]] = np.stack(angles, axis=-1)
 
-    def leg(self, side: str, foot: FootTarget) -> None:
+    def pose_leg(self, side: str, foot: FootTarget) -> None:
         """Reach the foot; the knee bends towards `foot.knee`."""
         thigh, shank = self.length_m(f"{side}femur"), self.length_m(f"{side}tibia")
         hip = self.hip_m(side)
@@ -129,7 +131,7 @@ class ArticulatedFigure:
         left = normalize(np.cross(hip - ankle, bend))
         rest = limb_ik.hinge_frame(self.skeleton, f"{side}femur")
         femur, flexion = limb_ik.two_bone_angles(normalize(knee - hip), normalize(ankle - knee), left, rest)
-        self._three(f"{side}femur", np.swapaxes(self.pelvis, -1, -2) @ femur, rest)
+        self._set_ball_joint(f"{side}femur", np.swapaxes(self.pelvis, -1, -2) @ femur, rest)
         self._set(f"{side}tibia", flexion)
         tibia = femur @ rest @ axis_rotation(0, flexion)
         a, c = limb_ik.universal_joint_angles(
@@ -138,10 +140,10 @@ class ArticulatedFigure:
         )
         self._set(f"{side}foot", a, c)
 
-    def _three(self, bone: str, relative: Floats, rest: Floats) -> None:
+    def _set_ball_joint(self, bone: str, relative: Floats, rest: Floats) -> None:
         self._set(bone, *np.unwrap(limb_ik.euler_xyz(rest.T @ relative @ rest), axis=0).T)
 
-    def arm(self, side: str, upper: Floats, elbow: Floats, turn: Floats, hand: WristAngles) -> None:
+    def pose_arm(self, side: str, upper: Floats, elbow: Floats, turn: Floats, hand: WristAngles) -> None:
         """Set an arm from its upper bone's world rotation (T, 3, 3) and the elbow's flexion (T,) [rad].
 
         `turn` is the forearm's pronation; `hand` the wrist's flexion (towards the palm) and deviation (towards the
@@ -150,31 +152,31 @@ class ArticulatedFigure:
         sign = SIDE_SIGN[side]
         rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
         above = self._world[f"{side}clavicle"]
-        self._three(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
+        self._set_ball_joint(f"{side}humerus", np.swapaxes(above, -1, -2) @ upper, rest)
         self._set(f"{side}radius", elbow)
-        self._set(f"{side}wrist", -sign * turn + self._manner[f"{side}wrist"][:, 0])
-        loose = self._manner[f"{side}hand"]
+        self._set(f"{side}wrist", -sign * turn + self._posture_offsets[f"{side}wrist"][:, 0])
+        loose = self._posture_offsets[f"{side}hand"]
         self._set(f"{side}hand", hand[0] + loose[:, 0], -sign * hand[1] + loose[:, 1])
 
-    def hang(
+    def pose_hanging_arm(
         self, side: str, swing: Floats, spread: Floats, twist: Floats, elbow: Floats, turn: Floats, hand: WristAngles
     ) -> None:
         """An arm that hangs from the chest: swung forward, spread sideways, twisted inward, elbow bent (T,) [rad]."""
         sign = SIDE_SIGN[side]
         rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
         placed = axis_rotation(1, -swing) @ axis_rotation(0, sign * spread) @ axis_rotation(2, -sign * twist)
-        self.arm(side, self.chest @ placed @ _HANGING_ARM_FRAME @ rest.T, elbow, turn, hand)
+        self.pose_arm(side, self.chest @ placed @ _HANGING_ARM_FRAME @ rest.T, elbow, turn, hand)
 
-    def reach(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: WristAngles) -> None:
+    def pose_reaching_arm(self, side: str, wrist_m: Floats, towards: Floats, turn: Floats, hand: WristAngles) -> None:
         """An arm whose wrist is at `wrist_m` (T, 3) in the world, drawn in if too far; the elbow points `towards`."""
-        self.arm(side, *self._bent(side, wrist_m, towards), turn, hand)
+        self.pose_arm(side, *self._two_bone_arm(side, wrist_m, towards), turn, hand)
 
-    def palm_turn(self, side: str, wrist_m: Floats, towards: Floats, palm: Floats) -> Floats:
+    def pronation_facing(self, side: str, wrist_m: Floats, towards: Floats, palm: Floats) -> Floats:
         """Pronation (T,) [rad] at which the palm of an arm that reaches so faces the world direction `palm` (T, 3).
 
         Softly bounded to what a forearm can do.
         """
-        upper, elbow = self._bent(side, wrist_m, towards)
+        upper, elbow = self._two_bone_arm(side, wrist_m, towards)
         rest = limb_ik.hinge_frame(self.skeleton, f"{side}humerus")
         facing = rotate_vectors(np.swapaxes(upper @ rest @ axis_rotation(0, elbow), -1, -2), palm)
         down = -rest[2]
@@ -183,7 +185,7 @@ class ArticulatedFigure:
         out: Floats = -0.4 + 1.3 * np.tanh((angle + 0.4) / 1.3)
         return out
 
-    def _bent(self, side: str, wrist_m: Floats, towards: Floats) -> tuple[Floats, Floats]:
+    def _two_bone_arm(self, side: str, wrist_m: Floats, towards: Floats) -> tuple[Floats, Floats]:
         """World rotation (T, 3, 3) of the upper arm and flexion (T,) of the elbow that bring the wrist there."""
         first = self.length_m(f"{side}humerus")
         second = self.length_m(f"{side}radius") + self.length_m(f"{side}wrist")

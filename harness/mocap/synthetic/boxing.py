@@ -172,7 +172,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     }
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for who, side, guard in (("lead", lead, (0.36, 0.16, 0.04)), ("rear", rear, (0.20, 0.14, 0.06))):
-        figure.leg(side, feet[side])
+        figure.pose_leg(side, feet[side])
         _pose_arm(figure, side, rng, t, facing, np.array(guard), {k: act[f"{who}.{k}"] for k in _CHANNELS}, act["drop"])
     return figure
 
@@ -193,14 +193,14 @@ def _pose_arm(
     """One arm from its guard: ahead, out and up of the chest for an arm of 0.58 m [m]."""
     sign, reach = SIDE_SIGN[side], figure.arm_m(side) / 0.58
     x, y, z = guard + rng.normal(0.0, 0.025, 3)
-    wrist = figure.around_m(
+    wrist = figure.point_near_chest_m(
         facing,
         reach * (x + act["ahead"] - 0.10 * drop + smooth_noise(rng, t, 1.3, 0.018)),
         sign * reach * (y - act["in"] + 0.08 * drop + smooth_noise(rng, t, 1.3, 0.014)),
         reach * (z + act["up"] - 0.30 * drop + smooth_noise(rng, t, 1.3, 0.016)),
     )
     raised = act["elbow"] + 0.30 + float(rng.normal(0.0, 0.08)) + smooth_noise(rng, t, 1.6, 0.05)
-    figure.reach(
+    figure.pose_reaching_arm(
         side,
         wrist,
         stack_columns(*horizontal_vector(facing, -0.25, sign * np.sin(raised)).T, -np.cos(raised)),
@@ -234,13 +234,13 @@ def _plan_combinations(rng: np.random.Generator, t: Floats, size: float, slow: f
         combination = _COMBINATIONS[int(rng.choice(len(_COMBINATIONS), p=favour / favour.sum()))]
         for parts in combination:
             flip = -1.0 if parts is _SLIP and rng.random() < 0.5 else 1.0
-            punch = Gesture(now, parts).varied(rng, flip * size, slow)
+            punch = Gesture(now, parts).vary(rng, flip * size, slow)
             if flip < 0.0:
-                punch = Gesture(now, {**punch.parts, "dip": [(dt, -v) for dt, v in punch.parts["dip"]]})
+                punch = Gesture(now, {**punch.channels, "dip": [(dt, -v) for dt, v in punch.channels["dip"]]})
             gestures.append(punch)
             now += (0.62 if parts is _ROLL else rng.uniform(0.34, 0.46)) * slow
         now += rng.uniform(0.15, 0.8) * slow
         if rng.random() < 0.16:
-            gestures.append(Gesture(now, _GUARD_DOWN).varied(rng, 1.0, slow))
+            gestures.append(Gesture(now, _GUARD_DOWN).vary(rng, 1.0, slow))
             now += 2.1 * slow
     return gestures

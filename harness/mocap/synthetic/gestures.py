@@ -18,13 +18,13 @@ class Gesture:
     """What one movement adds to each channel."""
 
     at_s: float
-    parts: Mapping[str, Keyframes]
+    channels: Mapping[str, Keyframes]
 
     @property
     def end_s(self) -> float:
-        return self.at_s + max(keys[-1][0] for keys in self.parts.values())
+        return self.at_s + max(keys[-1][0] for keys in self.channels.values())
 
-    def varied(self, rng: np.random.Generator, size: float, slowness: float, spread: float = 0.06) -> "Gesture":
+    def vary(self, rng: np.random.Generator, size: float, slowness: float, spread: float = 0.06) -> "Gesture":
         """The same movement at another size and speed, and never twice alike: `spread` is the relative variation."""
         slow = slowness * rng.normal(1.0, 0.5 * spread)
         big = size * rng.normal(1.0, 0.5 * spread)
@@ -32,7 +32,7 @@ class Gesture:
             self.at_s,
             {
                 name: [(dt * slow, value * big * rng.normal(1.0, spread)) for dt, value in keys]
-                for name, keys in self.parts.items()
+                for name, keys in self.channels.items()
             },
         )
 
@@ -48,7 +48,7 @@ def sum_gestures(t: Floats, gestures: Iterable[Gesture]) -> Mapping[str, Floats]
     """Every channel (T,) as the sum of the gestures on it; a channel that nothing moves is 0."""
     out: defaultdict[str, Floats] = defaultdict(lambda: np.zeros(len(t)))
     for gesture in gestures:
-        for name, keys in gesture.parts.items():
+        for name, keys in gesture.channels.items():
             first = int(np.searchsorted(t, gesture.at_s + keys[0][0]))
             last = len(t) if keys[-1][1] else int(np.searchsorted(t, gesture.at_s + keys[-1][0]))
             out[name][first:last] += interpolate_keys(

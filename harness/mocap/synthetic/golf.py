@@ -81,7 +81,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
         skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits, 1.4)
     )
     for side in (lead, trail):
-        figure.leg(side, feet[side])
+        figure.pose_leg(side, feet[side])
     _pose_arms(figure, rng, t, facing, act, lead, trail)
     return figure
 
@@ -123,7 +123,9 @@ def _pose_arms(
         palm = (1.0 if side == trail else -1.0) * strike - [0.0, 0.0, 0.2]
         back = 0.10 + (0.35 if side == trail else 0.10) * np.tanh(0.8 * act["load"])
         up = 0.05 + 0.45 * np.tanh(0.6 * act["load"])
-        figure.reach(side, wrist, elbow, figure.palm_turn(side, wrist, elbow, normalize(palm)), (-back, up))
+        figure.pose_reaching_arm(
+            side, wrist, elbow, figure.pronation_facing(side, wrist, elbow, normalize(palm)), (-back, up)
+        )
 
 
 def _plan_swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) -> tuple[list[Gesture], list[float]]:
@@ -144,7 +146,7 @@ def _plan_swings(rng: np.random.Generator, t: Floats, habits: Habits, full: floa
         at["end"] = at["hold"] + home
         size = full * float(rng.normal(1.0, 0.02))
         gestures += [
-            Gesture(now, _swing_channels(at, size)).varied(rng, 1.0, 1.0, 0.02),
+            Gesture(now, _swing_channels(at, size)).vary(rng, 1.0, 1.0, 0.02),
             _relax_gesture(rng, now + at["hold"] + 0.5 * home, relax),
             Gesture(now, {"swing": _waggle_keyframes(rng, waggle), "cock": _waggle_keyframes(rng, waggle, 1.6)}),
         ]

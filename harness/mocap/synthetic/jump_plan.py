@@ -20,14 +20,14 @@ class Jump:
     bottom_s: float
     leave_s: float
     land_s: float
-    deep_s: float
+    landing_bottom_s: float
     """The landing is at its lowest."""
     up_s: float
     dip: float
     """Depth of the countermovement as a share of the leg."""
-    give: float
+    landing_depth: float
     """Depth of the landing, likewise."""
-    way_m: tuple[float, float]
+    displacement_m: tuple[float, float]
     """How far it goes, in the world."""
     turn_rad: float
     rebound: bool
@@ -72,7 +72,7 @@ def plan_jumps(rng: np.random.Generator, t: Floats, habits: Habits, kind: str) -
         again = left_in_series > 0
         up_s = deep_s if again else deep_s + rng.uniform(0.5, 0.75) * slow
         give = rng.uniform(0.18, 0.26) if again else rng.uniform(0.14, 0.28)
-        dip = jumps[-1].give if rebound else rng.uniform(0.26, 0.38)
+        dip = jumps[-1].landing_depth if rebound else rng.uniform(0.26, 0.38)
         way_m = horizontal_vector(yaw, along, aside)
         down_s = bottom_s if rebound else now
         way = (float(way_m[0]), float(way_m[1]))

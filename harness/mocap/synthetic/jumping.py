@@ -41,10 +41,10 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     for jump in jumps:
         share = (t - jump.leave_s) / jump.flight_s
         aloft = minimum_jerk((share - 0.1) / 0.8)
-        foot_place += aloft[:, None] * jump.way_m
+        foot_place += aloft[:, None] * jump.displacement_m
         foot_yaw += jump.turn_rad * aloft
         yaw += jump.turn_rad * minimum_jerk((t - jump.leave_s + 0.12) / (jump.flight_s + 0.2))
-        place += _ground_travel(t, jump)[:, None] * jump.way_m
+        place += _ground_travel(t, jump)[:, None] * jump.displacement_m
         tuck += 0.95 * GRAVITY_M_S2 * jump.flight_s**2 / 8.0 * pulse(share)
         leave, land = jump.leave_s, jump.land_s
         heels_up = [0.45 * leave + 0.55 * jump.bottom_s, leave, leave + 0.09, land - 0.08, land, land + 0.09]
@@ -90,9 +90,9 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     shoulders = {side: (0.02 * breath + 0.06 * up, 0.05 * up + smooth_noise(rng, t, 2.0, 0.01)) for side in SIDES}
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
-        figure.leg(side, feet[side])
+        figure.pose_leg(side, feet[side])
         own = float(rng.uniform(0.95, 1.05))
-        figure.hang(
+        figure.pose_hanging_arm(
             side,
             0.06 + own * act["swing"] + smooth_noise(rng, t, 1.8, 0.04),
             habits.spread_rad + 0.05 + act["spread"] + smooth_noise(rng, t, 1.8, 0.03),
@@ -106,7 +106,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
 
 def _ground_travel(t: Floats, jump: Jump) -> Floats:
     """0 to 1: the root's way over the ground, at an even speed in flight."""
-    push, slow = 0.8 * (jump.leave_s - jump.bottom_s), 1.1 * (jump.deep_s - jump.land_s)
+    push, slow = 0.8 * (jump.leave_s - jump.bottom_s), 1.1 * (jump.landing_bottom_s - jump.land_s)
     speed = 1.0 / (jump.flight_s + 0.4 * push + 0.4 * slow)
     at = np.array([jump.leave_s - push, jump.leave_s, jump.land_s, jump.land_s + slow])
     value = np.array([0.0, 0.4 * push * speed, 1.0 - 0.4 * slow * speed, 1.0])
@@ -129,8 +129,8 @@ def _root_height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floa
             value.append(stand - jump.dip * leg)
             slope.append(0.0)
             bend.append(14.0)
-        at += [jump.leave_s, jump.land_s, jump.deep_s]
-        value += [leave, leave, stand - jump.give * leg]
+        at += [jump.leave_s, jump.land_s, jump.landing_bottom_s]
+        value += [leave, leave, stand - jump.landing_depth * leg]
         slope += [fast, -fast, 0.0]
         bend += [-GRAVITY_M_S2, -GRAVITY_M_S2, 14.0]
         if not jump.rebound:
@@ -161,11 +161,11 @@ def _jump_gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gestu
         "leave": jump.leave_s - start_s,
         "top": 0.5 * (jump.leave_s + jump.land_s) - start_s,
         "land": jump.land_s - start_s,
-        "deep": jump.deep_s - start_s,
-        "end": max(jump.up_s, jump.deep_s + 0.45) - start_s,
+        "deep": jump.landing_bottom_s - start_s,
+        "end": max(jump.up_s, jump.landing_bottom_s + 0.45) - start_s,
     }
     high = min(float(rng.uniform(1.2, 1.9)) * habits.size, 2.0) * (0.55 if jump.rebound else 1.0)
-    dip, give, far = jump.dip, jump.give, float(np.hypot(*jump.way_m))
+    dip, give, far = jump.dip, jump.landing_depth, float(np.hypot(*jump.displacement_m))
     parts = {
         "pelvis": keyframes_at(at, bottom=1.5 * dip, leave=0.05, top=-0.03, land=0.04, deep=1.4 * give),
         "bend": keyframes_at(at, bottom=0.9 * dip, leave=-0.05, top=0.02, land=0.0, deep=0.8 * give),
@@ -176,4 +176,4 @@ def _jump_gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gestu
         "nod": keyframes_at(at, bottom=0.10, leave=-0.16, land=0.20, deep=0.16),
         "look": keyframes_at(at, bottom=0.25 * jump.turn_rad, land=0.0),
     }
-    return Gesture(start_s, parts).varied(rng, 1.0, 1.0, 0.04)
+    return Gesture(start_s, parts).vary(rng, 1.0, 1.0, 0.04)

@@ -168,7 +168,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     }
     turned = {bat: facing, free: facing + 0.75 * s * (act["pelvis"] + act["twist"])}
     for side in (bat, free):
-        figure.leg(side, feet[side])
+        figure.pose_leg(side, feet[side])
         _pose_arm(figure, side, rng, t, turned[side], wrists[side], forearm[side])
     return figure
 
@@ -187,9 +187,9 @@ def _pose_arm(
     ahead, out, up = (x + rng.normal(0.0, 0.02) + smooth_noise(rng, t, 1.4, 0.018) for x in wrist_m)
     elbow, pronate, lay = forearm
     raised = 0.35 + elbow + float(rng.normal(0.0, 0.08)) + smooth_noise(rng, t, 1.6, 0.05)
-    figure.reach(
+    figure.pose_reaching_arm(
         side,
-        figure.around_m(facing, reach * ahead, sign * reach * out, reach * up),
+        figure.point_near_chest_m(facing, reach * ahead, sign * reach * out, reach * up),
         stack_columns(*horizontal_vector(facing, -0.45, sign * np.sin(raised)).T, -np.cos(raised)),
         -0.25 + pronate + smooth_noise(rng, t, 1.4, 0.05),
         (-0.12 - lay, 0.05 + 0.4 * lay),
@@ -212,7 +212,7 @@ def _plan_rallies(
         corner = {id(_BACKHAND): -0.22, id(_PUSH): -0.05}.get(id(parts), 0.22)
         wanted = bat_side * (corner + rng.normal(0.0, 0.14))
         deep = rng.normal(0.08 if parts is _PUSH else -0.03, 0.06)
-        stroke = Gesture(now, parts).varied(rng, size, slow)
+        stroke = Gesture(now, parts).vary(rng, size, slow)
         strokes.append(stroke)
         step_s = rng.uniform(0.19, 0.25) * slow
         if abs(wanted - aside) > 0.12 and now - 0.15 > busy_s:
@@ -228,8 +228,8 @@ def _plan_rallies(
         left_in_rally -= 1
         if left_in_rally <= 0:
             strokes += [
-                Gesture(now, _BETWEEN_RALLIES).varied(rng, 1.0, slow),
-                Gesture(now + 2.0 * slow, _SERVE).varied(rng, size, slow),
+                Gesture(now, _BETWEEN_RALLIES).vary(rng, 1.0, slow),
+                Gesture(now + 2.0 * slow, _SERVE).vary(rng, size, slow),
             ]
             now += 3.3 * slow
             left_in_rally = int(rng.integers(3, 8))

@@ -100,7 +100,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     shoulders = {s: (0.02 * breath + smooth_noise(rng, t, 3.0, 0.01), 0.04 * gait.swing * forward[s]) for s in SIDES}
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
-        figure.leg(side, feet[side])
+        figure.pose_leg(side, feet[side])
         _swing_arm(figure, side, rng, t, habits, gait, forward[side])
     return figure
 
@@ -187,7 +187,7 @@ def _swing_arm(
     """`forward` (T,) is 1 when the arm is most forward, -1 when it is most back."""
     size = gait.swing * gait.effort * float(rng.uniform(0.9, 1.1))
     bent = gait.elbow_rad
-    figure.hang(
+    figure.pose_hanging_arm(
         side,
         0.26 * size * forward - 0.08 + 0.10 * bent + smooth_noise(rng, t, 2.5, 0.03),
         habits.spread_rad + 0.02 * forward + smooth_noise(rng, t, 2.5, 0.02),

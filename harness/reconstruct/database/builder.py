@@ -34,7 +34,7 @@ def build_database(
             writer.add(run, rate_hz, posture, step)
             if progress is not None:
                 progress(run.take, done, planned)
-        if not writer.runs:
+        if not writer.segments:
             raise BadInput("A motion database is built of takes, and there are none.", "Name examples in the scenario.")
     return writer.result()
 
@@ -67,7 +67,7 @@ def convert_take(limits: HingeLimits, take: BodyMotion | Callable[[], BodyMotion
     if not len(take):
         raise BadInput(f"{take.name} has no frames.", "Leave it out of the examples.")
     qpos = np.array(take.qpos)
-    qpos[:, 7:] = limits.course(qpos[:, 7:])
+    qpos[:, 7:] = limits.normalise_motion(qpos[:, 7:])
     ground = ground_from_qpos(qpos)
     step = np.zeros((len(qpos), 3), np.float32)
     step[1:] = relative_ground(ground[:-1], ground[1:])

@@ -118,12 +118,12 @@ class MotionDatabase:
         step[ends[:-1]] = 0.0
         return MotionDatabase(self.rate_hz, np.concatenate([self.posture[where] for where in rows]), step, runs)
 
-    def run_of(self, row: int) -> TakeSegment:
+    def segment_of(self, row: int) -> TakeSegment:
         """Where a frame comes from."""
         starts: Sequence[int] = [run.start for run in self.runs]
         return self.runs[int(np.searchsorted(starts, row, side="right")) - 1]
 
-    def let_go(self) -> None:
+    def release_memory(self) -> None:
         """Give back the memory into which a map was read so far; what is asked for again is read again."""
         for array in (self.posture, self.step):
             mapped = getattr(array, "_mmap", None)

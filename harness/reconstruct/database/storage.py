@@ -30,7 +30,7 @@ class MemoryWriter:
     """Collects runs in memory."""
 
     def __init__(self) -> None:
-        self.runs: list[TakeSegment] = []
+        self.segments: list[TakeSegment] = []
         self.rate_hz = 0.0
         self._parts: dict[str, list[Singles]] = {name: [] for name in COLUMNS}
 
@@ -42,12 +42,12 @@ class MemoryWriter:
 
     def add(self, run: TakeSegment, rate_hz: float, posture: Singles, step: Singles) -> None:
         """Append a run; BadInput when its rate is another than the others'."""
-        if self.runs and rate_hz != self.rate_hz:
-            found = f"{run.take} has {rate_hz:g} frames a second, and {self.runs[0].take} {self.rate_hz:g}."
+        if self.segments and rate_hz != self.rate_hz:
+            found = f"{run.take} has {rate_hz:g} frames a second, and {self.segments[0].take} {self.rate_hz:g}."
             raise BadInput(found, "Bring all takes to the tracker's rate first.")
-        start = self.runs[-1].stop if self.runs else 0
+        start = self.segments[-1].stop if self.segments else 0
         self.rate_hz = rate_hz
-        self.runs.append(replace(run, start=start, stop=start + len(posture)))
+        self.segments.append(replace(run, start=start, stop=start + len(posture)))
         self._store("posture", posture)
         self._store("step", step)
 
@@ -58,7 +58,7 @@ class MemoryWriter:
         posture, step = (np.concatenate(self._parts.pop(name)) for name in COLUMNS)
         for array in (posture, step):
             array.setflags(write=False)
-        return MotionDatabase(self.rate_hz, posture, step, tuple(self.runs))
+        return MotionDatabase(self.rate_hz, posture, step, tuple(self.segments))
 
 
 class FolderWriter(MemoryWriter):
@@ -84,10 +84,15 @@ class FolderWriter(MemoryWriter):
     def finish(self) -> None:
         """All files complete and on the disk."""
         for name, file in self._files.items():
-            self._header(name, self.runs[-1].stop)
+            self._header(name, self.segments[-1].stop)
             file.flush()
             os.fsync(file.fileno())
-        card = {"format": FORMAT, "version": VERSION, "rate_hz": self.rate_hz, "runs": [asdict(r) for r in self.runs]}
+        card = {
+            "format": FORMAT,
+            "version": VERSION,
+            "rate_hz": self.rate_hz,
+            "runs": [asdict(r) for r in self.segments],
+        }
         with open(self._beside / _HEADER_FILE, "w", encoding="utf-8") as text:
             json.dump(card, text, indent=0, allow_nan=False, ensure_ascii=False)
             text.flush()

@@ -54,7 +54,7 @@ class Windows:
         return out
 
     @property
-    def follows(self) -> Bools:
+    def consecutive(self) -> Bools:
         """(W,) whether the next window is that of the next frame of the same take."""
         out = np.zeros(len(self), bool)
         out[:-1] = np.diff(self.frames) == 1

@@ -55,15 +55,15 @@ class HeadingEstimator(NamedTuple):
     """Which way a performer faces, by where stations are about the anchor; it turns with them."""
 
     anchor: int
-    asked: Bools
+    stations: Bools
     """(S,) which stations it goes by, the anchor among them."""
     weight: Complexes
     """(S,) what each one's place over the ground, x + i y from the anchor, counts; 0 for those that are not asked."""
-    told: float
+    explained: float
     """Share of the heading that it tells in the examples that it was learnt from, 0 to 1."""
 
     @classmethod
-    def learnt(cls, at_m: Floats, anchor: int, asked: Bools) -> "HeadingEstimator":
+    def fit(cls, at_m: Floats, anchor: int, asked: Bools) -> "HeadingEstimator":
         """From stations (N, S, 3) of performers who all face along x, least squares over those `asked` (S,)."""
         over = _horizontal_offsets(at_m, anchor)[:, asked]
         product, towards = over.conj().T @ over, over.conj().sum(axis=0)

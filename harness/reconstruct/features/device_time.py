@@ -17,7 +17,7 @@ class DeviceTime:
         """Time and reception of the first frame, or of the last that had a stamp to go by [s]."""
         self._now_s = 0.0
 
-    def of(self, frame: TrackerFrame) -> float:
+    def frame_time_s(self, frame: TrackerFrame) -> float:
         """The time of the next frame since the first [s]; by the host's clock where no stamp can be used."""
         stamps = [
             (row, stamp_s)

@@ -65,7 +65,7 @@ class ExampleFeatures:
         for run in database.runs:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
-        database.let_go()
+        database.release_memory()
         self._index = make_index(_default_index(len(database)) if index == AUTO else index, self, wanted)
 
     def nearest(self, query: Floats, trust: Floats, count: int) -> Ints:
@@ -88,7 +88,7 @@ class ExampleFeatures:
         out: Singles = self._codes[rows] * self._step
         return out
 
-    def pairs(self, rows: Ints, others: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats, Floats]:
+    def regression_data(self, rows: Ints, others: Ints, query: Floats, trust: Floats) -> tuple[Floats, Floats, Floats]:
         """What is learnt of some rows and others, none of them twice: inputs (m, n), the query (n,), outputs (m, 55).
 
         Inputs are positions and orientations, n <= 7 S; outputs are posture (52), and the root's ground frame seen from
@@ -101,7 +101,7 @@ class ExampleFeatures:
         """Rows from start to stop; `first` is the frame before, or start where a run begins."""
         count, rows = self.count, slice(first, stop)
         begins = first == start
-        at_m, turned = self._trackers.at(self._database.qpos(rows, np.zeros(3)))
+        at_m, turned = self._trackers.station_poses(self._database.qpos(rows, np.zeros(3)))
         # where the stations were a frame before, seen from the ground frame of this one
         back = relative_ground(self._database.step[rows].astype(float)[1:], np.zeros(3))[:, None]
         before = rotations.rotate(rotations.about_z(back[..., 2]), at_m[:-1])

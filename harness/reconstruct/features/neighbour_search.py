@@ -24,7 +24,7 @@ class NeighbourSearch(Protocol):
         """For the last answers (m, 55), newest first, and the readings at hand."""
         ...
 
-    def read(self) -> None:
+    def record(self) -> None:
         """A frame was answered; its readings are still at hand."""
         ...
 
@@ -42,7 +42,7 @@ class PoseHistorySearch:
         away -= query
         return Neighbours(rows, squared, away)
 
-    def read(self) -> None:
+    def record(self) -> None:
         pass
 
 
@@ -60,13 +60,13 @@ class FeatureSearch:
         residuals = self._residuals
         if self._expectation is None:
             usual = self._ever | residuals.measured
-            self._evidence = self._evidence.facing(usual)
-            self._expectation = self._evidence.expectation(self._evidence.columns(usual), self._kind, count)
+            self._evidence = self._evidence.with_usual_heading(usual)
+            self._expectation = self._evidence.search(self._evidence.columns(usual), self._kind, count)
         window = self._windows.query(past)
-        known = self._evidence.known(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
-        return self._expectation.around(known, residuals.measured, count)
+        known = self._evidence.predictors(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
+        return self._expectation.nearest(known, residuals.measured, count)
 
-    def read(self) -> None:
+    def record(self) -> None:
         self._ever |= self._residuals.measured
 
     def _view(self, last: Floats) -> AnchorFrame:
@@ -74,7 +74,7 @@ class FeatureSearch:
         residuals, anchor, bearing = self._residuals, self._evidence.anchor, self._evidence.bearing
         here, facing = residuals.measured[: len(residuals.bones)], residuals.measured[len(residuals.bones) + anchor]
         at_m, turned = residuals.target_m, residuals.world_from_target[anchor]
-        if not (here[anchor] and facing if bearing is None else here[bearing.asked].all()):
+        if not (here[anchor] and facing if bearing is None else here[bearing.stations].all()):
             residuals.kinematics.set(last)
             lent_m, lent = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
             at_m, turned = np.where(here[:, None], at_m, lent_m), (turned if facing else lent[anchor])

@@ -31,7 +31,7 @@ class QueryFeatures:
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
 
-    def seen(self, frame: TrackerFrame, answer: Floats) -> tuple[AnchorFrame, Floats, Floats]:
+    def compute(self, frame: TrackerFrame, answer: Floats) -> tuple[AnchorFrame, Floats, Floats]:
         """The view, the features (10 S,) and their trust (10 S,), 0 where not measured to 1.
 
         `answer` (55,) is the last one.
@@ -52,7 +52,7 @@ class QueryFeatures:
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
         query, trust = _compute_features(
             *(position_m, turned, velocity_m_s, x_m, y_m, view.yaw_rad, examples.hemisphere, examples.scale),
-            *(residuals.trust, moving),
+            *(residuals.confidence, moving),
         )
         return view, query, trust
 

@@ -76,17 +76,17 @@ class ReducedRankRegression:
         self._expectations: dict[bytes, ReducedRankSearch] = {}
         rows = self._learnt_from()
         self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE_SIZE)
-        for known, after in self.parts(windows, rows):
+        for known, after in self.training_data(windows, rows):
             self.mean += known.sum(axis=0) / len(rows)
             self._mean_after += after.sum(axis=0) / len(rows)
         self.scatter: Floats = np.zeros((self.size, self.size))
         """(D + 9 S, D + 9 S) covariance of the evidence."""
         self._shared = np.zeros((self.size, POSTURE_SIZE))
-        for known, after in self.parts(windows, rows):
+        for known, after in self.training_data(windows, rows):
             away = known - self.mean
             self.scatter += away.T @ away / len(rows)
             self._shared += away.T @ (after - self._mean_after) / len(rows)
-        windows.database.let_go()
+        windows.database.release_memory()
         self.least = terms.ridge * float(np.trace(self.scatter)) + 1e-12
 
     def _learnt_from(self) -> Ints:
@@ -97,30 +97,30 @@ class ReducedRankRegression:
             else np.linspace(0, len(every) - 1, _TRAINING_WINDOWS).astype(np.int64)
         )
 
-    def facing(self, usual: Bools) -> "ReducedRankRegression":
+    def with_usual_heading(self, usual: Bools) -> "ReducedRankRegression":
         """The same seen as a session sees it that has the `usual` readings (2 S,) of positions, then orientations."""
         places = usual[: self.count]
         if usual[self.count + self.anchor] or not places[self.anchor]:
             return self
         key = places.tobytes()
         if key not in self._by_positions:
-            at_m = [at_m for _, at_m, _ in self._stood(self.windows, self._learnt_from())]
-            bearing = HeadingEstimator.learnt(np.concatenate(at_m), self.anchor, places)
-            told = bearing.told > _MIN_HEADING_EXPLAINED
+            at_m = [at_m for _, at_m, _ in self._station_poses(self.windows, self._learnt_from())]
+            bearing = HeadingEstimator.fit(np.concatenate(at_m), self.anchor, places)
+            told = bearing.explained > _MIN_HEADING_EXPLAINED
             seen = ReducedRankRegression(self._body, self.windows, self._worn, self.terms, bearing) if told else self
             self._by_positions[key] = seen
         return self._by_positions[key]
 
-    def expectation(self, usual: Bools, index: str, wanted: int) -> "ReducedRankSearch":
+    def search(self, usual: Bools, index: str, wanted: int) -> "ReducedRankSearch":
         """The search for sessions that know the `usual` columns; made once."""
         key = usual.tobytes()
         if key not in self._expectations:
             self._expectations[key] = ReducedRankSearch(self, usual, index, wanted)
         return self._expectations[key]
 
-    def parts(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
+    def training_data(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
         """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
-        for some, at_m, turned in self._stood(windows, rows):
+        for some, at_m, turned in self._station_poses(windows, rows):
             after = windows.successors(some)[:, :POSTURE_SIZE].astype(float)
             facing = twist_rad(turned[:, self.anchor]) if self.bearing is None else self.bearing.heading_rad(at_m)
             level = rotations.about_z(-facing)[:, None]
@@ -130,13 +130,13 @@ class ReducedRankRegression:
             read = np.concatenate([place, axes.reshape(*place.shape[:2], 6)], axis=2)
             yield np.concatenate([window, read.reshape(len(some), -1)], axis=1), after
 
-    def _stood(self, windows: Windows, rows: Ints) -> Iterator[tuple[Ints, Floats, Floats]]:
+    def _station_poses(self, windows: Windows, rows: Ints) -> Iterator[tuple[Ints, Floats, Floats]]:
         """Rows (K,), station positions (K, S, 3) and orientations (K, S, 4), roots heading along x, chunk by chunk."""
         for start in range(0, len(rows), _CHUNK):
             some = rows[start : start + _CHUNK]
-            yield some, *self._trackers.at(windows.database.qpos(windows.frames[some] + 1, _ORIGIN))
+            yield some, *self._trackers.station_poses(windows.database.qpos(windows.frames[some] + 1, _ORIGIN))
 
-    def known(self, window: Singles, position_m: Floats, turned: Floats, view: AnchorFrame) -> Floats:
+    def predictors(self, window: Singles, position_m: Floats, turned: Floats, view: AnchorFrame) -> Floats:
         """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""
         read = features_from_readings(position_m, turned, np.array(view), self.terms.lever_m)
         return np.concatenate([self.terms.window_weight * window, read])
@@ -156,7 +156,7 @@ class ReducedRankRegression:
         out: Floats = to_posture @ vector[:, ::-1][:, : self.terms.directions]
         return out
 
-    def filled(self, columns: Bools, wanted: Bools) -> Floats:
+    def imputation_map(self, columns: Bools, wanted: Bools) -> Floats:
         """(C, W) from known columns to the wanted ones: themselves, or what the known ones lead to expect."""
         damped = self.scatter[np.ix_(columns, columns)] + self.least * np.eye(int(columns.sum()))
         out: Floats = solve(damped, self.scatter[np.ix_(columns, wanted)], assume_a="pos")
@@ -185,10 +185,10 @@ class ReducedRankVectors:
     def gather(self, rows: Ints | slice) -> Singles:
         wanted, start = np.arange(len(self))[rows], 0
         out: Singles = np.empty((len(wanted), self.size), np.float32)
-        for known, _ in self.evidence.parts(self.windows, wanted):
+        for known, _ in self.evidence.training_data(self.windows, wanted):
             out[start : start + len(known)] = (known - self.evidence.mean)[:, self.usual] @ self.directions
             start += len(known)
-        self.windows.database.let_go()
+        self.windows.database.release_memory()
         return out
 
 
@@ -201,7 +201,7 @@ class ReducedRankSearch:
         self.index: Index = make_index(index, self.vectors, wanted)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
 
-    def around(self, known: Floats, measured: Bools, count: int) -> Neighbours:
+    def nearest(self, known: Floats, measured: Bools, count: int) -> Neighbours:
         """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.
 
         What they differ by are z, or as much of it along other axes.
@@ -213,11 +213,11 @@ class ReducedRankSearch:
                 self._maps.clear()
             found = self._maps[key] = self._map(self.vectors.evidence.columns(measured))
         to_z, mean = found
-        return self.index.around((known @ to_z - mean).astype(np.float32), count)
+        return self.index.nearest_with_offsets((known @ to_z - mean).astype(np.float32), count)
 
     def _map(self, columns: Bools) -> tuple[Floats, Floats]:
         """(D + 9 S, 40) from evidence to z when some columns are known, the others count nothing; (40,) of the mean."""
         vectors, evidence = self.vectors, self.vectors.evidence
         to_z = np.zeros((evidence.size, vectors.size))
-        to_z[columns] = evidence.filled(columns, vectors.usual) @ vectors.directions
+        to_z[columns] = evidence.imputation_map(columns, vectors.usual) @ vectors.directions
         return to_z, evidence.mean @ to_z

@@ -31,11 +31,11 @@ class StationFeatures:
         for start in range(0, len(followed), _CHUNK):
             after = followed.frames[start : start + _CHUNK] + 1
             qpos = database.qpos(after, database.step[after].astype(float))
-            at_m, turned = trackers.at(qpos)
+            at_m, turned = trackers.station_poses(qpos)
             axes = lever_m * rotations.to_matrix(turned)[..., :2]
             columns = np.concatenate([at_m, axes.reshape(*at_m.shape[:2], 6)], axis=2)
             self.values[start : start + _CHUNK] = columns.reshape(len(after), -1)
-        database.let_go()
+        database.release_memory()
 
     def query(self, position_m: Floats, turned: Floats, ground: Floats) -> Singles:
         """(9 S,) of positions (S, 3) and bone orientations (S, 4) in the world, from a ground frame (3,)."""
@@ -47,7 +47,7 @@ class StationFeatures:
         places, axes = np.split(measured.astype(np.float32), 2)
         return np.concatenate([np.repeat(places, 3).reshape(-1, 3), np.repeat(axes, 6).reshape(-1, 6)], 1).reshape(-1)
 
-    def worn_at(self, body: Kinematics, qpos: Floats) -> tuple[Floats, Floats]:
+    def station_poses(self, body: Kinematics, qpos: Floats) -> tuple[Floats, Floats]:
         """Positions (S, 3) and bone orientations (S, 4) at a configuration (55,)."""
         body.set(qpos)
         return body.station_poses(self._bones, self._mount_m, self._no_turn)

@@ -15,7 +15,7 @@ def station_poses(body: Body, take: BodyMotion, worn: Calibration) -> tuple[Floa
 
     Signs of the quaternions are continuous in time.
     """
-    at_m, turned = VirtualTrackers(body, worn).at(take.qpos)
+    at_m, turned = VirtualTrackers(body, worn).station_poses(take.qpos)
     return at_m, rotations.continuous(turned)
 
 
@@ -26,7 +26,7 @@ class VirtualTrackers:
         self._chain = descent.build_tree(body, [body.skeleton.index(bone) for bone in worn.bones], worn.mount_m)
         self._placed = descent.new_state(self._chain)
 
-    def at(self, qpos: Floats) -> tuple[Floats, Floats]:
+    def station_poses(self, qpos: Floats) -> tuple[Floats, Floats]:
         """Positions (T, S, 3) [m] and bone orientations (T, S, 4) for configurations (T, 55)."""
         count = len(self._chain.station_body)
         at_m, turned = np.empty((len(qpos), count, 3)), np.empty((len(qpos), count, 4))

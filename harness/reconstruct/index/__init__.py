@@ -10,14 +10,14 @@ from harness.reconstruct.index.selection import INDEXES, make_index
 
 __all__ = [
     "INDEXES",
+    "ArrayVectors",
     "FlatIndex",
-    "Neighbours",
-    "NeighbourGraph",
     "Index",
     "InvertedFile",
     "KDTree",
     "Lookup",
-    "ArrayVectors",
+    "NeighbourGraph",
+    "Neighbours",
     "Vectors",
     "make_index",
     "nearest_partial",

@@ -30,10 +30,10 @@ class FlatIndex:
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """As `Index`."""
-        rows, squared, _ = self.around(query, count)
+        rows, squared, _ = self.nearest_with_offsets(query, count)
         return rows, squared
 
-    def around(self, query: Singles, count: int) -> Neighbours:
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """As `Index`."""
         asked = np.asarray(query, np.float32) - self._mean
         score = self._half_squares - self._values @ asked

@@ -51,7 +51,7 @@ class InvertedFile:
         sample = np.sort(rng.choice(count, min(count, _VECTORS_PER_CELL * cells), replace=False))
         seen = np.empty((len(sample), width), np.float32)
         for rows in chunks(np.arange(len(sample))):
-            seen[rows] = self._principal.seen(vectors.gather(sample[rows]))
+            seen[rows] = self._principal.project(vectors.gather(sample[rows]))
         with _faiss() as faiss:
             flat = faiss.IndexFlatL2(width)
             clustering = faiss.Clustering(width, cells)
@@ -61,7 +61,7 @@ class InvertedFile:
             cell_of = np.empty(count, np.int32)
             farthest = 0.0
             for start in range(0, count, CHUNK):
-                seen = self._principal.seen(vectors.gather(slice(start, start + CHUNK)))
+                seen = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
                 cell_of[start : start + CHUNK] = flat.search(seen, 1)[1][:, 0]
                 farthest = max(farthest, float(np.abs(seen).max()))
             centroids = flat.reconstruct_n(0, cells)
@@ -82,7 +82,7 @@ class InvertedFile:
         where[self._rows] = np.arange(count, dtype=np.int32)
         for start in range(0, count, CHUNK):
             some = slice(start, start + CHUNK)
-            seen = np.rint(self._principal.seen(vectors.gather(some)) / self._step)
+            seen = np.rint(self._principal.project(vectors.gather(some)) / self._step)
             _store_codes(seen.astype(np.int16), where[some], cell_of[some], self._starts, self._codes)
 
     def __len__(self) -> int:
@@ -93,7 +93,7 @@ class InvertedFile:
         rows, squared, _ = self._searched(query, count)
         return rows, squared
 
-    def around(self, query: Singles, count: int) -> Neighbours:
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """As `Index`, along the axes that were kept."""
         rows, squared, asked = self._searched(query, count)
         away = _gather_offsets(self._codes, self._starts, self._cell_of, self._where, rows, asked, self._step)
@@ -102,7 +102,7 @@ class InvertedFile:
     def _searched(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles]:
         """Rows (K,), squared distances (K,), and the query in steps (d,)."""
         count, probes = min(count, len(self)), self._probes
-        asked = self._principal.seen(np.asarray(query, np.float32)) / self._step
+        asked = self._principal.project(np.asarray(query, np.float32)) / self._step
         if np.isnan(asked).any():
             raise ArithmeticError(
                 "a query for neighbours holds something that is not a number: is a reading not finite?"

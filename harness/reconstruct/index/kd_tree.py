@@ -28,7 +28,7 @@ class KDTree:
         self._vectors, self._principal = vectors, PrincipalAxes(vectors, generator(0, "kd-tree", count), kept=1.0)
         seen: Floats = np.empty((count, self._principal.width))
         for start in range(0, count, CHUNK):
-            seen[start : start + CHUNK] = self._principal.seen(vectors.gather(slice(start, start + CHUNK)))
+            seen[start : start + CHUNK] = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
         self._tree = cKDTree(seen, balanced_tree=False)
 
     def __len__(self) -> int:
@@ -36,13 +36,13 @@ class KDTree:
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """As `Index`."""
-        rows, squared, _ = self.around(query, count)
+        rows, squared, _ = self.nearest_with_offsets(query, count)
         return rows, squared
 
-    def around(self, query: Singles, count: int) -> Neighbours:
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """As `Index`."""
         query = np.asarray(query, np.float32)
         count = min(count, len(self))
-        _, found = self._tree.query(self._principal.seen(query), min(count + _EXTRA_CANDIDATES, len(self)))
+        _, found = self._tree.query(self._principal.project(query), min(count + _EXTRA_CANDIDATES, len(self)))
         rows: Ints = np.asarray(found, np.int64).reshape(-1)
         return rank_neighbours(rows, self._vectors.gather(rows) - query, count)

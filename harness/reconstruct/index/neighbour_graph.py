@@ -34,7 +34,7 @@ class NeighbourGraph:
         step = 0.0
         for start in range(0, count, CHUNK):
             values = vectors.gather(slice(start, start + CHUNK))
-            self._seen[start : start + CHUNK] = self._principal.seen(values)
+            self._seen[start : start + CHUNK] = self._principal.project(values)
             steps = np.abs(np.diff(values, axis=0)).mean(axis=1)[follows[start : start + len(values) - 1]]
             step = max(step, float(steps.max(initial=0.0)))
         self.links: Links = self._joined(vectors, max(step, LINK_DISTANCE))
@@ -50,13 +50,13 @@ class NeighbourGraph:
             links[row, : len(near)] = near
         return links
 
-    def follow(self) -> "GraphSearch":
+    def begin_search(self) -> "GraphSearch":
         return GraphSearch(self)
 
     def among(self, rows: Ints, query: Singles, count: int) -> tuple[Ints, Singles]:
         """The nearest of some rows, in the leading principal axes."""
         away = self._seen[rows].astype(np.float32)
-        away -= self._principal.seen(np.asarray(query, np.float32))
+        away -= self._principal.project(np.asarray(query, np.float32))
         squared = np.vecdot(away, away)
         if len(rows) > count:
             some = np.argpartition(squared, count - 1)[:count]

@@ -36,7 +36,7 @@ class PrincipalAxes:
         strongest = axes[:, ::-1][:, : self.width]
         self._axes[:, : strongest.shape[1]] = strongest
 
-    def seen(self, vectors: Singles) -> Singles:
+    def project(self, vectors: Singles) -> Singles:
         """(..., d) of vectors (..., D)."""
         out: Singles = np.matmul(vectors - self._middle, self._axes, dtype=np.float32)
         return out

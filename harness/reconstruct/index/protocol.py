@@ -31,7 +31,7 @@ class Neighbours(NamedTuple):
     """(K,)"""
     squared: Singles
     """(K,) distances from the query."""
-    away: Singles
+    offsets: Singles
     """(K, d) the vectors minus the query, along axes of the index's choice."""
 
 
@@ -49,7 +49,7 @@ class Lookup(Protocol):
 class Index(Lookup, Protocol):
     """A search among N vectors: immutable, deterministic, shared by sessions."""
 
-    def around(self, query: Singles, count: int) -> Neighbours:
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """The same, and how the vectors differ from the query."""
         ...
 

@@ -83,12 +83,12 @@ class BestMatchSession:
         self._answer = self._qpos[0]
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.seen(frame)
+        status, any_seen = self._coverage.update(frame)
         if any_seen:
             self._gate.read(frame, self._residuals)
             velocity_m_s, moving = self._velocities(frame)
             self._answer = self._nearest(velocity_m_s, moving)
-            self._gate.answered(self._residuals, self._answer)
+            self._gate.update(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
@@ -108,7 +108,7 @@ class BestMatchSession:
         Turning an example by y takes Re(e^-iy pull) off its squared distance, so the best y is the angle of `pull`.
         """
         options, count = self._options, len(self._residuals.bones)
-        here, facing = self._residuals.trust[:count], self._residuals.trust[count:]
+        here, facing = self._residuals.confidence[:count], self._residuals.confidence[count:]
         target_m = self._residuals.target_m
         middle_m = np.zeros(3)
         if total := float(here.sum()):

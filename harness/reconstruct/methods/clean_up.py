@@ -78,7 +78,7 @@ class CleanUpSession:
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
             return guess
         self._gate.read(frame, self._residuals)
-        start = np.concatenate([guess.qpos[:7], self._limits.clipped(self._limits.principal(guess.qpos[7:]))])
+        start = np.concatenate([guess.qpos[:7], self._limits.clip(self._limits.principal(guess.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
-        self._gate.answered(self._residuals, qpos)
+        self._gate.update(self._residuals, qpos)
         return Estimate(qpos, guess.status)

@@ -155,7 +155,7 @@ class FittedDynamicMap:
     """(55,) for starts without a past."""
     _evidence: CalibrationCache[ReducedRankRegression] = field(default_factory=CalibrationCache)
 
-    def evidence(self, worn: Calibration) -> ReducedRankRegression:
+    def regression(self, worn: Calibration) -> ReducedRankRegression:
         """Of the database, for stations worn like this; made once."""
         return self._evidence.get(
             worn, lambda: ReducedRankRegression(self.body, self.windows, worn, self.options.terms)
@@ -176,7 +176,7 @@ class DynamicMapSession(HistorySession):
         self._options, self._windows = options, windows
         self._precedents: NeighbourSearch
         if fitted.index is None:
-            evidence = fitted.evidence(calibration)
+            evidence = fitted.regression(calibration)
             self._precedents = FeatureSearch(windows, evidence, self.residuals, options.index)
         else:
             self._precedents = PoseHistorySearch(windows, fitted.index)
@@ -190,33 +190,33 @@ class DynamicMapSession(HistorySession):
         self._least_variance = sigma**2
         self._closest: Floats = np.zeros(POSTURE_SIZE + 3)
 
-    def continued(self) -> IKSolution:
+    def solve_next(self) -> IKSolution:
         """Eq. 9 and 10: the most likely pose of the frame, by the readings and by what went before."""
-        prior = self.predicted()
+        prior = self.predict()
         forward = self._options.start == "prediction"
-        found = self.solver.solve(prior.qpos if forward else self._stood(self._closest), prior)
-        if found.converged and self.contradiction() == 0.0:
+        found = self.solver.solve(prior.qpos if forward else self._configuration(self._closest), prior)
+        if found.converged and self.outlier_share() == 0.0:
             return found
-        again = self.solver.solve(self._stood(self._closest) if forward else prior.qpos, prior)
+        again = self.solver.solve(self._configuration(self._closest) if forward else prior.qpos, prior)
         best = again if again.cost < found.cost else found
-        self.residuals.place(best.qpos)
+        self.residuals.evaluate(best.qpos)
         return best
 
-    def _stood(self, following: Floats) -> Floats:
+    def _configuration(self, following: Floats) -> Floats:
         """The configuration (55,) of a posture and of the step to it (55,)."""
         out: Floats = qpos_from_posture(
             following[:POSTURE_SIZE], ground_after_step(self.past[0], following[POSTURE_SIZE:])
         )
         return out
 
-    def noted(self, frame: TrackerFrame, anew: bool) -> None:
-        super().noted(frame, anew)
-        self._precedents.read()
+    def record(self, frame: TrackerFrame, anew: bool) -> None:
+        super().record(frame, anew)
+        self._precedents.record()
 
-    def bridged(self) -> Floats:
-        return self.predicted().qpos
+    def predict_gap(self) -> Floats:
+        return self.predict().qpos
 
-    def predicted(self) -> Prior:
+    def predict(self) -> Prior:
         """Eq. 8 for what follows `past`, on the ground and in the solver's tangent space."""
         options, windows = self._options, self._windows
         rows, squared, away = self._precedents.nearest(self.past, options.neighbours)
@@ -225,8 +225,8 @@ class DynamicMapSession(HistorySession):
         after = windows.successors(rows)
         next_mean, left = forecast(away, after, weight, options.kept, options.ridge)
         self._closest = after[0].astype(float)
-        mean = self._stood(next_mean)
-        mean[7:] = self.limits.clipped(mean[7:])
+        mean = self._configuration(next_mean)
+        mean[7:] = self.limits.clip(mean[7:])
         variance_of = options.spread**2 * left + self._least_variance
         variance_of += options.novelty**2 * float(squared[0]) / away.shape[1]
         precision = 1.0 / variance_of[_TANGENT_INDICES]

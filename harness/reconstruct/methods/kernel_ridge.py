@@ -100,7 +100,7 @@ class KernelRidgeSession:
         self._weights: Floats = cho_solve(factor, y)
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.seen(frame)
+        status, any_seen = self._coverage.update(frame)
         if any_seen:
             self._gate.read(frame, self._residuals)
             qpos = self._mean_qpos.copy()
@@ -108,7 +108,7 @@ class KernelRidgeSession:
             qpos[7:] += (near @ self._weights)[0]
             qpos[:7] = self._answer[:7]
             self._answer = place_root(self._residuals, qpos)
-            self._gate.answered(self._residuals, self._answer)
+            self._gate.update(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _filled(self) -> tuple[Floats, Floats]:

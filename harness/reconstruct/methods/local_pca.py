@@ -86,7 +86,7 @@ class FittedLocalPca:
     mean_qpos: Floats
     """(55,) for starts without a past."""
 
-    worn: "CalibrationCache[tuple[StationFeatures, Vectors, Index]]" = field(
+    cache: "CalibrationCache[tuple[StationFeatures, Vectors, Index]]" = field(
         default_factory=CalibrationCache, repr=False
     )
     """What the last calibration has the trackers read, and the search in it: sessions of one performer share it."""
@@ -94,9 +94,9 @@ class FittedLocalPca:
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
         return LocalPcaSession(self, calibration)
 
-    def seen_through(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
+    def station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
         """What trackers worn so would have read after every window; both together, and an index of them."""
-        return self.worn.get(calibration, lambda: self._seen_through(calibration))
+        return self.cache.get(calibration, lambda: self._seen_through(calibration))
 
     def _seen_through(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
         controls = StationFeatures(self.body, self.windows, calibration, self.options.lever_m)
@@ -114,9 +114,9 @@ class LocalPcaSession(HistorySession):
         super().__init__(fitted.body, calibration, manner, leaning, _HISTORY, windows.database.rate_hz)
         self._options, self._windows = options, windows
         self._confined = SubspaceSolver(self.residuals, self.limits, options.stopping)
-        self._controls, self._examples, self._index = fitted.seen_through(calibration)
+        self._controls, self._examples, self._index = fitted.station_features(calibration)
 
-    def continued(self) -> IKSolution:
+    def solve_next(self) -> IKSolution:
         options = self._options
         before = self._windows.query(self.past)
         rows = self._nearest(before)
@@ -129,7 +129,7 @@ class LocalPcaSession(HistorySession):
             space, ground_after_step(self.past[0], closest[POSTURE_SIZE:]), closest[:POSTURE_SIZE]
         )
 
-    def bridged(self) -> Floats:
+    def predict_gap(self) -> Floats:
         """Nothing was read, and there are no dynamics: as it was."""
         held: Floats = self.past[0]
         return held
@@ -146,7 +146,7 @@ class LocalPcaSession(HistorySession):
             return rows
         count = len(position_m)
         here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        at_m, at_turned = controls.worn_at(residuals.kinematics, self.past[0])
+        at_m, at_turned = controls.station_poses(residuals.kinematics, self.past[0])
         control = controls.query(np.where(here, position_m, at_m), np.where(facing, turned, at_turned), ground)
         weight = np.concatenate([np.ones(len(past)), controls.columns(residuals.measured)])
         query = np.concatenate([past, scale * control])

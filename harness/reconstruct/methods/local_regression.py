@@ -106,18 +106,18 @@ class FittedLocalRegression:
     database: MotionDatabase
     hinge_sigma_rad: Floats
     """(48,)"""
-    worn: CalibrationCache[ExampleFeatures] = field(default_factory=CalibrationCache, repr=False)
+    cache: CalibrationCache[ExampleFeatures] = field(default_factory=CalibrationCache, repr=False)
 
     def begin(self, calibration: Calibration) -> "LocalRegressionSession":
-        self.database.let_go()  # what the sessions before have read
+        self.database.release_memory()  # what the sessions before have read
         return LocalRegressionSession(self, calibration)
 
-    def seen_through(self, calibration: Calibration) -> ExampleFeatures:
+    def example_features(self, calibration: Calibration) -> ExampleFeatures:
         """What trackers worn so would have read in the examples."""
         options, weights = self.options, self.options.weights
         if self.database.rate_hz * options.longest_gap_s < 1.0:
             weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
-        return self.worn.get(
+        return self.cache.get(
             calibration,
             lambda: ExampleFeatures(self.body, self.database, calibration, weights, options.index, options.neighbours),
         )
@@ -131,7 +131,7 @@ class LocalRegressionSession:
         self._residuals = Residuals(fitted.body, calibration, Loss())
         jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
         self._coverage, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
-        self._examples = fitted.seen_through(calibration)
+        self._examples = fitted.example_features(calibration)
         self._outlook = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
         self._solver = IKSolver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
@@ -143,25 +143,25 @@ class LocalRegressionSession:
         self._poses_before: list[Floats] = []
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.seen(frame)
+        status, any_seen = self._coverage.update(frame)
         if not any_seen:
             self._rows_before, self._poses_before = _NO_ROWS, []
             return Estimate(self._answer, status)
         self._gate.read(frame, self._residuals)
         if not np.count_nonzero(self._residuals.measured):
             return Estimate(self._answer, status)
-        view, query, trust = self._outlook.seen(frame, self._answer)
+        view, query, trust = self._outlook.compute(frame, self._answer)
         pose = self._smoothed(self._regressed(query, trust))
         self._answer = self._fitted_to_trackers(
             qpos_from_posture(pose[:POSTURE_SIZE], step_ground(np.array(view), pose[POSTURE_SIZE:]))
         )
-        self._gate.answered(self._residuals, self._answer)
+        self._gate.update(self._residuals, self._answer)
         return Estimate(self._answer, status)
 
     def _regressed(self, query: Floats, trust: Floats) -> Floats:
         """(55,) what is learnt (`ExampleFeatures.pairs`), from the neighbours of this frame and the last."""
         rows = self._examples.nearest(query, trust, self._options.neighbours)
-        inputs, asked, outputs = self._examples.pairs(rows, self._rows_before, query, trust)
+        inputs, asked, outputs = self._examples.regression_data(rows, self._rows_before, query, trust)
         self._rows_before = rows
         if len(outputs) == 1:
             return outputs.reshape(-1)
@@ -177,11 +177,11 @@ class LocalRegressionSession:
         return pose
 
     def _fitted_to_trackers(self, qpos: Floats) -> Floats:
-        qpos[7:] = self._limits.clipped(qpos[7:])
+        qpos[7:] = self._limits.clip(qpos[7:])
         if not np.count_nonzero(self._residuals.measured[: self._examples.count]):
             qpos[:2] = self._answer[:2]  # orientations alone do not say where: stay
         if self._options.final_ik and self._options.solve == "limbs":
-            return self._limbs.reach(qpos)
+            return self._limbs.solve(qpos)
         if self._options.final_ik:
             return self._solver.solve(qpos, Prior(qpos, self._precision)).qpos
         return place_root(self._residuals, qpos)

@@ -32,7 +32,7 @@ def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) ->
     if not count:
         raise BadInput("The mean posture is learnt from examples, and there are none.", "Name some in the scenario.")
     out = np.array(tpose(body.skeleton))
-    out[7:] = limits.clipped(limits.principal(np.arctan2(*total)))
+    out[7:] = limits.clip(limits.principal(np.arctan2(*total)))
     return out
 
 
@@ -51,7 +51,7 @@ def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | Moti
     if isinstance(examples, MotionDatabase):
         for run in examples.runs:
             yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
-        examples.let_go()
+        examples.release_memory()
     else:
         for take in examples:
             yield limits.principal(take.qpos[:, 7:])
@@ -91,7 +91,7 @@ class MeanPoseSession:
         self._qpos = fitted.qpos
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.seen(frame)
+        status, any_seen = self._coverage.update(frame)
         if any_seen:
             self._residuals.read(frame)
             self._qpos = place_root(self._residuals, self._qpos)

@@ -31,14 +31,14 @@ class HingeLimits:
             [QPOS_OF_DOF[where] for where in body.skeleton.dof_of_bone if are_gimbal(body.skeleton.axes[where])]
         )
 
-    def clipped(self, angles_rad: Floats) -> Floats:
+    def clip(self, angles_rad: Floats) -> Floats:
         """The nearest angles (..., 48) within the limits."""
         out: Floats = np.minimum(np.maximum(angles_rad, self.low_rad), self.high_rad)
         return out
 
     def excess_rad(self, angles_rad: Floats) -> Floats:
         """(..., 48) how far each angle lies outside."""
-        out: Floats = np.abs(angles_rad - self.clipped(angles_rad))
+        out: Floats = np.abs(angles_rad - self.clip(angles_rad))
         return out
 
     def past_gimbal(self, angles_rad: Floats) -> bool:
@@ -62,7 +62,7 @@ class HingeLimits:
         plain[..., self._gimbals] = np.where(better[..., None], other[..., self._gimbals], plain[..., self._gimbals])
         return plain
 
-    def course(self, angles_rad: Floats) -> Floats:
+    def normalise_motion(self, angles_rad: Floats) -> Floats:
         """The same motion (T, 48), changed as a whole to the representation that is `principal` on most frames.
 
         What is continuous stays so, and takes of one body agree with each other, whatever their files began with.
@@ -75,7 +75,7 @@ class HingeLimits:
         out += _FULL_TURN_RAD * np.round(np.median(principal - out, axis=0) / _FULL_TURN_RAD)
         return out
 
-    def near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
+    def unwrap_near(self, angles_rad: Floats, other_rad: Floats) -> Floats:
         """`angles_rad` with every hinge that has no limits turned as near to the other as whole turns bring it."""
         turns = np.where(np.isinf(self.high_rad), np.round((other_rad - angles_rad) / _FULL_TURN_RAD), 0.0)
         out: Floats = angles_rad + _FULL_TURN_RAD * turns
@@ -85,7 +85,7 @@ class HingeLimits:
         """(48,) mean of angles (T, 48) as directions, in principal form and within the limits."""
         principal = self.principal(angles_rad)
         mean = np.arctan2(np.mean(np.sin(principal), axis=0), np.mean(np.cos(principal), axis=0))
-        return self.clipped(self._wrapped(mean))
+        return self.clip(self._wrapped(mean))
 
     def _wrapped(self, angles_rad: Floats) -> Floats:
         """Whole turns added until every angle is within pi of the middle of its limits."""

@@ -40,26 +40,26 @@ class HistorySession(IKSession, ABC):
         self._replaced = np.array(self.past[-1])
 
     @abstractmethod
-    def continued(self) -> IKSolution:
+    def solve_next(self) -> IKSolution:
         """The pose that follows `past`."""
 
     @abstractmethod
-    def bridged(self) -> Floats:
+    def predict_gap(self) -> Floats:
         """The configuration (55,) that follows `past` when nothing was read."""
 
-    def followed(self, frame: TrackerFrame) -> IKSolution:
+    def track(self, frame: TrackerFrame) -> IKSolution:
         if self._known >= len(self.past):
             periods = round((self.now_s - self._noted_s) * self._rate_hz)
             if periods == 0:
                 self.past[:-1], self.past[-1] = self.past[1:].copy(), self._replaced
             if periods <= self.longest_gap:
                 for _ in range(periods - 1):
-                    self._remember(self.bridged())
-                return self.continued()
+                    self._remember(self.predict_gap())
+                return self.solve_next()
             self._known = 0
-        return super().followed(frame)
+        return super().track(frame)
 
-    def noted(self, frame: TrackerFrame, anew: bool) -> None:
+    def record(self, frame: TrackerFrame, anew: bool) -> None:
         self._known = 0 if anew else self._known
         self._remember(self.qpos)
         self._noted_s = self.now_s

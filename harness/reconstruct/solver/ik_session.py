@@ -54,7 +54,7 @@ class PosturePrior:
         precision[6:] = self.spread_rad**-2.0
         if self.mean_qpos is not None:
             mean = np.array(previous)
-            posture = limits.near(self.mean_qpos[7:], previous[7:])
+            posture = limits.unwrap_near(self.mean_qpos[7:], previous[7:])
             mean[7:] += self.towards_mean * (posture - previous[7:])
         return Prior(mean, precision)
 
@@ -92,42 +92,42 @@ class IKSession:
         self._started, self._following = False, False
         self._contradicted_since_s: float | None = None
 
-    def followed(self, frame: TrackerFrame) -> IKSolution:
+    def track(self, frame: TrackerFrame) -> IKSolution:
         """The pose of a frame that continues what went before; its readings are in `residuals`."""
-        return self.leaning(self.qpos, self.qpos)
+        return self.solve_with_prior(self.qpos, self.qpos)
 
-    def noted(self, frame: TrackerFrame, anew: bool) -> None:
+    def record(self, frame: TrackerFrame, anew: bool) -> None:
         """`qpos` is the answer to this frame; `anew` when it rests on nothing that went before."""
 
-    def leaning(self, start: Floats, previous: Floats) -> IKSolution:
+    def solve_with_prior(self, start: Floats, previous: Floats) -> IKSolution:
         """Inverse kinematics with the weak prior alone."""
         return self.solver.solve(start, self._leaning.prior(self.limits, previous))
 
-    def contradiction(self) -> float:
+    def outlier_share(self) -> float:
         """The share of readings that lie far from the pose."""
         far = (self.residuals.distance > _OUTLIER_SCALES * self.residuals.scale) & self.residuals.measured
         return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.seen(frame)
-        self.now_s = self._time.of(frame)
+        status, any_seen = self._coverage.update(frame)
+        self.now_s = self._time.frame_time_s(frame)
         if any_seen:
             self._gate.read(frame, self.residuals)
             anew = self._gate.all_moved or (not self._following and (status is Status.SOLVED or not self._started))
             if anew:
-                solution = self._sought()
+                solution = self._solve_cold()
             else:
-                solution, anew = self._checked(self.followed(frame))
-            self.qpos = self._tidy(solution.qpos)
+                solution, anew = self._verify(self.track(frame))
+            self.qpos = self._canonical(solution.qpos)
             self._started = True
-            self.noted(frame, anew)
-            self._gate.answered(self.residuals, self.qpos)
+            self.record(frame, anew)
+            self._gate.update(self.residuals, self.qpos)
         self._following = status is Status.SOLVED or (self._following and status is not Status.LOST)
         return Estimate(self.qpos, status)
 
-    def _checked(self, warm: IKSolution) -> tuple[IKSolution, bool]:
+    def _verify(self, warm: IKSolution) -> tuple[IKSolution, bool]:
         """The pose as it was followed, or one sought anew when the readings contradict it; and whether so."""
-        contradicted = self.contradiction()
+        contradicted = self.outlier_share()
         if contradicted == 0.0 and not self._gate.left_out:
             self._contradicted_since_s = None
             return warm, False
@@ -138,10 +138,10 @@ class IKSession:
         ):
             return warm, False
         self._contradicted_since_s = self.now_s
-        cold = self._sought()
+        cold = self._solve_cold()
         return (cold, True) if cold.cost < 0.8 * warm.cost else (warm, False)
 
-    def _sought(self) -> IKSolution:
+    def _solve_cold(self) -> IKSolution:
         """The cheapest pose found from the last one and from the starting postures, stood where the readings are."""
         postures_here = (self.qpos, *self._starts)
         starts = _unique(
@@ -158,11 +158,11 @@ class IKSession:
             arrived.append(solution.qpos)
             for factor in _LOSS_SCALE_FACTORS:
                 self.residuals.widen(factor)
-                solution = self.leaning(solution.qpos, start)
+                solution = self.solve_with_prior(solution.qpos, start)
             found.append(solution)
         return min(found, key=lambda solution: solution.cost)
 
-    def _tidy(self, qpos: Floats) -> Floats:
+    def _canonical(self, qpos: Floats) -> Floats:
         """The same pose in lawful angles: past a gimbal's pole the limits hold for the twin."""
         if self.limits.past_gimbal(qpos[7:]):
             qpos = np.concatenate([qpos[:7], self.limits.principal(qpos[7:])])

@@ -57,7 +57,7 @@ class IKSolver:
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
         nv = residuals.kinematics.nv
-        self._model = descent.new_quadratic_model(residuals.chain)
+        self._model = descent.new_quadratic_model(residuals.tree)
         self._trust = descent.PriorAndLimits(
             mean=np.zeros(nv + 1),
             precision=np.zeros(nv),
@@ -67,7 +67,7 @@ class IKSolver:
             decrease=stopping.decrease,
             most_steps=stopping.most_steps,
         )
-        self._arrays = (residuals.chain, residuals.readings, residuals.placed, self._model, self._trust)
+        self._arrays = (residuals.tree, residuals.targets, residuals.state, self._model, self._trust)
         self._descend = specialise(descent.minimise, *self._arrays, np.zeros(nv + 1))
 
     def solve(self, start: Floats, prior: Prior) -> IKSolution:

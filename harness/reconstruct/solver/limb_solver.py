@@ -35,24 +35,24 @@ class LimbSolver:
                 if worn:
                     self._parts.append(_LimbStations(body, side, levels, sorted(worn, reverse=True), limits))
 
-    def reach(self, qpos: Floats) -> Floats:
+    def solve(self, qpos: Floats) -> Floats:
         """The configuration (55,) moved from one that lies within the limits."""
         residuals, count = self._residuals, len(self._residuals.bones)
         out = np.array(qpos)
-        residuals.place(out)
+        residuals.evaluate(out)
         here, facing = residuals.measured[:count], residuals.measured[count:]
         if self._trunk is not None and (here[self._trunk] or facing[self._trunk]):
             self._move_trunk(out, self._trunk, bool(here[self._trunk]), bool(facing[self._trunk]))
-            residuals.place(out)
-        at_m, turned = residuals.placed.at_m, residuals.placed.turned
+            residuals.evaluate(out)
+        at_m, turned = residuals.state.body_m, residuals.state.world_from_body
         for part in self._parts:
-            part.reach(out, at_m, turned, residuals, here, facing)
+            part.solve(out, at_m, turned, residuals, here, facing)
         return out
 
     def _move_trunk(self, qpos: Floats, station: int, here: bool, facing: bool) -> None:
         residuals = self._residuals
         if facing:
-            bone = residuals.placed.turned[residuals.chain.station_body[station]]
+            bone = residuals.state.world_from_body[residuals.tree.station_body[station]]
             turn = rotations.multiply(residuals.world_from_target[station], rotations.inverse(bone))
             about_m = residuals.station_m[station]
             qpos[:3] = about_m + rotations.rotate(turn, qpos[:3] - about_m)
@@ -98,7 +98,7 @@ class _LimbStations:
         where = body.skeleton.dof_of_bone[bone]
         return list(range(where.start, where.stop))
 
-    def reach(
+    def solve(
         self, qpos: Floats, at_m: Floats, turned: Floats, residuals: Residuals, here: Bools, facing: Bools
     ) -> None:
         for level, station in self._stations:

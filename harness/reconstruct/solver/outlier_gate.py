@@ -37,18 +37,18 @@ class OutlierGate:
     def read(self, frame: TrackerFrame, residuals: Residuals) -> None:
         """Have the residuals read the frame, but for what jumped."""
         residuals.read(frame)
-        self._now_s = self._time.of(frame)
-        jumped = self.jumped(self._now_s, residuals.target_m, frame.position_valid)
+        self._now_s = self._time.frame_time_s(frame)
+        jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid)
         self.left_out = bool(np.count_nonzero(jumped))
         if self.left_out:
             residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
-    def answered(self, residuals: Residuals, qpos: Floats) -> None:
+    def update(self, residuals: Residuals, qpos: Floats) -> None:
         """The configuration (55,) that was given for the frame that was read."""
-        residuals.place(qpos)
-        self.settled(self._now_s, residuals.station_m)
+        residuals.evaluate(qpos)
+        self.update_stations(self._now_s, residuals.station_m)
 
-    def jumped(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
+    def find_jumps(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
         """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""
         out, self.all_moved = np.zeros(len(measured), bool), False
         period_s = now_s - self._known_at_s
@@ -62,7 +62,7 @@ class OutlierGate:
             self._believed_at_s[:] = now_s
         return out
 
-    def settled(self, now_s: float, station_m: Floats) -> None:
+    def update_stations(self, now_s: float, station_m: Floats) -> None:
         """Where the answer to this frame puts the stations (S, 3) [m]."""
         period_s = now_s - self._known_at_s
         self._moving = 0.0 < period_s <= _MAX_PERIOD_S

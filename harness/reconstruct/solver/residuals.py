@@ -54,7 +54,7 @@ class Residuals:
         self.mount_m, self.bone_from_station = calibration.mount_m, calibration.bone_from_station
         self.measured: Bools = np.zeros(2 * count, bool)
         """(2S,) which rows the last frame measured."""
-        self.trust: Floats = np.zeros(2 * count)
+        self.confidence: Floats = np.zeros(2 * count)
         """(2S,) how much each row counts, by quality and suspicion: 1 fully; 0 where not measured."""
         self.target_m: Floats = np.zeros((count, 3))
         """(S, 3) measured station positions in the world [m]; 0 where not measured."""
@@ -62,19 +62,19 @@ class Residuals:
         """(S, 4) measured orientation of the bones that carry the stations; identity where not measured."""
         self.scale: Floats = np.repeat([loss.position_scale_m, loss.orientation_scale_rad], count)
         """(2S,) where each row's Lorentzian starts to let go [m; rad]."""
-        self.chain = descent.build_tree(body, self.bones, self.mount_m)
-        self.readings = descent.StationTargets(self.target_m, self.world_from_target, *np.zeros((2, 2 * count)))
-        self.placed = descent.new_state(self.chain)
-        self.error: Floats = self.placed.error
+        self.tree = descent.build_tree(body, self.bones, self.mount_m)
+        self.targets = descent.StationTargets(self.target_m, self.world_from_target, *np.zeros((2, 2 * count)))
+        self.state = descent.new_state(self.tree)
+        self.error: Floats = self.state.error
         """(2S, 3) measured minus modelled [m; rad]; means nothing in rows that were not measured."""
-        self.station_m: Floats = self.placed.station_m
+        self.station_m: Floats = self.state.station_m
         """(S, 3) modelled station positions in the world [m]."""
 
         self._qpos = np.zeros(body.model.nq)
         self._tracker = descent.MeasurementModel(
-            turn=rotations.to_matrix(calibration.world_from_tracker),
+            world_from_tracker=rotations.to_matrix(calibration.world_from_tracker),
             origin_m=np.array(calibration.tracker_origin_m),
-            to_bone=_left_multiplication(calibration.world_from_tracker)
+            bone_from_reading=_left_multiplication(calibration.world_from_tracker)
             @ _right_multiplication(rotations.inverse(calibration.bone_from_station)),
             precision=np.repeat([loss.position_sigma_m**-2, loss.orientation_sigma_rad**-2], count),
             twice_scale_squared=2.0 * self.scale**2 if loss.robust else np.full(2 * count, np.inf),
@@ -84,14 +84,19 @@ class Residuals:
         silent, never = np.zeros(count), np.zeros(count, bool)
         nothing = TrackerFrame(0.0, silent, np.zeros((count, 3)), np.zeros((count, 4)), never, never, silent, never)
         self._read = specialise(
-            descent.update_targets, self._tracker, self.readings, *_frame_arguments(nothing), self.measured, self.trust
+            descent.update_targets,
+            self._tracker,
+            self.targets,
+            *_frame_arguments(nothing),
+            self.measured,
+            self.confidence,
         )
-        self._place = specialise(descent.evaluate, self.chain, self.readings, self.placed, self._qpos)
+        self._place = specialise(descent.evaluate, self.tree, self.targets, self.state, self._qpos)
 
     @property
     def distance(self) -> Floats:
         """(2S,) norms of `error` [m; rad]."""
-        out: Floats = np.sqrt(self.placed.squared)
+        out: Floats = np.sqrt(self.state.squared)
         return out
 
     def read(self, frame: TrackerFrame) -> None:
@@ -101,21 +106,21 @@ class Residuals:
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
             )
         self.measured = np.empty(2 * len(self.bones), bool)
-        self._read(self._tracker, self.readings, *_frame_arguments(frame), self.measured, self.trust)
+        self._read(self._tracker, self.targets, *_frame_arguments(frame), self.measured, self.confidence)
 
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
         self.measured = self.measured & ~rows
-        self.trust[rows] = self.readings.precision[rows] = 0.0
+        self.confidence[rows] = self.targets.precision[rows] = 0.0
 
     def widen(self, factor: float) -> None:
         """Let the Lorentzian reach `factor` times farther, until the next frame: for solving from far away."""
-        np.multiply(self._tracker.twice_scale_squared, factor * factor, out=self.readings.twice_scale_squared)
+        np.multiply(self._tracker.twice_scale_squared, factor * factor, out=self.targets.twice_scale_squared)
 
-    def place(self, qpos: Floats) -> float:
+    def evaluate(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""
         self._qpos[:] = qpos
-        return self._place(self.chain, self.readings, self.placed, self._qpos)
+        return self._place(self.tree, self.targets, self.state, self._qpos)
 
     def normal_equations(self, hessian: Floats, bent: bool = False) -> Floats:
         """Where `place` left the body: fills `hessian` (54, 54) with Gauss and Newton's, returns the descent (54,).
@@ -124,7 +129,7 @@ class Residuals:
         is `bent`, it has what Gauss and Newton leave out as well.
         """
         found = np.empty(len(hessian))
-        descent.normal_equations(self.chain, self.placed, hessian, found, bent)
+        descent.normal_equations(self.tree, self.state, hessian, found, bent)
         hessian += np.tril(hessian, -1).T
         return found
 

@@ -25,7 +25,7 @@ def candidate_placements(residuals: Residuals, qpos: Floats) -> tuple[Floats, Fl
     count = len(residuals.bones)
     residuals.kinematics.set(qpos)
     at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, residuals.bone_from_station)
-    positions, orientations = residuals.trust[:count], residuals.trust[count:]
+    positions, orientations = residuals.confidence[:count], residuals.confidence[count:]
     middle_m, target_middle_m, moment = _cross_covariance(
         *(at_m, turned, residuals.target_m, residuals.world_from_target, residuals.bone_from_station),
         *(positions, orientations, qpos[:3]),
@@ -41,7 +41,7 @@ def candidate_placements(residuals: Residuals, qpos: Floats) -> tuple[Floats, Fl
 def place_root(residuals: Residuals, qpos: Floats) -> Floats:
     """The cheaper of the two; the upright one unless tilting pays."""
     upright, tilted = candidate_placements(residuals, qpos)
-    return tilted if residuals.place(tilted) < 0.9 * residuals.place(upright) else upright
+    return tilted if residuals.evaluate(tilted) < 0.9 * residuals.evaluate(upright) else upright
 
 
 def starting_postures(body: Body) -> tuple[Floats, ...]:

@@ -16,12 +16,12 @@ class StatusMonitor:
         self._lost_after_s = lost_after_s
         self._time, self._enough_at_s = DeviceTime(), -np.inf
 
-    def seen(self, frame: TrackerFrame) -> tuple[Status, bool]:
+    def update(self, frame: TrackerFrame) -> tuple[Status, bool]:
         """The status of this frame, and whether any station reports at all.
 
         SOLVED with at least half of the stations, else HELD, else LOST once that has lasted too long.
         """
-        now_s = self._time.of(frame)
+        now_s = self._time.frame_time_s(frame)
         count = int(np.count_nonzero(frame.position_valid | frame.orientation_valid))
         if 2 * count >= len(frame.position_valid) and count:
             self._enough_at_s = now_s

@@ -28,7 +28,7 @@ class SubspaceSolver:
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self._residuals, self._limits = residuals, limits
-        self._arrays = residuals.chain, residuals.readings, residuals.placed
+        self._arrays = residuals.tree, residuals.targets, residuals.state
         self._stop = stopping.step, stopping.decrease, stopping.most_steps
         any_space = fit_subspace(
             np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, np.zeros(POSTURE_SIZE), 0.0
@@ -42,8 +42,8 @@ class SubspaceSolver:
         qpos, cost, steps, converged = self._descend(*self._arrays, space, self._stop, start)
         if steps < 0:
             raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
-        qpos[7:] = self._limits.clipped(qpos[7:])
-        self._residuals.place(qpos)
+        qpos[7:] = self._limits.clip(qpos[7:])
+        self._residuals.evaluate(qpos)
         return IKSolution(qpos, cost, steps, converged)
 
 

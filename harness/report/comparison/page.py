@@ -35,7 +35,7 @@ class ComparisonCharts:
     """Of each gated line, in the order of `sort_by_verdict`."""
     gated: Sequence[Chart] = ()
     """Intervals, a chart for each metric."""
-    rest: Sequence[Chart] = ()
+    ungated: Sequence[Chart] = ()
     """The same for lines that are not gated."""
 
 
@@ -112,13 +112,13 @@ def _panel(line: Difference, chart: Chart, varied: bool) -> Markup:
 
 
 def _interval_section(pictures: ComparisonCharts) -> Markup:
-    if not (pictures.gated or pictures.rest):
+    if not (pictures.gated or pictures.ungated):
         return Markup()
     text = (
         "The mean difference of each line in percent of A's mean with its 95 % interval, over the band of its margin. "
         "Full circles are the same, triangles better or worse, empty circles cannot tell."
     )
-    rest = details("Metrics that are not gated", _grid(pictures.rest)) if pictures.rest else None
+    rest = details("Metrics that are not gated", _grid(pictures.ungated)) if pictures.ungated else None
     return join(tag("p", text), _grid(pictures.gated), rest)
 
 

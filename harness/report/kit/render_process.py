@@ -54,7 +54,7 @@ class RenderProcess:
         for job in jobs:
             job.output.unlink(missing_ok=True)
         if jobs and not self._reason:
-            self._process = self._started()
+            self._process = self._start()
 
     def finish(self, progress: ProgressCallback = lambda last, done, planned: None) -> str:
         """Wait for the pictures: those that could be made are there. Why others are missing, "" if none is.
@@ -89,7 +89,7 @@ class RenderProcess:
             job.output.with_name(f".unfinished-{job.output.name}").unlink(missing_ok=True)
         self._folder.cleanup()
 
-    def _started(self) -> "subprocess.Popen[str]":
+    def _start(self) -> "subprocess.Popen[str]":
         files = []
         for n, job in enumerate(self._jobs):
             files.append(str(Path(self._folder.name) / f"{n}.npz"))

@@ -39,12 +39,12 @@ class _BarSeries:
     spread: Floats
     low: Floats
     high: Floats
-    theirs: Floats
+    published: Floats
 
     @property
     def tips(self) -> Floats:
         """How far anything reaches."""
-        out: Floats = np.fmax.reduce([self.length, self.length + self.spread, self.high, self.theirs])
+        out: Floats = np.fmax.reduce([self.length, self.length + self.spread, self.high, self.published])
         return np.maximum(np.nan_to_num(out), 0.0)
 
 
@@ -131,7 +131,7 @@ def _draw_whiskers(axes: "Axes", row: _BarSeries, lying: bool) -> None:
 
 def _draw_numbers(axes: "Axes", row: _BarSeries, unit: str, lying: bool) -> None:
     """The value of every bar beyond its tip, a dash for a bar that is not there."""
-    for along, value, tip, theirs in zip(row.along, row.length, row.tips, row.theirs, strict=True):
+    for along, value, tip, theirs in zip(row.along, row.length, row.tips, row.published, strict=True):
         off = 10 if tip == theirs else 4
         axes.annotate(
             format_with_minus(value, unit) if np.isfinite(value) else "–",
@@ -149,8 +149,8 @@ def _draw_published(axes: "Axes", rows: list[_BarSeries], lying: bool) -> None:
     """A diamond where the paper's figure is; one entry in the legend."""
     label: str | None = "published"
     for row in rows:
-        if np.isfinite(row.theirs).any():
-            at = (row.theirs, row.along) if lying else (row.along, row.theirs)
+        if np.isfinite(row.published).any():
+            at = (row.published, row.along) if lying else (row.along, row.published)
             axes.plot(*at, "D", color=PAPER, markeredgecolor=INK, markersize=6, label=label, zorder=4)
             label = None
 

@@ -46,9 +46,9 @@ class BodyMapValues:
     """One map: what each candidate is worth in one way of asking."""
 
     values: CandidateValues
-    what: str
+    description: str
     """The same in words."""
-    worn: StationNames = ()
+    base: StationNames = ()
     """What is worn already: it has no value, and a dark ball."""
 
 
@@ -60,7 +60,7 @@ def draw_body_map(
     Places that have no value and are not worn are left out. Without matplotlib or pyvista, or where nothing can be
     rendered, the reason is in one line, as the report lists it.
     """
-    here = [place for place in places if place.name in shown.worn or shown.values.get(place.name) is not None]
+    here = [place for place in places if place.name in shown.base or shown.values.get(place.name) is not None]
     known = [value for place in here if (value := shown.values.get(place.name)) is not None]
     if not known:
         return None, "no candidate has a value"
@@ -137,7 +137,7 @@ def _chart(
             _label_places(axes, at[side], {n: texts[n] for n in here}, views["picture"].shape[1:3])
         bar = canvas.add_subplot(grid[1, :])
         canvas.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
-        bar.set_xlabel(f"{shown.what} [{unit}]")
+        bar.set_xlabel(f"{shown.description} [{unit}]")
         bar.grid(False)
 
     most = f" Names: the {_MOST_NAMED} of {len(order)} places worth most." if len(order) > _MOST_NAMED else ""
@@ -150,10 +150,10 @@ def _chart(
     said = ", ".join(f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order)
     return draw_chart(
         f"body_map_{number}",
-        f"{shown.what[0].upper()}{shown.what[1:]}",
+        f"{shown.description[0].upper()}{shown.description[1:]}",
         f"Balls: places that were tried, with what they are worth [{unit}]. Skin has the colour of the places on its "
         f"own bone, nearer ones more; grey bones had none.{worn}{pairs}{most} Seen from ahead, left is right.",
-        f"The body coloured by {shown.what}: {said} {unit}.",
+        f"The body coloured by {shown.description}: {said} {unit}.",
         draw,
         _HEIGHT_IN,
         raster=True,
@@ -226,5 +226,5 @@ def select_body_maps(worth: Sequence[MarginalContribution]) -> list[BodyMapValue
         for (mode, base), values in sorted(groups.items(), key=lambda group: group[0][0] != "exhaustive")
         if any(value is not None for value in values.values())
     ]
-    among, more = [one for one in found if not one.worn], [one for one in found if one.worn]
+    among, more = [one for one in found if not one.base], [one for one in found if one.base]
     return [max(kind, key=lambda one: len(one.values)) for kind in (among, more) if kind]

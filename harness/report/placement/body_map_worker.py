@@ -70,7 +70,7 @@ class _TPose:
         self._root = root_m[0], rotations.to_matrix(turned[0])
         self._bones = dict(zip(skeleton.names, zip(pose.start_m[0], pose.world_from_bone[0], strict=True), strict=True))
 
-    def of(self, bone: str) -> tuple[Floats, Floats]:
+    def joint_pose(self, bone: str) -> tuple[Floats, Floats]:
         """Joint (3,) [m] and rotation (3, 3) of a bone, or of the root."""
         return self._bones.get(bone, self._root)
 
@@ -79,7 +79,7 @@ def _mount_positions(skeleton: Skeleton, standing: _TPose, mounts: list[Mount]) 
     """(N, 3) where the skin under each mount is in the room, and (N, 3) which way it faces."""
     at_m, outward = np.empty((len(mounts), 3)), np.empty((len(mounts), 3))
     for n, mount in enumerate(mounts):
-        start_m, turn = standing.of(mount.bone)
+        start_m, turn = standing.joint_pose(mount.bone)
         local_m, bone_from_station = locate_mount(skeleton, mount)
         at_m[n] = start_m + turn @ local_m
         outward[n] = turn @ rotations.rotate(bone_from_station, np.array([0.0, 0.0, 1.0]))
@@ -92,7 +92,7 @@ def _coloured_mesh(
     """One part of the body, each point in the colour of the places of its bone."""
     mesh = _mesh(shape)
     mesh.points = np.asarray(mesh.points) @ rotations.to_matrix(shape.bone_from_shape).T + shape.centre_m
-    start_m, turn = standing.of(shape.bone)
+    start_m, turn = standing.joint_pose(shape.bone)
     mesh.points = np.asarray(mesh.points) @ turn.T + start_m
     carriers = _PELVIS if shape.bone in _PELVIS else (shape.bone,)
     mine = np.array([n for n, bone in enumerate(bones) if bone in carriers and known[n]], dtype=int)

@@ -47,10 +47,10 @@ def error_over_time(run: RunData, behaviour: str) -> Chart:
 
     def draw(figure: "Figure") -> None:
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
-        for trace in (trace for trace in shown if trace.series in run.lines):
+        for trace in (trace for trace in shown if trace.series in run.charted_series):
             values = np.where(trace.scored, trace.errors[ANGLE_METRIC], np.nan)
             time_s, values = decimate(*_insert_gaps(trace.time_s, values))
-            error.plot(time_s, values, label=trace.series, **line_style(run.lines.index(trace.series)))
+            error.plot(time_s, values, label=trace.series, **line_style(run.charted_series.index(trace.series)))
         _set_log_scale(error, "y")
         error.set_ylabel(UNITS[ANGLE_METRIC])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
@@ -117,7 +117,7 @@ def error_distribution(run: RunData) -> Chart:
 
     def draw(figure: "Figure") -> None:
         for axes, metric in zip(figure.subplots(1, 2, sharey=True), UNITS, strict=True):
-            for place, name in enumerate(run.lines):
+            for place, name in enumerate(run.charted_series):
                 values = np.concatenate(
                     [t.errors[metric][t.scored] for t in run.traces if t.series == name] or [np.empty(0)]
                 )
@@ -143,7 +143,7 @@ def error_distribution(run: RunData) -> Chart:
 
 def omitted_series_note(run: RunData) -> str:
     """What a caption says of series that have no line."""
-    lines, series = len(run.lines), len(run.series)
+    lines, series = len(run.charted_series), len(run.series)
     return f" Shown are the {lines} of {series} with the least error." if lines < series else ""
 
 

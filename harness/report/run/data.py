@@ -67,7 +67,7 @@ class RunData:
     manifest: Manifest
     summary: Row
     traces: tuple[Trace, ...]
-    whole: Row
+    full_summary: Row
     """The summary with every combination of varied values; `summary` has the last one alone."""
 
     @property
@@ -81,7 +81,7 @@ class RunData:
         return rows
 
     @property
-    def varied(self) -> str:
+    def varied_label(self) -> str:
         """The varied values that are shown, as text; empty when the scenario varies none."""
         return varied_text(self.cells[0]["varied"]) if self.cells else ""
 
@@ -97,7 +97,7 @@ class RunData:
         return tuple(sorted(self.series, key=lambda name: np.inf if errors[name] is None else errors[name]))
 
     @cached_property
-    def lines(self) -> tuple[str, ...]:
+    def charted_series(self) -> tuple[str, ...]:
         """The series that charts show: as many as colours and dashes tell apart, those with the least error."""
         return tuple(name for name in self.series if name in self.ranked[:STYLES])
 
@@ -110,7 +110,7 @@ class RunData:
 
     def series_of(self, row: Row) -> str:
         """Name of the group of a row of the summary."""
-        rows = self.whole["methods"]
+        rows = self.full_summary["methods"]
         parts = []
         if len({r["inputs"] for r in rows}) > 1:
             parts.append(str(row["inputs"]))

@@ -64,7 +64,7 @@ def _ranking_sentence(
     whose = f" by {kind} performers" if several and kind else ""
     start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences} of {_source(run)}{whose}"
     lead = _lead_text(measured, order[0], order[1], shared) if len(order) > 1 else "; no other method was measured"
-    at = f", with {run.varied}" if run.varied else ""
+    at = f", with {run.varied_label}" if run.varied_label else ""
     return f"{start}{lead}{at}.{_positions(run, order, shared)}", order[0]
 
 
@@ -144,8 +144,8 @@ def _learning(run: RunData) -> str:
 
 def _varied(run: RunData) -> str:
     """The combinations that were run, and which of them is shown."""
-    texts = list(dict.fromkeys(varied_text(row["varied"]) for row in run.whole["cells"]))
-    return f"{'; '.join(texts)}. From the results on everything is about {run.varied}" if run.varied else ""
+    texts = list(dict.fromkeys(varied_text(row["varied"]) for row in run.full_summary["cells"]))
+    return f"{'; '.join(texts)}. From the results on everything is about {run.varied_label}" if run.varied_label else ""
 
 
 def _progress(run: RunData) -> str:

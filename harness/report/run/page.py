@@ -74,14 +74,14 @@ def run_page(content: RunContent) -> str:
 def _sections(content: RunContent) -> list[Section]:
     run = content.run
     measured = bool(run.cells)
-    nothing, cells = Markup(), run.whole["cells"]
+    nothing, cells = Markup(), run.full_summary["cells"]
     return [
         (
             "Varied",
             "varied",
             join(*(chart_figure(chart, 3) for chart in content.varied), parameter_effects.effect_tables(run)),
         ),
-        ("Expected orders", "orders", expected_orders.section(run.whole)),
+        ("Expected orders", "orders", expected_orders.section(run.full_summary)),
         ("Calibration", "calibration", join(calibration_errors.section(cells), calibration_cost.section(cells))),
         ("Results", "results", tables.results_tables(run) if measured else nothing),
         ("Recovery", "recovery", recovery.section(run.summary)),

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def effect_charts(run: RunData) -> list[Chart]:
     """For each behaviour the error against the varied key; none unless a single key takes several numbers."""
-    values = [row["varied"] for row in run.whole["cells"]]
+    values = [row["varied"] for row in run.full_summary["cells"]]
     keys = {key for varied in values for key in varied}
     if len(keys) != 1 or len({varied_text(varied) for varied in values}) < 2:
         return []
@@ -28,14 +28,14 @@ def effect_charts(run: RunData) -> list[Chart]:
 
 def effect_tables(run: RunData) -> Markup:
     """Every method against every combination of values, behaviour by behaviour; nothing when nothing is varied."""
-    if not run.varied:
+    if not run.varied_label:
         return Markup()
     return join(*(_table(run, behaviour, metric) for behaviour in run.behaviours for metric in UNITS))
 
 
 def _chart(run: RunData, behaviour: str, key: str) -> Chart:
     found = _rows(run, behaviour)
-    names = [name for name in run.lines if name in found]
+    names = [name for name in run.charted_series if name in found]
 
     def draw(figure: "Figure") -> None:
         for axes, (metric, unit) in zip(figure.subplots(1, 2), UNITS.items(), strict=True):
@@ -60,12 +60,12 @@ def _chart(run: RunData, behaviour: str, key: str) -> Chart:
 
 
 def _line_options(run: RunData, name: str) -> dict[str, Any]:
-    return {"label": name, **line_style(run.lines.index(name))}
+    return {"label": name, **line_style(run.charted_series.index(name))}
 
 
 def _table(run: RunData, behaviour: str, metric: str) -> Markup:
     found, unit = _rows(run, behaviour), DEFINITIONS[metric].unit
-    columns = list(dict.fromkeys(varied_text(row["varied"]) for row in run.whole["cells"]))
+    columns = list(dict.fromkeys(varied_text(row["varied"]) for row in run.full_summary["cells"]))
     rows = []
     for name in run.series:
         if name in found:
@@ -84,7 +84,7 @@ def _table(run: RunData, behaviour: str, metric: str) -> Markup:
 def _rows(run: RunData, behaviour: str) -> dict[str, dict[str, Row]]:
     """Series -> varied values as text -> its row of the whole summary."""
     found: dict[str, dict[str, Row]] = {}
-    for row in run.whole["behaviours"]:
+    for row in run.full_summary["behaviours"]:
         if row["behaviour"] == behaviour:
             found.setdefault(run.series_of(row), {})[varied_text(row["varied"])] = row
     return found

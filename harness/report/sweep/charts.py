@@ -34,7 +34,7 @@ class Curve:
     """One series of one scenario against a key."""
 
     name: str
-    place: int
+    colour_index: int
     """Which colour."""
     points: tuple[Statistic, ...]
     """For each value of the key."""
@@ -46,17 +46,19 @@ def curves(
     """Of each series that has anything there, in the order of the sweep; intervals for those that are drawn."""
     found = [_curve(sweep, key, scenario, place, metric) for place in range(len(sweep.series))]
     found = [curve for curve in found if any(point.mean is not None for point in curve.points)]
-    drawn = {curve.place for curve in select_curves(found)} if ends else set()
-    return [_curve(sweep, key, scenario, c.place, metric, ends=True) if c.place in drawn else c for c in found]
+    drawn = {curve.colour_index for curve in select_curves(found)} if ends else set()
+    return [
+        _curve(sweep, key, scenario, c.colour_index, metric, ends=True) if c.colour_index in drawn else c for c in found
+    ]
 
 
 def select_curves(found: Sequence[Curve]) -> list[Curve]:
     """The series with the least error, as many as can be told apart, in the order of the sweep."""
-    return sorted(sorted(found, key=_curve_mean)[:MAX_SERIES], key=lambda curve: curve.place)
+    return sorted(sorted(found, key=_curve_mean)[:MAX_SERIES], key=lambda curve: curve.colour_index)
 
 
 def _curve(sweep: SweepData, key: VariedKey, scenario: int, place: int, metric: str, *, ends: bool = False) -> Curve:
-    chosen = [sweep.where(scenario, place, **{key.name: value}) for value in range(len(key.texts))]
+    chosen = [sweep.select(scenario, place, **{key.name: value}) for value in range(len(key.labels))]
     return Curve(sweep.series[place], place, tuple(sweep.statistic(metric, one, ends=ends) for one in chosen))
 
 
@@ -91,13 +93,13 @@ def sweep_chart(sweep: SweepData, key: VariedKey, scenario: int, found: Sequence
 def _dot_chart_height_in(key: VariedKey, series: int) -> float:
     """Height with a row for each value, as high as its name or its dots need."""
     rows = max(1 + text.count("\n") for text in _row_labels(key))
-    return 0.75 + len(key.texts) * max(_ROW_IN * (series + 1), _LETTER_IN * rows + 0.08)
+    return 0.75 + len(key.labels) * max(_ROW_IN * (series + 1), _LETTER_IN * rows + 0.08)
 
 
 def _row_labels(key: VariedKey) -> list[str]:
     """Values in several rows, broken after a plus where they can be."""
     out = []
-    for text in key.texts:
+    for text in key.labels:
         rows = [row.replace("+ ", "+") for row in textwrap.wrap(text.replace("+", "+ "), _LETTERS)]
         more = "…" if len(rows) > _MOST_ROWS else ""
         out.append("\n".join(rows[:_MOST_ROWS]) + more)
@@ -121,7 +123,7 @@ def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tu
     """Each series; last value, name and colour of each."""
     ends = []
     for curve in shown:
-        style = line_style(curve.place)
+        style = line_style(curve.colour_index)
         at = [n for n, point in enumerate(curve.points) if point.mean is not None]
         x, y = [key.numbers[n] for n in at], [float(curve.points[n].mean or 0.0) for n in at]
         axes.plot(x, y, marker=_marker(curve), markersize=4.0, label=_shorten(curve.name), **style)
@@ -133,7 +135,7 @@ def _draw_lines(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> list[tu
     if key.numbers[0] > 0.0 and key.numbers[-1] > _LOG_SCALE_RATIO * key.numbers[0]:
         axes.set_xscale("log")
         every = -(-len(key.numbers) // _MOST_TICKS)
-        axes.set_xticks(key.numbers[::every], key.texts[::every])
+        axes.set_xticks(key.numbers[::every], key.labels[::every])
         axes.set_xticks([], minor=True)
     axes.set_xlabel(key.name)
     axes.set_ylabel(f"joint angle error [{unit_of(PRIMARY_METRIC)}]")
@@ -145,7 +147,7 @@ def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
     """A row for each value, in it a dot for each series."""
     step = 0.8 / max(len(shown), 1)
     for row, curve in enumerate(shown):
-        colour, label = line_style(curve.place)["color"], _shorten(curve.name)
+        colour, label = line_style(curve.colour_index)["color"], _shorten(curve.name)
         for value, point in enumerate(curve.points):
             if point.mean is None:
                 continue
@@ -154,13 +156,13 @@ def _draw_dots(axes: "Axes", key: VariedKey, shown: Sequence[Curve]) -> None:
                 axes.plot([point.low, point.high], [y, y], color=colour, linewidth=1.4, alpha=0.7)
             axes.plot([point.mean], [y], _marker(curve), markersize=4.5, color=colour, label=label)
             label = "_"
-    axes.set_yticks(range(len(key.texts)), _row_labels(key))
-    axes.set_ylim(len(key.texts) - 0.5, -0.5)
+    axes.set_yticks(range(len(key.labels)), _row_labels(key))
+    axes.set_ylim(len(key.labels) - 0.5, -0.5)
     axes.set_xlabel(f"joint angle error [{unit_of(PRIMARY_METRIC)}]")
     axes.set_xlim(left=0.0)
     axes.tick_params(axis="y", length=0)
     axes.grid(False, axis="y")
-    for edge in range(1, len(key.texts)):
+    for edge in range(1, len(key.labels)):
         axes.axhline(edge - 0.5, color=GRID, linewidth=0.8)
 
 
@@ -170,7 +172,7 @@ def _shorten(name: str) -> str:
 
 def _marker(curve: Curve) -> str:
     """Told apart by shape as well as by colour."""
-    return _MARKERS[(curve.place + curve.place // len(COLOURS)) % len(_MARKERS)]
+    return _MARKERS[(curve.colour_index + curve.colour_index // len(COLOURS)) % len(_MARKERS)]
 
 
 def _curve_mean(curve: Curve) -> float:
@@ -181,7 +183,7 @@ def _curve_mean(curve: Curve) -> float:
 def _curve_values_text(curve: Curve, key: VariedKey) -> str:
     figures = [
         f"{format_number(point.mean, unit_of(PRIMARY_METRIC))} at {text}"
-        for text, point in zip(key.texts, curve.points, strict=True)
+        for text, point in zip(key.labels, curve.points, strict=True)
         if point.mean is not None
     ]
     return ", ".join(figures)

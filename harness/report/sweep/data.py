@@ -31,7 +31,7 @@ class VariedKey:
     """What was varied: its values in rising order if they are numbers, else as they came."""
 
     name: str
-    texts: tuple[str, ...]
+    labels: tuple[str, ...]
     numbers: tuple[float, ...] = ()
     """The same as numbers; () where any is none."""
 
@@ -64,7 +64,7 @@ class SweepData:
     def __len__(self) -> int:
         return len(self.scenario_of)
 
-    def where(self, scenario: int | None = None, series: int | None = None, **values: int) -> Bools:
+    def select(self, scenario: int | None = None, series: int | None = None, **values: int) -> Bools:
         """(N,) the cells of a scenario, a series and of values of keys."""
         chosen: Bools = np.ones(len(self), dtype=bool)
         if scenario is not None:

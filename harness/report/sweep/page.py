@@ -43,7 +43,7 @@ def sweep_page(sweep: SweepData) -> str:
     """The whole file."""
     draw, missing = find_spec("matplotlib") is not None, []
     wanted = min(len(sweep.series), MAX_SERIES) * sum(
-        len(key.texts) * len(scenarios_varying(sweep, key)[:MAX_SCENARIOS]) for key in sweep.keys
+        len(key.labels) * len(scenarios_varying(sweep, key)[:MAX_SCENARIOS]) for key in sweep.keys
     )
     ends = wanted <= MAX_INTERVALS
     if sweep.keys and not draw:

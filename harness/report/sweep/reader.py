@@ -40,8 +40,8 @@ def collect_cells(
     for scenario, clip, method, *telling in cells:
         group = (method, *telling[: len(_GROUP_COLUMNS)])
         varied, *metrics = telling[len(_GROUP_COLUMNS) :]
-        clip_code = clips.of(f"{scenario}: {clip}")
-        codes.append((scenarios.of(scenario), clip_code, groups.of(group), values.of(varied)))
+        clip_code = clips.code(f"{scenario}: {clip}")
+        codes.append((scenarios.code(scenario), clip_code, groups.code(group), values.code(varied)))
         figures.append(metrics)
     scenario_of, clip_of, series_of, varied_of = np.array(codes, dtype=np.int64).reshape(-1, 4).T
     table = np.array(figures, dtype=np.float64).reshape(-1, len(METRICS))  # None becomes NaN
@@ -71,7 +71,7 @@ class _LabelEncoder:
         self.names: list[Any] = []
         self._places: dict[Any, int] = {}
 
-    def of(self, name: Any) -> int:
+    def code(self, name: Any) -> int:
         if name not in self._places:
             self._places[name] = len(self.names)
             self.names.append(name)

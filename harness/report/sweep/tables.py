@@ -20,7 +20,7 @@ _LOWER_IS_BETTER = ("deg", "mm", "ms")
 def scenario_table(sweep: SweepData, metric: str) -> Markup:
     """A row for each series, a column for each scenario, and all of them together where there are several."""
     columns: list[int | None] = [*range(len(sweep.scenarios)), *([None] if len(sweep.scenarios) > 1 else [])]
-    found = [[sweep.statistic(metric, sweep.where(c, s)) for c in columns] for s in range(len(sweep.series))]
+    found = [[sweep.statistic(metric, sweep.select(c, s)) for c in columns] for s in range(len(sweep.series))]
     titles = ["all" if c is None else sweep.scenarios[c].replace("_", " ") for c in columns]
     return _grid(
         metric, "± standard deviation over clips, each averaged over what is varied", titles, sweep.series, found
@@ -29,7 +29,7 @@ def scenario_table(sweep: SweepData, metric: str) -> Markup:
 
 def value_table(sweep: SweepData, key: VariedKey, scenario: int, curves: Sequence[Curve], metric: str) -> Markup:
     """The figures of a chart."""
-    titles = [f"{key.name}={text}" for text in key.texts]
+    titles = [f"{key.name}={text}" for text in key.labels]
     over = f"over clips of {sweep.scenarios[scenario]} ± standard deviation, or with the 95 % interval"
     return _grid(metric, over, titles, [c.name for c in curves], [c.points for c in curves])
 
@@ -68,9 +68,11 @@ def _failure_item(fault: FailureGroup, command: str) -> Markup:
     cells = [tag("li", cell) for cell in fault.cells[:_MOST_CELLS]]
     if (more := len(fault.cells) - _MOST_CELLS) > 0:
         cells.append(tag("li", f"and {more:,} more"))
-    title = join(tag("b", f"{len(fault.cells):,} cell{'s'[: len(fault.cells) != 1]}"), f": {fault.line}")
+    title = join(tag("b", f"{len(fault.cells):,} cell{'s'[: len(fault.cells) != 1]}"), f": {fault.message}")
     alone = tag("pre", tag("code", f"{command} --cell {shlex.quote(fault.cells[0])}")) if command else None
-    return tag("li", details(title, tag("ul", *cells), tag("p", "The first one's:"), tag("pre", fault.text), alone))
+    return tag(
+        "li", details(title, tag("ul", *cells), tag("p", "The first one's:"), tag("pre", fault.traceback), alone)
+    )
 
 
 def _best_statistic(column: Sequence[Statistic], metric: str) -> Statistic | None:

@@ -17,7 +17,7 @@ def text(sweep: SweepData) -> str:
     found = group_failures(sweep)
     lines += [""] if found else []
     for fault in found[:_MOST_FAILURES]:
-        lines.append(f"FAILED {len(fault.cells):,}, such as {fault.cells[0]}: {fault.line}")
+        lines.append(f"FAILED {len(fault.cells):,}, such as {fault.cells[0]}: {fault.message}")
     if (more := len(found) - _MOST_FAILURES) > 0:
         lines.append(f"and {more:,} more kinds of failure, in failures.json")
     return "\n".join(lines)
@@ -28,7 +28,7 @@ def _table(sweep: SweepData) -> list[str]:
     rows = []
     for s, scenario in enumerate(sweep.scenarios):
         for n, series in enumerate(sweep.series):
-            chosen = sweep.where(s, n)
+            chosen = sweep.select(s, n)
             if chosen.any():
                 figures = [sweep.statistic(metric, chosen) for metric in (PRIMARY_METRIC, SECONDARY_METRIC)]
                 clips = str(max(one.clips for one in figures))

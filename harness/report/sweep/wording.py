@@ -16,10 +16,10 @@ from harness.report.sweep.data import PRIMARY_METRIC, SweepData, VariedKey, unit
 class FailureGroup:
     """What several cells failed of."""
 
-    line: str
+    message: str
     """The last one of the traceback."""
     cells: tuple[str, ...]
-    text: str
+    traceback: str
     """The first cell's, whole."""
 
 
@@ -39,7 +39,7 @@ def progress_sentence(sweep: SweepData) -> str:
 
 def _best(sweep: SweepData) -> str:
     """Of known and of new performers, which have other clips."""
-    found = {name: sweep.by_clip(PRIMARY_METRIC, sweep.where(series=n)) for n, name in enumerate(sweep.series)}
+    found = {name: sweep.by_clip(PRIMARY_METRIC, sweep.select(series=n)) for n, name in enumerate(sweep.series)}
     found = {name: means for name, means in found.items() if np.isfinite(means).any()}
     kinds = {name: kind for name, kind in zip(sweep.series, sweep.performers, strict=True) if name in found}
     if not found:
@@ -78,14 +78,14 @@ def _describe_difference(difference: Floats) -> str:
 
 def describe_effect(sweep: SweepData, key: VariedKey) -> str:
     """From which value to which the error goes, over the series and clips that have all values."""
-    means = np.array([_per_series(sweep, key, value) for value in range(len(key.texts))])
+    means = np.array([_per_series(sweep, key, value) for value in range(len(key.labels))])
     shared = np.isfinite(means).all(axis=0)
     if not shared.any():
         return "no clip was measured with all values"
     errors = means[:, shared].mean(axis=1)
     least, most = int(np.argmin(errors)), int(np.argmax(errors))
     rise = format_percent(100.0 * (errors[most] / errors[least] - 1.0)) if errors[least] else "–"
-    return f"{_format_error(errors[least])} at {key.texts[least]}, {_format_error(errors[most])} at {key.texts[most]} ({rise})"
+    return f"{_format_error(errors[least])} at {key.labels[least]}, {_format_error(errors[most])} at {key.labels[most]} ({rise})"
 
 
 def group_failures(sweep: SweepData) -> list[FailureGroup]:
@@ -98,13 +98,13 @@ def group_failures(sweep: SweepData) -> list[FailureGroup]:
 
 
 def list_values(key: VariedKey, most: int = 8) -> str:
-    return list_first(key.texts, most)
+    return list_first(key.labels, most)
 
 
 def _per_series(sweep: SweepData, key: VariedKey, value: int) -> Floats:
     """(series * clips,) errors at one value."""
     parts = [
-        sweep.by_clip(PRIMARY_METRIC, sweep.where(series=n, **{key.name: value})) for n in range(len(sweep.series))
+        sweep.by_clip(PRIMARY_METRIC, sweep.select(series=n, **{key.name: value})) for n in range(len(sweep.series))
     ]
     return np.concatenate(parts)
 

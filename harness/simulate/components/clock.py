@@ -22,5 +22,5 @@ class Clock:
     def __post_init__(self) -> None:
         require_ranges(self, offset_s=(0.0, 1e6), drift_ppm=(-1e5, 1e5))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         sensed.device_s = self.offset_s + (1.0 + 1e-6 * self.drift_ppm) * sensed.time_s

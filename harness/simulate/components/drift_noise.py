@@ -32,8 +32,8 @@ class DriftNoise:
             self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6)
         )
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
-        draws = [sensed.draw("slow", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
+    def apply(self, sensed: SimulatedReadings) -> None:
+        draws = [sensed.take_rng("slow", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
         wander = gauss_markov(np.stack(draws, axis=1), float(np.exp(-1.0 / (sensed.rate_hz * self.correlation_s))))
         sensed.move(self.position_m * wander[..., :3])
         sensed.rotate(np.array([self.pitch_roll_rad, self.pitch_roll_rad, self.yaw_rad]) * wander[..., 3:])

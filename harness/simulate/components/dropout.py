@@ -29,13 +29,13 @@ class Dropout:
     def __post_init__(self) -> None:
         require_ranges(self, share=(0.0, 0.99), gap_s=(1e-3, 1e6), coast_s=(1e-3, 60.0), tilt_rad=(0.0, 1.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         lost = np.zeros(sensed.time_s.shape, bool)
         coasting = np.zeros(sensed.time_s.shape, bool)
         leak_m_s2 = GRAVITY_M_S2 * float(np.sin(self.tilt_rad))
         for row, station in enumerate(sensed.stations):
             time_s, sighted_s = sensed.time_s[:, row], -np.inf
-            for begin_s, end_s, sideways in self.gaps(sensed.draw("dropout", station), float(time_s.max())):
+            for begin_s, end_s, sideways in self.gaps(sensed.take_rng("dropout", station), float(time_s.max())):
                 blocked_s = max(begin_s - self.coast_s, sighted_s)
                 coast = (time_s >= blocked_s) & (time_s < begin_s)
                 coasted_s = time_s[coast] - blocked_s
@@ -46,7 +46,7 @@ class Dropout:
                 lost[:, row] |= (time_s >= begin_s) & (time_s < end_s)
                 sighted_s = end_s
         sensed.lose(lost)
-        sensed.hits["coast"] = coasting & ~lost
+        sensed.affected["coast"] = coasting & ~lost
 
     def gaps(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, float, Floats]]:
         """Begin and end [s] of each gap up to `until_s`, and the horizontal unit vector (3,) of the error before it."""

@@ -30,12 +30,12 @@ class Echo:
     def __post_init__(self) -> None:
         require_ranges(self, share=(0.0, 0.99), burst_records=(1, 100_000), size_m=(0.0, 10.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         hit = np.zeros(sensed.time_s.shape, bool)
         if self.share > 0.0:
             for row, station in enumerate(sensed.stations):
-                self._one(sensed, hit, row, sensed.draw("echo", station))
-        sensed.hits["echo"] = hit
+                self._one(sensed, hit, row, sensed.take_rng("echo", station))
+        sensed.affected["echo"] = hit
 
     def _one(self, sensed: SimulatedReadings, hit: np.ndarray, row: int, rng: np.random.Generator) -> None:
         fewest, most = self.burst_records

@@ -29,19 +29,19 @@ class Excursion:
     def __post_init__(self) -> None:
         require_ranges(self, onsets_per_min=(0.0, 600.0), size_m=(0.0, 10.0), stay_s=(0.0, 1e6), ramp_s=(0.0, 60.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         hit = np.zeros(sensed.time_s.shape, bool)
         for row, station in enumerate(sensed.stations):
             time_s = sensed.time_s[:, row]
             offset_m = np.zeros((len(time_s), 3))
-            for begin_s, stay_s, whole_m in self.events(sensed.draw("excursion", station), float(time_s.max())):
+            for begin_s, stay_s, whole_m in self.events(sensed.take_rng("excursion", station), float(time_s.max())):
                 share = self.course(time_s - begin_s, stay_s)
                 offset_m += share[:, None] * whole_m
                 hit[:, row] |= share > 0.0
             largest_m = max(self.size_m[1], 1e-12)
             size_m = np.sqrt(np.sum(offset_m**2, axis=1, keepdims=True))
             sensed.position_m[:, row] += offset_m * (largest_m / np.maximum(size_m, largest_m))
-        sensed.hits["excursion"] = hit
+        sensed.affected["excursion"] = hit
 
     def events(self, rng: np.random.Generator, until_s: float) -> list[tuple[float, float, Floats]]:
         """Onset [s], stay [s] and offset (3,) [m] of each excursion that touches the time from 0 to `until_s`."""

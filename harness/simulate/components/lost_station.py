@@ -22,7 +22,7 @@ class LostStation:
     def __post_init__(self) -> None:
         require_ranges(self, to_s=(self.from_s, math.inf), fade_s=(0.0, math.inf))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         lost = sensed.during((self.station,), self.from_s, self.to_s)
         row = sensed.stations.index(self.station)
         left = np.clip((self.from_s - sensed.time_s[:, row]) / max(self.fade_s, 1e-9), 1.0 / 255.0, 1.0)

@@ -23,9 +23,9 @@ class MountOffset:
     def __post_init__(self) -> None:
         require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, math.pi))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         for row, station in enumerate(sensed.stations):
-            draw = sensed.draw_of_session("mount", station).normal(size=6)
+            draw = sensed.session_rng("mount", station).normal(size=6)
             sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], self.position_m * draw[:3])
             turn = rotations.exp(self.orientation_rad * draw[3:])
             sensed.turn[:, row] = rotations.multiply(sensed.turn[:, row], turn)
@@ -48,7 +48,7 @@ class MountSlip:
     def __post_init__(self) -> None:
         require_ranges(self, over_s=(0.0, math.inf))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         if self.station not in sensed.stations:
             raise UnknownName("station", self.station, sensed.stations)
         row = sensed.stations.index(self.station)

@@ -26,7 +26,7 @@ class OrientationOffset:
     def __post_init__(self) -> None:
         require_ranges(self, to_s=(self.from_s, math.inf))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         hit = sensed.during(self.stations, self.from_s, self.to_s)
         sensed.rotate(hit[:, :, None] * np.array([0.0, 0.0, self.angle_rad]))
-        sensed.hits["turned"] = hit | sensed.hits.get("turned", False)
+        sensed.affected["turned"] = hit | sensed.affected.get("turned", False)

@@ -21,7 +21,7 @@ class PositionOffset:
     def __post_init__(self) -> None:
         require_ranges(self, to_s=(self.from_s, math.inf))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         hit = sensed.during(self.stations, self.from_s, self.to_s)
         sensed.position_m = sensed.position_m + hit[:, :, None] * self.offset_m
-        sensed.hits["displaced"] = hit | sensed.hits.get("displaced", False)
+        sensed.affected["displaced"] = hit | sensed.affected.get("displaced", False)

@@ -22,8 +22,8 @@ class SessionBias:
     def __post_init__(self) -> None:
         require_ranges(self, scale=(0.0, 0.1), station_offset_m=(0.0, 1.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         for row, station in enumerate(sensed.stations):
-            offset_m = self.station_offset_m * sensed.draw_of_session("session", station).normal(size=3)
+            offset_m = self.station_offset_m * sensed.session_rng("session", station).normal(size=3)
             sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], offset_m)
-        sensed.position_m *= 1.0 + self.scale * sensed.draw_of_session("session", "").normal()
+        sensed.position_m *= 1.0 + self.scale * sensed.session_rng("session", "").normal()

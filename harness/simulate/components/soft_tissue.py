@@ -38,7 +38,7 @@ class SoftTissueArtefact:
     def __post_init__(self) -> None:
         require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), of_flesh_m=(1e-3, 0.5))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         frequency_hz = self.frequency_hz * np.sqrt(self.of_flesh_m / sensed.flesh_m)
         pace = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
         linear_m = simulate_oscillators(-sensed.force_m_s2, pace, self.damping, 1.0 / sensed.rate_hz)

@@ -19,5 +19,5 @@ class SpeedError:
     def __post_init__(self) -> None:
         require_ranges(self, ahead_s=(-1.0, 1.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         sensed.move(self.ahead_s * sensed.velocity_m_s)

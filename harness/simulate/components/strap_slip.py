@@ -28,10 +28,10 @@ class StrapSlip:
     def __post_init__(self) -> None:
         require_ranges(self, share=(0.0, 1.0), along_m=(0.0, 0.5), around_rad=(0.0, math.pi), over_s=(0.0, 60.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
+    def apply(self, sensed: SimulatedReadings) -> None:
         begin_s, end_s = float(sensed.time_s.min()), float(sensed.time_s.max())
         for station in sensed.stations:
-            rng = sensed.draw("loose", station)
+            rng = sensed.take_rng("loose", station)
             slips, when, along, around = rng.random() < self.share, rng.random(), rng.normal(), rng.normal()
             if slips:
                 MountSlip(
@@ -40,4 +40,4 @@ class StrapSlip:
                     over_s=self.over_s,
                     around_rad=self.around_rad * around,
                     along_m=self.along_m * along,
-                ).spoil(sensed)
+                ).apply(sensed)

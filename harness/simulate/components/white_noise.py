@@ -21,8 +21,8 @@ class WhiteNoise:
     def __post_init__(self) -> None:
         require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, 1.0))
 
-    def spoil(self, sensed: SimulatedReadings) -> None:
-        draws = [sensed.draw("white", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
+    def apply(self, sensed: SimulatedReadings) -> None:
+        draws = [sensed.take_rng("white", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
         noise: Floats = np.stack(draws, axis=1)
         sensed.move(self.position_m * noise[..., :3])
         sensed.rotate(self.orientation_rad * noise[..., 3:])

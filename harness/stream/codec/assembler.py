@@ -65,7 +65,7 @@ class FrameAssembler:
             return []
         given = more if self._open is None else concatenate_readings([self._open, more])
         frame, doubtful = self._cut(given)
-        given = given.doubted(doubtful)
+        given = given.with_suspect(doubtful)
         open_from = int(np.searchsorted(frame, frame[-1]))
         if len(given) - open_from == self._stations:
             open_from, self._round = len(given), self._after
@@ -87,7 +87,7 @@ class FrameAssembler:
 
     def _cut(self, given: Readings) -> tuple[Ints, Bools]:
         """The frame of each reading (N,), from 0, and which ones (N,) are doubtful after a look at their neighbours."""
-        frame, doubtful = np.zeros(len(given), dtype=np.int64), given.doubtful.copy()
+        frame, doubtful = np.zeros(len(given), dtype=np.int64), given.suspect.copy()
         began_s, first, before_s = self._round.began_s, self._round.first, self._round.before_s
         led_s, led = self._round.arrived_s, self._round.led
         heard, heard_before = self._round.heard, self._round.heard_before
@@ -152,7 +152,7 @@ class FrameAssembler:
             spread(placed, missing=0.0) > 0.0,
             spread(turned, missing=0.0) > 0.0,
             spread(given.quality, missing=0.0),
-            spread(given.doubtful, missing=0.0) > 0.0,
+            spread(given.suspect, missing=0.0) > 0.0,
         )
         return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
 

@@ -53,7 +53,7 @@ class ContinuousFrameReader:
         """When every unfinished frame is due if no byte comes before."""
         return self._heard_s + SILENCE_PERIODS * self._period_s
 
-    def configured(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
+    def begin_session(self, wire: WireFormat, now_s: float) -> list[TrackerFrame]:
         """What was unfinished; from here on bytes are read with this format, and the device's clock began at zero."""
         frames = self.finish()
         self._before["sessions"] += 1
@@ -61,11 +61,11 @@ class ContinuousFrameReader:
         self._heard_s, self._new = now_s, True
         return frames
 
-    def received(self, data: bytes, now_s: float) -> list[TrackerFrame]:
+    def feed(self, data: bytes, now_s: float) -> list[TrackerFrame]:
         """What these bytes complete; nothing unless it is set up."""
-        return self.received_all(ByteCapture(data, np.array([len(data)]), np.array([now_s])))
+        return self.feed_all(ByteCapture(data, np.array([len(data)]), np.array([now_s])))
 
-    def received_all(self, capture: ByteCapture) -> list[TrackerFrame]:
+    def feed_all(self, capture: ByteCapture) -> list[TrackerFrame]:
         """The same of one chunk or more at once."""
         if self._reader is None or not len(capture.ends):
             return []

@@ -41,16 +41,16 @@ class PlausibilityCheck:
         self._odd: list[_StationState | None] = [None] * stations
         """The one after it, where it was not."""
 
-    def judge(self, given: Readings) -> Readings:
+    def mark_suspect(self, given: Readings) -> Readings:
         """The same readings, of which those are doubtful too that nobody could reach."""
-        usable: Bools = (given.quality > 0.0) & ~given.doubtful
+        usable: Bools = (given.quality > 0.0) & ~given.suspect
         if not usable.any():
             return given
-        doubtful: Bools = given.doubtful.copy()
+        doubtful: Bools = given.suspect.copy()
         if len(given) <= _SEQUENTIAL_BELOW:
             for row in np.flatnonzero(usable).tolist():
                 doubtful[row] = not self._believed(int(given.station[row]), _state_of_row(given, row))
-            return given.doubted(doubtful)
+            return given.with_suspect(doubtful)
         for station in np.unique(given.station[usable]).tolist():
             rows = np.flatnonzero(usable & (given.station == station))
             if self._calm(given, rows, station):
@@ -58,7 +58,7 @@ class PlausibilityCheck:
                 continue
             for row in rows.tolist():
                 doubtful[row] = not self._believed(station, _state_of_row(given, row))
-        return given.doubted(doubtful)
+        return given.with_suspect(doubtful)
 
     def _believed(self, station: int, now: _StationState) -> bool:
         last, odd = self._last[station], self._odd[station]

@@ -161,10 +161,12 @@ class FrameReader:
     def _readings(self, table: Table, received_s: Floats) -> Readings:
         raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
         measured_s = self._clock.unwrap(raw.measured_s, received_s)
-        doubtful = raw.doubtful | np.isnan(measured_s) if self._stamped else raw.doubtful
+        doubtful = raw.suspect | np.isnan(measured_s) if self._stamped else raw.suspect
         quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
         place_m, turn = raw.position_m, raw.tracker_from_station
-        return self._motion.judge(Readings(raw.station, received_s, measured_s, place_m, turn, quality, doubtful))
+        return self._motion.mark_suspect(
+            Readings(raw.station, received_s, measured_s, place_m, turn, quality, doubtful)
+        )
 
 
 class CaptureStream:

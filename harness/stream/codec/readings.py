@@ -40,7 +40,7 @@ class Readings:
     """(N, 4) as on the wire, nearly of unit length; NaN when the list has none."""
     quality: Floats
     """(N,) 0 lost to 1 best, from item 40, else 76; 1 when the list has neither."""
-    doubtful: Bools
+    suspect: Bools
     """(N,) True where something speaks against the record."""
 
     def __len__(self) -> int:
@@ -49,7 +49,7 @@ class Readings:
     def __getitem__(self, rows: slice) -> "Readings":
         return Readings(*(column[rows] for column in self.columns()))
 
-    def doubted(self, doubtful: Bools) -> "Readings":
+    def with_suspect(self, doubtful: Bools) -> "Readings":
         """The same readings, of which these (N,) are doubtful."""
         first = self.station, self.received_s, self.measured_s, self.position_m
         return Readings(*first, self.tracker_from_station, self.quality, doubtful)

@@ -21,13 +21,13 @@ from harness.stream.codec.replies_intersense import (
 
 __all__ = [
     "DeviceError",
-    "IntegerReply",
     "Emitter",
     "GenlockReply",
     "GeometryReply",
+    "IntegerReply",
     "OutputList",
-    "PredictionReply",
     "ParsedReply",
+    "PredictionReply",
     "SensitivityReply",
     "StationRecord",
     "StationStates",

@@ -13,7 +13,7 @@ class DeviceSamples:
     """Names; the first is station `1` of the device, and so on."""
     rate_hz: float
     """Readings per second of each station."""
-    first_lap: int
+    take_frames: int
     """So many instants, from the first, are the take itself; the others lead back to its beginning."""
     taken_s: Floats
     """(E, S) when each station is sampled, from the beginning of a lap [s]."""
@@ -37,14 +37,14 @@ class DeviceSamples:
         return len(self.taken_s)
 
     @property
-    def lap_s(self) -> float:
+    def loop_s(self) -> float:
         """How long a lap takes [s]."""
         return len(self) / self.rate_hz
 
     @property
-    def device_lap_s(self) -> float:
+    def device_loop_s(self) -> float:
         """The same by the device's clock [s]."""
         if len(self) < 2:
-            return self.lap_s
+            return self.loop_s
         pace = (self.device_s[-1, 0] - self.device_s[0, 0]) / (self.taken_s[-1, 0] - self.taken_s[0, 0])
-        return float(pace * self.lap_s)
+        return float(pace * self.loop_s)

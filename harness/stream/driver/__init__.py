@@ -4,4 +4,4 @@ from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.is900 import Is900
 from harness.stream.line_events import LineEvent, LineObserver
 
-__all__ = ["Is900", "LineEvent", "DriverTiming", "DriverConfig", "LineObserver"]
+__all__ = ["DriverConfig", "DriverTiming", "Is900", "LineEvent", "LineObserver"]

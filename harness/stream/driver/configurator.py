@@ -45,7 +45,7 @@ class DeviceConfigurator:
         self._port, self._baud, self._line, self._wanted = port, baud, line, wanted
         self._items = select_items(port, status, wanted)
 
-    def carry_out(self, stations: StationSelection, boresight: bool, known_hz: float | None = None) -> WireFormat:
+    def configure(self, stations: StationSelection, boresight: bool, known_hz: float | None = None) -> WireFormat:
         """Tell and ask; BadInput when the device does not do as it is told, or the line is too slow for it.
 
         `known_hz` is the rate that an earlier set-up found; without it the device is believed what it says of its rate

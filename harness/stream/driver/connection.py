@@ -30,7 +30,7 @@ class DeviceConnection:
 
     def __init__(self, transport: Transport, host: Host, witness: LineObserver, timing: DriverTiming) -> None:
         self.transport, self.timing = transport, timing
-        self.heard = 0
+        self.received_bytes = 0
         """Bytes received."""
         self.closing: Callable[[], bool] = lambda: False
         """Asked before each wait, which is short; True ends it with `DriverClosed`."""
@@ -46,7 +46,7 @@ class DeviceConnection:
         """To the device; LineLost."""
         now_s, wall_s = self._host.monotonic_s(), self._host.wall_s()
         self.transport.write(data)
-        self._witness.sent(data, now_s, wall_s)
+        self._witness.on_sent(data, now_s, wall_s)
 
     def receive(self, timeout_s: float) -> bytes:
         """What is there, after a wait of so long, or of `poll_s`, at most; LineLost, Closing."""
@@ -55,12 +55,12 @@ class DeviceConnection:
         data = self.transport.read(min(timeout_s, self.timing.poll_s))
         if data:
             now_s = self._host.monotonic_s()
-            self.heard += len(data)
-            self._witness.received(data, now_s, self._host.wall_s())
+            self.received_bytes += len(data)
+            self._witness.on_received(data, now_s, self._host.wall_s())
             self.on_data(data, now_s)
         return data
 
-    def quiet(self) -> bool:
+    def wait_for_silence(self) -> bool:
         """Wait for silence and forget what came before; False when the device goes on."""
         until_s = self._host.monotonic_s() + _STOP_TIMEOUT_FACTOR * self.timing.quiet_s
         silent_from_s = self._host.monotonic_s()
@@ -83,7 +83,7 @@ class DeviceConnection:
         """End the stream of data; False when it goes on though it was told so three times."""
         for _ in range(3):
             self.send(command)
-            if self.quiet():
+            if self.wait_for_silence():
                 return True
         return False
 

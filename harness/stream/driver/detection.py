@@ -46,7 +46,7 @@ def detect_device(
             if status is not None:
                 _check_kind(port, status)
                 return DetectedDevice(line, baud, status)
-            heard += line.heard
+            heard += line.received_bytes
         except LineLost as lost:
             line.transport.close()
             raise NoAnswer(
@@ -64,8 +64,8 @@ def query_status(line: DeviceConnection, answer_s: float) -> StatusRecord | None
     if not line.stop(WAKE_UP):
         return None
     status = line.ask(STATUS, StatusRecord, answer_s)
-    if status is None and line.heard:
-        line.quiet()
+    if status is None and line.received_bytes:
+        line.wait_for_silence()
         status = line.ask(b"\r" + STATUS, StatusRecord, answer_s)
     return status
 

@@ -45,7 +45,7 @@ class Is900:
         host: Host | None = None,
     ) -> None:
         """`witness` sees all bytes and events, `on_event` the events; both in the thread that iterates."""
-        self.port, self.wanted = port, wanted or DriverConfig()
+        self.port, self.config = port, wanted or DriverConfig()
         self._timing, self._host = timing or DriverTiming(), host or Host()
         self._witness, self._on_event = witness or NullLineObserver(), on_event
         self._wall_ahead_s = self._host.wall_s() - self._host.monotonic_s()
@@ -56,11 +56,11 @@ class Is900:
         self._streaming = False
         self._heard_s = self._tracked_s = self._zeroed_s = self._host.monotonic_s()
         self._reconnects = 0
-        found = detect_device(port, candidate_baud_rates(port, self.wanted), self._connect, self._timing.answer_s)
+        found = detect_device(port, candidate_baud_rates(port, self.config), self._connect, self._timing.answer_s)
         self._line, self._baud, self._status = found.line, found.baud, found.status
         self._stations = StationSelection("", (), "")
         try:
-            self._stations = select_stations(port, self._line, self.wanted.stations)
+            self._stations = select_stations(port, self._line, self.config.stations)
             if self._stations.others:
                 restore_stations(port, self._line, self._stations)
             self._wire = self._set_up(self._status, known_hz=None)
@@ -162,20 +162,20 @@ class Is900:
                 if not came:  # for longer than USB adapters hold bytes back: no frame is torn that is only late
                     late = self._sessions.expire(now_s)
                     if late:
-                        self._witness.received(b"", now_s, self._host.wall_s())
+                        self._witness.on_received(b"", now_s, self._host.wall_s())
                     self._framed(late, now_s)
                 self._keep_up(now_s)
                 if (reader := self._sessions.reader) is not None:
-                    for finding in self._watchdog.look(now_s, bool(came), reader):
+                    for finding in self._watchdog.check(now_s, bool(came), reader):
                         self._act(finding)
-                        if finding.step in ("set up", "reopen"):
+                        if finding.action in ("set up", "reopen"):
                             break
             except LineLost as lost:
                 self._lost(lost)
 
     def _keep_up(self, now_s: float) -> None:
         """What the device is told now and then."""
-        if self.wanted.quality == "mp" and now_s - self._tracked_s >= self._timing.tracking_s:
+        if self.config.quality == "mp" and now_s - self._tracked_s >= self._timing.tracking_s:
             self._tracked_s = now_s
             self._line.send(commands.TRACKING)
         if 21 in self._wire.items and now_s - self._zeroed_s >= self._timing.rezero_s:
@@ -186,12 +186,12 @@ class Is900:
     def _act(self, finding: Diagnosis) -> None:
         if finding.kind is not None:
             self._tell(finding.kind, finding.text)
-        if finding.step == "ask":
+        if finding.action == "ask":
             self._line.send(commands.STATUS)
             for station in self._stations.characters:
                 self._line.send(commands.query_output_list(station))
-        elif finding.step != "none" and self._streaming:
-            self._come_back(reopen=finding.step == "reopen")
+        elif finding.action != "none" and self._streaming:
+            self._come_back(reopen=finding.action == "reopen")
 
     def _lost(self, lost: LineLost) -> None:
         if self._closing.is_set():
@@ -200,10 +200,10 @@ class Is900:
         self._come_back(reopen=True)
 
     def _tell(self, kind: LineEventKind, text: str) -> None:
-        if kind == "reset" and self.wanted.boresight:
+        if kind == "reset" and self.config.boresight:
             text += "; boresight is lost, and nobody may stand in the pose for it now"
         event = LineEvent(kind, self._host.monotonic_s(), self._host.wall_s(), text)
-        self._witness.happened(event)
+        self._witness.on_event(event)
         self._on_event(event)
 
     def _connect(self, baud: int | None) -> DeviceConnection:
@@ -217,7 +217,7 @@ class Is900:
 
     def _received(self, data: bytes, now_s: float) -> None:
         self._heard_s = now_s
-        self._framed(self._sessions.received(data, now_s), now_s)
+        self._framed(self._sessions.feed(data, now_s), now_s)
 
     def _framed(self, frames: list[TrackerFrame], now_s: float) -> None:
         self._frames.extend(frames)
@@ -227,15 +227,15 @@ class Is900:
 
     def _set_up(self, status: StatusRecord, known_hz: float | None) -> WireFormat:
         """Boresight is for the first time, when nothing is known."""
-        set_up = DeviceConfigurator(self.port, self._baud, self._line, status, self.wanted)
-        return set_up.carry_out(self._stations, self.wanted.boresight and known_hz is None, known_hz)
+        set_up = DeviceConfigurator(self.port, self._baud, self._line, status, self.config)
+        return set_up.configure(self._stations, self.config.boresight and known_hz is None, known_hz)
 
     def _start(self) -> None:
         """The device's clock to zero, then `C`: records that leave between the two would carry the old clock."""
         self._line.send(commands.ZERO_CLOCK)
         now_s = self._host.monotonic_s()
-        self._witness.configured(self._wire)
-        self._frames.extend(self._sessions.configured(self._wire, now_s))
+        self._witness.on_configured(self._wire)
+        self._frames.extend(self._sessions.begin_session(self._wire, now_s))
         self._watchdog.start(self._wire, now_s)
         self._zeroed_s = self._tracked_s = now_s
         self._streaming = True

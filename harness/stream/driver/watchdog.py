@@ -24,7 +24,7 @@ RecoveryAction = Literal["none", "ask", "set up", "reopen"]
 class Diagnosis:
     """Something to be told, something to be done, or both."""
 
-    step: RecoveryAction
+    action: RecoveryAction
     kind: LineEventKind | None = None
     text: str = ""
 
@@ -85,7 +85,7 @@ class Watchdog:
         stations = f"{len(self._wire.stations)} stations at {self._wire.rate_hz:g} Hz"
         return [Diagnosis("none", "connected", f"records come{again}: {stations}")]
 
-    def look(self, now_s: float, came: bool, reader: FrameReader) -> list[Diagnosis]:
+    def check(self, now_s: float, came: bool, reader: FrameReader) -> list[Diagnosis]:
         """What is amiss now; `came` tells whether bytes did since the last look."""
         if self._wire is None:
             return []

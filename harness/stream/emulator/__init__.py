@@ -16,7 +16,7 @@ __all__ = [
     "EmulatorConfig",
     "Fault",
     "Message",
-    "SentMessage",
     "RunningEmulator",
+    "SentMessage",
     "serve_emulator",
 ]

@@ -61,14 +61,14 @@ class CommandArgument:
                 raise CommandError(OUT_OF_RANGE, place + 2)
         return [int(value) for value in values]
 
-    def whole(self, low: int, high: int, after: int = 1) -> int:
+    def integer(self, low: int, high: int, after: int = 1) -> int:
         """The one field after so many others: a whole number within these."""
         (value,) = self.numbers(1, after, largest=high)
         if value != int(value) or not low <= value <= high:
             raise CommandError(OUT_OF_RANGE, after + 1)
         return int(value)
 
-    def nothing(self) -> None:
+    def require_empty(self) -> None:
         """The command has no argument."""
         if self.text.strip():
             raise CommandError(UNKNOWN_COMMAND)

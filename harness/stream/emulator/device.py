@@ -38,7 +38,7 @@ class Device:
         self.firmware = self.config.firmware
         self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
         self.streaming = self.suspended = False
-        self.commands = self.refused = 0
+        self.command_count = self.refused_count = 0
         """Commands obeyed or refused, and those refused."""
         self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
@@ -61,11 +61,11 @@ class Device:
         for command in self._reader.feed(data) if now_s >= self._silent_until_s else ():
             if now_s < self._silent_until_s:
                 return
-            self.commands += 1
+            self.command_count += 1
             try:
                 self._obey(command, now_s)
             except CommandError as refused:
-                self.refused += 1
+                self.refused_count += 1
                 error = DeviceError(command.line.decode("latin-1"), refused.code, fl=refused.field)
                 if self.settings.error_log:
                     self.errors.append(error)
@@ -91,9 +91,9 @@ class Device:
         """Characters of the stations that report."""
         return "".join(name for name in self.rounds.plugged if self.settings.station(name).active)
 
-    def lose(self, stations: Iterable[str]) -> None:
+    def set_lost_stations(self, stations: Iterable[str]) -> None:
         """From now on these are out of sight, and no others (but where the samples say so)."""
-        self.rounds.lose(stations)
+        self.rounds.set_lost_stations(stations)
 
     def say(self, now_s: float, *replies: ParsedReply) -> None:
         said = [Message(now_s, reply.line()) for reply in replies]
@@ -102,7 +102,7 @@ class Device:
         else:
             self._out += said
 
-    def stream(self, now_s: float) -> None:
+    def start_streaming(self, now_s: float) -> None:
         """From the next whole round of stations on."""
         if not self.streaming:
             self.streaming, self._next = True, (self.rounds.player.first_from(now_s), 0)
@@ -131,7 +131,7 @@ class Device:
     def save(self) -> None:
         self._saved = self.settings
 
-    def forget(self) -> None:
+    def restore_factory_defaults(self) -> None:
         """Back to factory defaults; what was saved stays saved until it is saved anew."""
         self.settings = self._factory
 

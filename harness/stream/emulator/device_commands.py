@@ -37,7 +37,7 @@ def _switch_station(device: "Device", argument: CommandArgument, now_s: float) -
     if not argument.sets:
         device.say(now_s, *QUERIES["l"](device.settings, argument))
         return
-    name, on = argument.station(), bool(argument.whole(0, 1))
+    name, on = argument.station(), bool(argument.integer(0, 1))
     station = replace(device.settings.station(name), active=on and name in device.rounds.plugged)
     device.settings = device.settings.with_station(name, station)
 
@@ -51,7 +51,7 @@ def _boresight(device: "Device", argument: CommandArgument, now_s: float, full: 
 
 def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> None:
     """Polled, the motion begins anew too, so that what follows is known to the bit."""
-    argument.nothing()
+    argument.require_empty()
     if device.streaming:
         device.rounds.player.zero(now_s)
     else:
@@ -60,7 +60,7 @@ def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> No
 
 def _report_tracking(device: "Device", argument: CommandArgument, now_s: float) -> None:
     """Ranges are as many as the quality lets one expect; none is ever rejected."""
-    argument.nothing()
+    argument.require_empty()
     quality = {name: device.rounds.quality(now_s, name) for name in device.active}
     states = "".join(
         "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
@@ -70,27 +70,27 @@ def _report_tracking(device: "Device", argument: CommandArgument, now_s: float) 
 
 
 def _read_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    argument.nothing()
+    argument.require_empty()
     device.say(now_s, *device.errors)
 
 
 def _clear_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    argument.nothing()
+    argument.require_empty()
     device.errors.clear()
 
 
 def _send_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    argument.nothing()
+    argument.require_empty()
     device.say(now_s, *(UnknownReply(f"31LF{entry}".encode("latin-1")) for entry in device.log))
 
 
 def _clear_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    argument.nothing()
+    argument.require_empty()
     device.log.clear()
 
 
 def _report_information(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    argument.nothing()
+    argument.require_empty()
     device.say(now_s, UnknownReply(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
 
 
@@ -103,14 +103,14 @@ def _settings_change(**values: Any) -> Callable[["Device", float], None]:
 
 IMMEDIATE_COMMANDS: dict[str, Callable[["Device", float], None]] = {
     "P": lambda device, now_s: device.poll(now_s),
-    "C": lambda device, now_s: device.stream(now_s),
+    "C": lambda device, now_s: device.start_streaming(now_s),
     "c": lambda device, now_s: device.stop(now_s),
     "F": _settings_change(binary=False),
     "f": _settings_change(binary=True),
     "S": _report_status,
     "U": _settings_change(centimetres=False),
     "u": _settings_change(centimetres=True),
-    "W": lambda device, now_s: device.forget(),
+    "W": lambda device, now_s: device.restore_factory_defaults(),
     "\x0b": lambda device, now_s: device.save(),
     "\x11": lambda device, now_s: device.resume(now_s),
     "\x13": lambda device, now_s: device.suspend(now_s),

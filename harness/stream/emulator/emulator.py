@@ -18,9 +18,9 @@ class Emulator:
         self.config = config or EmulatorConfig()
         self.device = Device(samples, self.config, now_s)
         self.line = SerialLine(self.config.baud, self.config.queue_records, self.config.paced)
-        self.spells: list[FaultEpisode] = []
+        self.episodes: list[FaultEpisode] = []
         """All that have begun."""
-        self.unheard = 0
+        self.unplugged_messages = 0
         """Messages that went while the line was unplugged."""
         self._lasting: list[FaultEpisode] = []
         self._faults = FaultInjector(self.config.faults, self.config.seed, now_s)
@@ -42,9 +42,9 @@ class Emulator:
         self._until(now_s)
         out = []
         for due_s, message in self.line.gone(now_s):
-            data, damage = self._faults.damaged(message.data, self._on("burst", due_s), due_s)
+            data, damage = self._faults.corrupt(message.data, self._on("burst", due_s), due_s)
             if self._on("disconnect", due_s):
-                self.unheard += 1
+                self.unplugged_messages += 1
             else:
                 out.append(SentMessage(message, due_s, data, damage))
         self._lasting = [spell for spell in self._lasting if spell.to_s > now_s]
@@ -62,7 +62,7 @@ class Emulator:
 
     def _until(self, now_s: float) -> None:
         """Let happen what happens until now."""
-        begun = self._faults.begun(now_s)
+        begun = self._faults.pop_started(now_s)
         ended = [spell for spell in [*self._lasting, *begun] if spell.to_s <= now_s]
         changes = [*((spell.from_s, True, spell) for spell in begun), *((spell.to_s, False, spell) for spell in ended)]
         for at_s, begins, spell in sorted(changes, key=lambda change: change[0]):
@@ -74,7 +74,7 @@ class Emulator:
         self._hand_over(now_s)
 
     def _begin(self, spell: FaultEpisode) -> None:
-        self.spells.append(spell)
+        self.episodes.append(spell)
         self._lasting.append(spell)
         if spell.fault.kind == "stall":
             self.line.hold(spell.from_s, spell.to_s)
@@ -86,7 +86,7 @@ class Emulator:
         names = self.device.samples.stations
         spells = (spell for spell in self._lasting if spell.fault.kind == "lost_station")
         out = (spell.fault.station or names[0] for spell in spells if spell.from_s <= at_s < spell.to_s)
-        self.device.lose(STATION_NAMES[names.index(name)] for name in out)
+        self.device.set_lost_stations(STATION_NAMES[names.index(name)] for name in out)
 
     def _hand_over(self, now_s: float) -> None:
         """What the device says until now goes to the line, at the rate that it has set."""

@@ -104,14 +104,14 @@ class FaultInjector:
         """When the next spell begins [s]."""
         return min((moments.next_s for moments in self._spells), default=float("inf"))
 
-    def begun(self, now_s: float) -> list[FaultEpisode]:
+    def pop_started(self, now_s: float) -> list[FaultEpisode]:
         """The spells that have begun since this was asked last, in order of time."""
         found: list[FaultEpisode] = []
         for moments in self._spells:
             found += [FaultEpisode(moments.fault, at_s, at_s + moments.fault.lasts_s) for at_s in moments.until(now_s)]
         return sorted(found, key=lambda spell: spell.from_s)
 
-    def damaged(self, data: bytes, bursting: bool, due_s: float) -> tuple[bytes, tuple[str, ...]]:
+    def corrupt(self, data: bytes, bursting: bool, due_s: float) -> tuple[bytes, tuple[str, ...]]:
         """What becomes of a message that is due at this moment, and the kinds of faults that did it."""
         kinds: list[str] = []
         for fault, draws, moments in self._byte_faults:

@@ -22,7 +22,9 @@ def apply_station_settings(position_m: Floats, turn: Floats, station: StationSet
     if station.plain:
         return position_m, turn
     position_m, turn = _apply_alignment(position_m, turn, station)
-    return position_m, rotations.multiply(rotations.multiply(np.array(station.before), turn), np.array(station.after))
+    return position_m, rotations.multiply(
+        rotations.multiply(np.array(station.heading_boresight), turn), np.array(station.full_boresight)
+    )
 
 
 def align(station: StationSettings, origin_m: Floats, on_x_m: Floats, on_y_m: Floats) -> StationSettings | None:
@@ -52,13 +54,13 @@ def boresight(station: StationSettings, turn: Floats, full: bool) -> StationSett
     wanted = from_yaw_pitch_roll_deg(np.array([station.reference_deg]))[0]
     if full:
         after = rotations.multiply(rotations.inverse(now), wanted)
-        return replace(clear_boresight(station), after=_turn(after))
+        return replace(clear_boresight(station), full_boresight=_turn(after))
     by_deg = station.reference_deg[0] - float(yaw_pitch_roll_deg(now[None])[0, 0])
-    return replace(clear_boresight(station), before=_turn(rotations.about_z(np.deg2rad(by_deg))))
+    return replace(clear_boresight(station), heading_boresight=_turn(rotations.about_z(np.deg2rad(by_deg))))
 
 
 def clear_boresight(station: StationSettings) -> StationSettings:
-    return replace(station, before=(1.0, 0.0, 0.0, 0.0), after=(1.0, 0.0, 0.0, 0.0))
+    return replace(station, heading_boresight=(1.0, 0.0, 0.0, 0.0), full_boresight=(1.0, 0.0, 0.0, 0.0))
 
 
 def _apply_alignment(position_m: Floats, turn: Floats, station: StationSettings) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ class SamplePlayer:
     def __init__(self, samples: DeviceSamples, now_s: float) -> None:
         self.samples = samples
         self._taken_s: list[list[float]] = samples.taken_s.tolist()
-        self._lap_s, self._device_lap_s = samples.lap_s, samples.device_lap_s
+        self._lap_s, self._device_lap_s = samples.loop_s, samples.device_loop_s
         self._pace = self._device_lap_s / self._lap_s
         self.begin(now_s)
 

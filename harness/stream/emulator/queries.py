@@ -34,7 +34,7 @@ def _station_query(reply: Callable[[str, StationSettings], ParsedReply]) -> Quer
 
 def _device_query(reply: Callable[[DeviceSettings], ParsedReply]) -> Query:
     def query(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
-        argument.nothing()
+        argument.require_empty()
         return [reply(settings)]
 
     return query
@@ -56,7 +56,7 @@ def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iter
 def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
     if not argument.text.strip():
         return settings.emitters
-    number = argument.whole(1, 9999999, after=0)
+    number = argument.integer(1, 9999999, after=0)
     found = [emitter for emitter in settings.emitters if emitter.number == number]
     if not found:
         raise CommandError(OUT_OF_RANGE)

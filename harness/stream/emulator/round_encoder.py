@@ -28,7 +28,7 @@ class RoundEncoder:
         """Characters of the stations that are there."""
         return STATION_NAMES[: len(self.player.samples.stations)]
 
-    def lose(self, stations: Iterable[str]) -> None:
+    def set_lost_stations(self, stations: Iterable[str]) -> None:
         """From now on these are out of sight, and no others (but where the samples say so)."""
         self._lost, self._written = frozenset(stations), None
 

@@ -53,7 +53,7 @@ def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSe
     """`o1152,N,8,0`: a hundredth of the rate, parity, bits, handshake."""
     if len(argument.fields) < 4:
         raise CommandError(MISSING, len(argument.fields) + 1)
-    hundredths, parity = CommandArgument(argument.fields[0]).whole(3, 1152, after=0), argument.fields[1]
+    hundredths, parity = CommandArgument(argument.fields[0]).integer(3, 1152, after=0), argument.fields[1]
     bits, handshake = CommandArgument(",".join(argument.fields[2:])).numbers(2, after=0)
     if (
         100 * hundredths not in SUPPORTED_BAUD_RATES
@@ -73,16 +73,18 @@ def _set_genlock(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 
 
 def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    number = CommandArgument(argument.fields[0]).whole(1, 9999999, after=0)
+    number = CommandArgument(argument.fields[0]).integer(1, 9999999, after=0)
     x, y, z, nx, ny, nz, identity = argument.numbers(7)
     made = Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
-    kept = (emitter for emitter in settings.drafted if emitter.number != number)
-    return replace(settings, drafted=tuple(sorted((*kept, made), key=lambda emitter: emitter.number)))
+    kept = (emitter for emitter in settings.draft_emitters if emitter.number != number)
+    return replace(settings, draft_emitters=tuple(sorted((*kept, made), key=lambda emitter: emitter.number)))
 
 
 def _remove_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    number = argument.whole(1, 9999999, after=0)
-    return replace(settings, drafted=tuple(emitter for emitter in settings.drafted if emitter.number != number))
+    number = argument.integer(1, 9999999, after=0)
+    return replace(
+        settings, draft_emitters=tuple(emitter for emitter in settings.draft_emitters if emitter.number != number)
+    )
 
 
 def _set_address(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
@@ -109,21 +111,21 @@ def _float_setter(field: str, count: int, scale: float = 1.0) -> Setter:
 
 def _station_setter(field: str, low: int, high: int) -> Setter:
     def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-        return _with_station(settings, argument, **{field: argument.whole(low, high)})
+        return _with_station(settings, argument, **{field: argument.integer(low, high)})
 
     return setter
 
 
 def _device_setter(field: str, low: int, high: int, kind: type = int) -> Setter:
     def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-        return replace(settings, **{field: kind(argument.whole(low, high, after=0))})
+        return replace(settings, **{field: kind(argument.integer(low, high, after=0))})
 
     return setter
 
 
 def _constant_setter(**values: Any) -> Setter:
     def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-        argument.nothing()
+        argument.require_empty()
         return replace(settings, **values)
 
     return setter
@@ -135,7 +137,7 @@ def _station_reset(**values: Any) -> Setter:
 
 def _emitter_setter(change: Callable[[DeviceSettings], dict[str, Any]]) -> Setter:
     def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-        argument.nothing()
+        argument.require_empty()
         return replace(settings, **change(settings))
 
     return setter
@@ -180,7 +182,7 @@ SET_ONLY_COMMANDS: dict[str, Setter] = {
     "MGS": _device_setter("genlock_source", 1, 2),
     "MCf": _remove_emitter,
     "MCC": _constant_setter(drafted=()),
-    "MCe": _emitter_setter(lambda settings: {"emitters": settings.drafted}),
+    "MCe": _emitter_setter(lambda settings: {"emitters": settings.draft_emitters}),
     "MCx": _emitter_setter(lambda settings: {"drafted": settings.emitters}),
     "MCi": _no_change,
     "ML0": _constant_setter(lights=False),

@@ -29,9 +29,9 @@ class StationSettings:
     origin_m: Vector = ZERO_VECTOR
     """Of the alignment frame, in the tracker's."""
     tracker_from_aligned: Quaternion = IDENTITY_QUATERNION
-    before: Quaternion = IDENTITY_QUATERNION
+    heading_boresight: Quaternion = IDENTITY_QUATERNION
     """Boresight of the heading: turns what is reported about the frame's own axes."""
-    after: Quaternion = IDENTITY_QUATERNION
+    full_boresight: Quaternion = IDENTITY_QUATERNION
     """Full boresight: turns the station's axes."""
     reference_deg: Vector = ZERO_VECTOR
     """Angles that boresight makes of the present ones."""
@@ -50,7 +50,7 @@ class StationSettings:
         """Whether readings are reported as they were taken."""
         return (
             self.origin_m == self.tip_m == self.mounting_deg == ZERO_VECTOR
-            and self.tracker_from_aligned == self.before == self.after == IDENTITY_QUATERNION
+            and self.tracker_from_aligned == self.heading_boresight == self.full_boresight == IDENTITY_QUATERNION
         )
 
 
@@ -74,7 +74,7 @@ class DeviceSettings:
     genlock_source: int = 1
     genlock_phase: float = 0.0
     emitters: tuple[Emitter, ...] = DEFAULT_EMITTERS
-    drafted: tuple[Emitter, ...] = DEFAULT_EMITTERS
+    draft_emitters: tuple[Emitter, ...] = DEFAULT_EMITTERS
     """Emitters as `MCe` would make them."""
     error_log: bool = True
     command_log: bool = False

@@ -60,7 +60,7 @@ class Recording:
         return (entry for entry in self._entries() if isinstance(entry, RecordingBlock))
 
     @cached_property
-    def lost(self) -> tuple[str, ...]:
+    def damage(self) -> tuple[str, ...]:
         """What is cut off or damaged, a line each, in the order of the file."""
         out: list[str] = []
         spoilt: DamagedSpan | None = None
@@ -165,13 +165,13 @@ class RecordingWriter:
         self._lock = Lock()
         """The thread that reads and the one that closes both write."""
 
-    def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+    def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         self._append_all(RECEIVED, data, monotonic_s, wall_s)
 
-    def sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+    def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         self._append_all(SENT, data, monotonic_s, wall_s)
 
-    def configured(self, wire: WireFormat, monotonic_s: float | None = None, wall_s: float | None = None) -> None:
+    def on_configured(self, wire: WireFormat, monotonic_s: float | None = None, wall_s: float | None = None) -> None:
         """BadFile for other stations than the recording has had: a stream's never change."""
         if self._stations not in (None, wire.stations):
             raise BadFile(
@@ -185,7 +185,7 @@ class RecordingWriter:
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 
-    def happened(self, event: "LineEvent") -> None:
+    def on_event(self, event: "LineEvent") -> None:
         self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
 
@@ -277,10 +277,10 @@ def record_capture(
     ends, received_s = capture.ends.tolist(), capture.received_s.tolist()
     with RecordingWriter(path, note) as writer:
         start_s = received_s[0] if received_s else 0.0
-        writer.configured(wire, start_s, start_s)
+        writer.on_configured(wire, start_s, start_s)
         for begin, end, now_s in zip([0, *ends], ends, received_s, strict=False):
             if now_s - start_s < seconds:
-                writer.received(capture.data[begin:end], now_s, now_s)
+                writer.on_received(capture.data[begin:end], now_s, now_s)
     return writer
 
 

@@ -65,7 +65,7 @@ class RecordingStream:
         self.recording = recording if isinstance(recording, Recording) else read_recording(recording)
         formats = self.recording.formats
         if not formats:
-            lost = "; ".join(self.recording.lost)
+            lost = "; ".join(self.recording.damage)
             found = "the device was never set up in it" + (f" ({lost})" if lost else "")
             raise BadFile(self.recording.path, found, EXPECTED_FILE, "There are no frames in it.")
         for wire in formats[1:]:
@@ -122,13 +122,13 @@ class RecordingStream:
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 waiting.append((now_s, block.payload))
                 if len(waiting) >= at_once:
-                    yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
+                    yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
             elif block.kind == RECEIVED:
-                yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
+                yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 yield from _with_due_time(now_s, sessions.expire(now_s))
             elif block.kind == CONFIGURED:
-                yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
+                yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
                 yield from _with_due_time(now_s, sessions.finish())
                 wire = self.recording.format_of(block)
                 if block.monotonic_s + shift_s < now_s:  # recorded after a restart of the computer
@@ -136,8 +136,8 @@ class RecordingStream:
                     shift_s = now_s + pause_s - block.monotonic_s
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 self._wall_ahead_s = wall_s - now_s
-                sessions.configured(wire, now_s)
-        yield from _with_due_time(now_s, sessions.received_all(_concatenate_chunks(waiting)))
+                sessions.begin_session(wire, now_s)
+        yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
         yield from _with_due_time(now_s, sessions.finish())
 
 

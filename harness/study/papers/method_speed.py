@@ -48,12 +48,12 @@ def measure_speed(methods: Sequence[str], motion: SpeedDataset, seed: int) -> li
     ready_s, contenders = {}, {}
     for name in methods:
         start = perf_counter()
-        learnt = benchmark_clips.fit_named_method(name, motion.learnt, seed)
-        learnt.begin(motion.shown[0].simulation.calibration)
+        learnt = benchmark_clips.fit_named_method(name, motion.database, seed)
+        learnt.begin(motion.test_clips[0].simulation.calibration)
         ready_s[name], contenders[name] = perf_counter() - start, time_method(learnt)
-    tallies = time_round_robin(contenders, motion.shown, lambda *_: None)
+    tallies = time_round_robin(contenders, motion.test_clips, lambda *_: None)
     return [
-        _method_speed(name, len(motion.learnt), ready_s[name], tallies[name], tallies[REFERENCE_METHOD])
+        _method_speed(name, len(motion.database), ready_s[name], tallies[name], tallies[REFERENCE_METHOD])
         for name in methods
     ]
 

@@ -43,7 +43,7 @@ def load_paper(name: str) -> Paper:
     """The paper of that name; UnknownName."""
     if name not in PAPERS:
         raise UnknownName("paper", name, PAPERS)
-    found: Paper = import_module(f"harness.study.{name}").PAPER
+    found: Paper = import_module(f"harness.study.papers.{name}").PAPER
     return found
 
 

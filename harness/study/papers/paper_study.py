@@ -52,7 +52,7 @@ class PaperStudy:
         """The same as whole cells, with the errors of every frame and joint, one at a time."""
         return (read_cell(cell_folder(self.out / run, row["key"])) for row in self.rows(run, **where))
 
-    def kept(self, name: str, measure: Callable[[], Any]) -> Any:
+    def cached_measurement(self, name: str, measure: Callable[[], Any]) -> Any:
         """What `measure` gave, in JSON's types: it is asked once, and again when the package's source has changed."""
         path = self.out / "measured" / f"{name}.json"
         if path.is_file():

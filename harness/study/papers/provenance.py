@@ -42,7 +42,7 @@ def _run_row(scenario: Scenario) -> tuple[str, ...]:
     setting = (
         f"{motion.source}, protocol {motion.protocol}, body {motion.body}, calibration {scenario.calibration}, "
         f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
-        f"stations {', '.join(scenario.wearing)}"
+        f"stations {', '.join(scenario.worn_stations)}"
     )
     varied = [
         f"{key}: {', '.join(_varied_value_text(key, value) for value in values)}"

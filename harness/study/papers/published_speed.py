@@ -29,14 +29,14 @@ _SYNTHETIC_NOTE = (
 class PublishedSpeed:
     """What a paper says of its speed, and on what."""
 
-    said: str
+    statement: str
     """In words."""
     scenario: str
     """Whose stations are worn."""
     databases: Mapping[str, Mapping[str, int]]
     """Name -> behaviour -> frames."""
     methods: tuple[str, ...]
-    own: tuple[str, ...]
+    paper_methods: tuple[str, ...]
     """Those that stand for the paper's own."""
     fps: float
     latency_ms: float | None = None
@@ -69,7 +69,9 @@ def compare_speed(study: PaperStudy, published: PublishedSpeed) -> PaperExperime
     """Each database in turn, measured once and kept."""
     folder, found, absent = study.out / "measured" / "databases", dict[str, list[MethodSpeed]](), []
     for database, frames in published.databases.items():
-        kept = study.kept(f"speed_{database}".replace(" ", "_"), partial(_measure, study, published, frames, folder))
+        kept = study.cached_measurement(
+            f"speed_{database}".replace(" ", "_"), partial(_measure, study, published, frames, folder)
+        )
         if "absent" in kept:
             absent.append(f"{database}: {kept['absent']}")
         else:
@@ -98,13 +100,13 @@ def make_speed_experiment(
     absent: Sequence[str] = (),
 ) -> PaperExperiment:
     """The experiment of what was measured: database -> paces."""
-    claims = [_frame_rate_claim(published, found, own) for own in published.own]
+    claims = [_frame_rate_claim(published, found, own) for own in published.paper_methods]
     if published.latency_ms is not None:
-        claims += [_latency_claim(published, published.latency_ms, found, own) for own in published.own]
+        claims += [_latency_claim(published, published.latency_ms, found, own) for own in published.paper_methods]
     return PaperExperiment(
         name="speed",
         title="Frame rate and latency",
-        question=f"{published.said} How fast are its methods here, with databases as large?",
+        question=f"{published.statement} How fast are its methods here, with databases as large?",
         differences=(
             _REAL_NOTE if real else _SYNTHETIC_NOTE,
             f"Another machine: {on}. An absolute speed says as much of it as of a method; beside each stands how "
@@ -204,6 +206,6 @@ def _speed_bars(published: PublishedSpeed, found: Mapping[str, Sequence[MethodSp
         unit="frames/s",
         groups=tuple(f"{database}, {paces[0].frames:,}" for database, paces in found.items()),
         series=rates,
-        published={own: (published.fps,) * len(found) for own in published.own},
+        published={own: (published.fps,) * len(found) for own in published.paper_methods},
         caption="1 / mean step, warm; groups are databases with their frames.",
     )

@@ -30,8 +30,8 @@ MAX_TEST_S = 12.0
 class SpeedDataset:
     """What to learn from, and what to follow."""
 
-    learnt: MotionDatabase
-    shown: list[BenchmarkClip]
+    database: MotionDatabase
+    test_clips: list[BenchmarkClip]
 
 
 def missing_clips(study: PaperStudy, frames: Mapping[str, int]) -> str:

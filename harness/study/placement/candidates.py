@@ -53,7 +53,7 @@ class Candidate:
     pair: Pair = ""
     """With its mirror image: `each` by itself, or both `together`."""
 
-    def units(self) -> tuple[CandidateGroup, ...]:
+    def groups(self) -> tuple[CandidateGroup, ...]:
         """BadInput for a pair in the middle of the body, or a name that says another side than the bone."""
         side = body_side(self.bone, self.along)
         one = StationPlacement(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
@@ -80,9 +80,9 @@ class CandidateGrid:
     stand_off_m: float = 0.01
     pair: Pair = ""
 
-    def units(self) -> tuple[CandidateGroup, ...]:
+    def groups(self) -> tuple[CandidateGroup, ...]:
         found = itertools.product(self.bones, self.along, self.around_deg)
-        each = [Candidate(self._name(*at), *at, self.stand_off_m, self.pair).units() for at in found]
+        each = [Candidate(self._name(*at), *at, self.stand_off_m, self.pair).groups() for at in found]
         return tuple(itertools.chain.from_iterable(each))
 
     def _name(self, bone: str, along: float, around_deg: float) -> str:
@@ -120,7 +120,7 @@ def make_candidate_groups(
     tables: Iterable[Candidate | CandidateGrid], skeleton: Skeleton | None = None
 ) -> tuple[CandidateGroup, ...]:
     """All that a study may let a performer wear; BadInput names every place without flesh, and names given twice."""
-    units = tuple(itertools.chain.from_iterable(table.units() for table in tables))
+    units = tuple(itertools.chain.from_iterable(table.groups() for table in tables))
     places = [one for unit in units for one in unit]
     names = [one.name for one in places]
     if twice := sorted({name for name in names if names.count(name) > 1}):

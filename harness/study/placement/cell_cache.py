@@ -61,7 +61,7 @@ class CellCache:
     """An opened folder of a study."""
     folder: Path | None
     """The library of real motion."""
-    each: TaskExecutor
+    executor: TaskExecutor
     command: str
     progress: ProgressCallback
     run: RunCells = run_cells
@@ -74,7 +74,7 @@ class CellCache:
     _known: dict[str, set[str]] = field(default_factory=dict)
     """Scenario -> what was varied."""
 
-    def try_all(self, asked: Iterable[SetRequest]) -> None:
+    def run_missing(self, asked: Iterable[SetRequest]) -> None:
         """All at once, so that they share the workers."""
         todo: dict[str, Scenario] = {}
         values: dict[str, dict[str, Any]] = {}
@@ -96,7 +96,7 @@ class CellCache:
         def told(last: str, done: int, planned: int) -> None:
             self.progress(last, before + done, before + planned)
 
-        asked_for = {"folder": self.folder, "each": self.each, "command": self.command, "progress": told}
+        asked_for = {"folder": self.folder, "each": self.executor, "command": self.command, "progress": told}
         self._take(scenarios, self.run(scenarios, self.out, **asked_for))
 
     def errors(
@@ -104,7 +104,7 @@ class CellCache:
     ) -> dict[StationSet, dict[str, float | None]]:
         """Of each set, by clip: the mean over the scenario's methods, or over some of them; None where one of them was
         not measured."""
-        self.try_all([asked])
+        self.run_missing([asked])
         return {worn: self._errors(asked, worn, metric, methods) for worn in asked.sets}
 
     def _errors(

@@ -140,7 +140,7 @@ class PlacementStudy:
     """The sets of so many stations that every condition ranks."""
     claim: tuple[PublishedClaim, ...] = ()
 
-    def units(self) -> tuple[CandidateGroup, ...]:
+    def groups(self) -> tuple[CandidateGroup, ...]:
         return make_candidate_groups((*self.candidate, *self.grid))
 
 
@@ -210,7 +210,7 @@ def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
 
 def _check_names(study: PlacementStudy) -> None:
     """That every set is of candidates, and can be worn."""
-    units = study.units()
+    units = study.groups()
     asked: list[tuple[str, tuple[str, ...]]] = [("ablate.full", study.ablate.full)] if study.ablate else []
     for mode, table in (("add", study.add), ("greedy", study.greedy)):
         asked += [(f"{mode}.base", table.base), (f"{mode}.of", table.of)] if table else []
@@ -237,7 +237,7 @@ def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptio
     scenario = load_scenario(_scenario_file(named, beside))
     methods = (condition.methods if condition is not None else ()) or study.methods
     stations = {}
-    for unit in study.units():
+    for unit in study.groups():
         for one in unit:
             stations[one.name] = {"bone": one.bone, "along": one.along, "around_deg": one.around_deg}
             stations[one.name]["stand_off_m"] = one.stand_off_m

@@ -75,7 +75,7 @@ class _PlacementRun:
         """Of every set that was tried on the clips on which choices are made."""
 
     def measure(self, sets: Sequence[StationSet]) -> Mapping[StationSet, Costs]:
-        errors = self.trying.errors(self.plan.asked(self.plan.scenario, sets), self.study.metric)
+        errors = self.trying.errors(self.plan.request(self.plan.scenario, sets), self.study.metric)
         self.costs |= {one: self.plan.costs(found) for one, found in errors.items()}
         return {one: self.costs[one] for one in sets}
 
@@ -85,16 +85,16 @@ class _PlacementRun:
         modes = list(self._modes())
         searches, ends = self._searches()
         best = best_by_size(
-            {names_of_places(one): self.costs[one] for one in self.costs if not is_refined(one)}, ready.sign
+            {names_of_places(one): self.costs[one] for one in self.costs if not is_refined(one)}, ready.cost_sign
         )
         rivals = [self._rival(claim) for claim in study.claim]
-        compared = ready.compared(self.costs)
+        compared = ready.sets_to_compare(self.costs)
         judged = self._judged([one.stations for one in best], [*rivals, *ends])
-        asked = [ready.asked(one, compared) for one in ready.elsewhere.values()]
-        self.trying.try_all([*([ready.asked(ready.held_out, judged)] if ready.held_out else []), *asked])
+        asked = [ready.request(one, compared) for one in ready.condition_scenarios.values()]
+        self.trying.run_missing([*([ready.request(ready.held_out, judged)] if ready.held_out else []), *asked])
         held = self._on(ready.held_out, judged) if ready.held_out else {}
         each = self._elsewhere(compared)
-        best = tuple(_with_held_out_error(one, held.get(one.stations, {}), ready.sign) for one in best)
+        best = tuple(_with_held_out_error(one, held.get(one.stations, {}), ready.cost_sign) for one in best)
         rated = sorted({len(one) for one in self.costs})
         return PlacementFindings(
             name=study.name,
@@ -105,7 +105,7 @@ class _PlacementRun:
             behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
             methods=scenario.methods,
             noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
-            link=ready.link(rated),
+            link=ready.describe_link(rated),
             seed=scenario.seed,
             command=command,
             candidates=tuple(dict.fromkeys((*ready.places, *(place for one in self.costs for place in one)))),
@@ -119,17 +119,17 @@ class _PlacementRun:
             searches=tuple(_with_held_out_gain(one, held) for one in searches),
             worth=tuple(worth for mode in modes for worth in mode.worth),
             compared=tuple(map(names_of_places, compared)),
-            conditions=rank_by_condition(each, list(map(names_of_places, compared)), ready.sign),
+            conditions=rank_by_condition(each, list(map(names_of_places, compared)), ready.cost_sign),
             agreements=rank_agreements(each, list(map(names_of_places, compared))),
             claims=tuple(self._claims(rivals, held)),
             notes=tuple(self._notes(modes, held)),
             failures=dict(self.trying.failures),
             planned=self.trying.planned,
-            better="lower" if ready.sign > 0.0 else "higher",
+            better="lower" if ready.cost_sign > 0.0 else "higher",
         )
 
     def _modes(self) -> Iterator[ModeResult]:
-        study, units = self.study, self.plan.units
+        study, units = self.study, self.plan.groups
         if study.ablate:
             yield search.ablate(study.ablate, units, self.measure)
         if study.add:
@@ -139,7 +139,7 @@ class _PlacementRun:
 
     def _searches(self) -> tuple[list[PlacementSearch], list[StationSet]]:
         """Those that go step by step, and the sets where `refine_set` began and ended."""
-        study, units, found, ends = self.study, self.plan.units, list[PlacementSearch](), list[StationSet]()
+        study, units, found, ends = self.study, self.plan.groups, list[PlacementSearch](), list[StationSet]()
         if study.greedy:
             found.append(search.search_greedy(study.greedy, units, self.measure))
         if study.refine:
@@ -152,7 +152,7 @@ class _PlacementRun:
 
     def _rival(self, claim: PublishedClaim) -> StationSet:
         """The best other set that a paper could have meant, on the clips on which choices are made."""
-        _, others, _ = published_claims.sets_of_claim(claim, self.plan.units)
+        _, others, _ = published_claims.sets_of_claim(claim, self.plan.groups)
         found = published_claims.best_alternative(
             [names_of_places(one) for one in others], {names_of_places(one): self.costs[one] for one in others}
         )
@@ -163,7 +163,7 @@ class _PlacementRun:
         by_name = {names_of_places(one): one for one in self.costs}
         found = [by_name[one] for one in best] + [one for one in others if one]
         for claim in self.study.claim:
-            suited, _, whole = published_claims.sets_of_claim(claim, self.plan.units)
+            suited, _, whole = published_claims.sets_of_claim(claim, self.plan.groups)
             found += [suited, whole]
         return list(dict.fromkeys(found))
 
@@ -171,7 +171,7 @@ class _PlacementRun:
         self, scenario: Scenario, sets: Sequence[StationSet], methods: tuple[str, ...] = ()
     ) -> dict[StationNames, Costs]:
         """What sets cost in a scenario, to its methods or some of them."""
-        errors = self.trying.errors(self.plan.asked(scenario, sets), self.study.metric, methods)
+        errors = self.trying.errors(self.plan.request(scenario, sets), self.study.metric, methods)
         return {names_of_places(one): self.plan.costs(found) for one, found in errors.items()}
 
     def _elsewhere(self, compared: Sequence[StationSet]) -> list[ConditionCosts]:
@@ -183,7 +183,7 @@ class _PlacementRun:
         found = [replace(own, costs={names_of_places(one): self.costs[one] for one in compared})]
         if len(scenario.methods) > 1:
             found += [ConditionCosts(m, "method", self._on(scenario, compared, (m,))) for m in scenario.methods]
-        for name, other in ready.elsewhere.items():
+        for name, other in ready.condition_scenarios.items():
             found.append(ConditionCosts(name, _condition_kind(scenario, other), self._on(other, compared)))
         return found
 
@@ -195,7 +195,7 @@ class _PlacementRun:
             costs = {names_of_places(one): costs for one, costs in self.costs.items()}
         unit = DEFINITIONS[self.study.metric].unit
         for claim, rival in zip(self.study.claim, rivals, strict=True):
-            suited, _, whole = published_claims.sets_of_claim(claim, self.plan.units)
+            suited, _, whole = published_claims.sets_of_claim(claim, self.plan.groups)
             yield from published_claims.evaluate_claim(
                 claim,
                 names_of_places(suited),

@@ -27,25 +27,25 @@ class PlacementPlan:
     """One study, ready to be done."""
 
     study: PlacementStudy
-    units: tuple[CandidateGroup, ...]
+    groups: tuple[CandidateGroup, ...]
     scenario: Scenario
     """With the clips on which everything is chosen."""
     held_out: Scenario | None
     """The same with the clips on which nothing is."""
-    elsewhere: Mapping[str, Scenario]
+    condition_scenarios: Mapping[str, Scenario]
     """Condition -> its scenario."""
     motion: str
 
     @property
-    def sign(self) -> float:
+    def cost_sign(self) -> float:
         """Costs are errors times this: the less the better."""
         return 1.0 if margin_of(self.study.metric).rise_is_worse else -1.0
 
     @property
     def places(self) -> tuple[StationPlacement, ...]:
-        return tuple(dict.fromkeys(place for unit in self.units for place in unit))
+        return tuple(dict.fromkeys(place for unit in self.groups for place in unit))
 
-    def asked(self, scenario: Scenario, sets: Iterable[StationSet]) -> SetRequest:
+    def request(self, scenario: Scenario, sets: Iterable[StationSet]) -> SetRequest:
         return SetRequest(scenario, tuple(dict.fromkeys(sets)), self.study.link)
 
     def rate_hz(self, size: int) -> float:
@@ -56,26 +56,26 @@ class PlacementPlan:
         """That will be tried whatever comes out: asked for at once they keep all workers busy."""
         study, found = self.study, list[StationSet]()
         if study.ablate:
-            full, less = search.ablation_sets(study.ablate, self.units)
+            full, less = search.ablation_sets(study.ablate, self.groups)
             found += [full, *less.values()]
         if study.add:
-            base, more = search.addition_sets(study.add, self.units)
+            base, more = search.addition_sets(study.add, self.groups)
             found += [*([base] if base else []), *more.values()]
         if study.exhaustive:
-            found += search.exhaustive_sets(study.exhaustive, self.units)
+            found += search.exhaustive_sets(study.exhaustive, self.groups)
         for claim in study.claim:
-            suited, others, whole = published_claims.sets_of_claim(claim, self.units)
+            suited, others, whole = published_claims.sets_of_claim(claim, self.groups)
             found += [suited, *others, whole]
         return list(dict.fromkeys(found))
 
-    def compared(self, tried: Iterable[StationSet]) -> list[StationSet]:
+    def sets_to_compare(self, tried: Iterable[StationSet]) -> list[StationSet]:
         """The sets that every condition ranks, those of `exhaustive` if there are; none without another condition."""
-        if not self.elsewhere and len(self.study.methods) < 2:
+        if not self.condition_scenarios and len(self.study.methods) < 2:
             return []
-        alike = search.exhaustive_sets(self.study.exhaustive, self.units) if self.study.exhaustive else tried
+        alike = search.exhaustive_sets(self.study.exhaustive, self.groups) if self.study.exhaustive else tried
         return [one for one in alike if len(one) == self.study.condition_size and not is_refined(one)]
 
-    def link(self, sizes: Sequence[int]) -> str:
+    def describe_link(self, sizes: Sequence[int]) -> str:
         """In words."""
         if not self.study.link:
             return ""
@@ -88,7 +88,7 @@ class PlacementPlan:
 
     def costs(self, errors: Costs) -> dict[str, float | None]:
         """The other way round as well."""
-        return {clip: None if value is None else self.sign * value for clip, value in errors.items()}
+        return {clip: None if value is None else self.cost_sign * value for clip, value in errors.items()}
 
 
 def is_refined(one: StationSet) -> bool:
@@ -104,15 +104,15 @@ def plan_placement(path: Path | str, folder: Path | None) -> PlacementPlan:
     elsewhere = {one.name: base_scenario(study, file.parent, one) for one in study.condition}
     held_out = _held_out_scenario(study, scenario)
     source = open_scenario_motion(scenario.motion, folder, scenario.seed)
-    made = PlacementPlan(study, study.units(), scenario, held_out, elsewhere, source.title)
+    made = PlacementPlan(study, study.groups(), scenario, held_out, elsewhere, source.title)
     for one in filter(None, (scenario, held_out, *elsewhere.values())):
-        alone = replace(one, worn=names_of_places(station_set(made.units[:1], made.units)))
+        alone = replace(one, worn=names_of_places(station_set(made.groups[:1], made.groups)))
         parts = [ClipPart.parse(text) for text in one.motion.test]
         check_names(alone, open_scenario_motion(one.motion, folder, one.seed), parts)
     if study.exhaustive:
-        search.check_cell_count(study.exhaustive, made.units, len(scenario.motion.test) * len(scenario.methods))
+        search.check_cell_count(study.exhaustive, made.groups, len(scenario.motion.test) * len(scenario.methods))
     if study.refine and study.refine.set:
-        start = station_set(select_groups(study.refine.set, made.units, "refine.set"), made.units)
+        start = station_set(select_groups(study.refine.set, made.groups, "refine.set"), made.groups)
         check_clip_count(start, len(scenario.motion.test))
     for size in {len(one) for one in made.known_sets()}:
         made.rate_hz(size)

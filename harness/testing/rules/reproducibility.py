@@ -24,20 +24,20 @@ from harness.testing.rules.assertions import require_identical
 
 def is_deterministic(trial: ContractCase) -> str:
     """The same examples and frames give the same answers."""
-    once, again = (stack_qpos(run_session(trial.begun(1)[0], trial.frames)) for _ in range(2))
+    once, again = (stack_qpos(run_session(trial.begin_sessions(1)[0], trial.frames)) for _ in range(2))
     return require_identical(once, again)
 
 
 def starts_without_history(trial: ContractCase) -> str:
     """A session knows nothing of the one before it."""
-    reconstructor = trial.fitted()
+    reconstructor = trial.fit()
     once, again = (stack_qpos(run_session(reconstructor.begin(trial.calibration), trial.frames)) for _ in range(2))
     return require_identical(once, again)
 
 
 def isolates_sessions(trial: ContractCase) -> str:
     """A session knows nothing of one beside it, whose frames run backwards."""
-    alone, ours, other = trial.begun(3)
+    alone, ours, other = trial.begin_sessions(3)
     plain, beside = stack_qpos(run_session(alone, trial.frames)), []
     for mine, theirs in zip(trial.frames, reversed(trial.frames), strict=True):
         beside.append(ours.step(mine))
@@ -47,7 +47,7 @@ def isolates_sessions(trial: ContractCase) -> str:
 
 def is_thread_safe(trial: ContractCase) -> str:
     """Two sessions step at the same moment, each in a thread of its own."""
-    alone, *both = trial.begun(3)
+    alone, *both = trial.begin_sessions(3)
     plain = stack_qpos(run_session(alone, trial.frames))
     together = threading.Barrier(len(both))
     answers: list[list[Estimate]] = [[] for _ in both]
@@ -77,7 +77,7 @@ def is_thread_safe(trial: ContractCase) -> str:
 
 def works_in_another_process(trial: ContractCase) -> str:
     """What was fitted is sent to another process, where it answers as it does here."""
-    task = trial.fitted(), trial.calibration, trial.frames
+    task = trial.fit(), trial.calibration, trial.frames
     ((_, there),) = run_in_workers(estimate_qpos, [task], 1)
     return require_identical(estimate_qpos(*task), there.result())
 
@@ -93,7 +93,7 @@ def is_causal(trial: ContractCase) -> str:
         )
         for frame in trial.frames[half:]
     ]
-    one, other = trial.begun(2)
+    one, other = trial.begin_sessions(2)
     spoken, estimates = [], []
     for frame in trial.frames:
         estimates.append(one.step(frame))

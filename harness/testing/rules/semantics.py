@@ -57,10 +57,10 @@ def recovers_from_disturbances(trial: ContractCase) -> str:
 
     Hinges that no station shows are not judged here, for that takes real motion: `harness run recovery` does.
     """
-    plain_mm = _station_error_mm(trial, trial.long)
+    plain_mm = _station_error_mm(trial, trial.long_frames)
     worst, which = 0.0, ""
     for what in DISTURBANCES:
-        frames, judged = disturb_frames(trial.long, what)
+        frames, judged = disturb_frames(trial.long_frames, what)
         before, after = (float(x[judged].mean()) for x in (plain_mm, _station_error_mm(trial, frames)))
         seen = f"{after:.2f} mm after {what}, {before:.2f} without"
         if not after <= MAX_RECOVERED_RATIO * before + _TOLERANCE_MM:
@@ -88,9 +88,9 @@ def is_invariant_to_placement(trial: ContractCase) -> str:
 def _station_error_mm(trial: ContractCase, frames: Frames) -> Floats:
     """(T,) of a new session: mean distance of the stations from where undisturbed readings have them [mm]."""
     judge, off_m = Residuals(trial.body, trial.calibration, Loss()), []
-    for frame, qpos in zip(trial.long, stack_qpos(trial.run(frames)), strict=False):
+    for frame, qpos in zip(trial.long_frames, stack_qpos(trial.run(frames)), strict=False):
         judge.read(frame)
-        judge.place(qpos)
+        judge.evaluate(qpos)
         off_m.append(judge.distance[: len(judge.bones)].mean())
     return 1e3 * np.array(off_m)
 

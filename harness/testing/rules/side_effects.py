@@ -28,7 +28,7 @@ def preserves_global_random_state(trial: ContractCase) -> str:
         numpys.seed(20_110_218)
         random.seed(20_110_218)
         before = repr(numpys.get_state(legacy=False)), random.getstate()
-        run_session(trial.begun(1)[0], trial.frames[:5])
+        run_session(trial.begin_sessions(1)[0], trial.frames[:5])
         if (repr(numpys.get_state(legacy=False)), random.getstate()) != before:
             raise RuleViolation("a global generator was seeded or drawn from")
     finally:

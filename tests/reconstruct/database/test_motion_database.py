@@ -70,7 +70,7 @@ def test_poses_come_back(takes: list[BodyMotion], database: MotionDatabase) -> N
         back = database.qpos(slice(run.start, run.stop), ground_from_qpos(take.qpos))
         np.testing.assert_allclose(back[:, :3], take.qpos[:, :3], atol=1e-6)
         np.testing.assert_allclose(np.abs(np.vecdot(back[:, 3:7], take.qpos[:, 3:7])), 1.0, atol=1e-12)
-        np.testing.assert_allclose(back[:, 7:], HingeLimits(BODY).course(take.qpos[:, 7:]), atol=1e-6)
+        np.testing.assert_allclose(back[:, 7:], HingeLimits(BODY).normalise_motion(take.qpos[:, 7:]), atol=1e-6)
 
 
 def test_steps_lead_through_the_take(takes: list[BodyMotion], database: MotionDatabase) -> None:
@@ -106,7 +106,7 @@ def test_a_query_is_the_window_of_its_own_poses(takes: list[BodyMotion], databas
     vectors = windows.gather(np.arange(len(windows)))
     assert vectors.dtype == np.float32
     for run, take in zip(database.runs, takes, strict=True):
-        qpos = np.concatenate([take.qpos[:, :7], limits.course(take.qpos[:, 7:])], axis=1)
+        qpos = np.concatenate([take.qpos[:, :7], limits.normalise_motion(take.qpos[:, 7:])], axis=1)
         for frame in (length - 1, length, len(take) - 1):
             row = int(np.searchsorted(windows.frames, run.start + frame))
             assert windows.frames[row] == run.start + frame
@@ -120,10 +120,10 @@ def test_no_window_reaches_into_another_take(database: MotionDatabase) -> None:
             windows = database.windows(length, followed=followed)
             assert len(windows) == sum(len(run) - length + 1 - followed for run in database.runs)
             for frame in windows.frames:
-                first, last = database.run_of(int(frame) - length + 1), database.run_of(int(frame) + followed)
+                first, last = database.segment_of(int(frame) - length + 1), database.segment_of(int(frame) + followed)
                 assert first == last
             ends = [run.stop - 1 - followed for run in database.runs]
-            np.testing.assert_array_equal(windows.frames[~windows.follows], ends)
+            np.testing.assert_array_equal(windows.frames[~windows.consecutive], ends)
     with pytest.raises(BadInput, match="Windows of 0"):
         database.windows(0)
     assert len(database.windows(10_000)) == 0
@@ -162,8 +162,8 @@ def test_every_frame_says_where_it_is_from(takes: list[BodyMotion], database: Mo
     assert [run.take for run in database.runs] == [take.name for take in takes]
     assert [len(run) for run in database.runs] == [len(take) for take in takes]
     assert database.runs[1].behaviour == "boxing"
-    assert database.run_of(database.runs[1].start) == database.runs[1]
-    assert database.run_of(database.runs[1].stop - 1) == database.runs[1]
+    assert database.segment_of(database.runs[1].start) == database.runs[1]
+    assert database.segment_of(database.runs[1].stop - 1) == database.runs[1]
     assert database.runs[-1].stop == len(database)
 
 

@@ -125,6 +125,6 @@ def test_arrays_of_other_kinds_are_refused(saved: Path) -> None:
 def test_what_was_let_go_is_read_again(saved: Path) -> None:
     mapped = MotionDatabase.open(saved)
     before = np.array(mapped.posture), np.array(mapped.step)
-    mapped.let_go()
+    mapped.release_memory()
     np.testing.assert_array_equal(mapped.posture, before[0])
     np.testing.assert_array_equal(mapped.step, before[1])

@@ -20,16 +20,16 @@ def stations() -> Floats:
 
 
 def test_a_bearing_tells_the_heading_and_turns_with_the_performer(stations: Floats) -> None:
-    bearing = HeadingEstimator.learnt(stations, 3, EVERY)
+    bearing = HeadingEstimator.fit(stations, 3, EVERY)
     found = bearing.heading_rad(stations)
-    assert 0.9 < bearing.told < 1.0
+    assert 0.9 < bearing.explained < 1.0
     assert np.sqrt(np.mean(found**2)) < np.deg2rad(15.0)
     turned = np.array([3.0, -4.0, 0.2]) + rotations.rotate(rotations.about_z(1.2), stations)
     np.testing.assert_allclose(bearing.heading_rad(turned), found + 1.2, atol=1e-9)
 
 
 def test_only_those_asked_count(stations: Floats) -> None:
-    bearing = HeadingEstimator.learnt(stations, 3, np.array([True, True, False, True]))
+    bearing = HeadingEstimator.fit(stations, 3, np.array([True, True, False, True]))
     away = np.array(stations)
     away[:, 2] += 5.0
     np.testing.assert_array_equal(bearing.heading_rad(away), bearing.heading_rad(stations))
@@ -37,4 +37,4 @@ def test_only_those_asked_count(stations: Floats) -> None:
 
 def test_what_lies_all_around_tells_little(stations: Floats) -> None:
     for asked in ([False, False, True, True], [False, False, False, True]):
-        assert HeadingEstimator.learnt(stations, 3, np.array(asked)).told < 0.1
+        assert HeadingEstimator.fit(stations, 3, np.array(asked)).explained < 0.1

@@ -4,8 +4,7 @@ import threading
 from dataclasses import replace
 
 from harness.reconstruct.features.calibration_cache import CalibrationCache
-
-from .conftest import Scene
+from tests.reconstruct.conftest import Scene
 
 
 def test_it_is_made_once_for_each_way_of_wearing(walk: Scene) -> None:

@@ -25,7 +25,7 @@ def frame(index: int, came_s: float, missing: tuple[int, ...] = (), suspect: tup
 
 def times_s(frames: list[TrackerFrame]) -> list[float]:
     clock = DeviceTime()
-    return [clock.of(f) for f in frames]
+    return [clock.frame_time_s(f) for f in frames]
 
 
 def test_a_host_that_is_late_changes_nothing(rng: np.random.Generator) -> None:

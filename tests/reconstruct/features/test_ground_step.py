@@ -14,9 +14,8 @@ from harness.reconstruct.solver.ground_frame import (
     qpos_from_postures,
     step_grounds,
 )
-
-from .conftest import Scene
-from .conftest import moved as elsewhere
+from tests.reconstruct.conftest import Scene
+from tests.reconstruct.conftest import moved as elsewhere
 
 
 @pytest.mark.parametrize("yaw_rad", [0.0, 3.0, -2.0])
@@ -35,7 +34,7 @@ def test_readings_of_an_example_are_its_controls(boxing: Scene) -> None:
     qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))
     for row in (0, 40):
         before = int(windows.frames[row])
-        placed = controls.worn_at(Kinematics(boxing.body), qpos[before + 1])
+        placed = controls.station_poses(Kinematics(boxing.body), qpos[before + 1])
         np.testing.assert_allclose(
             controls.query(*placed, ground_from_qpos(qpos[before])), controls.values[row], atol=1e-5
         )

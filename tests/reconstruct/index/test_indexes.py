@@ -164,14 +164,14 @@ def test_a_graph_follows_and_asks_for_everything_when_it_must() -> None:
     graph = NeighbourGraph(ArrayVectors(values), follows, FlatIndex(ArrayVectors(values)))
     assert graph.links.min() >= 0
     assert graph.links.max() < 3000
-    session, found = graph.follow(), []
+    session, found = graph.begin_search(), []
     for row in range(1200, 1300):
         rows, squared = session.nearest(values[row] + np.float32(0.01), 20)
         assert np.all(np.diff(squared) >= 0.0)
         found.append(len(set(rows.tolist()) & set(truth(values, values[row], 20)[0].tolist())) / 20)
     assert np.mean(found) > 0.8
-    rows, _ = graph.follow().nearest(values[2500], 20)  # a new session knows nothing of the last one
+    rows, _ = graph.begin_search().nearest(values[2500], 20)  # a new session knows nothing of the last one
     assert rows[0] == 2500
-    fresh, again = graph.follow(), graph.follow()
+    fresh, again = graph.begin_search(), graph.begin_search()
     for row in (5, 6, 7):
         np.testing.assert_array_equal(fresh.nearest(values[row], 9)[0], again.nearest(values[row], 9)[0])

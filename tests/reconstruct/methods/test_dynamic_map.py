@@ -14,8 +14,7 @@ from harness.reconstruct.methods.dynamic_map import LITERAL, DynamicMap
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import drop_stations, exact_frames
-
-from .conftest import Scene, moved
+from tests.reconstruct.conftest import Scene, moved
 
 BOTH = [DynamicMap(), LocalPca()]
 FEW = [DynamicMap(neighbours=30), LocalPca(neighbours=60)]
@@ -115,7 +114,7 @@ def test_what_is_far_from_all_examples_is_believed_less(walk: Scene) -> None:
         for frame in walk.frames[:5]:
             session.step(frame)
         session.past[:, 7:] += 0.3
-        precision = session.predicted().precision
+        precision = session.predict().precision
         assert precision is not None
         spreads.append(precision)
     assert (spreads[1] < spreads[0]).all()
@@ -127,22 +126,22 @@ def test_with_positions_alone_the_heading_of_the_last_answers_does_not_matter(wa
         session = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).begin(walk.calibration)
         for frame in walk.only(inputs)[:20]:
             session.step(frame)
-        before = session.predicted().qpos[7:]
+        before = session.predict().qpos[7:]
         session.past = moved(session.past, 0.3, (0.0, 0.0, 0.0))
-        np.testing.assert_allclose(session.predicted().qpos[7:], before, atol=1e-4)
+        np.testing.assert_allclose(session.predict().qpos[7:], before, atol=1e-4)
 
 
 def test_positions_are_asked_for_the_heading_only_where_no_orientation_and_enough_of_them_tell_it(walk: Scene) -> None:
-    evidence = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).evidence(walk.calibration)
+    evidence = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).regression(walk.calibration)
     torso, count = walk.calibration.stations.index("torso"), len(walk.calibration.stations)
     positions = np.repeat([True, False], count)
-    assert evidence.facing(positions).bearing is not None
-    assert evidence.facing(positions) is evidence.facing(positions)
+    assert evidence.with_usual_heading(positions).bearing is not None
+    assert evidence.with_usual_heading(positions) is evidence.with_usual_heading(positions)
     with_torso, without_torso, lone = np.array(positions), np.array(positions), np.zeros(2 * count, bool)
     with_torso[count + torso], without_torso[torso] = True, False
     lone[torso] = True
     for usual in (with_torso, without_torso, lone):
-        assert evidence.facing(usual) is evidence
+        assert evidence.with_usual_heading(usual) is evidence
 
 
 def test_the_room_does_not_matter_with_positions_alone(walk: Scene) -> None:

@@ -16,8 +16,7 @@ from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import drop_stations, exact_calibration, exact_frames
-
-from .conftest import Scene, moved
+from tests.reconstruct.conftest import Scene, moved
 
 LEFT_WRIST, TORSO = 0, 4
 

@@ -7,8 +7,7 @@ from harness.core.humanoid24 import unpack
 from harness.errors import BadInput
 from harness.reconstruct.methods.kernel_ridge import KernelRidge
 from harness.testing.frames import drop_stations, exact_frames
-
-from .conftest import Scene, moved
+from tests.reconstruct.conftest import Scene, moved
 
 EXACT = KernelRidge(ridge=1e-6, position_noise_m=0.0, orientation_noise_rad=0.0)
 

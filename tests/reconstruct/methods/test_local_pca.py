@@ -19,8 +19,7 @@ from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
-
-from .conftest import Scene
+from tests.reconstruct.conftest import Scene
 
 
 def postures_of(scene: Scene) -> Singles:
@@ -47,7 +46,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     z[4:7] = [0.6 * lean_rad, 0.8 * lean_rad, 0.0]
 
     def data_cost(z: Floats) -> float:
-        return residuals.place(qpos_from_posture(z[3:], z[:3]))
+        return residuals.evaluate(qpos_from_posture(z[3:], z[:3]))
 
     h, hessian = 1e-6, np.zeros((54, 54))
     steps = h * np.eye(55)
@@ -59,7 +58,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     ]
     jacobian = np.array(slopes).T / (2.0 * h)
     gradient = np.array([(data_cost(z + step) - data_cost(z - step)) / (2.0 * h) for step in steps])
-    gradient[3:] += space.curvature @ (z[3:] - space.mean) - space.pull
+    gradient[3:] += space.curvature @ (z[3:] - space.mean) - space.linear
     data_cost(z)
     descent = residuals.normal_equations(hessian)
     expected = jacobian.T @ hessian @ jacobian
@@ -73,7 +72,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
 def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene, rng: np.random.Generator) -> None:
     space = space_of(walk, 40)
     basis = np.eye(55)
-    basis[3:, 3:] -= space.across.T @ space.across
+    basis[3:, 3:] -= space.normals.T @ space.normals
     half = rng.normal(size=(55, 55))
     normal, gradient = half @ half.T + np.eye(55), rng.normal(size=55)
     normal[3:, 3:] += space.curvature
@@ -87,8 +86,8 @@ def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene,
 def test_what_is_left_out_varies_least(walk: Scene) -> None:
     """Found by inverse iteration: orthonormal, and next to no more variance than the smallest eigenvalues hold."""
     space, scatter = space_of(walk, 40), scatter_of(postures_of(walk))
-    np.testing.assert_allclose(space.across @ space.across.T, np.eye(12), atol=1e-10)
-    held = np.trace(space.across @ scatter @ space.across.T)
+    np.testing.assert_allclose(space.normals @ space.normals.T, np.eye(12), atol=1e-10)
+    held = np.trace(space.normals @ scatter @ space.normals.T)
     assert held <= 1.01 * np.sum(np.linalg.eigvalsh(scatter)[:12]) + 12 * 1e-9
 
 
@@ -122,7 +121,7 @@ def test_the_answer_lies_in_the_subspace_and_is_a_minimum(walk: Scene, rng: np.r
     for step in 1e-3 * rng.normal(size=(20, 55)):
         there = project_posture(space, posture + step[3:])
         assert (
-            residuals.place(qpos_from_posture(there, ground + step[:3])) + subspace_cost(space, there)
+            residuals.evaluate(qpos_from_posture(there, ground + step[:3])) + subspace_cost(space, there)
             > found.cost - 1e-9
         )
 

@@ -18,8 +18,7 @@ from harness.reconstruct.methods.weighted_blend import WeightedBlend
 from harness.reconstruct.solver import ground_frame
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations, exact_frames
-
-from .conftest import Scene, moved
+from tests.reconstruct.conftest import Scene, moved
 
 METHODS = [KernelCca(), WeightedBlend()]
 IDS = [method.name for method in METHODS]
@@ -104,10 +103,10 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     outlook = QueryFeatures(residuals, walk.calibration, examples, 0.2)
     for frame in walk.frames[row - 1 : row + 1]:
         residuals.read(frame)
-        view, query, trust = outlook.seen(frame, walk.take.qpos[row])
+        view, query, trust = outlook.compute(frame, walk.take.qpos[row])
     np.testing.assert_allclose(query, examples.gather(np.array([row]))[0], atol=5e-4)
     assert examples.nearest(query, trust, 1).tolist() == [row]
-    inputs, asked, poses = examples.pairs(np.array([row]), np.array([row]), query, trust)
+    inputs, asked, poses = examples.regression_data(np.array([row]), np.array([row]), query, trust)
     np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
     stood = ground_frame.qpos_from_postures(poses[0, :52], ground_frame.step_grounds(np.array(view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)

@@ -73,7 +73,7 @@ def test_the_mean_is_that_of_directions(rng: np.random.Generator) -> None:
 
 def test_near_adds_whole_turns_to_free_hinges_only() -> None:
     other = np.full(48, 7.0)
-    moved = LIMITS.near(np.full(48, 0.5), other)
+    moved = LIMITS.unwrap_near(np.full(48, 0.5), other)
     free = np.isinf(LIMITS.high_rad)
     np.testing.assert_allclose(moved[free], 0.5 + 2.0 * np.pi)
     np.testing.assert_allclose(moved[~free], 0.5)

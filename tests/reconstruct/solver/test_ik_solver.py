@@ -7,8 +7,7 @@ from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations
-
-from .conftest import Scene
+from tests.reconstruct.conftest import Scene
 
 
 def precision(sigma_rad: float) -> np.ndarray:
@@ -29,10 +28,10 @@ def test_ends_where_no_lawful_step_lowers_the_cost(walk: Scene, rng: np.random.G
     assert solution.converged
 
     def cost(step: np.ndarray) -> float:
-        moved = residuals.kinematics.moved(solution.qpos, step)
-        moved[7:] = limits.clipped(moved[7:])
+        moved = residuals.kinematics.integrate(solution.qpos, step)
+        moved[7:] = limits.clip(moved[7:])
         away = residuals.kinematics.difference(moved, prior.qpos)
-        return residuals.place(moved) + 0.5 * float(precision(0.5) @ (away * away))
+        return residuals.evaluate(moved) + 0.5 * float(precision(0.5) @ (away * away))
 
     least = cost(np.zeros(54))
     for _ in range(200):
@@ -61,7 +60,7 @@ def test_without_prior_six_trackers_are_met_exactly(walk: Scene) -> None:
     residuals.read(walk.frames[44])
     solution = solver.solve(walk.take.qpos[40], Prior(walk.take.qpos[40], None))
     assert solution.converged
-    assert residuals.place(solution.qpos) < 1e-4
+    assert residuals.evaluate(solution.qpos) < 1e-4
 
 
 def test_a_solve_leaves_no_trace(walk: Scene) -> None:

@@ -34,8 +34,8 @@ class Bench:
 
     def reached(self, truth: Floats, guess: Floats, lost: tuple[int, ...] = ()) -> Floats:
         self.residuals.read(drop_stations(exact_frames(BODY, self.calibration, truth[None])[0], lost))
-        out = self.limbs.reach(guess)
-        self.residuals.place(out)
+        out = self.limbs.solve(guess)
+        self.residuals.evaluate(out)
         return out
 
 
@@ -74,7 +74,7 @@ def test_a_point_too_far_away_straightens_the_limb(rng: np.random.Generator) -> 
     truth, _ = poses(rng, 0.0)
     bench.residuals.read(exact_frames(BODY, bench.calibration, truth[None])[0])
     bench.residuals.target_m[0] += [0.0, 5.0, 0.0]
-    out = bench.limbs.reach(truth)
+    out = bench.limbs.solve(truth)
     assert abs(out[7 + JOINTS.index("lradius.rx")]) < 1e-6
 
 

@@ -19,15 +19,15 @@ def at(frame: int) -> Floats:
 def watched(frames: int) -> OutlierGate:
     gate = OutlierGate(4, jump_m=0.15, patience_s=0.25)
     for frame in range(frames):
-        assert not gate.jumped(frame * PERIOD_S, at(frame), EVERY).any()
-        gate.settled(frame * PERIOD_S, at(frame))
+        assert not gate.find_jumps(frame * PERIOD_S, at(frame), EVERY).any()
+        gate.update_stations(frame * PERIOD_S, at(frame))
     return gate
 
 
 def jumped(gate: OutlierGate, frame: int, by_m: float, stations: list[int], measured: Bools = EVERY) -> list[int]:
     target_m = at(frame)
     target_m[stations, 2] += by_m
-    return np.flatnonzero(gate.jumped(frame * PERIOD_S, target_m, measured)).tolist()
+    return np.flatnonzero(gate.find_jumps(frame * PERIOD_S, target_m, measured)).tolist()
 
 
 @pytest.mark.parametrize(("by_m", "out"), [(0.0, []), (0.14, []), (0.16, [2]), (3.0, [2])])
@@ -54,5 +54,5 @@ def test_what_lasts_is_believed() -> None:
     gate, out = watched(2), []
     for frame in range(2, 30):
         out.append(jumped(gate, frame, 0.5, [1]) == [1])
-        gate.settled(frame * PERIOD_S, at(frame))
+        gate.update_stations(frame * PERIOD_S, at(frame))
     assert out == [True] * 10 + [False] * 18

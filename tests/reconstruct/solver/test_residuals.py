@@ -10,8 +10,7 @@ from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations
-
-from .conftest import Scene
+from tests.reconstruct.conftest import Scene
 
 
 def noisy(walk: Scene, rng: np.random.Generator, loss: Loss, off_m: float) -> tuple[Residuals, np.ndarray]:
@@ -28,11 +27,11 @@ def noisy(walk: Scene, rng: np.random.Generator, loss: Loss, off_m: float) -> tu
 @pytest.mark.parametrize("off_m", [0.003, 0.2])
 def test_descent_is_the_slope_of_the_cost(walk: Scene, rng: np.random.Generator, robust: bool, off_m: float) -> None:
     residuals, qpos = noisy(walk, rng, Loss(robust=robust), off_m)
-    residuals.place(qpos)
+    residuals.evaluate(qpos)
     descent = residuals.normal_equations(np.zeros((54, 54)))
     h, slopes = 1e-6, np.zeros(54)
     for k, step in enumerate(h * np.eye(54)):
-        ahead, behind = (residuals.place(residuals.kinematics.moved(qpos, s)) for s in (step, -step))
+        ahead, behind = (residuals.evaluate(residuals.kinematics.integrate(qpos, s)) for s in (step, -step))
         slopes[k] = (ahead - behind) / (2.0 * h)
     np.testing.assert_allclose(-descent, slopes, atol=1e-6 * np.max(np.abs(descent)))
 
@@ -42,12 +41,12 @@ def test_slopes_of_every_residual_against_differences(walk: Scene) -> None:
     loss = Loss(position_sigma_m=1.0, orientation_sigma_rad=1.0, robust=False)
     residuals, here = Residuals(walk.body, walk.calibration, loss), walk.take.qpos[30]
     residuals.read(walk.frames[30])
-    residuals.place(here)
+    residuals.evaluate(here)
     hessian = np.zeros((54, 54))
     residuals.normal_equations(hessian)
 
     def errors(step: np.ndarray) -> np.ndarray:
-        residuals.place(residuals.kinematics.moved(here, step))
+        residuals.evaluate(residuals.kinematics.integrate(here, step))
         return residuals.error.reshape(-1).copy()
 
     h = 1e-6
@@ -58,7 +57,7 @@ def test_slopes_of_every_residual_against_differences(walk: Scene) -> None:
 def test_curvature_completes_the_hessian(walk: Scene, rng: np.random.Generator) -> None:
     residuals, qpos = noisy(walk, rng, Loss(robust=False), 0.02)
     hessian = np.zeros((54, 54))
-    residuals.place(qpos)
+    residuals.evaluate(qpos)
     residuals.normal_equations(hessian)
     gauss_newton = hessian.copy()
     residuals.normal_equations(full := np.zeros((54, 54)), bent=True)
@@ -66,7 +65,7 @@ def test_curvature_completes_the_hessian(walk: Scene, rng: np.random.Generator) 
     for step in h * np.eye(54):
         slopes = []
         for s in (step, -step):
-            residuals.place(residuals.kinematics.moved(qpos, s))
+            residuals.evaluate(residuals.kinematics.integrate(qpos, s))
             slopes.append(-residuals.normal_equations(scratch))
         columns.append((slopes[0] - slopes[1]) / (2.0 * h))
     true = np.array(columns)[6:, 6:]
@@ -83,22 +82,22 @@ def test_one_lorentzian_for_each_tracker_and_kind(walk: Scene) -> None:
     shift[2] = [0.03, 0.04, 0.12]  # 13 cm
     residuals.read(replace(frame, position_m=frame.position_m + shift))
     expected = (loss.position_scale_m / loss.position_sigma_m) ** 2 * np.log1p(0.13**2 / (2 * loss.position_scale_m**2))
-    assert residuals.place(walk.take.qpos[0]) == pytest.approx(expected, rel=1e-6)
+    assert residuals.evaluate(walk.take.qpos[0]) == pytest.approx(expected, rel=1e-6)
     residuals.widen(1000.0)
-    assert residuals.place(walk.take.qpos[0]) == pytest.approx(0.5 * (0.13 / 0.003) ** 2, rel=1e-3)
+    assert residuals.evaluate(walk.take.qpos[0]) == pytest.approx(0.5 * (0.13 / 0.003) ** 2, rel=1e-3)
 
 
 def test_rows_that_were_not_measured_count_nothing(walk: Scene) -> None:
     residuals = Residuals(walk.body, walk.calibration, Loss())
     residuals.read(drop_stations(walk.frames[0], [1, 3]))
     assert not residuals.measured[[1, 3, 7, 9]].any()
-    assert residuals.place(walk.take.qpos[0]) == pytest.approx(0.0, abs=1e-9)
+    assert residuals.evaluate(walk.take.qpos[0]) == pytest.approx(0.0, abs=1e-9)
     residuals.read(walk.frames[0])
     elsewhere = np.array(walk.take.qpos[0])
     elsewhere[0] += 1.0
-    whole = residuals.place(elsewhere)
+    whole = residuals.evaluate(elsewhere)
     residuals.leave_out(np.arange(12) < 6)
-    assert residuals.place(elsewhere) == pytest.approx(0.0, abs=1e-9)
+    assert residuals.evaluate(elsewhere) == pytest.approx(0.0, abs=1e-9)
     assert whole > 100.0
 
 
@@ -113,12 +112,12 @@ def test_a_station_of_low_quality_pulls_less(walk: Scene) -> None:
         said = np.ones(6)
         said[5] = quality
         residuals.read(replace(frame, position_m=frame.position_m + shift, quality=said))
-        assert residuals.trust == pytest.approx(np.tile(said, 2))
-        assert residuals.place(truth) == pytest.approx(quality * 0.5 * (0.1 / 0.05) ** 2, rel=1e-6)
+        assert residuals.confidence == pytest.approx(np.tile(said, 2))
+        assert residuals.evaluate(truth) == pytest.approx(quality * 0.5 * (0.1 / 0.05) ** 2, rel=1e-6)
         qpos = IKSolver(residuals, limits, Stopping()).solve(truth, Prior(truth, np.full(54, 30.0))).qpos
-        residuals.place(truth)
+        residuals.evaluate(truth)
         at_m = residuals.station_m[5].copy()
-        residuals.place(qpos)
+        residuals.evaluate(qpos)
         pulled_m.append(float(np.linalg.norm(residuals.station_m[5] - at_m)))
     assert pulled_m[1] < 0.5 * pulled_m[0]
     assert pulled_m[0] > 0.01
@@ -134,11 +133,11 @@ def test_quality_and_suspicion_may_be_ignored_or_taken_in_earnest(walk: Scene) -
     ):
         residuals = Residuals(walk.body, walk.calibration, loss)
         residuals.read(doubted)
-        assert residuals.trust == pytest.approx(np.tile(expected, 2))
+        assert residuals.confidence == pytest.approx(np.tile(expected, 2))
         residuals.leave_out(np.arange(12) == 0)
-        assert residuals.trust == pytest.approx([0.0, *expected[1:], *expected])
+        assert residuals.confidence == pytest.approx([0.0, *expected[1:], *expected])
         residuals.read(walk.frames[0])
-        assert residuals.trust == pytest.approx(np.ones(12))
+        assert residuals.confidence == pytest.approx(np.ones(12))
 
 
 @pytest.mark.parametrize("stations", [3, 7])

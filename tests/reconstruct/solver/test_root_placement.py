@@ -32,7 +32,7 @@ def test_a_body_that_was_moved_is_found(inputs: str, tilt_rad: float, rng: np.ra
             rotations.about_z(rng.uniform(-np.pi, np.pi)), rotations.exp(np.array([0.0, tilt_rad, 0.0]))
         )
         there = moved(posture, turn, np.array([1.0, -2.0, 0.3]))
-        residuals.read(make_inputs(inputs, known.stations).masked(exact_frames(body, known, there[None])[0]))
+        residuals.read(make_inputs(inputs, known.stations).mask(exact_frames(body, known, there[None])[0]))
         upright, tilted = candidate_placements(residuals, posture)
         found = [tilted] if tilt_rad else [upright, tilted]
         for qpos in found:

@@ -201,10 +201,10 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
     among, more = select_body_maps(findings.worth)
     assert len(among.values) == len(PLACES)
-    assert among.what == "error without it, of 11 trackers, less error with it"
-    assert among.worn == ()
-    assert more.worn == ("pelvis", "left_ankle", "right_ankle")
-    assert set(more.values) == {place.name for place in PLACES} - set(more.worn)
+    assert among.description == "error without it, of 11 trackers, less error with it"
+    assert among.base == ()
+    assert more.base == ("pelvis", "left_ankle", "right_ankle")
+    assert set(more.values) == {place.name for place in PLACES} - set(more.base)
     assert select_body_maps(()) == []
 
 

@@ -170,7 +170,9 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
     last = next(r["metrics"]["joint_angle_mean_deg"]["mean"] for r in rows[4:] if r["method"] == "ik")
     assert f"ik is best: {last:.2f}° mean joint-angle error on 1 sequence" in said
     assert "the next, with components.echo.share=0.1." in said
-    assert {trace.key for trace in read_run(out).traces} == {row["key"] for row in read_run(out).whole["cells"][-2:]}
+    assert {trace.key for trace in read_run(out).traces} == {
+        row["key"] for row in read_run(out).full_summary["cells"][-2:]
+    }
 
 
 def test_charts_show_no_more_lines_than_look_different(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -73,8 +73,8 @@ def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
         cells = list(index.columns("scenario", "method", "varied", "clip", PRIMARY_METRIC))
     rows = [row for row in cells if row[:2] == ("walking", "ik") and json.loads(row[2])[RATE] == 60]
     means = [np.mean([error for *_, name, error in rows if name == clip]) for clip in sorted({row[3] for row in rows})]
-    series, value = sweep.series.index("ik"), next(k for k in sweep.keys if k.name == RATE).texts.index("60")
-    found = sweep.statistic(PRIMARY_METRIC, sweep.where(0, series, **{RATE: value}), ends=True)
+    series, value = sweep.series.index("ik"), next(k for k in sweep.keys if k.name == RATE).labels.index("60")
+    found = sweep.statistic(PRIMARY_METRIC, sweep.select(0, series, **{RATE: value}), ends=True)
     assert (found.clips, len(rows)) == (7, 14)
     assert found.mean == pytest.approx(np.mean(means))
     assert found.sd == pytest.approx(np.std(means, ddof=1))
@@ -83,8 +83,8 @@ def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
 
 def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> None:
     rate, noise = read_sweep(folder).keys
-    assert (rate.texts, rate.numbers) == (("20", "60", "120"), (20.0, 60.0, 120.0))
-    assert (noise.texts, noise.numbers) == (("clean", "default"), ())
+    assert (rate.labels, rate.numbers) == (("20", "60", "120"), (20.0, 60.0, 120.0))
+    assert (noise.labels, noise.numbers) == (("clean", "default"), ())
 
 
 def test_what_a_key_does_is_told(folder: Path) -> None:
@@ -107,7 +107,7 @@ def test_methods_stand_beside_each_other_in_every_scenario(folder: Path) -> None
     sweep, said = read_sweep(folder), text_of(folder / "report.html")
     for scenario in range(2):
         for series in range(len(sweep.series)):
-            found = sweep.statistic(PRIMARY_METRIC, sweep.where(scenario, series))
+            found = sweep.statistic(PRIMARY_METRIC, sweep.select(scenario, series))
             assert f"{found.mean:.2f} ± {found.sd:.2f}" in said
             assert f"{found.mean:.2f} ± {found.sd:.2f}" in text(sweep)
     assert "walking n 7 boxing n 7 all n 14" in said.replace("\u00a0", " ").replace("  ", " ")
@@ -115,7 +115,7 @@ def test_methods_stand_beside_each_other_in_every_scenario(folder: Path) -> None
 
 def test_failures_that_end_alike_are_one_with_the_command_that_tries_again(folder: Path) -> None:
     (fault,) = group_failures(read_sweep(folder))
-    assert (len(fault.cells), fault.line) == (84, "ValueError: <b>no</b> pose & no plan")
+    assert (len(fault.cells), fault.message) == (84, "ValueError: <b>no</b> pose & no plan")
     said = text_of(folder / "report.html")
     assert "84 cells : ValueError: <b>no</b> pose & no plan" in said
     assert "and 64 more" in said
@@ -161,7 +161,7 @@ def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(scenarios=("walking",), seeds=(1, 2, 3))))
     assert len(sweep) == 63
-    assert sweep.statistic(PRIMARY_METRIC, sweep.where(0, 0)).clips == 7
+    assert sweep.statistic(PRIMARY_METRIC, sweep.select(0, 0)).clips == 7
 
 
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:

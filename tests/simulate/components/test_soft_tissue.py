@@ -57,7 +57,7 @@ def test_a_scenario_adds_them_by_name() -> None:
 
 def test_where_nothing_pushes_nothing_moves(still: Still) -> None:
     true, seen = still(2.0), still(2.0)
-    SoftTissueArtefact().spoil(seen)
+    SoftTissueArtefact().apply(seen)
     np.testing.assert_array_equal(seen.position_m, true.position_m)
     np.testing.assert_array_equal(seen.turn, true.turn)
 
@@ -106,7 +106,7 @@ def test_a_lasting_force_pulls_it_aside_in_proportion_to_the_flesh(still: Still)
     true, seen = still(1.0, 2), still(1.0, 2)
     seen.force_m_s2[:] = [0.3, 0.0, 0.3]
     seen.flesh_m = np.array([0.04, 0.01])
-    SoftTissueArtefact(frequency_hz=5.0).spoil(seen)
+    SoftTissueArtefact(frequency_hz=5.0).apply(seen)
     sag_m = 0.3 / (2.0 * np.pi * 5.0) ** 2
     expected = np.array([[-sag_m, 0.0, -sag_m / 4.0], [-sag_m / 4.0, 0.0, -sag_m / 16.0]])
     np.testing.assert_allclose(own_axes(true, seen)[-1], expected, rtol=1e-3, atol=1e-12)
@@ -116,10 +116,10 @@ def test_what_slides_around_the_bone_turns_about_it(still: Still) -> None:
     """As a strap that slips by the same angle does, to the second order."""
     true, seen, slipped = still(1.0, 1), still(1.0, 1), still(1.0, 1)
     seen.force_m_s2[:] = [0.0, 1.0, 0.0]
-    SoftTissueArtefact().spoil(seen)
+    SoftTissueArtefact().apply(seen)
     around_rad = -own_axes(true, seen)[0, 0, 1] / 0.05
     assert around_rad > 0.009
-    MountSlip("s0", around_rad=float(around_rad)).spoil(slipped)
+    MountSlip("s0", around_rad=float(around_rad)).apply(slipped)
     shift, turn = errors(slipped, seen)
     assert np.abs(turn).max() < 1e-9
     assert np.linalg.norm(shift, axis=2).max() < 0.05 * around_rad**2
@@ -202,7 +202,7 @@ def test_loose_straps_slip_as_often_and_as_far_as_said(still: Still) -> None:
     slipped, along, around = [], [], []
     for seed in range(60):
         true, seen = still(0.5, 8, seed=seed), still(0.5, 8, seed=seed)
-        StrapSlip(share=0.3, along_m=0.01, around_rad=0.1, over_s=0.0).spoil(seen)
+        StrapSlip(share=0.3, along_m=0.01, around_rad=0.1, over_s=0.0).apply(seen)
         shift, turned = own_axes(true, seen), rotations.multiply(rotations.inverse(true.turn), seen.turn)
         for row in range(8):
             last = shift[-1, row, 0]
@@ -222,6 +222,6 @@ def test_a_strap_slips_alike_whatever_else_is_worn(still: Still) -> None:
     few, many = still(2.0, 2), still(2.0, 5)
     many.position_m[:, :2], many.turn[:, :2] = few.position_m, few.turn
     for sensed in (few, many):
-        StrapSlip(share=0.7).spoil(sensed)
+        StrapSlip(share=0.7).apply(sensed)
     np.testing.assert_array_equal(few.position_m, many.position_m[:, :2])
     np.testing.assert_array_equal(few.turn, many.turn[:, :2])

@@ -86,7 +86,7 @@ def test_example_e_quality_time_buttons_and_joystick() -> None:
     rows = table(E, codes, as_text())
     assert (rows["buttons"][0], rows["joystick"][0].tolist(), rows["quality"][0]) == (5, [127, 255], 214)
     got = read(E, codes, as_text())
-    assert (got.station.tolist(), got.quality.tolist(), got.doubtful.tolist()) == ([2], [214.0 / 255.0], [False])
+    assert (got.station.tolist(), got.quality.tolist(), got.suspect.tolist()) == ([2], [214.0 / 255.0], [False])
     np.testing.assert_allclose(got.measured_s, 12.345, atol=1e-6)
 
 
@@ -153,7 +153,7 @@ def test_every_item_goes_out_and_comes_back(codes: tuple[int, ...], unit: float,
     rows = table(data, codes, settings)
     assert to_bytes(codes, rows, settings) == data
     got = decode_readings(rows, np.zeros(40), b"123", settings)
-    assert not got.doubtful.any()
+    assert not got.suspect.any()
     assert got.station.tolist() == [k % 3 for k in range(40)]
     position_m, turn_rad = _steps(codes, settings)
     if position_m < np.inf:

@@ -40,7 +40,7 @@ def readings(rounds: int = 40, stations: int = 3, seed: int = 1) -> Readings:
 
 def judged(given: Readings, pieces: list[int] | None = None, stations: int = 3) -> Bools:
     motion, cuts = PlausibilityCheck(stations, 1.0 / RATE_HZ), [0, *(pieces or []), len(given)]
-    return np.concatenate([motion.judge(given[a:b]).doubtful for a, b in pairwise(cuts) if b > a])
+    return np.concatenate([motion.mark_suspect(given[a:b]).suspect for a, b in pairwise(cuts) if b > a])
 
 
 def moved(given: Readings, rows: list[int], by_m: Floats) -> Readings:
@@ -82,9 +82,9 @@ def test_a_long_silence_allows_a_long_way() -> None:
 
 def test_lost_and_doubtful_readings_are_no_evidence() -> None:
     given = moved(readings(), [61, 64], np.array([4.0, 0.0, 0.0]))
-    quality, doubtful = given.quality.copy(), given.doubtful.copy()
+    quality, doubtful = given.quality.copy(), given.suspect.copy()
     quality[61], doubtful[64] = 0.0, True
-    assert np.flatnonzero(judged(replace(given, quality=quality, doubtful=doubtful))).tolist() == [64]
+    assert np.flatnonzero(judged(replace(given, quality=quality, suspect=doubtful))).tolist() == [64]
 
 
 def test_without_stamps_the_host_clock_serves() -> None:
@@ -135,7 +135,7 @@ def test_no_sound_reading_of_a_simulation_is_marked(behaviour: str, rate_hz: flo
     setups: list[tuple[str, Kind]] = [("clean", "none"), ("noise", "none"), *(("default", kind) for kind in KINDS)]
     for level, kind in setups:
         for items in ((40, 2, 11, 21, 1), (40, 18, 19, 21, 1)) if kind == "none" else ((40, 2, 11, 21, 1),):
-            spoilt = Disturbance(kind=kind).added(noise.noise_preset(level), STATIONS)
+            spoilt = Disturbance(kind=kind).add_to(noise.noise_preset(level), STATIONS)
             tracker = TrackerConfig(rate_hz=rate_hz, baud=921600, items=items)
             seen = simulate_tracker(body, take, worn, tracker, spoilt, seed=3)
             assert not any(frame.suspect.any() for frame in seen.frames), (level, kind, items)

@@ -36,7 +36,7 @@ def test_example_a_vrpn_in_inches() -> None:
     read = _read(A, (2, 11, 0), INCHES)
     np.testing.assert_allclose(read.position_m, POSITION_M, atol=1e-6)
     np.testing.assert_allclose(read.tracker_from_station, YAW_90, atol=1e-7)
-    assert not read.doubtful.any()
+    assert not read.suspect.any()
     assert np.isnan(read.measured_s).all()
     assert read.quality.tolist() == [1.0]
 
@@ -131,7 +131,7 @@ def test_numbers_that_cannot_be_are_doubtful(field: str, value: float) -> None:
     table = encode_records(items.STANDARD_LIST, np.frombuffer(b"12", np.uint8), said, CENTIMETRES)
     table[field][1] = value
     read = decode_readings(table, np.zeros(2), b"12", CENTIMETRES)
-    assert read.doubtful.tolist() == [False, True]
+    assert read.suspect.tolist() == [False, True]
 
 
 def test_microseconds() -> None:
@@ -152,7 +152,7 @@ def test_what_was_said_is_what_is_read(codes: tuple[int, ...], rng: np.random.Ge
     assert bytes(b"123"[row] for row in read.station) == stations.tobytes()
     assert np.abs(read.position_m - said.position_m).max() < (3.0 / 8192 if coarse else 1e-6)
     assert rotations.angle_between_rad(read.tracker_from_station, turn).max() < (1e-3 if coarse else 2e-6)
-    assert not read.doubtful.any()
+    assert not read.suspect.any()
     if 21 in codes:
         assert np.abs(read.measured_s - said.measured_s).max() < 1e-5
     if 40 in codes:

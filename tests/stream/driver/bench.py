@@ -33,7 +33,7 @@ def swaying(stations: int, rate_hz: float = 50.0) -> DeviceSamples:
     return DeviceSamples(
         stations=NAMES[:stations],
         rate_hz=rate_hz,
-        first_lap=count,
+        take_frames=count,
         taken_s=taken_s,
         ready_s=0.002,
         device_s=taken_s,
@@ -205,16 +205,16 @@ class Notes:
         self.events: list[LineEvent] = []
         self.times_s: list[float] = []
 
-    def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+    def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         self.got += data
         self.times_s.append(monotonic_s)
 
-    def sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+    def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         self.said += data
         self.times_s.append(monotonic_s)
 
-    def configured(self, wire: WireFormat) -> None:
+    def on_configured(self, wire: WireFormat) -> None:
         self.formats.append((len(self.got), len(self.said), wire))
 
-    def happened(self, event: LineEvent) -> None:
+    def on_event(self, event: LineEvent) -> None:
         self.events.append(event)

@@ -342,11 +342,11 @@ def test_what_a_witness_wrote_down_gives_the_same_frames() -> None:
     sessions, replayed = ContinuousFrameReader(), list[TrackerFrame]()
 
     class Replaying(Notes):
-        def received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
-            replayed.extend(sessions.received(data, monotonic_s) if data else sessions.expire(monotonic_s))
+        def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+            replayed.extend(sessions.feed(data, monotonic_s) if data else sessions.expire(monotonic_s))
 
-        def configured(self, wire: Any) -> None:
-            replayed.extend(sessions.configured(wire, bench.now_s))
+        def on_configured(self, wire: Any) -> None:
+            replayed.extend(sessions.begin_session(wire, bench.now_s))
 
     with Is900("bench", witness=Replaying(), host=bench.host) as stream:
         frames = frames_for(stream, bench, 16.0)

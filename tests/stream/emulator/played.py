@@ -20,7 +20,7 @@ def samples(stations: int = 4, rate_hz: float = 50.0, instants: int = 100, turn:
     return DeviceSamples(
         stations=NAMES[:stations],
         rate_hz=rate_hz,
-        first_lap=instants,
+        take_frames=instants,
         taken_s=taken_s,
         ready_s=0.004,
         device_s=5.0 + (1.0 + 20e-6) * taken_s,

@@ -82,20 +82,20 @@ def test_the_clock_counts_samples_from_zero() -> None:
 
 def test_laps_follow_each_other_and_the_clock_goes_on() -> None:
     talk, given = Talk(), samples()
-    heard = table(talk.say(QUIET + b"MZ\rC") + talk.wait(2.5 * given.lap_s))
+    heard = table(talk.say(QUIET + b"MZ\rC") + talk.wait(2.5 * given.loop_s))
     one = heard[heard["station"] == ord("1")]
     np.testing.assert_array_equal(one["position"][0], one["position"][len(given)])
-    assert one["time"][len(given)] == np.float32(1e3 * (given.device_s[0, 0] + given.device_lap_s))
+    assert one["time"][len(given)] == np.float32(1e3 * (given.device_s[0, 0] + given.device_loop_s))
     assert np.ptp(np.diff(one["time"].astype(float))) < 0.01
 
 
 def test_a_lost_station_keeps_sending_and_one_switched_off_is_silent() -> None:
     talk = Talk()
     talk.say(QUIET)
-    talk.device.lose("2")
+    talk.device.set_lost_stations("2")
     assert table(talk.say(b"P"))["quality"].tolist() == [255, 0, 255, 255]
     assert b"TC0L00TC0" in talk.say(b"MP\r").upper()
-    talk.device.lose("")
+    talk.device.set_lost_stations("")
     assert bytes(table(talk.say(b"l2,0\rP"))["station"]) == b"134"
     assert b"TC0X00TC0" in talk.say(b"MP\r").upper()
 

@@ -71,7 +71,7 @@ def test_a_stalled_line_drops_the_oldest_and_then_goes_on() -> None:
 def test_what_is_sent_to_an_unplugged_line_is_gone() -> None:
     emulator, sent = heard(Fault("disconnect", at_s=(2.0,), lasts_s=1.0))
     assert not [one for one in sent if 2.0 <= one.due_s < 3.0]
-    assert emulator.unheard == pytest.approx(200, abs=2)
+    assert emulator.unplugged_messages == pytest.approx(200, abs=2)
     assert len(sent) == pytest.approx(4 * 50 * 9, abs=8)
     unplugged = Emulator(samples(), EmulatorConfig(faults=(Fault("disconnect", at_s=(0.0,), lasts_s=1.0),)), 0.0)
     unplugged.receive(SET_UP, 0.5)
@@ -107,7 +107,7 @@ def test_another_firmware_knows_no_quality() -> None:
 
 def test_random_spells_come_as_often_as_asked_and_never_two_at_once() -> None:
     faults = FaultInjector([Fault("stall", per_minute=6.0, lasts_s=2.0)], 1, 100.0)
-    spells = faults.begun(100.0 + 3600.0)
+    spells = faults.pop_started(100.0 + 3600.0)
     assert 60 * 6 * 0.7 < len(spells) < 60 * 6 * 1.0
     assert all(a.to_s <= b.from_s for a, b in itertools.pairwise(spells))
     assert spells[0].from_s > 100.0

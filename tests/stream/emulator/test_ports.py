@@ -110,7 +110,7 @@ def test_unplugged_the_pty_goes_dead_and_comes_back(link: Path) -> None:
         os.write(client, b"S")
         assert hear(client, 55)[:3] == b"21S"
         os.close(client)
-        assert [spell.fault.kind for spell in served.emulator.spells] == ["disconnect"]
+        assert [spell.fault.kind for spell in served.emulator.episodes] == ["disconnect"]
     assert not os.path.lexists(link)
 
 

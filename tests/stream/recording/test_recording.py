@@ -48,18 +48,18 @@ def entries(data: bytes) -> tuple[list[RecordingBlock], list[DamagedSpan]]:
 def written(path: Path) -> Path:
     """A small recording with something of everything."""
     with RecordingWriter(path, {"source": "a test"}) as writer:
-        writer.sent(b"c", 1.0, 101.0)
-        writer.configured(FOUR, 1.1, 101.1)
-        writer.sent(b"C", 1.2, 101.2)
-        writer.received(b"01 ", 1.3, 101.3)
-        writer.happened(LineEvent("unplugged", 1.35, 101.35, "the port is gone"))
-        writer.received(b"02 ", 1.4, 101.4)
+        writer.on_sent(b"c", 1.0, 101.0)
+        writer.on_configured(FOUR, 1.1, 101.1)
+        writer.on_sent(b"C", 1.2, 101.2)
+        writer.on_received(b"01 ", 1.3, 101.3)
+        writer.on_event(LineEvent("unplugged", 1.35, 101.35, "the port is gone"))
+        writer.on_received(b"02 ", 1.4, 101.4)
     return path
 
 
 def test_what_was_written_is_read(tmp_path: Path) -> None:
     recording = read_recording(written(tmp_path / "a.rec"))
-    assert recording.lost == ()
+    assert recording.damage == ()
     assert recording.note == {"source": "a test"}
     assert recording.formats == (FOUR,)
     assert recording.events == [{"monotonic_s": 1.35, "kind": "unplugged", "text": "the port is gone"}]
@@ -82,15 +82,15 @@ def test_any_bytes_at_any_time_come_back(data: bytes, monotonic_s: float, wall_s
 def test_a_format_says_all_that_a_reader_needs(tmp_path: Path) -> None:
     odd = WireFormat(("head", "torso"), 75.0, (18, 20, 21), RecordFormat(0.0254, 1e-6, binary=False), b"2A")
     with RecordingWriter(tmp_path / "a.rec") as writer:
-        writer.configured(odd)
+        writer.on_configured(odd)
     assert read_recording(tmp_path / "a.rec").formats == (odd,)
 
 
 def test_more_than_a_block_holds_is_cut_in_two(tmp_path: Path) -> None:
     data = os.urandom(MAX_PAYLOAD_BYTES + 5)
     with RecordingWriter(tmp_path / "a.rec") as writer:
-        writer.configured(FOUR, 1.0, 2.0)
-        writer.received(data, 1.0, 2.0)
+        writer.on_configured(FOUR, 1.0, 2.0)
+        writer.on_received(data, 1.0, 2.0)
     read = [b for b in read_recording(tmp_path / "a.rec").blocks() if b.kind == RECEIVED]
     assert [len(b.payload) for b in read] == [MAX_PAYLOAD_BYTES, 5]
     assert b"".join(b.payload for b in read) == data
@@ -109,7 +109,7 @@ def test_cut_at_any_byte_it_opens_and_says_what_was_lost(tmp_path: Path) -> None
         kept = sum(end <= cut for end in ends[1:])
         assert list(recording.blocks()) == every[:kept]
         begin = ends[kept] if cut >= len(FILE_HEADER) else 0
-        assert [f"the last {cut - begin} bytes" in lost for lost in recording.lost] == [True] * (cut > begin)
+        assert [f"the last {cut - begin} bytes" in lost for lost in recording.damage] == [True] * (cut > begin)
 
 
 @given(at=st.integers(0, len(WHOLE) - 1), flip=st.integers(1, 255))
@@ -143,7 +143,7 @@ def test_damage_in_the_middle_is_named_by_place_and_time(tmp_path: Path) -> None
     at = data.index(b"01 ")
     data[at] ^= 1
     path.write_bytes(data)
-    (lost,) = read_recording(path).lost
+    (lost,) = read_recording(path).damage
     assert "damaged: between 1.200 s and" in lost
 
 
@@ -153,7 +153,7 @@ def test_a_damaged_header_does_not_cost_the_rest(tmp_path: Path) -> None:
     (tmp_path / "a.rec").write_bytes(data)
     recording = read_recording(tmp_path / "a.rec")
     assert recording.formats == (FOUR,)
-    assert recording.lost == ("bytes 0 to 16 are damaged: the beginning, until 1.000 s",)
+    assert recording.damage == ("bytes 0 to 16 are damaged: the beginning, until 1.000 s",)
 
 
 def test_recording_goes_on_behind_what_is_there(tmp_path: Path) -> None:
@@ -162,14 +162,14 @@ def test_recording_goes_on_behind_what_is_there(tmp_path: Path) -> None:
     cut = path.read_bytes()[:-7]
     path.write_bytes(cut)
     with RecordingWriter(path, {"source": "another test"}) as writer:
-        writer.configured(FOUR, 5.0, 105.0)
-        writer.received(b"03 ", 5.1, 105.1)
+        writer.on_configured(FOUR, 5.0, 105.0)
+        writer.on_received(b"03 ", 5.1, 105.1)
     assert path.read_bytes()[: len(cut)] == cut
     recording = read_recording(path)
     assert [b.payload for b in recording.blocks() if b.kind == RECEIVED] == [b"01 ", b"03 "]
     assert len(recording.formats) == 2
     assert recording.note == {"source": "another test"}
-    assert len(recording.lost) == 1
+    assert len(recording.damage) == 1
 
 
 @pytest.mark.parametrize("kept", range(len(FILE_HEADER)))
@@ -177,9 +177,9 @@ def test_a_header_that_was_cut_is_completed(kept: int, tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     path.write_bytes(FILE_HEADER[:kept])
     with RecordingWriter(path) as writer:
-        writer.sent(b"c", 1.0, 2.0)
+        writer.on_sent(b"c", 1.0, 2.0)
     assert path.read_bytes().startswith(FILE_HEADER + BLOCK_MARKER)
-    assert read_recording(path).lost == ()
+    assert read_recording(path).damage == ()
 
 
 def test_nothing_happens_to_a_file_before_there_is_something_to_write(tmp_path: Path) -> None:
@@ -241,28 +241,28 @@ def test_other_stations_are_refused(tmp_path: Path) -> None:
         RecordingWriter(path) as writer,
         pytest.raises(BadFile, match="Record other stations into another file"),
     ):
-        writer.configured(WireFormat(("head",), 40.0))
+        writer.on_configured(WireFormat(("head",), 40.0))
     assert path.read_bytes() == before
 
 
 def test_two_cannot_record_into_one_file(tmp_path: Path) -> None:
     pytest.importorskip("fcntl", reason="only where the system has flock")
     with RecordingWriter(tmp_path / "a.rec") as first:
-        first.configured(FOUR, 1.0, 2.0)
+        first.on_configured(FOUR, 1.0, 2.0)
         with RecordingWriter(tmp_path / "a.rec") as second, pytest.raises(BadFile, match="Another process"):
-            second.sent(b"c", 1.0, 2.0)
+            second.on_sent(b"c", 1.0, 2.0)
     assert len(list(read_recording(tmp_path / "a.rec").blocks())) == 2
 
 
 def test_a_new_file_in_which_no_device_was_set_up_is_removed(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     with RecordingWriter(path) as writer:
-        writer.sent(b"S", 1.0, 2.0)
+        writer.on_sent(b"S", 1.0, 2.0)
         assert path.exists()
     assert not path.exists()
     before = written(path).read_bytes()
     with RecordingWriter(path) as writer:
-        writer.sent(b"S", 1.0, 2.0)
+        writer.on_sent(b"S", 1.0, 2.0)
     assert path.read_bytes().startswith(before)
 
 
@@ -272,7 +272,7 @@ def test_a_full_disk_is_said() -> None:
     writer = RecordingWriter("unused")
     writer._file = os.open("/dev/full", os.O_WRONLY)
     with pytest.raises(BadFile, match="No space left"):
-        writer.sent(b"c", 1.0, 2.0)
+        writer.on_sent(b"c", 1.0, 2.0)
     os.close(writer._file)
 
 
@@ -301,7 +301,7 @@ def test_a_killed_process_loses_at_most_the_block_it_was_writing(tmp_path: Path)
     counts = [int(b.payload) for b in recording.blocks() if b.kind == RECEIVED]
     assert counts == list(range(len(counts)))
     assert len(counts) > said
-    assert len(recording.lost) <= 1
+    assert len(recording.damage) <= 1
 
 
 def test_blocks_are_json_where_the_layout_says_so(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ def broken(tmp_path: Path) -> Path:
     """Silences, lost and damaged records, and a second set-up after a minute."""
     with RecordingWriter(tmp_path / "broken.rec") as writer:
         for begin_s in (100.0, 160.0):
-            writer.configured(FOUR, begin_s - 0.1, 1e9)
+            writer.on_configured(FOUR, begin_s - 0.1, 1e9)
             for i, at_s in enumerate((STAMPS_S - STAMPS_S[0] + begin_s).tolist()):
                 record = DATA[i * RECORD : (i + 1) * RECORD]
                 if i % 7 == 3:
@@ -55,7 +55,7 @@ def broken(tmp_path: Path) -> Path:
                     at_s += 0.5
                 if i % 11 == 5:
                     record = record[:9] + b"\xff" + record[10:]
-                writer.received(record, at_s, at_s + 1e9)
+                writer.on_received(record, at_s, at_s + 1e9)
     return tmp_path / "broken.rec"
 
 
@@ -97,10 +97,10 @@ def test_a_frame_is_given_up_when_the_driver_gave_it_up(tmp_path: Path) -> None:
     """Not when the line speaks again."""
     path = tmp_path / "a.rec"
     with RecordingWriter(path) as writer:
-        writer.configured(FOUR, 99.0, 99.0)
-        writer.received(DATA[: 5 * RECORD], 100.0, 100.0)
-        writer.received(b"", 100.0 + 2.0 / RATE_HZ, 100.0 + 2.0 / RATE_HZ)
-        writer.received(DATA[8 * RECORD :], 3600.0, 3600.0)
+        writer.on_configured(FOUR, 99.0, 99.0)
+        writer.on_received(DATA[: 5 * RECORD], 100.0, 100.0)
+        writer.on_received(b"", 100.0 + 2.0 / RATE_HZ, 100.0 + 2.0 / RATE_HZ)
+        writer.on_received(DATA[8 * RECORD :], 3600.0, 3600.0)
     stream = RecordingStream(path, 1.0)
     frames = iter(stream)
     began_s = time.monotonic()
@@ -114,9 +114,9 @@ def test_a_frame_is_given_up_when_the_driver_gave_it_up(tmp_path: Path) -> None:
 def test_closing_ends_a_wait(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     with RecordingWriter(path) as writer:
-        writer.configured(FOUR, 99.0, 99.0)
-        writer.received(DATA[: 4 * RECORD], 100.0, 100.0)
-        writer.received(DATA[4 * RECORD :], 1e6, 1e6)
+        writer.on_configured(FOUR, 99.0, 99.0)
+        writer.on_received(DATA[: 4 * RECORD], 100.0, 100.0)
+        writer.on_received(DATA[4 * RECORD :], 1e6, 1e6)
     stream = RecordingStream(path, 1.0)
     frames = iter(stream)
     next(frames)
@@ -147,9 +147,9 @@ def test_a_restart_of_the_computer_in_between_is_bridged_by_the_wall_clock(tmp_p
     path = tmp_path / "a.rec"
     for begin_s, wall_s in ((5000.0, 1e9), (7.0, 1e9 + 300.0)):
         with RecordingWriter(path) as writer:
-            writer.configured(FOUR, begin_s, wall_s)
+            writer.on_configured(FOUR, begin_s, wall_s)
             for i, at_s in enumerate((STAMPS_S - STAMPS_S[0]).tolist()):
-                writer.received(DATA[i * RECORD : (i + 1) * RECORD], begin_s + 0.1 + at_s, wall_s + 0.1 + at_s)
+                writer.on_received(DATA[i * RECORD : (i + 1) * RECORD], begin_s + 0.1 + at_s, wall_s + 0.1 + at_s)
     stream = RecordingStream(path)
     walls_s, frames = [], []
     for frame in stream:
@@ -170,7 +170,7 @@ def test_a_lost_block_costs_its_records_alone(whole: Path) -> None:
     whole.write_bytes(data)
     stream = RecordingStream(whole)
     frames = list(stream)
-    assert len(stream.recording.lost) == 1
+    assert len(stream.recording.damage) == 1
     clean = frames_of(received(DATA, STAMPS_S))
     assert [i for i, (a, b) in enumerate(zip(frames, clean, strict=True)) if not same(a, b)] == [10]
     assert frames[10].position_valid.tolist() == [False, True, True, True]
@@ -194,7 +194,7 @@ def test_cut_at_any_byte_it_plays_what_is_whole_or_says_why_not(whole: Path) -> 
 
 def test_without_a_set_up_there_is_nothing_to_play(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.rec") as writer:
-        writer.received(DATA, 1.0, 2.0)
+        writer.on_received(DATA, 1.0, 2.0)
         with pytest.raises(BadFile, match="the device was never set up in it"):
             RecordingStream(tmp_path / "a.rec")
 
@@ -210,7 +210,7 @@ def test_stations_never_change(whole: Path, tmp_path: Path) -> None:
 def test_reading_a_file_while_it_grows_gives_what_was_there(whole: Path) -> None:
     stream = RecordingStream(read_recording(whole))
     with RecordingWriter(whole) as writer:
-        writer.configured(FOUR, 1e4, 1e4)
+        writer.on_configured(FOUR, 1e4, 1e4)
     assert len(list(stream)) == len(list(stream)) == ROUNDS
 
 

@@ -45,7 +45,9 @@ def test_what_is_judged_is_never_learnt_from_and_enough(path: Path) -> None:
         assert not set(motion.test) & set(motion.examples)
     if path.stem.partition("_")[2].startswith("sensors"):
         assert (
-            len({format_station_set(made.wearing) for _, made in variants(scenario)}) == len(variants(scenario)) == 31
+            len({format_station_set(made.worn_stations) for _, made in variants(scenario)})
+            == len(variants(scenario))
+            == 31
         )
 
 

@@ -40,8 +40,8 @@ def test_the_papers_databases_have_the_frames_that_they_state() -> None:
         "all together": 65_922,
     }
     assert KIM2012.databases["boxing"] == {"boxing": 7_233}
-    assert set(LIU2011.own) <= set(LIU2011.methods)
-    assert set(KIM2012.own) <= set(KIM2012.methods)
+    assert set(LIU2011.paper_methods) <= set(LIU2011.methods)
+    assert set(KIM2012.paper_methods) <= set(KIM2012.methods)
 
 
 @pytest.mark.parametrize(("published", "claims"), [(LIU2011, 4), (KIM2012, 1)])

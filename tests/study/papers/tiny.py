@@ -39,7 +39,7 @@ def walks(study: PaperStudy) -> PaperExperiment:
     errors = {method: errors_by_clip(study.rows("walks", method=method)) for method in WALKS.methods}
     cells = {cell.method: cell for cell in study.cells("walks", clip="walking_p1_01")}
     groups = {method: errors_by_joint_group(study.cells("walks", method=method)) for method in WALKS.methods}
-    kept = study.kept("count", lambda: len(list((study.out / "walks" / "cells").iterdir())))
+    kept = study.cached_measurement("count", lambda: len(list((study.out / "walks" / "cells").iterdir())))
     return PaperExperiment(
         name="walks",
         title="Two walks",
