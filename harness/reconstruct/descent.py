@@ -672,7 +672,7 @@ class Subspace(NamedTuple):
     """(P,) what of the diagonal of A is the spring's."""
 
 
-_INITIAL_DAMPING, _MIN_DIAGONAL = 1e-3, 1e-6
+_INITIAL_SUBSPACE_DAMPING, _MIN_DIAGONAL = 1e-3, 1e-6
 """Of the first step among the postures of a space; what keeps a step of 0 where nothing was read about the ground."""
 
 
@@ -696,7 +696,7 @@ def minimise_in_subspace(
     z[3:] = project_posture(space, z[3:])
     qpos = qpos_from_posture(z[3:], z[:3])
     cost = evaluate(chain, readings, placed, qpos) + subspace_cost(space, z[3:])
-    damping = _INITIAL_DAMPING
+    damping = _INITIAL_SUBSPACE_DAMPING
     for steps in range(1, stop[2] + 1):
         normal_equations(chain, placed, hessian, descent)
         to_subspace(space, z, hessian, descent, normal, gradient)
