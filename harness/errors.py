@@ -55,6 +55,17 @@ class UnknownName(HarnessError):
         return f"no {self.kind} called {self.name!r}.{hint} Known: {', '.join(self.known) or 'none'}."
 
 
+class RenamedKey(HarnessError):
+    """A key of a scenario or study that has another name today."""
+
+    def __init__(self, where: str, old: str, new: str) -> None:
+        super().__init__(where, old, new)
+        self.where, self.old, self.new = self.args
+
+    def __str__(self) -> str:
+        return f"{self.where}: the key {self.old!r} is now called {self.new!r}. Rename it in the file."
+
+
 class ShapeError(HarnessError):
     """Arrays of one record that disagree about their sizes."""
 

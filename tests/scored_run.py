@@ -62,7 +62,7 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., storage.Cell]:
             "mount": "tibia",
             "rate_hz": RATE_HZ,
             "inputs": "pos+ori",
-            "protocol": "none",
+            "split": "none",
             "calibration": "exact",
             "noise": "clean",
             "seed": 1,

@@ -60,7 +60,7 @@ def add_live(verbs: Verbs) -> None:
     text = "window: as it moves; frames: PNG files in the folder --out"
     verb.add_argument("--view", choices=["window", "frames"], help=text)
     verb.add_argument("--out", type=Path, metavar="DIR", help="folder of --view frames")
-    verb.add_argument("--vmc", metavar="[HOST:]PORT", help="send VMC protocol by UDP; to this computer without HOST")
+    verb.add_argument("--vmc", metavar="[HOST:]PORT", help="send VMC split by UDP; to this computer without HOST")
     verb.add_argument("--lsl", metavar="NAME", help="streams NAME-qpos and NAME-joints of the Lab Streaming Layer")
     verb.add_argument("--lsl-network", action="store_true", help="announce them to the network too")
     verb.add_argument("--bvh", type=Path, metavar="FILE", help="write the motion")

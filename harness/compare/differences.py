@@ -19,7 +19,7 @@ class Difference:
     method: str
     """Or "a vs b" where two methods are compared."""
     group: str
-    """What is never pooled: inputs, protocol and whether the performer was known, as one text."""
+    """What is never pooled: inputs, split and whether the performer was known, as one text."""
     metric: str
     unit: str
     clips: tuple[str, ...]
@@ -54,7 +54,7 @@ class PairGroup:
 
     method: str
     text: str
-    """What they share besides: inputs, protocol, performer."""
+    """What they share besides: inputs, split, performer."""
     pairs: tuple[CellPair, ...]
 
     @property
@@ -63,12 +63,12 @@ class PairGroup:
 
 
 def group_pairs(pairs: Iterable[CellPair]) -> list[PairGroup]:
-    """By method, inputs, protocol and performer, in the order of the pairs."""
+    """By method, inputs, split and performer, in the order of the pairs."""
     found: dict[tuple[str, str], list[CellPair]] = {}
     for a, b in pairs:
         method = a.method if a.method == b.method else f"{a.method} vs {b.method}"
-        protocol = b.protocol if a.protocol == "none" else a.protocol
-        text = ", ".join(filter(None, (a.inputs, protocol, a.performer)))
+        split = b.split if a.split == "none" else a.split
+        text = ", ".join(filter(None, (a.inputs, split, a.performer)))
         found.setdefault((method, text), []).append((a, b))
     return [PairGroup(*name, tuple(of_it)) for name, of_it in found.items()]
 

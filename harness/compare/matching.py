@@ -10,8 +10,8 @@ from harness.results.cell import varied_text
 from harness.results.manifest import flatten
 from harness.results.reader import CellResult, ResultSet
 
-PAIRING_KEYS = ("scenario", "clip", "seed", "method", "inputs", "protocol", "noise", "varied")
-RELAXABLE_KEYS = ("scenario", "seed", "inputs", "protocol", "noise", "varied")
+PAIRING_KEYS = ("scenario", "clip", "seed", "method", "inputs", "split", "noise", "varied")
+RELAXABLE_KEYS = ("scenario", "seed", "inputs", "split", "noise", "varied")
 """Those that cells may be allowed to differ in and still pair."""
 _LEARNING_INPUTS = ("examples", "withheld")
 """Inputs of a method that learns; one that does not has none."""
@@ -35,15 +35,15 @@ def pair_cells(a: ResultSet, b: ResultSet, methods: tuple[str, str] | None, but_
     """Cells that agree in all of `PAIRING_KEYS` but for the names in `but_for`.
 
     With two `methods`, cells of the one in A and of the other in B, whatever their names; a method that learns nothing
-    (protocol "none") then pairs with any. UnknownName for a method that a side has no cell of, BadInput when two
+    (split "none") then pairs with any. UnknownName for a method that a side has no cell of, BadInput when two
     cells of a side cannot be told apart.
     """
     cells_a, cells_b = (list(_cells_of_method(side, at, methods)) for at, side in enumerate((a, b)))
     names = [name for name in PAIRING_KEYS if name not in but_for]
     if methods:
         names.remove("method")
-        if "none" in {c.protocol for c in cells_a} | {c.protocol for c in cells_b} and "protocol" in names:
-            names.remove("protocol")
+        if "none" in {c.split for c in cells_a} | {c.split for c in cells_b} and "split" in names:
+            names.remove("split")
     keyed_a, keyed_b = _cells_by_key(cells_a, names, a.title), _cells_by_key(cells_b, names, b.title)
     pairs = tuple((cell, keyed_b[key]) for key, cell in keyed_a.items() if key in keyed_b)
     return CellPairing(
@@ -115,7 +115,7 @@ def inputs_that_differ(
     found: dict[str, list[tuple[Any, Any, str]]] = {}
     for a, b in pairs:
         mine, theirs = (flatten(to_json_types(cell.defined_by)) for cell in (a, b))
-        ignored = _LEARNING_INPUTS if "none" in (a.protocol, b.protocol) and a.protocol != b.protocol else ()
+        ignored = _LEARNING_INPUTS if "none" in (a.split, b.split) and a.split != b.split else ()
         for name in {**mine, **theirs}:
             first, _, rest = name.partition(".")
             if first in ignored or (first == "metric_versions" and rest not in metrics):

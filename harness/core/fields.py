@@ -3,10 +3,10 @@
 import dataclasses
 import math
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from harness.errors import HarnessError, UnknownName
+from harness.errors import HarnessError, RenamedKey, UnknownName
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -23,9 +23,7 @@ def build(kind: type[T], content: Any, where: str) -> T:
         raise TypeError(f"{where}: expected a table, found {content!r}")
     hints = get_type_hints(kind)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
-    for key in content:
-        if key not in fields:
-            raise UnknownName(f"key in {where}", str(key), fields)
+    _refuse_unknown_keys(kind, content, fields, where)
     missing = [
         f.name
         for f in fields.values()
@@ -40,9 +38,7 @@ def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite
     """A copy of a dataclass with the given fields replaced, checked as `build` does; `infinite` allows such numbers."""
     hints = get_type_hints(type(instance))
     fields = [f.name for f in dataclasses.fields(instance) if f.init]
-    for key in content:
-        if key not in fields:
-            raise UnknownName(f"key in {where}", str(key), fields)
+    _refuse_unknown_keys(type(instance), content, fields, where)
     values: dict[str, Any] = {}
     for key, value in content.items():
         now = getattr(instance, key)
@@ -55,6 +51,16 @@ def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite
         else:
             values[key] = convert(hints[key], value, f"{where}.{key}")
     return dataclasses.replace(instance, **values)
+
+
+def _refuse_unknown_keys(kind: type, content: Mapping[str, Any], fields: Iterable[str], where: str) -> None:
+    """Raises RenamedKey for a key of `kind.RENAMED_KEYS` (old name -> new name), UnknownName for any other."""
+    renamed: Mapping[str, str] = getattr(kind, "RENAMED_KEYS", {})
+    for key in content:
+        if key in renamed:
+            raise RenamedKey(where, key, renamed[key])
+        if key not in fields:
+            raise UnknownName(f"key in {where}", str(key), fields)
 
 
 def _replace_entries(

@@ -54,9 +54,9 @@ def _text(share: float) -> str:
     return short if float(short) == share else np.format_float_positional(share)
 
 
-def select_examples(test: ClipPart, candidates: Iterable[str], protocol: Split, subjects: dict[str, str]) -> list[str]:
-    """The candidate clips that the protocol lets a method see; for `block` the test clip itself is among them."""
-    match protocol:
+def select_examples(test: ClipPart, candidates: Iterable[str], split: Split, subjects: dict[str, str]) -> list[str]:
+    """The candidate clips that the split lets a method see; for `block` the test clip itself is among them."""
+    match split:
         case "block":
             return sorted({*candidates, test.clip})
         case "sequence":
@@ -68,7 +68,7 @@ def select_examples(test: ClipPart, candidates: Iterable[str], protocol: Split, 
 def allowed_frames(closed: Iterable[ClipPart], example: str, count: int, rate_hz: float) -> list[range]:
     """The runs of frames of an example that may be learnt from: all, but for the closed parts and their guard time.
 
-    A clip that is closed whole gives nothing, whatever the protocol.
+    A clip that is closed whole gives nothing, whatever the split.
     """
     guard, first, runs = round(GUARD_S * rate_hz), 0, []
     for shut in sorted((p.frames(count) for p in closed if p.clip == example), key=lambda shut: shut.start):
@@ -86,5 +86,5 @@ def refuse_leak(closed: Iterable[ClipPart], example: str, runs: Iterable[range],
             if run.start < shut.stop + guard - 0.5 and run.stop > shut.start - guard + 0.5:
                 raise BadInput(
                     f"{part} is judged or withheld, but frames {run.start} to {run.stop} of that take are examples.",
-                    "A test clip can never be among its own examples: remove it, or use protocol block with a part.",
+                    "A test clip can never be among its own examples: remove it, or use split block with a part.",
                 )

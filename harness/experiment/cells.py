@@ -171,7 +171,7 @@ def evaluate_cell(
         mount=scenario.mount,
         rate_hz=scenario.tracker.rate_hz,
         inputs=planned.inputs,
-        protocol=scenario.motion.protocol if method.needs_examples else "none",
+        split=scenario.motion.split if method.needs_examples else "none",
         calibration=known.calibration.kind,
         noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,

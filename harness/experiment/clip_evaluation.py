@@ -98,7 +98,7 @@ class ClipEvaluation:
         return other
 
     def fit_method(self, method: Method, name: str) -> Reconstructor:
-        """The method of that name, trained once on what the protocol lets it see."""
+        """The method of that name, trained once on what the split lets it see."""
         if name not in self._fitted:
             rng = generator(self.scenario.seed, "method", registry.without_options(name))
             examples = self.examples if method.needs_examples else []
@@ -173,10 +173,10 @@ class ClipEvaluation:
 
     @cached_property
     def example_names(self) -> list[str]:
-        """The clips that the protocol and the scenario let a method learn from, wholly or in part."""
+        """The clips that the split and the scenario let a method learn from, wholly or in part."""
         motion, test = self.scenario.motion, self.part
         subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
-        names = select_examples(test, motion.examples, motion.protocol, subjects)
+        names = select_examples(test, motion.examples, motion.split, subjects)
         if motion.database == "behaviour":
             names = [name for name in names if self.source.behaviour(name) == self.behaviour]
         return [name for name in names if ClipPart(name) not in self.held_out_parts]
@@ -200,7 +200,7 @@ class ClipEvaluation:
 
     @cached_property
     def examples(self) -> list[BodyMotion]:
-        """What the protocol lets a method learn from, on the body that it goes by and at the tracker's rate."""
+        """What the split lets a method learn from, on the body that it goes by and at the tracker's rate."""
         takes, body = [], self.performer_calibration.body
         for clip in self.example_clips:
             runs = allowed_frames(self.held_out_parts, clip.name, len(clip), clip.rate_hz)
@@ -228,7 +228,7 @@ class ClipEvaluation:
         """Of the inputs, what all methods share."""
         scenario = self.scenario
         content = asdict(scenario)
-        for many in ("methods", "inputs", "name", "components", "vary", "order", "left_out", "fault", "worn"):
+        for many in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
             del content[many]
         content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
         del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]

@@ -63,7 +63,7 @@ def run(
             in_order = [ended[cell] for cell in planned if cell in ended]
             failed = {cell.cell: cell.failure for cell in in_order if cell.failure}
             keys = [cell.key for cell in in_order if not cell.failure]
-            orders = scenario.order
+            orders = scenario.expected_order
             summary = storage.write_summary(out, keys=keys, planned=len(planned), failures=failed, orders=orders)
     if failed and all(cell.refused for cell in in_order):
         raise BadInput(f"Nothing could be run. {next(iter(failed.values()))}", "")

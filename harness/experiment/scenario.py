@@ -5,7 +5,7 @@ import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 from harness.core.fields import build, replace_fields
 from harness.core.options import expand_alternatives
@@ -19,29 +19,31 @@ from harness.simulate.parameter_ranges import require_ranges
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
-_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "order", "left_out", "fault")
+_NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault")
 
 
 @dataclass(frozen=True)
 class ScenarioMotion:
     """Which clips are judged, and which may be learnt from."""
 
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"protocol": "split"}
+
     source: Literal["builtin", "cmu"]
     """`cmu` is looked up below --mocap or HARNESS_MOCAP and refused without it."""
     test: tuple[str, ...]
-    """Clip names; "13_17@0.20-0.40" is that share of the take (protocol block)."""
+    """Clip names; "13_17@0.20-0.40" is that share of the take (split block)."""
     behaviours: tuple[str, ...]
     """What the clips show: one word for all of them, or one for each."""
     examples: tuple[str, ...] = ()
-    """Clips that methods may learn from; what the protocol forbids is left out clip by clip."""
+    """Clips that methods may learn from; what the split forbids is left out clip by clip."""
     withheld: tuple[str, ...] = ()
-    """Clips and parts of clips that nothing is learnt from under any protocol, nor within 1 s of them: the test clips,
+    """Clips and parts of clips that nothing is learnt from under any split, nor within 1 s of them: the test clips,
     while constants are chosen on others."""
     thin_to: int = 0
     """Keep so many frames of all examples together, evenly spaced: a sparse database (Kim et al. 2012); 0 keeps all."""
     database: Literal["all", "behaviour"] = "all"
     """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
-    protocol: Literal["block", "sequence", "subject"] = "sequence"
+    split: Literal["block", "sequence", "subject"] = "sequence"
     body: Literal["own", "standard", "common"] = "own"
     """Judge on the performer's own proportions; or on the mean skeleton, `standard` with bones that point as the
     performer's do, `common` with the recorded angles kept and the root's path scaled by the legs."""
@@ -86,6 +88,8 @@ class CalibrationSettings:
 class Scenario:
     """One experiment: every test clip, with every method and every choice of inputs."""
 
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"order": "expected_order"}
+
     name: str
     motion: ScenarioMotion
     stations: dict[str, Station]
@@ -116,7 +120,7 @@ class Scenario:
     vary: dict[str, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
     or with each combination of them when there are several keys."""
-    order: tuple[ExpectedOrder, ...] = ()
+    expected_order: tuple[ExpectedOrder, ...] = ()
     """What a paper expects of the errors (see `harness.results.expected_orders`)."""
     left_out: dict[str, str] = field(default_factory=dict)
     """Clips, behaviours or experiments that are not here though one would expect them, and why: for the record."""
@@ -265,7 +269,7 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
 
 def check_expected_orders(path: Path, scenario: Scenario) -> None:
     """That the orders a file states are of what it runs; BadFile. Whoever replaces its methods need not mind them."""
-    for order in scenario.order:
+    for order in scenario.expected_order:
         where, what, known = f"the order of {order.source!r}", "methods", scenario.methods
         if order.inputs:
             what, known = "inputs", scenario.inputs

@@ -52,7 +52,7 @@ class TrackerSession:
     @property
     def calibration_noise(self) -> Noise:
         """What goes wrong while calibrating too."""
-        return replace(self.noise, slip=(), displaced=(), turned=(), lost=())
+        return replace(self.noise, mount_slip=(), position_offset=(), orientation_offset=(), lost=())
 
     def make_pose_take(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> BodyMotion:
         """The performer holding configurations (55,), at the world's origin and facing x to begin with.

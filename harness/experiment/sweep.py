@@ -22,7 +22,7 @@ from harness.results.manifest import Manifest
 from harness.results.table import compute_group_statistics, write_table
 from harness.score.metrics import VERSIONS
 
-_CIRCUMSTANCE_KEYS = ("name", "methods", "order", "left_out", "fault")
+_CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault")
 
 
 def run_sweep(

@@ -132,7 +132,7 @@ def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:
         methods=methods or scenario.methods,
         inputs=sweep.inputs or scenario.inputs,
         vary=_merge_vary(scenario.vary, sweep.vary),
-        order=(),
+        expected_order=(),
         left_out={},
         fault=(),
     )

@@ -45,7 +45,7 @@ class Method(Protocol):
 
     @property
     def needs_examples(self) -> bool:
-        """Whether `fit` learns from other takes; without it the result's protocol is "none"."""
+        """Whether `fit` learns from other takes; without it the result's split is "none"."""
         ...
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Reconstructor:

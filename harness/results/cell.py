@@ -31,7 +31,7 @@ IDENTITY = (
     "mount",
     "rate_hz",
     "inputs",
-    "protocol",
+    "split",
     "calibration",
     "noise",
     "seed",
@@ -66,7 +66,7 @@ class Cell:
     mount: str
     rate_hz: float
     inputs: str
-    protocol: str
+    split: str
     calibration: str
     noise: str
     seed: int

@@ -20,7 +20,7 @@ from harness.results.cell import IDENTITY, TRAILING_COLUMNS, read_row
 from harness.score.metrics import DEFINITIONS
 
 INDEX_FILE = "index.sqlite"
-TEXTS = ("scenario", "clip", "behaviour", "method", "inputs", "protocol", "performer", "calibration", "noise")
+TEXTS = ("scenario", "clip", "behaviour", "method", "inputs", "split", "performer", "calibration", "noise")
 """Columns to choose by, besides `seed`."""
 _COLUMNS = ("key", *TEXTS, "seed", "varied", "seconds", *DEFINITIONS, "rest")
 _ROW_KEYS = (*IDENTITY, *DEFINITIONS, *TRAILING_COLUMNS, "seconds")

@@ -29,7 +29,7 @@ class Manifest:
     """Of one run."""
 
     inputs: Mapping[str, Any]
-    """Motion, body, stations, mounts, rate, protocol, examples, calibration, noise, seed."""
+    """Motion, body, stations, mounts, rate, split, examples, calibration, noise, seed."""
     metric_versions: Mapping[str, int]
     circumstances: Mapping[str, Any]
     """Methods, command, source hash, commit, versions, platform."""
@@ -61,7 +61,7 @@ def describe_run(
 
     Methods, their `constants`, orders and what was left out are circumstances, all else is input.
     """
-    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "order", "left_out")}
+    inputs = {name: value for name, value in scenario.items() if name not in ("methods", "expected_order", "left_out")}
     return Manifest(
         inputs={**inputs, "motion_source": motion_source},
         metric_versions=VERSIONS,

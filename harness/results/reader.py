@@ -18,7 +18,7 @@ BASELINES = Path("results/baselines")
 CELLS_FILE = "cells.json"
 """Of a baseline (see `baseline.save`)."""
 SCHEMA = 1
-_TEXTS = ("scenario", "clip", "method", "inputs", "protocol", "noise", "behaviour", "performer")
+_TEXTS = ("scenario", "clip", "method", "inputs", "split", "noise", "behaviour", "performer")
 _KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
 COUNT_METRICS = ("frames_matched", "frames_expected")
 _ADVICE = "Run, or save, it again."
@@ -33,7 +33,7 @@ class CellResult:
     seed: int
     method: str
     inputs: str
-    protocol: str
+    split: str
     noise: str
     varied: Mapping[str, Any]
     """Scenario key -> value, of the keys that the scenario varies."""

@@ -41,7 +41,7 @@ class Recovery:
 
     method: str
     inputs: str
-    protocol: str
+    split: str
     behaviour: str
     clip: str
     disturbance: str
@@ -94,7 +94,7 @@ class RecoveryCollector:
         same = {name: value for name, value in cell.defined_by.items() if name != "disturbance"}
         kind = disturbance["kind"]
         settings = {name: value for name, value in disturbance.items() if name not in ("kind", "begins_s", "ends_s")}
-        names = ("method", "inputs", "protocol", "behaviour", "clip")
+        names = ("method", "inputs", "split", "behaviour", "clip")
         pair = json.dumps(to_json_types({"method": cell.method, "same": same, "settings": settings}), sort_keys=True)
         seen = (cell.position_valid | cell.orientation_valid).sum(axis=1)
         self._courses.setdefault(pair, {})[kind] = _CellErrors(
@@ -179,7 +179,7 @@ def _status_is_correct(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
 
 
 def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of `summary.json`'s rows: one for each method, inputs and protocol, clips pooled.
+    """Of `summary.json`'s rows: one for each method, inputs and split, clips pooled.
 
     Each has `clips`, `undisturbed_deg`, `status_right` (the least) and, under `after`, disturbance -> `ratio` of the
     means over clips, `worst` ratio of a single clip, how many times as large the error is `during` it (mean over
@@ -188,9 +188,9 @@ def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
-        groups.setdefault((row["method"], row["inputs"], row["protocol"]), []).append(row)
+        groups.setdefault((row["method"], row["inputs"], row["split"]), []).append(row)
     found = []
-    for (method, inputs, protocol), group in groups.items():
+    for (method, inputs, split), group in groups.items():
         after: dict[str, Any] = dict.fromkeys(row["disturbance"] for row in group)
         known = [row for row in group if row["judged"]]
         for kind in dict.fromkeys(row["disturbance"] for row in known):
@@ -207,7 +207,7 @@ def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]
             {
                 "method": method,
                 "inputs": inputs,
-                "protocol": protocol,
+                "split": split,
                 "clips": len({row["clip"] for row in known}),
                 "undisturbed_deg": _mean(known, "undisturbed_deg") if known else None,
                 "status_right": min((row["status_right"] for row in known), default=None),

@@ -134,7 +134,7 @@ def write_summary(
         "methods": methods.rows(),
         "behaviours": behaviours.rows(),
         "recovery": recoveries.rows(),
-        "orders": evaluate_orders(orders, rows),
+        "expected_orders": evaluate_orders(orders, rows),
         "cells": rows,
     }
     write_text(out / "summary.csv", as_csv(rows))

@@ -40,7 +40,7 @@ COLUMNS = (
 )
 """Of summary.csv."""
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
-GROUP_KEYS = ("method", "inputs", "protocol", "performer", "varied")
+GROUP_KEYS = ("method", "inputs", "split", "performer", "varied")
 """Cells that differ in these are never pooled."""
 
 

@@ -20,7 +20,7 @@ LEADING_COLUMNS = (
     "behaviour",
     "method",
     "inputs",
-    "protocol",
+    "split",
     "performer",
     "calibration",
     "noise",
@@ -39,7 +39,7 @@ SUMMARY_METRICS = (
     "step_p50_ms",
 )
 """Metrics of the summary; the table has the rest."""
-TABLE_GROUP_KEYS = ("scenario", "method", "inputs", "protocol", "performer", "varied")
+TABLE_GROUP_KEYS = ("scenario", "method", "inputs", "split", "performer", "varied")
 """Cells that differ in these are never pooled."""
 
 

@@ -69,14 +69,17 @@ class Disturbance:
             case "one_off":
                 return replace(
                     noise,
-                    displaced=(*noise.displaced, PositionOffset(one, offset_m=forward_offset_m(self.off_m), **within)),
+                    position_offset=(
+                        *noise.position_offset,
+                        PositionOffset(one, offset_m=forward_offset_m(self.off_m), **within),
+                    ),
                 )
             case "start_off":
                 everything = PositionOffset((), offset_m=forward_offset_m(self.start_off_m), **within)
-                return replace(noise, displaced=(*noise.displaced, everything))
+                return replace(noise, position_offset=(*noise.position_offset, everything))
             case "all_turned":
                 turned = OrientationOffset((), angle_rad=float(np.deg2rad(self.turn_deg)), **within)
-                return replace(noise, turned=(*noise.turned, turned))
+                return replace(noise, orientation_offset=(*noise.orientation_offset, turned))
 
 
 def forward_offset_m(by_m: float) -> tuple[float, float, float]:

@@ -1,6 +1,8 @@
 """How an IS-900 errs: components put together, and the named levels of docs/is900.md 13.5."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from harness.errors import UnknownName
 from harness.simulate.components.clock import Clock
@@ -26,18 +28,27 @@ NOISE_PRESETS = ("clean", "noise", "default")
 class Noise:
     """What goes wrong; None or () for what does not. Each component draws for itself, whatever else there is."""
 
-    wobble: SoftTissueArtefact | None = None
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
+        "wobble": "soft_tissue",
+        "loose": "strap_slip",
+        "slip": "mount_slip",
+        "slow": "drift",
+        "displaced": "position_offset",
+        "turned": "orientation_offset",
+    }
+
+    soft_tissue: SoftTissueArtefact | None = None
     mount: MountOffset | None = None
-    loose: StrapSlip | None = None
-    slip: tuple[MountSlip, ...] = ()
+    strap_slip: StrapSlip | None = None
+    mount_slip: tuple[MountSlip, ...] = ()
     speed: SpeedError | None = None
     session: SessionBias | None = None
-    slow: DriftNoise | None = None
+    drift: DriftNoise | None = None
     white: WhiteNoise | None = None
     excursion: Excursion | None = None
     echo: Echo | None = None
-    displaced: tuple[PositionOffset, ...] = ()
-    turned: tuple[OrientationOffset, ...] = ()
+    position_offset: tuple[PositionOffset, ...] = ()
+    orientation_offset: tuple[OrientationOffset, ...] = ()
     dropout: Dropout | None = None
     lost: tuple[LostStation, ...] = ()
     clock: Clock | None = None
@@ -45,18 +56,18 @@ class Noise:
     def apply(self, sensed: SimulatedReadings) -> None:
         """Let every component do its work, in the order of the fields: from the body outwards to the device."""
         for component in (
-            self.wobble,
+            self.soft_tissue,
             self.mount,
-            self.loose,
-            *self.slip,
+            self.strap_slip,
+            *self.mount_slip,
             self.speed,
             self.session,
-            self.slow,
+            self.drift,
             self.white,
             self.excursion,
             self.echo,
-            *self.displaced,
-            *self.turned,
+            *self.position_offset,
+            *self.orientation_offset,
             self.dropout,
             *self.lost,
             self.clock,
@@ -71,11 +82,11 @@ def noise_preset(name: str) -> Noise:
         case "clean":
             return Noise()
         case "noise":
-            return Noise(white=WhiteNoise(), slow=DriftNoise(), session=SessionBias(), clock=Clock())
+            return Noise(white=WhiteNoise(), drift=DriftNoise(), session=SessionBias(), clock=Clock())
         case "default":
             return Noise(
                 white=WhiteNoise(),
-                slow=DriftNoise(),
+                drift=DriftNoise(),
                 session=SessionBias(),
                 excursion=Excursion(),
                 echo=Echo(),

@@ -110,7 +110,7 @@ class RegressionGate:
         else:
             planned = load_scenario(scenario or DEFAULT_SCENARIO)
         return baseline.write_baseline(
-            self._run(replace(planned, methods=(method,), order=())), name, self.baselines, force=True
+            self._run(replace(planned, methods=(method,), expected_order=())), name, self.baselines, force=True
         )
 
     def _read(self, name: str) -> ResultSet:

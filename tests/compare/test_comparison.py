@@ -97,7 +97,7 @@ def test_clips_are_what_counts_and_their_cells_are_averaged() -> None:
 
 
 def test_known_and_new_performers_inputs_and_protocols_are_never_pooled() -> None:
-    parts = [side(), side(performer="new", seed=2), side(inputs="pos"), side(protocol="block")]
+    parts = [side(), side(performer="new", seed=2), side(inputs="pos"), side(split="block")]
     run = ResultSet("A", manifest(), tuple(c for part in parts for c in part.cells), 32)
     groups = [line.group for line in found(run, run).differences if line.gated]
     texts = ["pos+ori, sequence, known", "pos+ori, sequence, new", "pos, sequence, known", "pos+ori, block, known"]

@@ -16,7 +16,7 @@ OTHER: dict[str, Any] = {
     "seed": 2,
     "method": "mean_pose",
     "inputs": "pos",
-    "protocol": "block",
+    "split": "block",
     "noise": "clean",
     "varied": {"noise": "clean"},
 }
@@ -79,12 +79,12 @@ def test_two_methods_pair_whatever_they_are_called() -> None:
 
 
 def test_a_method_that_learns_nothing_pairs_with_any_protocol() -> None:
-    nothing, learns = cell(method="ik:previous", protocol="none"), cell(method="ik")
+    nothing, learns = cell(method="ik:previous", split="none"), cell(method="ik")
     run = of(nothing, learns)
     (pair,) = pair_cells(run, run, ("ik:previous", "ik"), ()).pairs
     assert inputs_that_differ([pair], ["mpjpe_mm"]) == {}
-    assert not pair_cells(of(nothing), of(replace(nothing, protocol="sequence")), None, ()).pairs
-    block = replace(learns, protocol="block", method="mean_pose")
+    assert not pair_cells(of(nothing), of(replace(nothing, split="sequence")), None, ()).pairs
+    block = replace(learns, split="block", method="mean_pose")
     assert not pair_cells(of(learns), of(block), ("ik", "mean_pose"), ()).pairs
 
 

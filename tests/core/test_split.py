@@ -1,4 +1,4 @@
-"""A test clip is never among its own examples, under any protocol."""
+"""A test clip is never among its own examples, under any split."""
 
 import pytest
 from hypothesis import given

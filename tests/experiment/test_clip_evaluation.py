@@ -142,7 +142,7 @@ def test_a_level_that_the_code_redefines_is_another_input(monkeypatch: pytest.Mo
 def test_a_part_is_warmed_up_on_what_comes_before_it() -> None:
     """The second before a block is guarded, so no method has learnt from it, and the whole block is scored."""
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
-    scenario = replace(SCENARIO, motion=replace(SCENARIO.motion, longest_s=0.0, protocol="block"))
+    scenario = replace(SCENARIO, motion=replace(SCENARIO.motion, longest_s=0.0, split="block"))
     part = ClipPart("walking_p1_01", 0.4, 0.6)
     setting = ClipEvaluation(scenario, source, part, "walking")
     block = part.frames(len(setting.full_take))

@@ -55,12 +55,12 @@ def test_a_run_measures_every_cell(tmp_path: Path) -> None:
     assert set(found) == {(m, c) for m in SMALL.methods for c in SMALL.motion.test}
     for (method, _), row in found.items():
         assert row["motion_source"] == "built-in performer"
-        assert row["protocol"] == ("none" if method == "ik:previous" else "sequence")
+        assert row["split"] == ("none" if method == "ik:previous" else "sequence")
         assert row["frames_matched"] == row["frames_expected"]
         assert 0.5 < row["joint_angle_mean_deg"] < 30.0
     header = (out / "summary.csv").read_text().splitlines()[0]
     assert header.startswith(
-        "method,behaviour,clip,motion_source,stations,mount,rate_hz,inputs,protocol,calibration,noise,seed,"
+        "method,behaviour,clip,motion_source,stations,mount,rate_hz,inputs,split,calibration,noise,seed,"
         "frames_matched,frames_expected,joint_angle_mean_deg,joint_angle_rms_deg,mpjre_deg,mpjpe_mm,mpjpe_root_mm,"
         "jitter_m_s3,step_p50_ms,step_p99_ms,fps"
     )
@@ -83,8 +83,8 @@ def test_a_run_goes_on_where_it_was(tmp_path: Path) -> None:
 def test_expected_orders_are_judged_and_are_no_part_of_what_a_run_is(tmp_path: Path) -> None:
     out = tmp_path / "run"
     expected = ExpectedOrder("nobody", methods=SMALL.methods)
-    engine.run(replace(SMALL, order=(expected,)), out)
-    walking, boxing = read_summary(out)["orders"]
+    engine.run(replace(SMALL, expected_order=(expected,)), out)
+    walking, boxing = read_summary(out)["expected_orders"]
     assert (walking["behaviour"], boxing["behaviour"], boxing["clips"]) == ("walking", "boxing", 1)
     errors = [row["joint_angle_mean_deg"] for row in rows(out) if row["behaviour"] == "boxing"]
     assert boxing["means_deg"] == errors
@@ -93,7 +93,7 @@ def test_expected_orders_are_judged_and_are_no_part_of_what_a_run_is(tmp_path: P
     made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     engine.run(SMALL, out)
     assert {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()} == made
-    assert read_summary(out)["orders"] == []
+    assert read_summary(out)["expected_orders"] == []
 
 
 def test_another_run_is_never_written_over(tmp_path: Path) -> None:
@@ -251,10 +251,10 @@ def test_what_is_all_warm_up_is_refused(tmp_path: Path) -> None:
         engine.run(replace(SMALL, motion=replace(SMALL.motion, longest_s=1.0)), tmp_path / "run")
 
 
-@pytest.mark.parametrize("protocol", ["sequence", "subject", "block"])
-def test_a_whole_clip_is_never_its_own_example(tmp_path: Path, protocol: Any) -> None:
+@pytest.mark.parametrize("split", ["sequence", "subject", "block"])
+def test_a_whole_clip_is_never_its_own_example(tmp_path: Path, split: Any) -> None:
     own = replace(SMALL.motion, test=("walking_p1_01",), behaviours=("walking",), examples=("walking_p1_01",))
-    scenario = replace(SMALL, motion=replace(own, protocol=protocol), methods=("mean_pose",))
+    scenario = replace(SMALL, motion=replace(own, split=split), methods=("mean_pose",))
     with pytest.raises(BadInput, match="examples"):
         engine.run(scenario, tmp_path / "run")
 
@@ -367,7 +367,7 @@ def test_real_motion_runs_the_same_way(tmp_path: Path, mocap: Path) -> None:
     assert engine.run(scenario, tmp_path / "run", folder=mocap) is Outcome.PASS
     found = {str(row["method"]): row for row in rows(tmp_path / "run")}
     assert found["ik"]["motion_source"] == "cmu"
-    assert found["best_match"]["protocol"] == "block"
+    assert found["best_match"]["split"] == "block"
     assert all(row["joint_angle_mean_deg"] is not None for row in rows(tmp_path / "run"))
     assert os.path.exists(tmp_path / "run" / "summary.csv")
 

@@ -94,7 +94,7 @@ def make_cell(
         mount="tibia",
         rate_hz=RATE_HZ,
         inputs=inputs,
-        protocol="none" if method == "ik" else "sequence",
+        split="none" if method == "ik" else "sequence",
         calibration="exact",
         noise="default",
         seed=1,

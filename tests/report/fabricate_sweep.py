@@ -75,7 +75,7 @@ def _row(
         "behaviour": scenario,
         "method": method,
         "inputs": "pos+ori",
-        "protocol": "none" if method == "ik" else "sequence",
+        "split": "none" if method == "ik" else "sequence",
         "performer": plan.performers[clip % len(plan.performers)],
         "noise": "default",
         "seed": seed,

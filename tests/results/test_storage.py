@@ -19,7 +19,7 @@ from harness.results import storage
 
 MakeCell = Callable[..., storage.Cell]
 ISSUE_COLUMNS = (
-    "method,behaviour,clip,motion_source,stations,mount,rate_hz,inputs,protocol,calibration,noise,seed,"
+    "method,behaviour,clip,motion_source,stations,mount,rate_hz,inputs,split,calibration,noise,seed,"
     "frames_matched,frames_expected,joint_angle_mean_deg,joint_angle_rms_deg,mpjre_deg,mpjpe_mm,mpjpe_root_mm,"
     "jitter_m_s3,step_p50_ms,step_p99_ms,fps"
 )
@@ -111,7 +111,7 @@ def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, ma
 
 
 def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: MakeCell) -> None:
-    cells = [make_cell(0.01 * n, clip=f"c{n}", inputs=i, protocol=p) for n, (i, p) in
+    cells = [make_cell(0.01 * n, clip=f"c{n}", inputs=i, split=p) for n, (i, p) in
              enumerate([("pos", "block"), ("pos", "subject"), ("pos+ori", "block")])]  # fmt: skip
     for cell in cells:
         storage.write_cell(run_folder, cell)

@@ -300,7 +300,7 @@ def test_displaced_stations_are_off_for_a_while_and_by_so_much(still: Still) -> 
     np.testing.assert_allclose(moved_m[off], np.tile([0.0, -0.3, 0.1], (off.sum(), 1)), atol=1e-12)
     assert np.abs(moved_m[~off]).max() == np.abs(turned_rad).max() == 0.0
     assert (seen.quality == 1.0).all()  # it does not know
-    np.testing.assert_array_equal(seen.affected["displaced"], off)
+    np.testing.assert_array_equal(seen.affected["position_offset"], off)
     with pytest.raises(UnknownName, match="'s9'"):
         PositionOffset(("s9",)).apply(seen)
     with pytest.raises(BadInput, match="to_s"):
@@ -315,7 +315,7 @@ def test_turned_stations_face_elsewhere_for_a_while_and_stay_in_place(still: Sti
     np.testing.assert_allclose(turned_rad[off], np.tile([0.0, 0.0, 0.5], (off.sum(), 1)), atol=1e-12)
     assert np.abs(turned_rad[~off]).max() < 1e-12
     assert np.abs(moved_m).max() == 0.0
-    np.testing.assert_array_equal(seen.affected["turned"], off)
+    np.testing.assert_array_equal(seen.affected["orientation_offset"], off)
     with pytest.raises(UnknownName, match="'s9'"):
         OrientationOffset(("s9",)).apply(seen)
 
@@ -371,7 +371,7 @@ def test_more_stations_leave_the_draws_of_the_others_alone(still: Still) -> None
         np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[:, :2])
 
 
-@pytest.mark.parametrize("left_out", ["white", "slow", "session", "excursion", "echo", "dropout", "speed", "clock"])
+@pytest.mark.parametrize("left_out", ["white", "drift", "session", "excursion", "echo", "dropout", "speed", "clock"])
 def test_one_component_less_leaves_the_draws_of_the_others_alone(still: Still, left_out: str) -> None:
     """Each component alone does what it does among all: contributions to the position add up."""
 
@@ -402,14 +402,14 @@ def test_levels_are_the_table_of_the_protocol() -> None:
     """docs/is900.md 13.5, number by number."""
     assert noise_preset("clean") == Noise()
     noise, default = noise_preset("noise"), noise_preset("default")
-    assert {name for name, part in vars(noise).items() if part} == {"white", "slow", "session", "clock"}
+    assert {name for name, part in vars(noise).items() if part} == {"white", "drift", "session", "clock"}
     assert {name for name, part in vars(default).items() if part} == {
-        *("white", "slow", "session", "clock"),
+        *("white", "drift", "session", "clock"),
         *("excursion", "echo", "dropout", "speed"),
     }
     deg = np.pi / 180.0
     assert default.white == WhiteNoise(0.00075, 0.05 * deg)
-    assert default.slow == DriftNoise(0.0015, 0.25 * deg, 0.5 * deg, 1.0)
+    assert default.drift == DriftNoise(0.0015, 0.25 * deg, 0.5 * deg, 1.0)
     assert default.session == SessionBias(0.001, 0.001)
     assert default.excursion == Excursion(1.0, (0.005, 0.03), (1.0, 5.0), 0.2)
     assert default.echo == Echo(0.03, (1, 8), (0.05, 0.30))

@@ -133,7 +133,7 @@ def test_a_tracker_that_cannot_be_is_told_by_its_key(key: str, value: Any) -> No
         TrackerConfig(**{key: value})
 
 
-@pytest.mark.parametrize("noise", [Noise(lost=(LostStation("haed"),)), Noise(slip=(MountSlip("haed"),))])
+@pytest.mark.parametrize("noise", [Noise(lost=(LostStation("haed"),)), Noise(mount_slip=(MountSlip("haed"),))])
 def test_faults_of_stations_that_are_not_worn_are_refused(boxer: Boxer, noise: Noise) -> None:
     with pytest.raises(UnknownName, match="Did you mean 'head'"):
         simulate_tracker(*boxer, worn(), TrackerConfig(), noise, seed=1)

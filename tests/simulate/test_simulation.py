@@ -193,7 +193,7 @@ def test_a_slipped_strap_is_a_tracker_mounted_elsewhere(boxer: Boxer) -> None:
     slip = MountSlip("left_ankle", around_rad=0.5, along_m=-0.03)
     length_m = body.skeleton.length_m[body.skeleton.index(shin.bone)]
     elsewhere = dataclasses.replace(shin, around_rad=shin.around_rad + 0.5, along=shin.along - 0.03 / length_m)
-    slipped = simulate_tracker(body, take, [shin], TrackerConfig(), Noise(slip=(slip,)), seed=1)
+    slipped = simulate_tracker(body, take, [shin], TrackerConfig(), Noise(mount_slip=(slip,)), seed=1)
     there = simulate_tracker(body, take, [elsewhere], TrackerConfig(), Noise(), seed=1)
     gap = column(slipped, "position_m") - column(there, "position_m")
     assert np.abs(gap).max() < 1e-6

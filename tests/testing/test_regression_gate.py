@@ -27,7 +27,7 @@ from tests.testing import upright
 
 pytest_plugins = ["pytester"]
 
-TINY = replace(load_scenario("demo"), name="tiny", methods=(), order=())
+TINY = replace(load_scenario("demo"), name="tiny", methods=(), expected_order=())
 SMALL = """
 methods = ["ik"]
 noise = "clean"
@@ -232,7 +232,7 @@ def test_annotations_are_escaped_as_github_reads_them() -> None:
 
 
 def test_a_scenario_is_read_off_a_manifest_and_only_a_runs() -> None:
-    scenario = replace(load_scenario("builtin_walking"), order=())
+    scenario = replace(load_scenario("builtin_walking"), expected_order=())
     of_it = Manifest(
         **json.loads(json.dumps(manifest.describe_run(asdict(scenario), motion_source="", command="").as_dict()))
     )

@@ -146,7 +146,7 @@ def _tables_section(comparison: Comparison, lines: Sequence[Difference], rest: S
 def _verdict_section(comparison: Comparison) -> Markup:
     items = [tag("li", verdict_badge(kind), ": ", MEANINGS[kind], ".") for kind in KINDS]
     texts: list[Any] = [
-        "Cells of A and B are paired by scenario, clip, seed, method, inputs, protocol and noise. Cells of one clip "
+        "Cells of A and B are paired by scenario, clip, seed, method, inputs, split and noise. Cells of one clip "
         "are averaged first: the clip is the unit, for clips are what another study would draw anew. Known and new "
         "performers, protocols and choices of inputs are never pooled.",
         "The interval is the bias-corrected and accelerated bootstrap over clips, its level expanded for small "

@@ -70,7 +70,7 @@ def clips_of(lines: Sequence[Difference]) -> list[str]:
 
 
 def groups_vary(comparison: Comparison) -> bool:
-    """Whether lines must say which group of inputs, protocol and performer they are of."""
+    """Whether lines must say which group of inputs, split and performer they are of."""
     return len({line.group for line in comparison.differences}) > 1
 
 

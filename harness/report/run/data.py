@@ -87,7 +87,7 @@ class RunData:
 
     @cached_property
     def series(self) -> tuple[str, ...]:
-        """Names of the groups that are compared: methods, told apart by inputs, protocol, performer where they vary."""
+        """Names of the groups that are compared: methods, told apart by inputs, split, performer where they vary."""
         return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
 
     @cached_property
@@ -114,8 +114,8 @@ class RunData:
         parts = []
         if len({r["inputs"] for r in rows}) > 1:
             parts.append(str(row["inputs"]))
-        if len({r["protocol"] for r in rows if r["method"] == row["method"]}) > 1:
-            parts.append(f"protocol {row['protocol']}")
+        if len({r["split"] for r in rows if r["method"] == row["method"]}) > 1:
+            parts.append(f"split {row['split']}")
         if len({r["performer"] for r in rows}) > 1:
             parts.append(f"{row['performer'] or 'no'} performer")
         return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")

@@ -27,7 +27,7 @@ def section(summary: Mapping[str, Any]) -> Markup:
 
 
 def _by_order(summary: Mapping[str, Any]) -> list[tuple[str, list[Mapping[str, Any]]]]:
-    groups = groupby(summary.get("orders", []), key=_title)
+    groups = groupby(summary.get("expected_orders", []), key=_title)
     return [(title, list(rows)) for title, rows in groups]
 
 

@@ -136,9 +136,9 @@ def _learning(run: RunData) -> str:
     """What methods that learn were allowed to see."""
     learners: dict[str, dict[str, None]] = {}
     for row in run.summary["methods"]:
-        learners.setdefault(str(row["protocol"]), {})[str(row["method"])] = None
+        learners.setdefault(str(row["split"]), {})[str(row["method"])] = None
     without = learners.pop("none", {})
-    parts = [f"{', '.join(names)} from other motion (protocol {protocol})" for protocol, names in learners.items()]
+    parts = [f"{', '.join(names)} from other motion (split {split})" for split, names in learners.items()]
     return "; ".join([*parts, *([f"{', '.join(without)} from none"] if without else [])])
 
 

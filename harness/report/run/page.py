@@ -81,7 +81,7 @@ def _sections(content: RunContent) -> list[Section]:
             "varied",
             join(*(chart_figure(chart, 3) for chart in content.varied), parameter_effects.effect_tables(run)),
         ),
-        ("Expected orders", "orders", expected_orders.section(run.full_summary)),
+        ("Expected orders", "expected_orders", expected_orders.section(run.full_summary)),
         ("Calibration", "calibration", join(calibration_errors.section(cells), calibration_cost.section(cells))),
         ("Results", "results", tables.results_tables(run) if measured else nothing),
         ("Recovery", "recovery", recovery.section(run.summary)),

@@ -24,10 +24,10 @@ def table_rows(summary: Mapping[str, Any]) -> list[list[str]]:
         return []
     kinds = list(dict.fromkeys(kind for row in rows for kind in row["after"]))
     inputs = ["inputs"] if len({row["inputs"] for row in rows}) > 1 else []
-    found = [["method", *inputs, "protocol", "clips", "undisturbed [deg]", *kinds, "status right"]]
+    found = [["method", *inputs, "split", "clips", "undisturbed [deg]", *kinds, "status right"]]
     for row in rows:
         ratios = [_format_ratio(row["after"].get(kind)) for kind in kinds]
-        names = [row["method"], *(row[name] for name in inputs), row["protocol"], str(row["clips"])]
+        names = [row["method"], *(row[name] for name in inputs), row["split"], str(row["clips"])]
         found.append(
             [
                 *names,

@@ -70,7 +70,7 @@ def _link_loss(cells: Sequence[Mapping[str, Any]]) -> list[str]:
 def _varying_columns(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     """Protocol always (examples decide much); inputs, performer and varied values where there is a choice."""
     choices = {name: {_format_cell(cell[name]) for cell in cells} for name in ("inputs", "performer", "varied")}
-    return ["protocol", *(name for name, texts in choices.items() if len(texts) > 1)]
+    return ["split", *(name for name, texts in choices.items() if len(texts) > 1)]
 
 
 def _format_cell(value: Any) -> str:

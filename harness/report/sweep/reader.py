@@ -12,7 +12,7 @@ from harness.report.sweep.data import METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
 
-_GROUP_COLUMNS = ("inputs", "protocol", "performer")
+_GROUP_COLUMNS = ("inputs", "split", "performer")
 """Never pooled, the performer last: a method has a series for each combination of them that it has."""
 _COLUMNS = ("scenario", "clip", "method", *_GROUP_COLUMNS, "varied", *METRICS)
 

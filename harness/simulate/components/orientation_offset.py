@@ -29,4 +29,4 @@ class OrientationOffset:
     def apply(self, sensed: SimulatedReadings) -> None:
         hit = sensed.during(self.stations, self.from_s, self.to_s)
         sensed.rotate(hit[:, :, None] * np.array([0.0, 0.0, self.angle_rad]))
-        sensed.affected["turned"] = hit | sensed.affected.get("turned", False)
+        sensed.affected["orientation_offset"] = hit | sensed.affected.get("orientation_offset", False)

@@ -24,4 +24,4 @@ class PositionOffset:
     def apply(self, sensed: SimulatedReadings) -> None:
         hit = sensed.during(self.stations, self.from_s, self.to_s)
         sensed.position_m = sensed.position_m + hit[:, :, None] * self.offset_m
-        sensed.affected["displaced"] = hit | sensed.affected.get("displaced", False)
+        sensed.affected["position_offset"] = hit | sensed.affected.get("position_offset", False)

@@ -23,23 +23,23 @@ class SoftTissueArtefact:
     """A damped oscillator for each axis of a station, driven by what its place on the bone is accelerated by.
 
     Flesh of thickness h is a layer in shear: its stiffness goes with 1/h, so that a tracker gives way in proportion to
-    h, and swings at `frequency_hz` times the root of `of_flesh_m`/h; yet it never gives way by more than h. What slides
+    h, and swings at `frequency_hz` times the root of `reference_tissue_m`/h; yet it never gives way by more than h. What slides
     around the bone turns about it as well. In the rest pose it hangs where it was strapped on; other poses pull it
     elsewhere. No draws: the same motion gives the same wobble.
     """
 
     frequency_hz: float = 5.0
-    """Natural frequency along the skin over `of_flesh_m` of flesh [Hz]."""
+    """Natural frequency along the skin over `reference_tissue_m` of flesh [Hz]."""
     damping: float = 0.3
     """Share of the critical damping."""
-    of_flesh_m: float = 0.04
+    reference_tissue_m: float = 0.04
     """The thickness that `frequency_hz` is of [m]."""
 
     def __post_init__(self) -> None:
         require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), of_flesh_m=(1e-3, 0.5))
 
     def apply(self, sensed: SimulatedReadings) -> None:
-        frequency_hz = self.frequency_hz * np.sqrt(self.of_flesh_m / sensed.flesh_m)
+        frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / sensed.flesh_m)
         pace = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
         linear_m = simulate_oscillators(-sensed.force_m_s2, pace, self.damping, 1.0 / sensed.rate_hz)
         shift_m = soft_limit(linear_m, sensed.flesh_m[:, None])

@@ -40,7 +40,7 @@ def provenance_tables(study: PaperStudy) -> tuple[FindingsTable, ...]:
 def _run_row(scenario: Scenario) -> tuple[str, ...]:
     motion = scenario.motion
     setting = (
-        f"{motion.source}, protocol {motion.protocol}, body {motion.body}, calibration {scenario.calibration}, "
+        f"{motion.source}, split {motion.split}, body {motion.body}, calibration {scenario.calibration}, "
         f"noise {scenario.noise}, {scenario.tracker.rate_hz:g} Hz, seed {scenario.seed}, "
         f"stations {', '.join(scenario.worn_stations)}"
     )

@@ -241,7 +241,9 @@ def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptio
         for one in unit:
             stations[one.name] = {"bone": one.bone, "along": one.along, "around_deg": one.around_deg}
             stations[one.name]["stand_off_m"] = one.stand_off_m
-    scenario = replace(scenario, vary={}, order=(), worn=(), stations={}, inputs=(study.inputs,), methods=methods)
+    scenario = replace(
+        scenario, vary={}, expected_order=(), worn=(), stations={}, inputs=(study.inputs,), methods=methods
+    )
     for where, content in (
         ("stations", {"stations": stations}),
         ("changes", {} if elsewhere else study.changes),
@@ -253,7 +255,7 @@ def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptio
 
 
 def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
-    if strange := [key for key in ("name", "methods", "inputs", "vary", "worn", "order") if key in content]:
+    if strange := [key for key in ("name", "methods", "inputs", "vary", "worn", "expected_order") if key in content]:
         raise BadInput(f"{where}: {', '.join(strange)}.", "The study has its own.")
     try:
         return replace_fields(scenario, content, where)

@@ -10,7 +10,7 @@ from harness.report.run.charts import add_legend, draw_chart
 
 LONG = load_scenario("boxing_outliers").methods
 ALL = load_scenario("boxing").methods
-LONGER = [f"{name} (pos+torso_ori, protocol sequence, new performer)" for name in LONG]
+LONGER = [f"{name} (pos+torso_ori, split sequence, new performer)" for name in LONG]
 
 
 @pytest.mark.parametrize("names", [ALL[:3], ALL, LONG, LONGER, ["x" * 90], []])

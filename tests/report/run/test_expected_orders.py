@@ -26,7 +26,7 @@ ROWS = [
 
 
 def test_each_order_is_stated_once_with_a_line_for_each_setting() -> None:
-    assert text({"orders": ROWS})[1:] == [
+    assert text({"expected_orders": ROWS})[1:] == [
         "",
         "new < old < ik (a paper)",
         "  new 0.83 < old 0.97 < ik 2.14: holds (table tennis, pos+ori, known performers, noise=clean, 2 clips)",
@@ -43,7 +43,9 @@ def test_each_order_is_stated_once_with_a_line_for_each_setting() -> None:
 
 
 def test_the_page_says_the_same_and_keeps_text_text() -> None:
-    page = section({"orders": [*ROWS, ROW | {"source": "<b>", "holds": None, "means_deg": None, "why": ["a & b"]}]})
+    page = section(
+        {"expected_orders": [*ROWS, ROW | {"source": "<b>", "holds": None, "means_deg": None, "why": ["a & b"]}]}
+    )
     assert page.count("<table") == 3
     assert page.count("<td>does not hold</td>") == 2
     assert page.count("<li>Where old &gt; ik: because</li>") == 1
@@ -52,5 +54,5 @@ def test_the_page_says_the_same_and_keeps_text_text() -> None:
 
 
 def test_a_run_without_expectations_says_nothing() -> None:
-    assert text({"orders": []}) == text({}) == []
+    assert text({"expected_orders": []}) == text({}) == []
     assert section({}) == ""

@@ -5,7 +5,7 @@ from harness.report.run.recovery import section, text
 ROW = {
     "method": "ik",
     "inputs": "pos+ori",
-    "protocol": "none",
+    "split": "none",
     "clip": "a",
     "judged": 40,
     "disturbed_deg": 3.0,
@@ -26,7 +26,7 @@ def test_ratios_that_are_too_large_or_unknown_are_marked() -> None:
     rows.append(ROW | {"disturbance": "start_off", "judged": 0, "ratio": None, "status_right": None})
     found = text({"recovery": rows})
     head, line = found[3], found[4]
-    for word in ("method", "protocol", "clips", "undisturbed [deg]", "one_lost", "all_lost", "one_off", "status right"):
+    for word in ("method", "split", "clips", "undisturbed [deg]", "one_lost", "all_lost", "one_off", "status right"):
         assert word in head
     assert "4.00, then 1.50 (1.50)  4.00, then 1.55 (1.55) FAIL  4.00, then nan (nan) FAIL  not measured" in line
     assert line.endswith("99.50 %")

@@ -42,17 +42,21 @@ def worn_through(
     """What these trackers say of a take, with nothing else wrong."""
     trajectory, tracker = Trajectory(body, take), TrackerConfig(rate_hz=40.0, slot_s=0.0)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
-    return simulate_readings(trajectory, mounts, tracker, Noise(wobble=wobble), time_s, seed=1, take=take.name)
+    return simulate_readings(trajectory, mounts, tracker, Noise(soft_tissue=wobble), time_s, seed=1, take=take.name)
 
 
 def test_it_is_in_no_level() -> None:
-    assert all((noise_preset(name).wobble, noise_preset(name).loose) == (None, None) for name in NOISE_PRESETS)
+    assert all(
+        (noise_preset(name).soft_tissue, noise_preset(name).strap_slip) == (None, None) for name in NOISE_PRESETS
+    )
 
 
 def test_a_scenario_adds_them_by_name() -> None:
     scenario = load_scenario("demo")
-    noise = noise_of(replace(scenario, components={"wobble": {"damping": 0.5}, "loose": {}}))
-    assert noise == replace(noise_preset(scenario.noise), wobble=SoftTissueArtefact(damping=0.5), loose=StrapSlip())
+    noise = noise_of(replace(scenario, components={"soft_tissue": {"damping": 0.5}, "strap_slip": {}}))
+    assert noise == replace(
+        noise_preset(scenario.noise), soft_tissue=SoftTissueArtefact(damping=0.5), strap_slip=StrapSlip()
+    )
 
 
 def test_where_nothing_pushes_nothing_moves(still: Still) -> None:

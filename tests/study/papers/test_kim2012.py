@@ -41,7 +41,7 @@ def test_what_is_judged_is_never_learnt_from_and_enough(path: Path) -> None:
     assert len(motion.test) >= 8
     assert scenario.noise == "clean"
     assert motion.body == "common"
-    if motion.protocol == "sequence":
+    if motion.split == "sequence":
         assert not set(motion.test) & set(motion.examples)
     if path.stem.partition("_")[2].startswith("sensors"):
         assert (

@@ -48,7 +48,7 @@ class Told(PaperStudy):
                     hard = generator(1, clip).uniform(0.0, 20.0)  # for every method: paired differences do not see it
                     off = generator(1, clip, method, inputs).normal(0.0, 0.1)
                     row = {"method": method, "inputs": inputs, "behaviour": behaviour, "clip": clip, "varied": {}}
-                    row |= {"protocol": motion.protocol, "performer": "new" if clip in self.new else "known"}
+                    row |= {"split": motion.split, "performer": "new" if clip in self.new else "known"}
                     error = self.errors.get(inputs, 0.0) + self.errors.get(method, 0.0)
                     found.append({**row, "joint_angle_mean_deg": error + hard + off})
         return found

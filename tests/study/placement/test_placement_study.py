@@ -307,7 +307,7 @@ def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
     (text,) = re.findall(r"```toml\n(schema = 1\nkind = \"placement\".*?)```", page.read_text(), re.DOTALL)
     (tmp_path / "mine.toml").write_text(text)
     ready = plan_placement(tmp_path / "mine.toml", None)
-    assert ready.scenario.components == {"wobble": {}, "loose": {"share": 0.2}}
+    assert ready.scenario.components == {"soft_tissue": {}, "strap_slip": {"share": 0.2}}
     assert len(ready.groups) == 2 + 1 + 12
     assert ready.rate_hz(5) == 40.0
 
