@@ -1,9 +1,9 @@
-# Everything a newcomer needs: `make demo` and `make test` set up .venv themselves and reuse it afterwards.
+# `make demo` and `make test` set up .venv themselves and reuse it afterwards.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow gate lint compiled clean
+.PHONY: demo test test-slow gate lint docs compiled clean
 
 demo: compiled
 	$(BIN)/harness demo
@@ -14,7 +14,7 @@ test: compiled
 test-slow: compiled
 	$(BIN)/python -m pytest -m slow --hypothesis-profile=default
 
-# Whether the project's own methods are as good as they were: see CONTRIBUTING.md.
+# Compares the project's own methods with their baseline: see CONTRIBUTING.md.
 gate: compiled
 	rm -rf build/gate
 	$(BIN)/harness run gate --jobs 2 --no-report --out build/gate
@@ -24,6 +24,10 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# The site of docs/ with the API reference, in build/site. A broken link is an error.
+docs: $(VENV)/.dev
+	$(BIN)/mkdocs build --strict --quiet
 
 # Exact versions come from requirements.lock, the ranges from pyproject.toml.
 $(VENV)/.ready: pyproject.toml requirements.lock
@@ -35,7 +39,7 @@ $(VENV)/.ready: pyproject.toml requirements.lock
 compiled: $(VENV)/.compiled
 
 $(VENV)/.compiled: $(VENV)/.ready
-	@echo 'compiling the inner loops, once: about a minute'
+	@echo 'compiling the inner loops once, for about a minute'
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m harness.testing.compile_all
 	touch $@
 

@@ -1,5 +1,6 @@
-"""What the README says to type works as it stands."""
+"""The commands, code and links of the README and of the documents work."""
 
+import json
 import re
 import shlex
 import tomllib
@@ -23,17 +24,21 @@ from tests.short_demo import short_demo
 
 ROOT = Path(harness.__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+OWN_METHOD = (ROOT / "docs" / "own_method.md").read_text(encoding="utf-8")
+RESULTS = (ROOT / "results" / "README.md").read_text(encoding="utf-8")
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
 DEMO = load_scenario("demo")
 
 
 def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By the very command; `demo` is a shorter one here, a file of that name."""
     short_demo(tmp_path / "demo")
-    code, gate = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    (code,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    (gate,) = re.findall(r"```python\n(.*?)```", OWN_METHOD, re.DOTALL)
     assert len(code.splitlines()) < 40
     assert 'harness_gate("upright:Upright"' in gate  # tests/testing/test_regression_gate.py runs one
     (tmp_path / "upright.py").write_text(code)
-    command = next(c for c in re.findall(r"`harness (run demo --methods [^`]*)`", README))
+    command = next(c for c in commands(README) if c.startswith("run demo --methods"))
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(str(tmp_path))
     assert main([*shlex.split(command), "--no-report"]) == 0
@@ -41,7 +46,7 @@ def test_the_method_of_the_readme_runs_beside_the_others(tmp_path: Path, monkeyp
     assert set(methods) == {"ik", "upright:Upright", "upright:Upright+ik"}
     errors = {name: row["metrics"]["mpjpe_mm"]["mean"] for name, row in methods.items()}
     assert errors["upright:Upright+ik"] < 0.2 * errors["upright:Upright"]
-    assert main(shlex.split(next(c for c in re.findall(r"`harness (check [^`]*)`", README)))) == 0
+    assert main(shlex.split(next(c for c in commands(README) if c.startswith("check ")))) == 0
 
 
 def test_the_entry_point_of_the_readme_gives_the_method_its_name(
@@ -49,7 +54,7 @@ def test_the_entry_point_of_the_readme_gives_the_method_its_name(
 ) -> None:
     """As an installer writes it: the package's folder beside its dist-info."""
     (tmp_path / "upright.py").write_text(re.findall(r"```python\n(.*?)```", README, re.DOTALL)[0])
-    (project,) = re.findall(r"```toml\n(.*?)```", README, re.DOTALL)
+    (project,) = re.findall(r"```toml\n(.*?)```", OWN_METHOD, re.DOTALL)
     points = tomllib.loads(project)["project"]["entry-points"]
     info = tmp_path / "upright-1.0.dist-info"
     info.mkdir()
@@ -66,10 +71,10 @@ def test_the_entry_point_of_the_readme_gives_the_method_its_name(
     assert {row["method"] for row in read_summary(out)["methods"]} == {"upright"}
 
 
-def test_options_of_the_readme_are_those_of_the_method() -> None:
-    (named,) = re.findall(r"`--methods '([^']*)'`", README)
+def test_documented_options_are_those_of_the_method() -> None:
+    (named,) = re.findall(r"`--methods '([^']*)'`", OWN_METHOD)
     assert registry.resolve(named).name == named
-    for text in re.findall(r"\(`(\w+\[[^`]*\|[^`]*\])`\)", README):
+    for text in re.findall(r"\(`(\w+\[[^`]*\|[^`]*\])`\)", OWN_METHOD):
         assert [registry.resolve(name).name for name in expand_alternatives(text)] == expand_alternatives(text)
 
 
@@ -82,7 +87,7 @@ def test_options_of_the_readme_are_those_of_the_method() -> None:
 )
 def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, clip: str, behaviour: str) -> None:
     """Every figure but times, to 5 %: another machine's arithmetic may differ in the last bits."""
-    shown = README.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
+    shown = RESULTS.split("<!-- demo table -->")[1].split("<!-- end of demo table -->")[0]
     alone = replace(DEMO, motion=replace(DEMO.motion, test=(clip,), behaviours=(behaviour,)))
     assert engine.run(alone, tmp_path / "demo") is Outcome.PASS
     made = run_table(read_summary(tmp_path / "demo"))
@@ -95,15 +100,46 @@ def test_the_table_of_the_readme_is_the_demo_s(tmp_path: Path, clip: str, behavi
         np.testing.assert_allclose([float(x) for x in row[5:-1]], [float(x) for x in other[5:-1]], rtol=0.05)
 
 
-def test_every_command_of_the_readme_parses() -> None:
-    commands = re.findall(r"^    harness (.*?)(?:  +#.*)?$", README, re.MULTILINE)
-    assert len(commands) >= 4
-    for command in commands:
-        build_parser().parse_args(shlex.split(command))
+def commands(text: str) -> list[str]:
+    """What follows `harness` in every indented line of code, without its comment and redirections."""
+    return re.findall(r"^    harness (.*?)(?:  +#.*)?$", text, re.MULTILINE)
 
 
-def test_every_link_of_the_readme_leads_somewhere() -> None:
-    links = re.findall(r"\]\(([^)]+)\)", README)
-    assert links
-    for link in links:
-        assert (ROOT / link).exists(), link
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_command_of_a_page_parses(page: Path) -> None:
+    found = commands(page.read_text(encoding="utf-8"))
+    assert len(found) >= 4 or page.name != "README.md" or page.parent != ROOT
+    for command in found:
+        build_parser().parse_args(shlex.split(command.replace("\\", "/")))
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of a page's headings, as GitHub and MkDocs make them."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", title.replace("`", "").lower()).strip().replace(" ", "-") for title in titles}
+
+
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "results" / "README.md"], ids=lambda page: str(page.relative_to(ROOT)))
+def test_every_link_of_a_page_leads_somewhere(page: Path) -> None:
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if link.startswith(("http://", "https://")):
+            continue
+        file, _, anchor = link.partition("#")
+        target = (page.parent / file).resolve() if file else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
+
+
+def test_the_results_format_names_every_column(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "results-format.md").read_text(encoding="utf-8")
+    out = tmp_path / "run"
+    assert (
+        main(["run", str(short_demo(tmp_path / "demo")), "--methods", "mean_pose", "--no-report", "--out", str(out)])
+        == 0
+    )
+    header = (out / "summary.csv").read_text(encoding="utf-8").splitlines()[0].split(",")
+    (cell, *_) = (out / "cells").iterdir()
+    with np.load(cell / "frames.npz") as arrays:
+        names = [name for name in arrays.files if not name.startswith("error.")]
+    keys = [*json.loads((cell / "cell.json").read_text(encoding="utf-8")), *read_summary(out)]
+    assert [name for name in (*header, *names, *keys) if f"`{name}`" not in text] == []
