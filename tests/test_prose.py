@@ -33,7 +33,7 @@ def prose(text: str) -> str:
     lines = [line for line in text.splitlines() if not re.match(r"\s*\||    \S|\s*!\[", line)]
     text = "\n".join(lines)
     text = re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", text)
-    return re.sub(r"`[^`]*`", "code", text)
+    return re.sub(r"`[^`]*`", "CODE", text)
 
 
 def sentences(text: str) -> Iterator[str]:
