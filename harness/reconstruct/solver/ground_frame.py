@@ -13,6 +13,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Singles
+from harness.core.compiled import compiled
 
 POSTURE_SIZE = 52
 HEIGHT, TILT, HINGES = 0, slice(1, 4), slice(4, 52)
@@ -65,3 +66,17 @@ def step_grounds(ground: Floats, step: Floats) -> Floats:
     forward, left = step[..., 0], step[..., 1]
     x, y = ground[..., 0] + cosine * forward - sine * left, ground[..., 1] + sine * forward + cosine * left
     return np.stack([x, y, ground[..., 2] + step[..., 2]], axis=-1)
+
+
+@compiled
+def qpos_from_posture(posture: Floats, ground: Floats) -> Floats:
+    """The configuration (P + 3,) of one posture (P,) on a ground frame (3,): `qpos_from_postures`, compiled."""
+    out = np.empty(len(posture) + 3)
+    out[0], out[1], out[2] = ground[0], ground[1], posture[0]
+    angle = np.sqrt(posture[1] ** 2 + posture[2] ** 2 + posture[3] ** 2)
+    share = np.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    w, x, y, z = np.cos(0.5 * angle), share * posture[1], share * posture[2], share * posture[3]
+    c, s = np.cos(0.5 * ground[2]), np.sin(0.5 * ground[2])
+    out[3], out[4], out[5], out[6] = c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+    out[7:] = posture[4:]
+    return out

@@ -5,12 +5,12 @@ import pytest
 
 from harness.body.kinematics import Kinematics
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import qpos_from_posture
 from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.station_features import StationFeatures
 from harness.reconstruct.solver.ground_frame import (
     ground_from_qpos,
     posture_from_qpos,
+    qpos_from_posture,
     qpos_from_postures,
     step_grounds,
 )
