@@ -99,7 +99,7 @@ class DynamicMap:
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
         """From a database that may lie on disk."""
-        windows = database.windows(self.poses, followed=True)
+        windows = database.windows(self.poses, with_successor=True)
         index = make_index(self.index, windows, self.neighbours) if self.like == "window" else None
         return FittedDynamicMap(self, body, windows, index, mean_posture(body, database))
 

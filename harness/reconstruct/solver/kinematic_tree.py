@@ -62,7 +62,7 @@ class KinematicState(NamedTuple):
     weight: Floats
     """(2S,) precision, reduced by the robust loss."""
     jacobian: Floats
-    """(6, D) of one station at a time: linear (0 to 2) and angular (3 to 5) velocity for the direction of each depth."""
+    """(6, D) of one station at a time: linear (rows 0 to 2) and angular velocity (3 to 5) for each depth."""
 
 
 def build_tree(body: Body, bones: Sequence[int], mount_m: Floats) -> KinematicTree:

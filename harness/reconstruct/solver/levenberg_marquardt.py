@@ -17,7 +17,7 @@ from harness.reconstruct.solver.quaternion_algebra import as_tuple, quaternion_p
 
 
 class QuadraticModel(NamedTuple):
-    """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, with the arrays that its minimum needs."""
+    """A quadratic model g x + 1/2 x H x of one step x (V,), low <= x <= high, and arrays to minimise it."""
 
     hessian: Floats
     """(V, D) Gauss-Newton matrix with prior and damping."""
@@ -98,7 +98,7 @@ _INITIAL_DAMPING, DAMPING_INCREASE, DAMPING_DECREASE = 0.3, 10.0, 3.0
 _MAX_CONVERGED_DAMPING = 30.0
 """Convergence is tested below this damping only: as a prior it is 10 deg about the present pose [1/rad^2]."""
 _GOOD_GAIN_RATIO, _FAIR_GAIN_RATIO = 0.9, 0.5
-"""Ratios of actual to predicted decrease: the Gauss-Newton model suffices from the first, damping falls from the second."""
+"""Ratios of actual to predicted decrease: above the first Gauss-Newton suffices, above the second the damping falls."""
 _MAX_STEP_RAD = 1.0
 """Larger rotations are scaled down to this."""
 _MAX_FINAL_STEP = 1e-2
@@ -186,7 +186,7 @@ def _prior_cost(problem: PriorAndLimits, qpos: Floats, to_mean: Floats) -> float
 
 @compiled
 def _integrate(qpos: Floats, step: Floats, next_qpos: Floats) -> None:
-    """Fill in the configuration after a tangent step: root translation in world axes, root rotation in its own, hinges."""
+    """Fill in the configuration after a tangent step: root translation (world axes), root rotation (its own), hinges."""
     next_qpos[:3] = qpos[:3] + step[:3]
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
     sine = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5
@@ -279,7 +279,7 @@ def _factorise(tree: KinematicTree, hessian: Floats, clamped: Bools, factor: Flo
 
 @compiled
 def _solve_factorised(tree: KinematicTree, factor: Floats, x: Floats) -> None:
-    """x := (L^T D L)^-1 x, in place: from the limbs inwards through L^T, then from the root outwards through D and L."""
+    """x := (L^T D L)^-1 x, in place: from the limbs inwards with L^T, then outwards with D and L."""
     for k in range(len(x) - 1, -1, -1):
         for d in range(tree.depth[k]):
             x[tree.ancestors[k, d]] -= factor[k, d] * x[k]

@@ -104,7 +104,7 @@ class Residuals:
         return out
 
     def read(self, frame: TrackerFrame) -> None:
-        """Take the valid readings of a frame as targets; ShapeError unless its stations are those of the calibration."""
+        """Take the valid readings of a frame as targets; ShapeError when it has other stations than the calibration."""
         if len(frame.position_m) != len(self.bones):
             raise ShapeError(
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"

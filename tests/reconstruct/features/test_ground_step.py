@@ -29,7 +29,7 @@ def test_standing_and_stepping(boxing: Scene, yaw_rad: float) -> None:
 
 def test_readings_of_an_example_are_its_controls(boxing: Scene) -> None:
     """What exact trackers read after a window is what the database says that they would have read."""
-    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, followed=True)
+    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, with_successor=True)
     controls = StationFeatures(boxing.body, windows, boxing.calibration, 0.3)
     qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))
     for row in (0, 40):
