@@ -77,7 +77,7 @@ class FolderWriter(MemoryWriter):
         self._files[name].write(np.ascontiguousarray(rows, "<f4").data)
 
     def _write_header(self, name: str, count: int) -> None:
-        """Write the npy header for `count` rows; numpy leaves room for the count, so the header's length is constant."""
+        """Write the npy header for `count` rows; numpy leaves room for the count, so the length is constant."""
         card = {"descr": "<f4", "fortran_order": False, "shape": (count, COLUMNS[name])}
         self._files[name].seek(0)
         np.lib.format.write_array_header_1_0(self._files[name], card)

@@ -186,7 +186,7 @@ def _prior_cost(problem: PriorAndLimits, qpos: Floats, to_mean: Floats) -> float
 
 @compiled
 def _integrate(qpos: Floats, step: Floats, next_qpos: Floats) -> None:
-    """Fill in the configuration after a tangent step: root translation (world axes), root rotation (its own), hinges."""
+    """Fill in the configuration after a tangent step (V,); the root rotates about its own axes."""
     next_qpos[:3] = qpos[:3] + step[:3]
     angle = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
     sine = np.sin(0.5 * angle) / angle if angle > 0.0 else 0.5

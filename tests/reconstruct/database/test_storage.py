@@ -84,8 +84,8 @@ def run(**changes: Any) -> dict[str, Any]:
         ({"runs": [run(start=1)]}, "run 0 has rows 1 to 50"),
         ({"runs": [run(stop=0)]}, "run 0 has rows 0 to 0"),
         ({"runs": [run(stop=30), run(start=31)]}, "run 1 has rows 31 to 50"),
-        ({"runs": [run(stop=True)]}, "fields of the wrong kind"),
-        ({"runs": [run(first_frame=-1)]}, "runs that join"),
+        ({"runs": [run(stop=True)]}, "fields of the wrong type"),
+        ({"runs": [run(first_frame=-1)]}, "runs that follow each other"),
         ({"runs": [run(stop=60)]}, "50 x 52 float32; expected an array of 60 x 52"),
     ],
 )
