@@ -13,8 +13,8 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import specialise
-from harness.reconstruct import descent
 from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.levenberg_marquardt import PriorAndLimits, minimise, new_quadratic_model
 from harness.reconstruct.solver.residuals import Residuals
 
 
@@ -57,8 +57,8 @@ class IKSolver:
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
         nv = residuals.kinematics.nv
-        self._model = descent.new_quadratic_model(residuals.tree)
-        self._trust = descent.PriorAndLimits(
+        self._model = new_quadratic_model(residuals.tree)
+        self._trust = PriorAndLimits(
             mean=np.zeros(nv + 1),
             precision=np.zeros(nv),
             low_rad=np.array(limits.low_rad),
@@ -68,7 +68,7 @@ class IKSolver:
             most_steps=stopping.most_steps,
         )
         self._arrays = (residuals.tree, residuals.targets, residuals.state, self._model, self._trust)
-        self._descend = specialise(descent.minimise, *self._arrays, np.zeros(nv + 1))
+        self._descend = specialise(minimise, *self._arrays, np.zeros(nv + 1))
 
     def solve(self, start: Floats, prior: Prior) -> IKSolution:
         """From a configuration (55,), clipped to the limits, downhill to a minimum."""

@@ -9,11 +9,11 @@ import numpy as np
 
 from harness.core.arrays import Floats, Singles
 from harness.core.compiled import compiled, specialise
-from harness.reconstruct.descent import Subspace, minimise_in_subspace
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
 from harness.reconstruct.solver.residuals import Residuals
+from harness.reconstruct.solver.subspace_minimiser import Subspace, minimise_in_subspace
 
 _VARIANCE_FLOOR = 1e-9
 """Added to all variances [m^2, rad^2]."""
