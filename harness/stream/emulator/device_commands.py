@@ -2,24 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from harness.stream.codec.replies import StatusRecord, TrackingStatus, UnknownReply
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import CommandArgument
+from harness.stream.emulator.device_state import DeviceState
 from harness.stream.emulator.queries import QUERIES
 from harness.stream.emulator.settings import STATION_NAMES
-
-if TYPE_CHECKING:
-    from harness.stream.emulator.device import Device
 
 _MAX_RANGES = 12
 """Two microphones, six emitters (docs/is900.md 7)."""
 
 
-def _report_status(device: "Device", now_s: float) -> None:
+def _report_status(device: DeviceState, now_s: float) -> None:
     settings = device.settings
     status = StatusRecord(
         binary=settings.binary,
@@ -32,7 +30,7 @@ def _report_status(device: "Device", now_s: float) -> None:
     device.say(now_s, status)
 
 
-def _switch_station(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _switch_station(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     """`l`: sets with a second field, else asks. A station that is not plugged in stays off."""
     if not argument.sets:
         device.say(now_s, *QUERIES["l"](device.settings, argument))
@@ -42,14 +40,14 @@ def _switch_station(device: "Device", argument: CommandArgument, now_s: float) -
     device.settings = device.settings.with_station(name, station)
 
 
-def _boresight(device: "Device", argument: CommandArgument, now_s: float, full: bool) -> None:
+def _boresight(device: DeviceState, argument: CommandArgument, now_s: float, full: bool) -> None:
     name = argument.station()
     if name in device.rounds.plugged:
         station = geometry.boresight(device.settings.station(name), device.rounds.turn(now_s, name), full)
         device.settings = device.settings.with_station(name, station)
 
 
-def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _zero_clock(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     """Polled, the motion begins anew too, so that what follows is known to the bit."""
     argument.require_empty()
     if device.streaming:
@@ -58,7 +56,7 @@ def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> No
         device.rounds.player.begin(now_s)
 
 
-def _report_tracking(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     """Ranges are as many as the quality lets one expect; none is ever rejected."""
     argument.require_empty()
     quality = {name: device.rounds.quality(now_s, name) for name in device.active}
@@ -69,39 +67,39 @@ def _report_tracking(device: "Device", argument: CommandArgument, now_s: float) 
     device.say(now_s, TrackingStatus(states, received, (0,) * len(STATION_NAMES), device.samples.rate_hz))
 
 
-def _read_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _read_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.say(now_s, *device.errors)
 
 
-def _clear_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _clear_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.errors.clear()
 
 
-def _send_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _send_log(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.say(now_s, *(UnknownReply(f"31LF{entry}".encode("latin-1")) for entry in device.log))
 
 
-def _clear_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _clear_log(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.log.clear()
 
 
-def _report_information(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _report_information(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.say(now_s, UnknownReply(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
 
 
-def _settings_change(**values: Any) -> Callable[["Device", float], None]:
-    def order(device: "Device", now_s: float) -> None:
+def _settings_change(**values: Any) -> Callable[[DeviceState, float], None]:
+    def change(device: DeviceState, now_s: float) -> None:
         device.settings = replace(device.settings, **values)
 
-    return order
+    return change
 
 
-IMMEDIATE_COMMANDS: dict[str, Callable[["Device", float], None]] = {
+IMMEDIATE_COMMANDS: dict[str, Callable[[DeviceState, float], None]] = {
     "P": lambda device, now_s: device.poll(now_s),
     "C": lambda device, now_s: device.start_streaming(now_s),
     "c": lambda device, now_s: device.stop(now_s),
@@ -118,7 +116,7 @@ IMMEDIATE_COMMANDS: dict[str, Callable[["Device", float], None]] = {
 }
 """Without a terminator."""
 
-DEVICE_COMMANDS: dict[str, Callable[["Device", CommandArgument, float], None]] = {
+DEVICE_COMMANDS: dict[str, Callable[[DeviceState, CommandArgument, float], None]] = {
     "l": _switch_station,
     "B": lambda device, argument, now_s: _boresight(device, argument, now_s, device.settings.boresight_as_fastrak),
     "MB": lambda device, argument, now_s: _boresight(device, argument, now_s, not device.settings.boresight_as_fastrak),

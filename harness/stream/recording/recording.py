@@ -20,7 +20,7 @@ from functools import cached_property
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from harness.core.fields import build
 from harness.errors import BadFile, HarnessError
@@ -41,9 +41,7 @@ from harness.stream.codec.blocks import (
 )
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
-
-if TYPE_CHECKING:
-    from harness.stream.driver import LineEvent
+from harness.stream.line_events import LineEvent
 
 EXPECTED_FILE = "a recording by `harness record`"
 
@@ -185,7 +183,7 @@ class RecordingWriter:
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 
-    def on_event(self, event: "LineEvent") -> None:
+    def on_event(self, event: LineEvent) -> None:
         self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
 
