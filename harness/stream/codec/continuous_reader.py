@@ -33,19 +33,16 @@ class ContinuousFrameReader:
         """True until the first bytes after a configuration."""
         self._device_s = 0.0
         """Latest device time of any frame [s]."""
-        self._earlier_counts = dict.fromkeys(("sessions", "records", "garbage_bytes", "clock_resets"), 0)
+        self._totals = dict.fromkeys(("sessions", "records", "garbage_bytes", "clock_resets"), 0)
+        """Counts of the earlier sessions."""
         self._frames = 0
 
     @property
     def counts(self) -> dict[str, int]:
         """Numbers of sessions, frames, records, garbage bytes and clock resets."""
         reader = self._reader
-        present = (
-            {}
-            if reader is None
-            else {name: getattr(reader, name) for name in self._earlier_counts if name != "sessions"}
-        )
-        return {"frames": self._frames} | {name: n + present.get(name, 0) for name, n in self._earlier_counts.items()}
+        current = {} if reader is None else {name: getattr(reader, name) for name in self._totals if name != "sessions"}
+        return {"frames": self._frames} | {name: n + current.get(name, 0) for name, n in self._totals.items()}
 
     @property
     def reader(self) -> FrameReader | None:
@@ -63,7 +60,7 @@ class ContinuousFrameReader:
         Returns the unfinished frame of the session before.
         """
         frames = self.finish()
-        self._earlier_counts["sessions"] += 1
+        self._totals["sessions"] += 1
         self._reader, self._period_s = FrameReader(wire), 1.0 / wire.rate_hz
         self._last_byte_s, self._is_new = now_s, True
         return frames
@@ -94,7 +91,7 @@ class ContinuousFrameReader:
         if self._reader is None:
             return []
         frames = self._to_stream_time(self._reader.finish())
-        self._earlier_counts, self._reader = {name: n for name, n in self.counts.items() if name != "frames"}, None
+        self._totals, self._reader = {name: n for name, n in self.counts.items() if name != "frames"}, None
         return frames
 
     def _to_stream_time(self, frames: list[TrackerFrame]) -> list[TrackerFrame]:

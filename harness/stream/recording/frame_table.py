@@ -42,7 +42,10 @@ def frame_rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> I
 
 
 def format_csv_row(row: dict[str, Any]) -> str:
-    """Format a row as a CSV line: floats with full precision, so that they read back unchanged; 1 and 0 for booleans."""
+    """Format a row as a CSV line.
+
+    Floats have full precision, so that they read back unchanged. Booleans are 1 and 0.
+    """
     return ",".join(_format_value(row[name]) for name in FRAME_COLUMNS)
 
 

@@ -136,7 +136,7 @@ def _check_kind(path: Path, data: bytes) -> None:
     version = read_version(data)
     if version is not None and version > VERSION:
         problem = f"a recording of version {version}"
-        raise BadFile(path, problem, f"version {VERSION} at most", "A newer version of the harness made it; use that.")
+        raise BadFile(path, problem, f"version {VERSION} at most", "Use the newer version of the harness that made it.")
     if (
         version is None
         and not FILE_HEADER.startswith(data)

@@ -113,7 +113,7 @@ def test_pieces_do_not_matter(seed: int, timed: bool) -> None:
     measured_s = np.where(rng.random(len(given)) < 0.05, rng.uniform(0.0, 0.7, len(given)), given.measured_s)
     measured_s[rng.random(len(given)) < (0.03 if timed else 1.0)] = np.nan
     station = np.where(rng.random(len(given)) < 0.03, rng.integers(0, 4, len(given)), given.station)
-    given = changed(given, measured_s=measured_s, station=station, doubtful=rng.random(len(given)) < 0.05)
+    given = changed(given, measured_s=measured_s, station=station, suspect=rng.random(len(given)) < 0.05)
     whole = frames(given)
     one, out = FrameAssembler(4, PERIOD_S), []
     at = 0
@@ -132,7 +132,7 @@ def test_what_is_doubtful_by_itself_is_suspect() -> None:
     given = told(*rounds(3))
     doubtful = np.zeros(12, bool)
     doubtful[6] = True
-    assert suspects(frames(changed(given, doubtful=doubtful))) == [(1, 2)]
+    assert suspects(frames(changed(given, suspect=doubtful))) == [(1, 2)]
 
 
 @pytest.mark.parametrize("timed", [True, False])
