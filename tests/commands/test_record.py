@@ -24,7 +24,7 @@ from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from tests.interrupts import heeding_interrupts
 from tests.stream.recording.test_recording import newer
-from tests.stream.wire import same
+from tests.stream.wire import frames_equal
 
 HARNESS = [sys.executable, "-m", "harness.cli"]
 CLIP = "boxing_p1_01"
@@ -172,7 +172,7 @@ def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Pl
             frames = iter(device)
             live.append([next(frames) for _ in range(60)])
     replayed = list(RecordingStream(tmp_path / "a.rec"))
-    assert all(same(a, b) for a, b in zip(live[0], replayed, strict=False))
+    assert all(frames_equal(a, b) for a, b in zip(live[0], replayed, strict=False))
     start = next(i for i, frame in enumerate(replayed) if frame.received_s == live[1][0].received_s)
     again = replayed[start : start + 60]
     assert [f.received_s for f in again] == [f.received_s for f in live[1]]
@@ -195,7 +195,7 @@ def test_a_device_that_was_gone_replays_as_it_was_live(played: Playback, tmp_pat
     for speed in ("max", 1e9):
         stream = RecordingStream(path, speed)
         replayed = list(stream)
-        assert all(same(one, other) for one, other in zip(live, replayed, strict=False))
+        assert all(frames_equal(one, other) for one, other in zip(live, replayed, strict=False))
         assert len(replayed) >= len(live)
         assert stream.counts["sessions"] == 2
 

@@ -18,7 +18,7 @@ sequence, a device that reads 11 as an ordinary byte still sees `c` at the start
 _STOP_TIMEOUT_FACTOR = 10
 """Multiple of `quiet_s` for which a device may go on sending after `c`, because its buffers empty first."""
 
-ReplyType = TypeVar("Answer", bound=ParsedReply)
+ReplyType = TypeVar("ReplyType", bound=ParsedReply)
 
 
 class DriverClosed(Exception):

@@ -29,7 +29,7 @@ class Device(DeviceState):
         self._reader = CommandReader()
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Bytes from the host; lost while it starts."""
+        """Take bytes from the host; they are lost while the device restarts."""
         self._play(now_s)
         for command in self._reader.feed(data) if now_s >= self._silent_until_s else ():
             if now_s < self._silent_until_s:
@@ -37,12 +37,12 @@ class Device(DeviceState):
             self.command_count += 1
             try:
                 self._execute(command, now_s)
-            except CommandError as refused:
+            except CommandError as rejected:
                 self.refused_count += 1
-                error = DeviceError(command.line.decode("latin-1"), refused.code, fl=refused.field)
+                error = DeviceError(command.line.decode("latin-1"), rejected.code, fl=rejected.field)
                 if self.settings.error_log:
                     self.errors.append(error)
-                self.say(now_s, error)
+                self.reply(now_s, error)
 
     def restart(self, now_s: float) -> None:
         """Restart as after command 19 or a power cut; an unfinished command is forgotten too."""
@@ -72,10 +72,10 @@ class Device(DeviceState):
                 self._check_items(argument)
             self.settings = SETTER_COMMANDS[name](self.settings, argument)
         else:
-            self.say(now_s, *QUERIES[name](self.settings, argument))
+            self.reply(now_s, *QUERIES[name](self.settings, argument))
 
     def _check_items(self, argument: CommandArgument) -> None:
-        """Items that this firmware does not have yet."""
-        for place, code in enumerate(argument.numbers()):
+        """Raise CommandError for items that this firmware does not have yet."""
+        for index, code in enumerate(argument.numbers()):
             if float(self.firmware[:4]) < SINCE_FIRMWARE.get(int(code), 0.0):
-                raise CommandError(OUT_OF_RANGE, place + 2)
+                raise CommandError(OUT_OF_RANGE, index + 2)

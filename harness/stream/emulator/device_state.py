@@ -26,35 +26,35 @@ class DeviceState:
     """
 
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
-        """Power-on at this moment."""
+        """Switch the device on at `now_s` [s]."""
         self.samples, self.config = samples, config or EmulatorConfig()
         self.firmware = self.config.firmware
         self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
         self.streaming = self.suspended = False
         self.command_count = self.refused_count = 0
-        """Commands obeyed or refused, and those refused."""
+        """Numbers of all commands and of the rejected ones."""
         self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
-        """Commands, while that is asked for."""
+        """Commands, while the command log is open."""
         stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
         self._factory = DeviceSettings(stations, baud=self.config.baud)
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
         self._next = 0, 0
-        """Round and row of the reading that is sent next while streaming."""
+        """Round and station row of the next reading while streaming."""
         self._silent_until_s = float("-inf")
         self._out: list[Message] = []
         self._held: deque[Message] = deque(maxlen=_LOG_LENGTH)
         """Replies of a suspended device."""
 
     def messages(self, now_s: float) -> list[Message]:
-        """What it has said since it was asked last, in order, with the readings until now."""
+        """Return all messages since the last call, in sequence, including the readings until `now_s`."""
         self._play(now_s)
         out, self._out = self._out, []
         return out
 
     def advance(self, now_s: float) -> bytes:
-        """The same as bytes, for an endlessly fast line."""
+        """Return the bytes of `messages`, as over an infinitely fast line."""
         return b"".join(message.data for message in self.messages(now_s))
 
     @property
@@ -68,51 +68,57 @@ class DeviceState:
         return "".join(name for name in self.rounds.plugged if self.settings.station(name).active)
 
     def set_lost_stations(self, stations: Iterable[str]) -> None:
-        """From now on these are out of sight, and no others (but where the samples say so)."""
+        """Lose exactly these stations from now on, in addition to what the samples say."""
         self.rounds.set_lost_stations(stations)
 
-    def say(self, now_s: float, *replies: ParsedReply) -> None:
-        said = [Message(now_s, reply.line()) for reply in replies]
+    def reply(self, now_s: float, *replies: ParsedReply) -> None:
+        """Send replies, or hold them while the device is suspended."""
+        messages = [Message(now_s, reply.line()) for reply in replies]
         if self.suspended:
-            self._held.extend(said)
+            self._held.extend(messages)
         else:
-            self._out += said
+            self._out += messages
 
     def start_streaming(self, now_s: float) -> None:
-        """From the next whole round of stations on."""
+        """Send records from the next whole round of stations on."""
         if not self.streaming:
             self.streaming, self._next = True, (self.rounds.player.first_from(now_s), 0)
 
     def stop(self, now_s: float) -> None:
-        """Before the next record, never inside one."""
+        """Stop before the next record, never inside one."""
         self.streaming = False
         self._out.append(Message(now_s, b"", halts=True))
 
     def poll(self, now_s: float) -> None:
-        """One record of each active station, ascending: its last reading."""
+        """Send one record of each active station, ascending, with its latest reading."""
         for name in "" if self.suspended else self.active:
             number = self.rounds.player.latest(now_s, STATION_NAMES.index(name))
             self._out.append(Message(now_s, self.rounds.records(number, self.settings)[name], name))
 
     def suspend(self, now_s: float) -> None:
-        """Readings are lost meanwhile, replies wait."""
+        """Hold replies and discard readings until `resume`."""
         self.suspended = True
         self._out.append(Message(now_s, b"", halts=True))
 
     def resume(self, now_s: float) -> None:
+        """End a suspension and send the held replies."""
         self.suspended = False
         self._out += [replace(message, ready_s=now_s) for message in self._held]
         self._held.clear()
 
     def save(self) -> None:
+        """Save the settings for the next restart."""
         self._saved = self.settings
 
     def restore_factory_defaults(self) -> None:
-        """Back to factory defaults; what was saved stays saved until it is saved anew."""
+        """Return to factory defaults. The saved settings stay saved."""
         self.settings = self._factory
 
     def restart(self, now_s: float) -> None:
-        """As after 19 or a cut of its power: saved settings, polled, a new clock, silence at first."""
+        """Restart as after command 19 or a power cut.
+
+        The saved settings return, the device is polled, its clock starts anew, and it is silent at first.
+        """
         self._play(now_s)
         self.stop(now_s)
         self.suspended = False

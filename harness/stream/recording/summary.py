@@ -41,8 +41,9 @@ class StreamSummary:
         return self._ended_s - self._began_s
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the totals and, per station, the frames with a record, a position, an orientation or suspicion, and
-        the mean quality.
+        """Return the totals, and for each station its counts and mean quality.
+
+        The counts are frames with a record, with a position, with an orientation, and suspect ones.
         """
         columns = (
             self._records,
@@ -66,13 +67,12 @@ class StreamSummary:
         head = f"{self._frames} frames in {self.duration_s:.2f} s{rate}, longest gap {1e3 * self._longest_gap_s:.0f} ms"
         width = max(map(len, (*self._stations, "station")))
         lines = [head, "", f"{'station':<{width}}  with a record  position  orientation  suspect  mean quality"]
+        frames = max(self._frames, 1)
         for i, station in enumerate(self._stations):
-            records, positions, orientations = (
-                f"{100.0 * count[i] / max(self._frames, 1):.1f} %"
-                for count in (self._records, self._positions, self._orientations)
-            )
-            quality = self._quality_sum[i] / max(self._frames, 1)
+            counts = (self._records[i], self._positions[i], self._orientations[i])
+            records, positions, orientations = (f"{100.0 * count / frames:.1f} %" for count in counts)
+            suspect, quality = self._suspect[i], self._quality_sum[i] / frames
             lines.append(
-                f"{station:<{width}}  {records:>13}  {positions:>8}  {orientations:>11}  {self._suspect[i]:>7}  {quality:>12.2f}"
+                f"{station:<{width}}  {records:>13}  {positions:>8}  {orientations:>11}  {suspect:>7}  {quality:>12.2f}"
             )
         return "\n".join(lines)

@@ -161,7 +161,7 @@ def test_tcp_serves_one_client_after_another(tmp_path: Path) -> None:
 
 def test_a_second_client_is_turned_away_and_told_of(tmp_path: Path) -> None:
     said: list[str] = []
-    port = TcpPort("127.0.0.1", 0, say=said.append)
+    port = TcpPort("127.0.0.1", 0, log=said.append)
     address = ("127.0.0.1", int(port.name.rpartition(":")[2]))
     with socket.create_connection(address, PATIENT_S), socket.create_connection(address, PATIENT_S) as second:
         wait_until(lambda: (port.read() == b"") and len(said) > 1)
