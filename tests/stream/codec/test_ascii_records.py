@@ -58,8 +58,8 @@ def decode_table(data: bytes, codes: tuple[int, ...], settings: RecordFormat, st
     decoder = Decoder(dict.fromkeys(stations, codes), settings)
     (run,) = merge_adjacent([*decoder.feed(data), *decoder.finish()])
     assert isinstance(run, RecordRun)
-    assert run.nbytes == len(data) == run.size * len(run.decode_table)
-    return run.decode_table
+    assert run.nbytes == len(data) == run.size * len(run.table)
+    return run.table
 
 
 def decode(data: bytes, codes: tuple[int, ...], settings: RecordFormat, stations: bytes = b"123") -> Readings:
