@@ -68,7 +68,9 @@ def check_pose(
     assert abs(z) < tolerance_m
     assert abs(math.hypot(x, y) - RADIUS_M) < tolerance_m
     heading_deg = math.degrees(math.atan2(y, x))
-    assert abs((angles_deg[0] - heading_deg + 180.0) % 360.0 - 180.0) < tolerance_deg + math.degrees(tolerance_m / RADIUS_M)
+    assert abs((angles_deg[0] - heading_deg + 180.0) % 360.0 - 180.0) < tolerance_deg + math.degrees(
+        tolerance_m / RADIUS_M
+    )
     assert all(abs(a - b) < tolerance_deg for a, b in zip(angles_deg[1:], tilt_deg(station), strict=True))
 
 

@@ -52,7 +52,11 @@ class VrJuggler:
                 raise ClientError(f"did not read full data record: {data!r}")
             data += new_bytes
         for offset in range(0, len(data), RECORD):
-            if data[offset : offset + 1] != b"0" or data[offset + 2 : offset + 3] != b" " or data[offset + 1] not in b"1234":
+            if (
+                data[offset : offset + 1] != b"0"
+                or data[offset + 2 : offset + 3] != b" "
+                or data[offset + 1] not in b"1234"
+            ):
                 raise ClientError(f"no record at {offset} of {data!r}")
             station = int(data[offset + 1 : offset + 2])
             numbers = struct.unpack_from("<7f", data, offset + 3)
@@ -83,11 +87,13 @@ class VrJuggler:
 
 
 class EarlyVrJuggler:
-    """Binary, centimetres, position and angles of stations 1 and 2; polled, or streaming with a flush when out of step.
+    """Binary, centimetres, position and angles of stations 1 and 2; polled, or streaming.
+
+    It flushes its input when a streamed record is out of step.
     """
 
     LENGTH = 29
-    """Of a record of 2,4,1."""
+    """Length of a record of 2,4,1 [bytes]."""
 
     def __init__(self, port: str, scale: float = 0.1) -> None:
         self.tty = Tty(port, raw_mode(termios.IGNBRK | termios.IGNPAR))
@@ -96,7 +102,7 @@ class EarlyVrJuggler:
         self.restarts = self.flushes = 0
 
     def open(self, stream: bool = False) -> bool:
-        """Status, a restart if there was none; then its lines, written in pieces."""
+        """Query the status, restart if there is none, then send its lines in parts."""
         if not self._status():
             self.restarts += 1
             self.tty.write(b"\x19")
@@ -113,7 +119,7 @@ class EarlyVrJuggler:
         return True
 
     def sample(self, until: Callable[[], bool], stream: bool = False) -> tuple[bytes, bytes] | None:
-        """Records of stations 1 and 2 that stand where they should; None where `until` came first."""
+        """Return the records of stations 1 and 2 once they are where they should be; None where `until` held first."""
         while not until():
             if not stream:
                 self.tty.write(b"P")

@@ -15,9 +15,12 @@ from tests.clients.tty import Tty, raw_mode
 RATES = (115200, 57600, 38400, 19200, 9600)
 SIZES = {0: (1, 1), 1: (2, 2), 2: (12, 21), 4: (12, 21), 11: (16, 28), 21: (4, 14), 22: (1, 5), 23: (2, 8), 40: (1, 4)}
 """Length of an item, binary and ASCII, as in the library's table [bytes]; only the items that are used here."""
-KNOWN_ITEMS = {"1.01": {0, 1, 2, 4, 5, 6, 7, 11, 18, 19, 20, 21, 22}, "2.09": {*range(3), *range(4, 8), 11, *range(18, 24)}}
+KNOWN = {
+    "1.01": {0, 1, 2, 4, 5, 6, 7, 11, 18, 19, 20, 21, 22},
+    "2.09": {*range(3), *range(4, 8), 11, *range(18, 24)},
+}
 """Item codes that each version knows in the reply to `O`."""
-KNOWN_ITEMS["2.09"] |= {*range(38, 50)}
+KNOWN["2.09"] |= {*range(38, 50)}
 """Codes that each version knows in the answer to `O`."""
 ANSWER_S = 2.0
 """Longest wait for most replies; each query is sent at most twice [s]."""
@@ -242,7 +245,7 @@ class InterSenseClient:
                 self.firmware = record[15:21].decode().strip()
             elif reply_type == "O" and 1 <= number <= 8:
                 codes = [int(text[k : k + 2]) for k in range(0, len(text) - 3, 2)]
-                first_unknown = next((k for k, code in enumerate(codes) if code not in KNOWN_ITEMS[self.version]), len(codes))
+                first_unknown = next((k for k, code in enumerate(codes) if code not in KNOWN[self.version]), len(codes))
                 self.stations[number - 1].items = codes[:first_unknown]
             elif reply_type == "l":
                 for station, flag in zip(self.stations, text.rstrip(), strict=False):

@@ -1,5 +1,4 @@
-"""VRPN's Fastrak tracker with its IS-900 options: what it sends, how long it waits, what it accepts as a record, and
-how it recovers.
+"""VRPN's Fastrak tracker with its IS-900 options: what it sends, how long it waits, what it accepts, how it recovers.
 
 It follows `vrpn_Tracker_Fastrak.C`, `vrpn_Serial.C` and `vrpn_Tracker.C` of version 07.38 (docs/is900.md 11.1).
 """
@@ -121,7 +120,7 @@ class VrpnClient:
         else:
             while self._get_report():
                 pass
-            elapsed_us = (int((time.time() - self._last_report_s) * 1e6) + 2**31) % 2**32 - 2**31  # a 32-bit int, as in C
+            elapsed_us = (int((time.time() - self._last_report_s) * 1e6) + 2**31) % 2**32 - 2**31  # an int32 of C
             if self.status != FAIL and elapsed_us > WATCHDOG_S * 1e6:
                 self.log.append("tracker failed to read")
                 self.status = FAIL
@@ -259,6 +258,7 @@ class VrpnClient:
 
     def _parse_report(self) -> None:
         x, y, z, w, i, j, k = struct.unpack_from("<7f", self._buffer, 3)
+        position_m = (x * INCH_M, y * INCH_M, z * INCH_M)
         offset = 31
         if self._has_time:
             self._last_report_s = self._zero_s + struct.unpack_from("<f", self._buffer, offset)[0] / 1000.0
@@ -268,5 +268,6 @@ class VrpnClient:
             buttons, offset = self._buffer[offset], offset + 1
         if self._sensor in self._sticks:
             stick = (self._buffer[offset] - 127) / 128.0, (self._buffer[offset + 1] - 127) / 128.0
-        position_m = (x * INCH_M, y * INCH_M, z * INCH_M)
-        self.reports.append(Report(self._sensor, self._last_report_s, time.time(), position_m, (i, j, k, w), buttons, stick))
+        self.reports.append(
+            Report(self._sensor, self._last_report_s, time.time(), position_m, (i, j, k, w), buttons, stick)
+        )

@@ -69,7 +69,9 @@ class VruiClient:
         if upload:
             self._command("MCC")
             for k, values in enumerate(upload):
-                position, normal = (", ".join(f"{v:{width}f}" for v in values[offset : offset + 3]) for offset, width in _WIDTHS)
+                position, normal = (
+                    ", ".join(f"{v:{width}f}" for v in values[offset : offset + 3]) for offset, width in _WIDTHS
+                )
                 self._command(f"MCF{k + 1}, {position}, {normal}, {5001 + k}")
             self._command("MCe")
         for number in stations:
@@ -121,7 +123,9 @@ class VruiClient:
         return chr(self._buffer.pop(0))
 
     def _line(self, end_s: float) -> str:
-        """Return a line up to CR LF, or what arrived in time; a CR alone is skipped together with its next character.
+        """Return a line up to CR LF, or what arrived in time.
+
+        A CR alone is skipped together with its next character.
         """
         out, after_cr = "", False
         try:

@@ -51,9 +51,9 @@ class SoakResult:
         """Whether the driver was configuring the device at this time, or about to."""
         began_s = None
         for event in self.events:
-            if event.record_dtype in RECONFIGURING_EVENTS and began_s is None:
+            if event.kind in RECONFIGURING_EVENTS and began_s is None:
                 began_s = event.monotonic_s
-            elif event.record_dtype == "connected" and began_s is not None:
+            elif event.kind == "connected" and began_s is not None:
                 if began_s - CLOSING_S <= at_s <= event.monotonic_s + CLOSING_S:
                     return True
                 began_s = None
@@ -84,7 +84,7 @@ def run_soak(seconds: float, folder: Path, seed: int) -> SoakResult:
 def count_outcomes(result: SoakResult) -> dict[str, int]:
     """Count outcomes; `missing` are undamaged readings of a working line that never arrived."""
     record_dtype = record_type(STANDARD_LIST)
-    first_s = next(event.monotonic_s for event in result.events if event.record_dtype == "connected")
+    first_s = next(event.monotonic_s for event in result.events if event.kind == "connected")
     last_s = result.sent[-1].written_s
     counts = dict.fromkeys(("records", "damaged", "undamaged", "while away", "missing", "beside damage"), 0)
     records = [sent for sent in result.sent if sent.message.station and not sent.unread and sent.written_s > first_s]
@@ -117,7 +117,7 @@ def check_result(result: SoakResult, capsys: pytest.CaptureFixture[str]) -> None
     counts = count_outcomes(result)
     event_counts: dict[str, int] = defaultdict(int)
     for event in result.events:
-        event_counts[event.record_dtype] += 1
+        event_counts[event.kind] += 1
     with capsys.disabled():
         print(f"\nsoak: {result.frames} frames; {counts}; events {dict(event_counts)}")
     assert counts["undamaged"] > 0.8 * counts["records"] > 0

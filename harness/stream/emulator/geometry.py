@@ -42,7 +42,10 @@ def align(station: StationSettings, origin_m: Floats, on_x_m: Floats, on_y_m: Fl
 
 
 def alignment_cm(station: StationSettings) -> tuple[float, ...]:
-    """Return the nine numbers of the present alignment: origin, point on X, point on Y, in the tracker frame [cm]."""
+    """Return the nine numbers of the present alignment in the tracker frame [cm].
+
+    They are the origin, a point on the X axis and a point on the Y axis.
+    """
     axes = rotations.to_matrix(np.array(station.tracker_from_aligned))
     origin = np.array(station.origin_m)
     points = np.concatenate([origin, origin + _AXIS_POINT_M * axes[:, 0], origin + _AXIS_POINT_M * axes[:, 1]])

@@ -5,11 +5,11 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
-from harness.stream.emulator.faults import Fault, FaultInjector
 
 from harness.errors import BadInput, UnknownName
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
+from harness.stream.emulator.faults import Fault, FaultInjector
 from harness.stream.emulator.message import SentMessage
 from tests.stream.emulator.played import make_samples
 

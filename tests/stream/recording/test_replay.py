@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness.stream.codec.blocks import FILE_HEADER, RECEIVED
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from harness.errors import BadFile, BadInput
+from harness.stream.codec.blocks import FILE_HEADER, RECEIVED
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
 from harness.stream.frame import TrackerFrame
