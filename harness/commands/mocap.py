@@ -38,9 +38,9 @@ def add_mocap(verbs: Verbs) -> None:
 
 def run_mocap_list(args: argparse.Namespace) -> Outcome:
     from harness.mocap.library import MotionLibrary
-    from harness.mocap.sources import find_library_folder
+    from harness.mocap.sources import find_library_folders
 
-    entries = MotionLibrary(find_library_folder(args.mocap)).entries()
+    entries = MotionLibrary(find_library_folders(args.mocap)).entries()
     if not entries:
         raise BadInput("There are no clips in it.", "Looked for .amc with .asf, .bvh, .npz and .c3d files.")
     return print_result(args, {"clips": [entry.as_dict() for entry in entries]}, *(entry.line() for entry in entries))
