@@ -98,12 +98,12 @@ class MotionLibrary:
 
     def _add(self, entry: LibraryEntry, folder: Path) -> None:
         other = self._entries.get(entry.name)
-        if other is not None and "c3d" not in (entry.format, other.format):
-            if not cmp(other.path, entry.path, shallow=False):
-                raise BadInput(
-                    f"The clip {entry.name} differs between two folders: {other.path} and {entry.path}.",
-                    "Rename or remove one of them, or name only one of the folders.",
-                )
+        motions = other is not None and "c3d" not in (entry.format, other.format)
+        if other is not None and motions and not cmp(other.path, entry.path, shallow=False):
+            raise BadInput(
+                f"The clip {entry.name} differs between two folders: {other.path} and {entry.path}.",
+                "Rename or remove one of them, or name only one of the folders.",
+            )
         if other is None or (other.format == "c3d" and entry.format != "c3d"):
             best, rest, self._folder_of[entry.name] = entry, other, folder
         else:
