@@ -96,7 +96,7 @@ def _prepare_folder(out: Path | None, force: bool) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadFile(out, f"it cannot be made ({error.strerror})", "a folder", "Name another.") from error
+        raise BadFile(out, f"it cannot be created ({error.strerror})", "a folder", "Name another.") from error
     old = sorted(out.glob(_PICTURE_PATTERN))
     if old and not force:
         advice = "Name another folder, or use --force."
