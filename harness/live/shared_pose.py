@@ -1,4 +1,4 @@
-"""What the session's process and the viewer's process share: the newest pose, the viewer's settings and its messages."""
+"""Data that the session and the viewer's process share: the newest pose, the viewer's settings and its messages."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
