@@ -1,11 +1,11 @@
-"""The flesh on the bones: capsules and ellipsoids with masses, for any 24-bone skeleton.
+"""Geoms of the body: capsules and ellipsoids with masses, for any 24-bone skeleton.
 
 Masses are the segment shares of de Leva 1996 (Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters,
 J. Biomechanics 29, Table 4, men): head and neck 6.94 %, upper, middle and lower trunk 15.96, 16.33 and 11.17 %,
-upper arm 2.71, forearm 1.62, hand 0.61, thigh 14.16, shank 4.33, foot 1.37 %; how a segment is shared among its
-bones is ours. The whole weighs what a person of the body-mass index of his mean man (73.0 kg at 1.741 m) weighs.
-Girths are ours, set by eye against a person of the mean CMU skeleton; they grow with the body, not with each bone.
-Heads, hands and feet reach beyond their bones, whose far ends are joints (the ball of the foot, the knuckles).
+upper arm 2.71, forearm 1.62, hand 0.61, thigh 14.16, shank 4.33, foot 1.37 %. The shares of a segment's bones are our
+choice. The total mass is that of a person with the body-mass index of his mean man (73.0 kg at 1.741 m). Girths are our
+choice, set by eye for a person with the mean CMU skeleton; they scale with the body, not with each bone. Heads, hands
+and feet extend beyond their bones, whose far ends are joints (the ball of the foot, the knuckles).
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from harness.core.skeleton import Skeleton
 _STANDARD_MASS_KG = 74.2
 """BMI of de Leva's mean man (24.08 kg/m2) times the square of the standard body's height, 1.755 m."""
 _LEAST_M = 1e-3
-"""Half length of the capsule of a bone without length (some BVH files leave bones out)."""
+"""Half length of the capsule of a bone of zero length, as some BVH files have [m]."""
 
 # bone: share of the body's mass, radius [m], and which part of the bone the capsule covers
 _LIMBS: tuple[tuple[str, float, float, float, float], ...] = (
@@ -47,19 +47,19 @@ _HAND_SHARE, _FOOT_SHARE = 0.0061, 0.0137
 
 @dataclass(frozen=True, eq=False)
 class BodyGeom:
-    """One geom in the frame of its bone."""
+    """One geom of the body, in the frame of its bone."""
 
     bone: str
-    """The bone, or "root"."""
+    """Name of the bone, or "root"."""
     name: str
     kind: str
     """`capsule` (along its z; size: radius, half length, 0) or `ellipsoid` (size: half axes)."""
     centre_m: Floats
-    """(3,)"""
+    """(3,) [m]."""
     bone_from_shape: Floats
     """(4,) unit quaternion."""
     size_m: Floats
-    """(3,)"""
+    """(3,) [m]; see `kind`."""
     mass_kg: float
 
     def __post_init__(self) -> None:
@@ -67,30 +67,30 @@ class BodyGeom:
 
 
 def body_scale(skeleton: Skeleton) -> float:
-    """Size of the body relative to the standard one: legs and spine, the bones that make up the height."""
+    """Size of the body relative to the standard one, by the lengths of legs and spine, which make up the height."""
     return _height_chain_m(skeleton) / _height_chain_m(humanoid24.standard_skeleton())
 
 
 @lru_cache(maxsize=64)
 def body_geoms(skeleton: Skeleton) -> tuple[BodyGeom, ...]:
-    """The geoms of the 24 bones and the root, in the order of the bodies."""
+    """The geoms of the root and the 24 bones, in the order of the model's bodies."""
     scale = body_scale(skeleton)
     mass_kg = _STANDARD_MASS_KG * scale**2
-    found = [_trunk(skeleton, row, scale, mass_kg) for row in _TRUNK]
+    geoms = [_trunk(skeleton, row, scale, mass_kg) for row in _TRUNK]
     for part, share, radius, start, stop in _LIMBS:
         for bone in (part,) if part in skeleton.names else (f"l{part}", f"r{part}"):
             vector = skeleton.bone_m[skeleton.index(bone)]
-            found.append(_capsule(bone, bone, start * vector, stop * vector, scale * radius, mass_kg * share))
+            geoms.append(_capsule(bone, bone, start * vector, stop * vector, scale * radius, mass_kg * share))
     for side in "lr":
-        found += [_hand(skeleton, side, scale, mass_kg), *_foot(skeleton, side, scale, mass_kg)]
+        geoms += [_hand(skeleton, side, scale, mass_kg), *_foot(skeleton, side, scale, mass_kg)]
     order = ("root", *skeleton.names)
-    return tuple(sorted(found, key=lambda shape: order.index(shape.bone)))
+    return tuple(sorted(geoms, key=lambda geom: order.index(geom.bone)))
 
 
-# The foot stands 80 mm below the ankle: the median ankle height of eight CMU clips in stance lies at 76 to 80 mm.
+# The sole is 80 mm below the ankle: the median ankle height in stance is 76 to 80 mm in eight CMU clips.
 _SOLE_DROP_M, _SOLE_RADIUS_M, _SOLE_HALF_WIDTH_M = 0.049, 0.031, 0.017
 _HEEL_M, _BALL_M, _TOE_M = -0.027, 0.118, 0.172
-"""Along the foot from the ankle [m]; toes bend at the ball, which the model's rigid foot cannot."""
+"""Positions along the foot from the ankle [m]. Real toes bend at the ball; the model's foot is rigid."""
 
 
 def sole_below_ankle_m(skeleton: Skeleton) -> float:
@@ -99,7 +99,7 @@ def sole_below_ankle_m(skeleton: Skeleton) -> float:
 
 
 def sole_points_m(skeleton: Skeleton) -> Floats:
-    """(2, 4, 3) heel and ball, inner and outer edge, of the left and right sole in the foot bone's frame [m]."""
+    """(2, 4, 3) corners of the left and right sole (heel and ball, inner and outer edge) in the foot's frame [m]."""
     scale, points = body_scale(skeleton), np.empty((2, 4, 3))
     for side, name in enumerate("lr"):
         ahead, down, across = _foot_axes(skeleton, name)
@@ -110,7 +110,7 @@ def sole_points_m(skeleton: Skeleton) -> Floats:
 
 
 def _foot_axes(skeleton: Skeleton, side: str) -> tuple[Floats, Floats, Floats]:
-    """Ahead, down and across of a foot in its bone's frame; down is along the shin of the rest pose."""
+    """Unit vectors ahead, down and across of a foot in its bone's frame; down is along the shin in the rest pose."""
     down = _unit(skeleton.bone_m[skeleton.index(f"{side}tibia")])
     toes = skeleton.bone_m[skeleton.index(f"{side}foot")]
     ahead = _unit(toes - (toes @ down) * down)
@@ -137,8 +137,8 @@ def _hand(skeleton: Skeleton, side: str, scale: float, mass_kg: float) -> BodyGe
     frame = np.stack([across, np.cross(along, across), along], axis=1)
     size = scale * np.array([0.043, 0.017, 0.092])
     bone = f"{side}hand"
-    turn = rotations.from_matrix(frame)
-    return BodyGeom(bone, bone, "ellipsoid", 0.085 * scale * along, turn, size, mass_kg * _HAND_SHARE)
+    rotation = rotations.from_matrix(frame)
+    return BodyGeom(bone, bone, "ellipsoid", 0.085 * scale * along, rotation, size, mass_kg * _HAND_SHARE)
 
 
 def _trunk(
@@ -156,13 +156,13 @@ def _trunk(
 def _capsule(bone: str, name: str, start_m: Floats, stop_m: Floats, radius_m: float, mass_kg: float) -> BodyGeom:
     span = stop_m - start_m
     length = float(np.sqrt(span @ span))
-    turn = _turn_z_to(span / length) if length > 0.0 else rotations.IDENTITY
+    rotation = _rotation_of_z_to(span / length) if length > 0.0 else rotations.IDENTITY
     size = np.array([radius_m, max(0.5 * length, _LEAST_M), 0.0])
-    return BodyGeom(bone, name, "capsule", 0.5 * (start_m + stop_m), turn, size, mass_kg)
+    return BodyGeom(bone, name, "capsule", 0.5 * (start_m + stop_m), rotation, size, mass_kg)
 
 
-def _turn_z_to(direction: Floats) -> Floats:
-    """Quaternion of the shortest turn of z onto a unit vector."""
+def _rotation_of_z_to(direction: Floats) -> Floats:
+    """Quaternion of the shortest rotation of z onto a unit vector."""
     if direction[2] < -1.0 + 1e-12:
         return np.array([0.0, 1.0, 0.0, 0.0])
     return _unit(np.array([1.0 + direction[2], -direction[1], direction[0], 0.0]))

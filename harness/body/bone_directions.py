@@ -1,4 +1,4 @@
-"""Hinge angles that make one body's bones point like another's."""
+"""Hinge angles with which the bones of one skeleton point in the directions of another's."""
 
 import numpy as np
 
@@ -8,35 +8,35 @@ from harness.core.hinges import are_gimbal, equivalent_euler_angles, hinge_angle
 from harness.core.skeleton import Skeleton
 
 
-def match_bone_directions(own: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
-    """Hinge angles (T, 48) with which the bones of `target` point as those of `own` do at `qpos` (T, 55).
+def match_bone_directions(source: Skeleton, qpos: Floats, target: Skeleton) -> Floats:
+    """Hinge angles (T, 48) with which the bones of `target` point as those of `source` do at `qpos` (T, 55) [rad].
 
-    Bones that agree about their direction in the rest pose keep their angles. A bone with three hinges is turned
-    exactly; one with fewer as well as they can, and never beyond a limit that its own angle kept. Each angle is the
-    one nearest to the own.
+    Bones with the same direction in both rest poses keep their angles. A bone with three hinges is oriented exactly. A
+    bone with fewer hinges is oriented as closely as they allow, within the joint limits unless the source angle is
+    outside. Of equivalent angles, the one nearest to the source angle is chosen.
     """
     _, world_from_root, angles_rad = humanoid24.unpack(qpos)
-    meant = skeleton.forward_kinematics(own, *humanoid24.unpack(qpos)).world_from_bone
+    source_rotation = skeleton.forward_kinematics(source, *humanoid24.unpack(qpos)).world_from_bone
     root, limits_rad = rotations.to_matrix(world_from_root), humanoid24.limits_rad()
-    out, turned = np.array(angles_rad), np.empty_like(meant)
+    out, target_rotation = np.array(angles_rad), np.empty_like(source_rotation)
     for bone, parent in enumerate(target.parents):
-        above = root if parent < 0 else turned[:, parent]
-        where = target.dof_of_bone[bone]
-        start, axes = angles_rad[:, where], target.axes[where]
+        above = root if parent < 0 else target_rotation[:, parent]
+        dofs = target.dof_of_bone[bone]
+        start, axes = angles_rad[:, dofs], target.axes[dofs]
         if len(axes):
-            wanted = meant[:, bone] @ _shortest_turn(target.bone_m[bone], own.bone_m[bone])
-            local = np.swapaxes(above, 1, 2) @ wanted
+            rotation = source_rotation[:, bone] @ _shortest_rotation(target.bone_m[bone], source.bone_m[bone])
+            local = np.swapaxes(above, 1, 2) @ rotation
             fitted = _nearest_euler_angles(axes, hinge_angles(axes, rotations.from_matrix(local)), start)
             if len(axes) < 3:
-                low, high = limits_rad[where].T
+                low, high = limits_rad[dofs].T
                 fitted = np.clip(fitted, np.minimum(low, start), np.maximum(high, start))
-            out[:, where] = fitted
-        turned[:, bone] = above @ skeleton.local_rotation(target, bone, out)
+            out[:, dofs] = fitted
+        target_rotation[:, bone] = above @ skeleton.local_rotation(target, bone, out)
     return out
 
 
-def _shortest_turn(a: Floats, b: Floats) -> Floats:
-    """The rotation matrix that takes direction a to b, which are not opposite; none for a bone without length."""
+def _shortest_rotation(a: Floats, b: Floats) -> Floats:
+    """Shortest rotation (3, 3) of direction a to b, which are not opposite; the identity for a zero vector."""
     lengths = np.sqrt((a @ a) * (b @ b))
     if lengths == 0.0:
         return np.eye(3)
@@ -45,17 +45,17 @@ def _shortest_turn(a: Floats, b: Floats) -> Floats:
 
 
 def _nearest_euler_angles(axes: Floats, angle_rad: Floats, near_rad: Floats) -> Floats:
-    """The same rotations (T, N), each angle within half a turn of `near_rad`; of twins the nearer one."""
-    found = _nearest_turn(angle_rad, near_rad)
+    """Of the equivalent angles (T, N) of the same rotations, those nearest to `near_rad` [rad]."""
+    first = _nearest_turn(angle_rad, near_rad)
     if not are_gimbal(axes):
-        return found
-    other = _nearest_turn(equivalent_euler_angles(angle_rad), near_rad)
-    closer = np.sum((found - near_rad) ** 2, axis=1) <= np.sum((other - near_rad) ** 2, axis=1)
-    out: Floats = np.where(closer[:, None], found, other)
+        return first
+    second = _nearest_turn(equivalent_euler_angles(angle_rad), near_rad)
+    closer = np.sum((first - near_rad) ** 2, axis=1) <= np.sum((second - near_rad) ** 2, axis=1)
+    out: Floats = np.where(closer[:, None], first, second)
     return out
 
 
 def _nearest_turn(angle_rad: Floats, near_rad: Floats) -> Floats:
-    """The same angles, whole turns added so that they lie within half a turn of `near_rad`."""
+    """The same angles with whole turns added, within half a turn of `near_rad` [rad]."""
     out: Floats = angle_rad - 2 * np.pi * np.round((angle_rad - near_rad) / (2 * np.pi))
     return out

@@ -9,33 +9,33 @@ import mujoco
 import numpy as np
 
 from harness.body import anatomy, mounts
-from harness.core import humanoid24, skeleton
+from harness.core import humanoid24
 from harness.core.arrays import Floats, Ints
 from harness.core.package_data import data_folder
-from harness.core.skeleton import Skeleton
+from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadInput
 
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A compiled model and the skeleton that it was scaled to. Shared: treat `model` as read-only.
+    """A compiled model and the skeleton that it was scaled to. It is shared: treat `model` as read-only.
 
-    Travels to worker processes as its ingredients and is built again there.
+    Pickling stores the skeleton and the mounts; the model is compiled again when it is loaded.
     """
 
     skeleton: Skeleton
     mounts: tuple[mounts.Mount, ...]
-    """Trackers, each a site named by its station."""
+    """Mounts of the stations; each is a site of the model with the station's name."""
     model: mujoco.MjModel
 
     @cached_property
     def bone_body_ids(self) -> Ints:
-        """(24,) the model's body of each bone; the body "root" is not among them."""
+        """(24,) index of each bone's body in the model; the body "root" is not included."""
         return np.array([self.model.body(name).id for name in self.skeleton.names], dtype=np.int64)
 
     @cached_property
     def limits_rad(self) -> Floats:
-        """(48, 2) lowest and highest hinge angle, in the skeleton's order [rad]."""
+        """(48, 2) lower and upper limit of each hinge angle, in the skeleton's order [rad]."""
         out: Floats = self.model.jnt_range[1:][humanoid24.QPOS_OF_DOF]
         return out
 
@@ -43,36 +43,36 @@ class Body:
         return build_body, (self.skeleton, self.mounts)
 
 
-def build_body(own: Skeleton | None = None, trackers: Iterable[mounts.Mount] = ()) -> Body:
-    """The humanoid with this skeleton (the standard one by default) and these trackers.
+def build_body(skeleton: Skeleton | None = None, trackers: Iterable[mounts.Mount] = ()) -> Body:
+    """Build the humanoid for a skeleton (the standard one by default), with the mounts of trackers.
 
-    Bones, hinge axes, geoms and masses follow the skeleton; equal input gives equal bytes. BadInput as
-    `require_humanoid` says or for a station worn twice; errors of `mounts.locate_mount` for the trackers.
+    Bones, hinge axes, geoms and masses follow the skeleton; equal input gives equal bytes. Raises BadInput for another
+    skeleton (`require_humanoid`) and for a station with two mounts, and the errors of `mounts.locate_mount`.
     """
-    fitted = humanoid24.standard_skeleton() if own is None else own
-    require_humanoid(fitted)
-    worn = tuple(trackers)
-    stations = [mount.station for mount in worn]
+    skeleton = humanoid24.standard_skeleton() if skeleton is None else skeleton
+    require_humanoid(skeleton)
+    station_mounts = tuple(trackers)
+    stations = [mount.station for mount in station_mounts]
     for station in stations:
         if stations.count(station) > 1:
-            raise BadInput(f"Station {station!r} is worn twice.", "Give each tracker its own name.")
-    return _compile(fitted.bone_m.tobytes(), fitted.axes.tobytes(), worn)
+            raise BadInput(f"Station {station!r} has two mounts.", "Give each station its own name.")
+    return _compile(skeleton.bone_m.tobytes(), skeleton.axes.tobytes(), station_mounts)
 
 
-def require_humanoid(own: Skeleton) -> None:
-    """BadInput unless the skeleton has the 24 bones and 48 hinges of the humanoid."""
+def require_humanoid(skeleton: Skeleton) -> None:
+    """Raise BadInput unless the skeleton has the 24 bones and 48 hinges of the humanoid."""
     standard = humanoid24.standard_skeleton()
-    if (own.names, own.parents, own.hinges) != (standard.names, standard.parents, standard.hinges):
+    if (skeleton.names, skeleton.parents, skeleton.hinges) != (standard.names, standard.parents, standard.hinges):
         raise BadInput(
-            f"A skeleton of {own.bone_count} bones and {len(own.axes)} hinges is not the humanoid's.",
-            "Take its 24 bones first, in the order of core.humanoid24.BONES: skeleton.subset(BONES).",
+            f"A skeleton of {skeleton.bone_count} bones and {len(skeleton.axes)} hinges is not the humanoid's.",
+            "Select its 24 bones in the order of core.humanoid24.BONES: skeleton.subset(BONES).",
         )
 
 
 @lru_cache(maxsize=32)
 def _compile(bone_m: bytes, axes: bytes, trackers: tuple[mounts.Mount, ...]) -> Body:
     standard = humanoid24.standard_skeleton()
-    own = Skeleton(
+    skeleton = Skeleton(
         standard.names,
         standard.parents,
         np.frombuffer(bone_m).reshape(-1, 3),
@@ -80,32 +80,32 @@ def _compile(bone_m: bytes, axes: bytes, trackers: tuple[mounts.Mount, ...]) -> 
         np.frombuffer(axes).reshape(-1, 3),
     )
     spec = mujoco.MjSpec.from_file(str(data_folder("models") / "humanoid24" / "humanoid24.xml"))
-    for name, start_m in zip(own.names, joint_offsets_m(own), strict=True):
+    for name, start_m in zip(skeleton.names, joint_offsets_m(skeleton), strict=True):
         spec.body(name).pos = start_m
-    for name, axis in zip(own.dof_names, own.axes, strict=True):
+    for name, axis in zip(skeleton.dof_names, skeleton.axes, strict=True):
         spec.joint(name).axis = axis
-    for shape in anatomy.body_geoms(own):
-        geom = spec.geom(shape.name)
-        geom.pos, geom.quat, geom.size, geom.mass = shape.centre_m, shape.bone_from_shape, shape.size_m, shape.mass_kg
+    for part in anatomy.body_geoms(skeleton):
+        geom = spec.geom(part.name)
+        geom.pos, geom.quat, geom.size, geom.mass = part.centre_m, part.bone_from_shape, part.size_m, part.mass_kg
     for mount in trackers:
-        mount_m, bone_from_station = mounts.locate_mount(own, mount)
+        mount_m, bone_from_station = mounts.locate_mount(skeleton, mount)
         spec.body(mount.bone).add_site(name=mount.station, pos=mount_m, quat=bone_from_station)
-    spec.key("tpose").qpos = tpose(own)
-    return Body(own, trackers, spec.compile())
+    spec.key("tpose").qpos = tpose(skeleton)
+    return Body(skeleton, trackers, spec.compile())
 
 
-def tpose(own: Skeleton) -> Floats:
-    """(55,) configuration: legs upright, soles on the floor, arms to the sides, facing x."""
-    angles = np.zeros(len(own.axes))
+def tpose(skeleton: Skeleton) -> Floats:
+    """(55,) configuration of the T-pose: legs upright, soles on the floor, arms to the sides, facing x."""
+    angles = np.zeros(len(skeleton.axes))
     for side in "lr":
-        thigh = own.bone_m[own.index(f"{side}femur")]
-        angles[own.dof_names.index(f"{side}femur.rz")] = -np.arctan2(thigh[1], -thigh[2])
-    pose = skeleton.forward_kinematics(own, np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), angles[None])
-    ankles_m = pose.end_m[0, [own.index("ltibia"), own.index("rtibia")], 2]
-    height_m = anatomy.sole_below_ankle_m(own) - float(np.min(ankles_m))
+        thigh = skeleton.bone_m[skeleton.index(f"{side}femur")]
+        angles[skeleton.dof_names.index(f"{side}femur.rz")] = -np.arctan2(thigh[1], -thigh[2])
+    pose = forward_kinematics(skeleton, np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]), angles[None])
+    ankles_m = pose.end_m[0, [skeleton.index("ltibia"), skeleton.index("rtibia")], 2]
+    height_m = anatomy.sole_below_ankle_m(skeleton) - float(np.min(ankles_m))
     return humanoid24.pack(np.array([0.0, 0.0, height_m]), np.array([1.0, 0.0, 0.0, 0.0]), angles)
 
 
-def joint_offsets_m(own: Skeleton) -> list[Floats]:
-    """(24) where each bone's joint lies in its parent's frame: at the parent's far end [m]."""
-    return [np.zeros(3) if parent < 0 else own.bone_m[parent] for parent in own.parents]
+def joint_offsets_m(skeleton: Skeleton) -> list[Floats]:
+    """(24) position of each bone's joint in its parent's frame, at the parent's far end [m]."""
+    return [np.zeros(3) if parent < 0 else skeleton.bone_m[parent] for parent in skeleton.parents]

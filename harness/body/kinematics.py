@@ -1,4 +1,4 @@
-"""Where bones and trackers are, and how they move with the configuration."""
+"""Forward kinematics of bones and stations, and their Jacobians."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -7,13 +7,13 @@ import mujoco
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core import humanoid24, rotations, skeleton
+from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, Ints
-from harness.core.skeleton import Skeleton
+from harness.core.skeleton import Pose, Skeleton, forward_kinematics
 
 
 class Kinematics:
-    """One pose of a body at a time, fast: MuJoCo's kinematics and Jacobians. Not for sharing between threads."""
+    """MuJoCo's kinematics and Jacobians of a body, one configuration at a time. For one thread only."""
 
     def __init__(self, body: Body) -> None:
         self.body = body
@@ -22,23 +22,26 @@ class Kinematics:
         self._bodies = [int(body_id) for body_id in body.bone_body_ids]
 
     def set(self, qpos: Floats) -> None:
-        """Take up a configuration (55,); the quaternion need not be of unit length."""
+        """Set the configuration (55,); its quaternion need not have unit length."""
         self.data.qpos[:] = qpos
         mujoco.mj_kinematics(self.body.model, self.data)
         mujoco.mj_comPos(self.body.model, self.data)
 
     def bone_poses(self) -> tuple[Floats, Floats]:
-        """Joints (24, 3) [m] and `world_from_bone` (24, 4)."""
+        """Joint positions (24, 3) [m] and `world_from_bone` (24, 4)."""
         ids = self.body.bone_body_ids
         return self.data.xpos[ids], self.data.xquat[ids]
 
     def station_poses(
         self, bones: Sequence[int] | Ints, mount_m: Floats, bone_from_station: Floats
     ) -> tuple[Floats, Floats]:
-        """Positions (S, 3) [m] and `world_from_station` (S, 4) of stations on these bones (S,)."""
+        """Positions (S, 3) [m] and `world_from_station` (S, 4) of stations.
+
+        `bones` (S,) are the indices of their bones, `mount_m` (S, 3) [m] and `bone_from_station` (S, 4) their mounts.
+        """
         ids = self.body.bone_body_ids[np.asarray(bones)]
-        reach_m = (self.data.xmat[ids].reshape(-1, 3, 3) @ mount_m[:, :, None])[:, :, 0]
-        return self.data.xpos[ids] + reach_m, rotations.multiply(self.data.xquat[ids], bone_from_station)
+        offset_m = (self.data.xmat[ids].reshape(-1, 3, 3) @ mount_m[:, :, None])[:, :, 0]
+        return self.data.xpos[ids] + offset_m, rotations.multiply(self.data.xquat[ids], bone_from_station)
 
     def jacobians(
         self,
@@ -47,39 +50,39 @@ class Kinematics:
         linear: Sequence[Floats] | Floats,
         angular: Sequence[Floats] | Floats,
     ) -> None:
-        """Fill in how points (S, 3) [m] fixed to these bones move: `linear` and `angular` (S, 3, nv), in world axes.
+        """Fill in the Jacobians `linear` and `angular` (S, 3, nv), in world axes, of points (S, 3) [m] fixed to bones.
 
-        Columns are MuJoCo's velocities: root velocity in world axes, root turn in the root's own, 48 hinges. Lists of
-        the rows are quicker than arrays.
+        Columns are MuJoCo's velocities: root velocity in world axes, root angular velocity in the root's axes, 48
+        hinges. Lists of rows are faster than arrays.
         """
         model, data, bodies = self.body.model, self.data, self._bodies
-        for bone, at_m, slope, turn in zip(bones, point_m, linear, angular, strict=True):
-            mujoco.mj_jac(model, data, slope, turn, at_m, bodies[bone])
+        for bone, point, translation, rotation in zip(bones, point_m, linear, angular, strict=True):
+            mujoco.mj_jac(model, data, translation, rotation, point, bodies[bone])
 
     def integrate(self, qpos: Floats, step: Floats) -> Floats:
-        """The configuration (55,) one tangent step (54,) from `qpos`."""
+        """The configuration (55,) after one tangent step (54,) from `qpos`."""
         out = np.array(qpos, dtype=float)
         mujoco.mj_integratePos(self.body.model, out, step, 1.0)
         return out
 
     def difference(self, start: Floats, stop: Floats) -> Floats:
-        """The tangent step (54,) that `moved` takes from `start` to `stop`."""
+        """The tangent step (54,) by which `integrate` goes from `start` to `stop`."""
         out = np.empty(self.nv)
         mujoco.mj_differentiatePos(self.body.model, out, 1.0, start, stop)
         return out
 
 
-def pose_from_qpos(own: Skeleton, qpos: Floats) -> skeleton.Pose:
-    """Forward kinematics of configurations (T, 55), in plain numpy."""
-    return skeleton.forward_kinematics(own, *humanoid24.unpack(qpos))
+def pose_from_qpos(skeleton: Skeleton, qpos: Floats) -> Pose:
+    """Forward kinematics of configurations (T, 55), in numpy."""
+    return forward_kinematics(skeleton, *humanoid24.unpack(qpos))
 
 
-def bone_poses(own: Skeleton, qpos: Floats) -> tuple[Floats, Floats]:
-    """Joints (T, 24, 3) [m] and `world_from_bone` (T, 24, 4) of configurations (T, 55); signs continuous in time."""
-    at = pose_from_qpos(own, qpos)
-    return at.start_m, rotations.continuous(rotations.from_matrix(at.world_from_bone))
+def bone_poses(skeleton: Skeleton, qpos: Floats) -> tuple[Floats, Floats]:
+    """Joint positions (T, 24, 3) [m] and `world_from_bone` (T, 24, 4) of configurations (T, 55), signs continuous."""
+    pose = pose_from_qpos(skeleton, qpos)
+    return pose.start_m, rotations.continuous(rotations.from_matrix(pose.world_from_bone))
 
 
-def joint_centres_m(own: Skeleton, qpos: Floats) -> Floats:
-    """(T, 25, 3) the root, then the far end of each bone, of configurations (T, 55) [m]."""
-    return np.concatenate([qpos[:, None, :3], pose_from_qpos(own, qpos).end_m], axis=1)
+def joint_centres_m(skeleton: Skeleton, qpos: Floats) -> Floats:
+    """(T, 25, 3) positions of the root, then of each bone's far end, for configurations (T, 55) [m]."""
+    return np.concatenate([qpos[:, None, :3], pose_from_qpos(skeleton, qpos).end_m], axis=1)

@@ -1,8 +1,8 @@
-"""The text of `models/humanoid24/humanoid24.xml`.
+"""Generator of the model file `models/humanoid24/humanoid24.xml`.
 
     python -m harness.body.mjcf > models/humanoid24/humanoid24.xml
 
-writes the file anew from `core.humanoid24` and `body.anatomy`; a test holds it up to date.
+writes the file from `core.humanoid24` and `body.anatomy`; a test checks that it is up to date.
 """
 
 import sys
@@ -17,12 +17,12 @@ from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 
 _HINGE_DAMPING_NMS, _HINGE_ARMATURE_KGM2 = 1.0, 0.01
-"""What keeps an unpowered fall tame; kinematics do not see them."""
+"""They stabilise an unactuated fall; kinematics do not depend on them."""
 
 
 def humanoid_mjcf() -> str:
     """The text of humanoid24.xml: the standard skeleton, before scaling."""
-    own, limits_deg = humanoid24.standard_skeleton(), np.rad2deg(humanoid24.limits_rad())
+    skeleton, limits_deg = humanoid24.standard_skeleton(), np.rad2deg(humanoid24.limits_rad())
     top = ET.Element("mujoco", model="humanoid24")
     ET.SubElement(top, "compiler", angle="degree", autolimits="true")
     ET.SubElement(top, "option", timestep="0.004", integrator="implicitfast")
@@ -38,45 +38,45 @@ def humanoid_mjcf() -> str:
     )
     nodes = {"root": ET.SubElement(world, "body", name="root", pos="0 0 1")}
     ET.SubElement(nodes["root"], "freejoint", name="root")
-    _add_geoms(nodes["root"], "root", own)
-    for bone, start_m in enumerate(humanoid.joint_offsets_m(own)):
-        name, parent = own.names[bone], own.parents[bone]
+    _add_geoms(nodes["root"], "root", skeleton)
+    for bone, start_m in enumerate(humanoid.joint_offsets_m(skeleton)):
+        name, parent = skeleton.names[bone], skeleton.parents[bone]
         nodes[name] = ET.SubElement(
-            nodes["root" if parent < 0 else own.names[parent]], "body", name=name, pos=_text(start_m)
+            nodes["root" if parent < 0 else skeleton.names[parent]], "body", name=name, pos=_text(start_m)
         )
-        where = own.dof_of_bone[bone]
-        for dof in reversed(range(where.start, where.stop)):  # MuJoCo composes outermost first
+        dofs = skeleton.dof_of_bone[bone]
+        for dof in reversed(range(dofs.start, dofs.stop)):  # MuJoCo composes outermost first
             ET.SubElement(
                 nodes[name],
                 "joint",
-                name=own.dof_names[dof],
-                axis=_text(own.axes[dof]),
+                name=skeleton.dof_names[dof],
+                axis=_text(skeleton.axes[dof]),
                 range=_text(limits_deg[dof]),
             )
-        _add_geoms(nodes[name], name, own)
+        _add_geoms(nodes[name], name, skeleton)
     keys = ET.SubElement(top, "keyframe")
-    ET.SubElement(keys, "key", name="tpose", qpos=_text(humanoid.tpose(own)))
+    ET.SubElement(keys, "key", name="tpose", qpos=_text(humanoid.tpose(skeleton)))
     ET.indent(top)
     return ET.tostring(top, encoding="unicode") + "\n"
 
 
-def _add_geoms(node: ET.Element, bone: str, own: Skeleton) -> None:
-    for shape in anatomy.body_geoms(own):
-        if shape.bone == bone:
+def _add_geoms(node: ET.Element, bone: str, skeleton: Skeleton) -> None:
+    for geom in anatomy.body_geoms(skeleton):
+        if geom.bone == bone:
             ET.SubElement(
                 node,
                 "geom",
-                name=shape.name,
-                type=shape.kind,
-                pos=_text(shape.centre_m),
-                quat=_text(shape.bone_from_shape),
-                size=_text(shape.size_m[: 2 if shape.kind == "capsule" else 3]),
-                mass=_text([shape.mass_kg]),
+                name=geom.name,
+                type=geom.kind,
+                pos=_text(geom.centre_m),
+                quat=_text(geom.bone_from_shape),
+                size=_text(geom.size_m[: 2 if geom.kind == "capsule" else 3]),
+                mass=_text([geom.mass_kg]),
             )
 
 
 def _add_appearance(top: ET.Element) -> None:
-    """Defaults, colours and light. Flesh meets the floor but not itself."""
+    """Defaults, colours and light. Geoms collide with the floor but not with each other."""
     default = ET.SubElement(top, "default")
     ET.SubElement(
         default, "joint", type="hinge", damping=_text([_HINGE_DAMPING_NMS]), armature=_text([_HINGE_ARMATURE_KGM2])

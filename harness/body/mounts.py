@@ -1,4 +1,4 @@
-"""Where trackers are worn: on the surface of a bone's flesh.
+"""Mounts of stations on the surface of the body.
 
 The axes of a station: z outward along the ray from the bone to the skin, x along the bone (towards its far
 end), y = z cross x. In the rest pose (arms to the sides, palms down) the angle around a bone is 0 where it faces
@@ -22,12 +22,12 @@ from harness.errors import BadInput
 
 _GEOM = {"capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "ellipsoid": mujoco.mjtGeom.mjGEOM_ELLIPSOID}
 _RAY_START_M = 1.0
-"""Farther from any bone than its skin."""
+"""Start of a ray outside the body, as a distance from the bone [m]."""
 
 
 @dataclass(frozen=True)
 class Mount:
-    """One tracker on the body."""
+    """Place and orientation of one station on the body."""
 
     station: str
     bone: str
@@ -38,9 +38,9 @@ class Mount:
     stand_off_m: float = 0.01
     """Distance of the tracker's origin from the skin [m]."""
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """How far from that place it really sits, along its axes there [m]."""
+    """Deviation of its position from that place, along the station's nominal axes [m]."""
     rotation_rad: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """How far it is really turned from those axes, a rotation vector in them [rad]: straps are put on anyhow."""
+    """Deviation of its orientation from the nominal axes, a rotation vector in them [rad]."""
 
 
 def _mount(station: str, bone: str, along: float, around_deg: float) -> Mount:
@@ -51,27 +51,27 @@ DEFAULT_MOUNTS: Mapping[str, Mount] = MappingProxyType(
     {
         mount.station: mount
         for mount in (
-            _mount("left_wrist", "lwrist", 0.6, -90.0),  # back of the forearm, where a watch sits
+            _mount("left_wrist", "lwrist", 0.6, -90.0),  # back of the forearm, as a watch
             _mount("right_wrist", "rwrist", 0.6, 90.0),
             _mount("left_hand", "lhand", 1.0, -90.0),  # back of the hand
             _mount("right_hand", "rhand", 1.0, 90.0),
-            _mount("left_ankle", "ltibia", 0.9, -90.0),  # outside of the shin; the foot stays unseen
+            _mount("left_ankle", "ltibia", 0.9, -90.0),  # outside of the shin, which does not observe the foot
             _mount("right_ankle", "rtibia", 0.9, 90.0),
-            _mount("left_foot", "lfoot", 0.5, 0.0),  # instep, the option for the ankles
+            _mount("left_foot", "lfoot", 0.5, 0.0),  # instep, an alternative to the ankles
             _mount("right_foot", "rfoot", 0.5, 0.0),
             _mount("torso", "thorax", 0.5, 0.0),  # breastbone
             _mount("head", "head", 1.0, 0.0),  # forehead
-            _mount("pelvis", "lhipjoint", 0.0, 165.0),  # sacrum, in the middle; hip bones are rigid with the root
+            _mount("pelvis", "lhipjoint", 0.0, 165.0),  # sacrum, on the midline; hip bones are rigid with the root
         )
     }
 )
-"""The stations that scenarios name: six of the first paper, five of the second, and the foot option."""
+"""Stations that scenarios name: the six of the first paper, the five of the second, and the feet."""
 
 
 def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     """Origin (3,) [m] and orientation `bone_from_station` (4,) of a station in the frame of its bone.
 
-    Raises UnknownName for the bone and BadInput where the bone has no flesh at that place.
+    Raises UnknownName for the bone and BadInput where the bone has no surface at that place.
     """
     bone = skeleton.index(mount.bone)
     if not skeleton.length_m[bone] > 0.0:
@@ -85,38 +85,38 @@ def locate_mount(skeleton: Skeleton, mount: Mount) -> tuple[Floats, Floats]:
     skin_m = _skin_m(skeleton, mount.bone, axis_m, outward)
     if skin_m is None:
         raise BadInput(
-            f"Station {mount.station!r} misses its bone: nothing of {mount.bone} is at {mount.along:.2f} along it.",
+            f"Station {mount.station!r} misses its bone: {mount.bone} has no surface at {mount.along:.2f} along it.",
             "Choose another place along the bone or another angle around it.",
         )
     nominal = rotations.from_matrix(np.stack([along, np.cross(outward, along), outward], axis=1))
-    beside_m = rotations.rotate(nominal, np.array(mount.offset_m))
-    turned = rotations.multiply(nominal, rotations.exp(np.array(mount.rotation_rad)))
-    return axis_m + (skin_m + mount.stand_off_m) * outward + beside_m, turned
+    offset_m = rotations.rotate(nominal, np.array(mount.offset_m))
+    rotation = rotations.multiply(nominal, rotations.exp(np.array(mount.rotation_rad)))
+    return axis_m + (skin_m + mount.stand_off_m) * outward + offset_m, rotation
 
 
 def _zero_direction(along: Floats) -> Floats:
-    """The unit vector at angle 0: square to the bone, forward, or up for a bone that points forward."""
+    """Unit vector at angle 0, perpendicular to the bone: forward, or up for a bone that points forward."""
     reference = np.array([0.0, 0.0, 1.0]) if abs(along[0]) > math.sqrt(0.5) else np.array([1.0, 0.0, 0.0])
-    square = reference - (reference @ along) * along
-    out: Floats = square / np.sqrt(square @ square)
+    perpendicular = reference - (reference @ along) * along
+    out: Floats = perpendicular / np.sqrt(perpendicular @ perpendicular)
     return out
 
 
 def _skin_m(skeleton: Skeleton, bone: str, axis_m: Floats, outward: Floats) -> float | None:
-    """Distance from the bone's axis to the outermost skin, found by a ray from outside; None where there is none."""
-    carriers = {bone} | ({"root"} if bone in ("lhipjoint", "rhipjoint") else set())
-    eye = axis_m + _RAY_START_M * outward
+    """Distance from the bone's axis to the outermost surface along a ray from outside [m]; None if the ray misses."""
+    bones = {bone} | ({"root"} if bone in ("lhipjoint", "rhipjoint") else set())
+    start_m = axis_m + _RAY_START_M * outward
     hits = [
         mujoco.mju_rayGeom(
-            shape.centre_m,
-            rotations.to_matrix(shape.bone_from_shape).ravel(),
-            shape.size_m,
-            eye,
+            geom.centre_m,
+            rotations.to_matrix(geom.bone_from_shape).ravel(),
+            geom.size_m,
+            start_m,
             -outward,
-            _GEOM[shape.kind],
+            _GEOM[geom.kind],
         )
-        for shape in anatomy.body_geoms(skeleton)
-        if shape.bone in carriers
+        for geom in anatomy.body_geoms(skeleton)
+        if geom.bone in bones
     ]
     depths = [_RAY_START_M - hit for hit in hits if 0.0 <= hit < _RAY_START_M]
     return max(depths, default=None)

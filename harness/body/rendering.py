@@ -1,7 +1,7 @@
-"""Bodies in three dimensions: a floor with light on it, and figures whose flesh follows their bones.
+"""Rendering of bodies with pyvista: a floor with lights and a camera, and meshes that follow the bones.
 
-VTK without a working OpenGL may end the process instead of raising, so whoever imports this file does it in a process
-of its own.
+VTK without a working OpenGL may end the process instead of raising an error, so this module is imported in processes of
+their own only.
 """
 
 from typing import Any
@@ -20,10 +20,10 @@ _CAMERA_DISTANCE_M = 4.6
 
 
 class RenderScene:
-    """One plotter for many pictures: a floor, lights, and a camera that goes along."""
+    """A plotter with a floor, lights, and a camera that follows the body."""
 
     def __init__(self, size: tuple[int, int], heading_rad: float, *, off_screen: bool = True) -> None:
-        """`size` in pixels; `heading_rad` is where the body faces, to see it from ahead and from the side."""
+        """`size` is in pixels; `heading_rad` is the body's heading, which the camera sees obliquely from the front."""
         self.plotter: Any = pv.Plotter(off_screen=off_screen, window_size=list(size), lighting="none")
         self.plotter.background_color = pv.Color(_BACKGROUND)
         self.plotter.enable_anti_aliasing("msaa", multi_samples=8)
@@ -45,11 +45,11 @@ class RenderScene:
             self.plotter.add_light(light)
 
     def follow(self, root_m: Floats) -> None:
-        """Floor and camera go where the body is (3,); from where one looks at it stays."""
-        at = np.array([*root_m[:2], 0.0])
-        self._disc.position = tuple(at)
-        self._grid.position = tuple(np.round(at / _GRID_M) * _GRID_M)
-        middle = np.array([*at[:2], max(0.93, float(root_m[2]) - 0.05)])
+        """Move floor and camera to the root (3,) [m]; the viewing direction stays."""
+        floor_m = np.array([*root_m[:2], 0.0])
+        self._disc.position = tuple(floor_m)
+        self._grid.position = tuple(np.round(floor_m / _GRID_M) * _GRID_M)
+        middle = np.array([*floor_m[:2], max(0.93, float(root_m[2]) - 0.05)])
         camera = self.plotter.camera
         away = np.array(camera.position) - np.array(camera.focal_point)
         camera.focal_point = tuple(middle)
@@ -57,7 +57,7 @@ class RenderScene:
         self.plotter.reset_camera_clipping_range()
 
     def picture(self) -> np.ndarray:
-        """(height, width, 3) bytes; RuntimeError when OpenGL is there but draws nothing."""
+        """(height, width, 3) picture in bytes; RuntimeError if OpenGL draws nothing."""
         self.plotter.render()
         picture = np.asarray(self.plotter.screenshot(return_img=True))
         if picture.std() == 0.0:
@@ -69,17 +69,17 @@ class RenderScene:
 
 
 class BodyMesh:
-    """A body of capsules and ellipsoids, drawn as one mesh whose points follow the bones, and its shadow."""
+    """One mesh of a body's capsules and ellipsoids, whose points follow the bones, and its shadow."""
 
     def __init__(self, plotter: "pv.Plotter", skeleton: Skeleton, colour: str, girth: float, opacity: float) -> None:
         self._parts, meshes, first = [], [], 0
-        for shape in body_geoms(skeleton):
-            mesh = _mesh(shape.kind, shape.size_m, girth)
-            turn = rotations.to_matrix(shape.bone_from_shape)
-            mesh.points = mesh.points @ turn.T + shape.centre_m
-            bone = -1 if shape.bone == "root" else skeleton.index(shape.bone)
-            where = slice(first, first + mesh.n_points)
-            self._parts.append((bone, where, np.asarray(mesh.points, dtype=float), mesh["Normals"] @ turn.T))
+        for geom in body_geoms(skeleton):
+            mesh = _mesh(geom.kind, geom.size_m, girth)
+            turn = rotations.to_matrix(geom.bone_from_shape)
+            mesh.points = mesh.points @ turn.T + geom.centre_m
+            bone = -1 if geom.bone == "root" else skeleton.index(geom.bone)
+            points = slice(first, first + mesh.n_points)
+            self._parts.append((bone, points, np.asarray(mesh.points, dtype=float), mesh["Normals"] @ turn.T))
             meshes.append(mesh)
             first += mesh.n_points
         self._body = meshes[0].append_polydata(*meshes[1:])
@@ -90,7 +90,7 @@ class BodyMesh:
         plotter.add_mesh(self._shadow, color=_SHADOW, lighting=False)
 
     def move(self, root_m: Floats, world_from_root: Floats, start_m: Floats, world_from_bone: Floats) -> None:
-        """To where the root (3,), (3, 3) and the joints of the bones (B, 3), (B, 3, 3) are [m]."""
+        """Set the pose of the root (3,) [m], (3, 3) and of the bones' joints (B, 3) [m], (B, 3, 3)."""
         points, normals = np.empty((self._body.n_points, 3)), np.empty((self._body.n_points, 3))
         for bone, where, local, normal in self._parts:
             turn = world_from_root if bone < 0 else world_from_bone[bone]
@@ -103,7 +103,7 @@ class BodyMesh:
 
 
 def _mesh(kind: str, size_m: Floats, girth: float) -> "pv.PolyData":
-    """A capsule along z or an ellipsoid, with normals."""
+    """Mesh of a capsule along z or of an ellipsoid, with normals; `girth` scales its thickness."""
     ball = pv.Sphere(radius=1.0, theta_resolution=20, phi_resolution=16)
     unit = np.asarray(ball.points, dtype=float)
     mesh = pv.PolyData(ball.points.copy(), ball.faces)
@@ -120,7 +120,7 @@ def _mesh(kind: str, size_m: Floats, girth: float) -> "pv.PolyData":
 
 
 def _grid() -> "pv.PolyData":
-    """Lines every half metre, within a circle."""
+    """Grid lines every half metre within the floor's radius."""
     offsets = np.arange(-_FLOOR_RADIUS_M + _GRID_M, _FLOOR_RADIUS_M, _GRID_M)
     half = np.sqrt(_FLOOR_RADIUS_M**2 - offsets**2)
     ends = []

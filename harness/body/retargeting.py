@@ -1,5 +1,7 @@
-"""Captured motion onto a body: the performer's own, exactly, or a common one: as closely as its proportions allow, or
-with every angle kept."""
+"""Retargeting of a clip to a body: the performer's own (exact), or a common one.
+
+On a common body either the bones point as closely as possible in the performer's directions, or all angles are kept.
+"""
 
 from dataclasses import dataclass
 
@@ -17,24 +19,24 @@ _LEGS = ("lfemur", "ltibia", "rfemur", "rtibia")
 
 @dataclass(frozen=True)
 class RetargetReport:
-    """What one clip lost on the way to a common body. Frames in stance decide about feet: NaN when there are none.
+    """Errors of retargeting one clip to a common body.
 
-    Deviation: distance of the 24 joint centres from those of the performer, enlarged by `leg_scale`. Float and sink:
-    how far soles in stance are above or below where the performer's, enlarged alike, stand over the clip's floor;
-    the 95th percentile of each. "Plain" is the root scaled and every angle kept.
+    Deviation is the distance of the 24 joint centres from those of the performer, scaled by `leg_scale`. Float and sink
+    are the 95th percentiles of the height of soles in stance above and below those of the performer, scaled alike, over
+    the clip's floor; NaN without stance. "Plain" is the motion with the root's path scaled and every angle kept.
     """
 
     clip: str
     leg_scale: float
     floor_m: float
-    """Height of the clip's floor that was taken out [m]."""
+    """Height of the clip's floor, which was subtracted [m]."""
     stance_share: float
-    """Frames with a foot in stance, of all."""
+    """Share of frames with a foot in stance."""
     deviation_plain_mm: float
     deviation_mm: float
     deviation_p95_mm: float
     proportions_mm: float
-    """The deviation that is left when every bone, hip bones too, points exactly as the performer's."""
+    """Deviation that remains if every bone, hip bones included, points exactly as the performer's [mm]."""
     float_plain_mm: float
     sink_plain_mm: float
     float_mm: float
@@ -42,98 +44,97 @@ class RetargetReport:
 
 
 def retarget_to_own_body(clip: Clip) -> tuple[Body, BodyMotion]:
-    """The clip on the body scaled to its own skeleton: nothing is changed, fingers and toes are left out."""
+    """The clip on the body scaled to its own skeleton, unchanged; fingers and toes are left out."""
     own, angles_rad = _humanoid_part(clip)
     return humanoid.build_body(own), _body_motion(clip, humanoid24.pack(clip.root_m, clip.world_from_root, angles_rad))
 
 
 def retarget_to_common_body(clip: Clip, target: Skeleton) -> tuple[BodyMotion, RetargetReport]:
-    """The clip on the body of another skeleton, and what that cost.
+    """The clip on the body of the skeleton `target` with matching bone directions, and the errors.
 
-    The root's path grows with the legs. Bones point as the performer's do where their hinges allow it. The root
-    then moves by one constant offset in its own frame, that of least squared joint deviation, and by a slowly
-    varying height that puts soles in stance where the performer's are, over a floor at z = 0.
+    The root's path scales with the legs. Bones point as the performer's where their hinges allow it. The root then
+    moves by a constant offset in its own frame, of least squared joint deviation, and by a slowly varying height that
+    puts soles in stance at the performer's heights over a floor at z = 0.
     """
-    own, kept_rad = _humanoid_part(clip)
-    turns = clip.world_from_root
-    meant = _RetargetGoal.on(target, own, kept_rad, clip)
-    angles_rad = bone_directions.match_bone_directions(own, humanoid24.pack(clip.root_m, turns, kept_rad), target)
-    turned = skeleton.world_rotations(target, turns, angles_rad)
-    moved = skeleton.pose_from_rotations(target, meant.root_m, turned)
-    root_m = meant.root_m + _best_offset_m(meant.joints_m - moved.end_m, turns)
-    moved = skeleton.pose_from_rotations(target, root_m, turned)
-    root_m[:, 2] += ground.smooth_sole_error(
-        meant.soles_m - ground.sole_heights_m(target, moved), meant.standing, clip.rate_hz
-    )
-    moved = skeleton.pose_from_rotations(target, root_m, turned)
-    return _body_motion(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
+    own, own_angles_rad = _humanoid_part(clip)
+    world_from_root = clip.world_from_root
+    goal = _RetargetGoal.create(target, own, own_angles_rad, clip)
+    qpos = humanoid24.pack(clip.root_m, world_from_root, own_angles_rad)
+    angles_rad = bone_directions.match_bone_directions(own, qpos, target)
+    world_from_bone = skeleton.world_rotations(target, world_from_root, angles_rad)
+    pose = skeleton.pose_from_rotations(target, goal.root_m, world_from_bone)
+    root_m = goal.root_m + _best_offset_m(goal.joints_m - pose.end_m, world_from_root)
+    pose = skeleton.pose_from_rotations(target, root_m, world_from_bone)
+    sole_error_m = goal.soles_m - ground.sole_heights_m(target, pose)
+    root_m[:, 2] += ground.smooth_sole_error(sole_error_m, goal.stance, clip.rate_hz)
+    pose = skeleton.pose_from_rotations(target, root_m, world_from_bone)
+    return _body_motion(clip, humanoid24.pack(root_m, world_from_root, angles_rad)), goal.report(pose)
 
 
 def retarget_with_same_angles(clip: Clip, target: Skeleton) -> tuple[BodyMotion, RetargetReport]:
-    """The clip's own angles, to the bit, on the body of another skeleton, and what that cost.
+    """The clip with its angles unchanged on the body of the skeleton `target`, and the errors.
 
-    The root's path grows with the legs and is lowered once, so that half of the soles in stance are below where the
-    performer's are over a floor at z = 0 and half above. Hands and feet are then not where the performer's were.
+    The root's path scales with the legs and is shifted once in height, so that the median height of soles in stance is
+    the performer's over a floor at z = 0. Hands and feet are not at the performer's positions.
     """
     own, angles_rad = _humanoid_part(clip)
-    turns = clip.world_from_root
-    meant = _RetargetGoal.on(target, own, angles_rad, clip)
-    moved = skeleton.forward_kinematics(target, meant.root_m, turns, angles_rad)
-    soles_m = (ground.sole_heights_m(target, moved) - meant.soles_m)[meant.standing]
-    root_m = meant.root_m - np.array([0.0, 0.0, np.median(soles_m) if soles_m.size else 0.0])
-    moved = skeleton.pose_from_rotations(target, root_m, moved.world_from_bone)
-    return _body_motion(clip, humanoid24.pack(root_m, turns, angles_rad)), meant.report(moved)
+    goal = _RetargetGoal.create(target, own, angles_rad, clip)
+    pose = skeleton.forward_kinematics(target, goal.root_m, clip.world_from_root, angles_rad)
+    soles_m = (ground.sole_heights_m(target, pose) - goal.soles_m)[goal.stance]
+    root_m = goal.root_m - np.array([0.0, 0.0, np.median(soles_m) if soles_m.size else 0.0])
+    pose = skeleton.pose_from_rotations(target, root_m, pose.world_from_bone)
+    return _body_motion(clip, humanoid24.pack(root_m, clip.world_from_root, angles_rad)), goal.report(pose)
 
 
 @dataclass(frozen=True, eq=False)
 class _RetargetGoal:
-    """What a clip asks of a common body: the performer's joints and soles, enlarged by the legs, over z = 0."""
+    """Targets on a common body: the performer's joints and soles, scaled by the legs, over a floor at z = 0."""
 
     clip: Clip
     own: Skeleton
-    kept_rad: Floats
-    """(T, 48) the clip's angles."""
+    angles_rad: Floats
+    """(T, 48) the clip's angles [rad]."""
     target: Skeleton
-    seen: Pose
-    """The clip on its own skeleton."""
-    standing: Bools
-    """(T, 2) feet in stance."""
+    pose: Pose
+    """Pose of the clip on its own skeleton."""
+    stance: Bools
+    """(T, 2) whether each foot is in stance."""
     floor_m: float
     scale: float
     root_m: Floats
-    """(T, 3)"""
+    """(T, 3) target of the root [m]."""
     joints_m: Floats
-    """(T, 24, 3)"""
+    """(T, 24, 3) targets of the bones' far ends [m]."""
     soles_m: Floats
-    """(T, 2)"""
+    """(T, 2) targets of the sole heights [m]."""
 
     @classmethod
-    def on(cls, target: Skeleton, own: Skeleton, kept_rad: Floats, clip: Clip) -> "_RetargetGoal":
-        seen = skeleton.forward_kinematics(own, clip.root_m, clip.world_from_root, kept_rad)
-        soles_m, standing = ground.sole_heights_m(own, seen), ground.detect_stance(own, seen, clip.rate_hz)
-        floor_m, scale = ground.floor_m(soles_m, standing), _leg_m(target) / _leg_m(own)
+    def create(cls, target: Skeleton, own: Skeleton, angles_rad: Floats, clip: Clip) -> "_RetargetGoal":
+        pose = skeleton.forward_kinematics(own, clip.root_m, clip.world_from_root, angles_rad)
+        soles_m, stance = ground.sole_heights_m(own, pose), ground.detect_stance(own, pose, clip.rate_hz)
+        floor_m, scale = ground.floor_m(soles_m, stance), _leg_m(target) / _leg_m(own)
         level_m = np.array([0.0, 0.0, floor_m])
-        root_m, joints_m = scale * (clip.root_m - level_m), scale * (seen.end_m - level_m)
-        low_m = scale * (soles_m - floor_m)
-        return cls(clip, own, kept_rad, target, seen, standing, floor_m, scale, root_m, joints_m, low_m)
+        root_m, joints_m = scale * (clip.root_m - level_m), scale * (pose.end_m - level_m)
+        soles_m = scale * (soles_m - floor_m)
+        return cls(clip, own, angles_rad, target, pose, stance, floor_m, scale, root_m, joints_m, soles_m)
 
-    def report(self, moved: Pose) -> RetargetReport:
-        """How far a motion of the common body is from it."""
+    def report(self, result: Pose) -> RetargetReport:
+        """Errors of a motion of the common body against the targets."""
         clip, target, scale = self.clip, self.target, self.scale
-        plain = skeleton.forward_kinematics(target, scale * clip.root_m, clip.world_from_root, self.kept_rad)
-        deviation_mm = 1e3 * np.linalg.norm(moved.end_m - self.joints_m, axis=2)
+        plain = skeleton.forward_kinematics(target, scale * clip.root_m, clip.world_from_root, self.angles_rad)
+        deviation_mm = 1e3 * np.linalg.norm(result.end_m - self.joints_m, axis=2)
         feet_mm, plain_feet_mm = (
-            1e3 * (ground.sole_heights_m(target, pose) - self.soles_m)[self.standing] for pose in (moved, plain)
+            1e3 * (ground.sole_heights_m(target, pose) - self.soles_m)[self.stance] for pose in (result, plain)
         )
         return RetargetReport(
             clip=clip.name,
             leg_scale=scale,
             floor_m=self.floor_m,
-            stance_share=float(np.mean(np.any(self.standing, axis=1))),
-            deviation_plain_mm=float(1e3 * np.mean(np.linalg.norm(plain.end_m - scale * self.seen.end_m, axis=2))),
+            stance_share=float(np.mean(np.any(self.stance, axis=1))),
+            deviation_plain_mm=float(1e3 * np.mean(np.linalg.norm(plain.end_m - scale * self.pose.end_m, axis=2))),
             deviation_mm=float(np.mean(deviation_mm)),
             deviation_p95_mm=float(np.percentile(deviation_mm, 95)),
-            proportions_mm=_proportions_mm(self.own, self.seen, target, scale, clip),
+            proportions_mm=_proportions_mm(self.own, self.pose, target, scale, clip),
             float_plain_mm=_percentile95(plain_feet_mm),
             sink_plain_mm=_percentile95(-plain_feet_mm),
             float_mm=_percentile95(feet_mm),
@@ -142,32 +143,32 @@ class _RetargetGoal:
 
 
 def _humanoid_part(clip: Clip) -> tuple[Skeleton, Floats]:
-    """The 24 bones of the clip's skeleton and their (T, 48) angles; UnknownName or BadInput if it has not got them."""
+    """The 24 bones of the clip's skeleton and their angles (T, 48) [rad]; UnknownName or BadInput if it lacks them."""
     own, dofs = clip.skeleton.subset(humanoid24.BONES)
     humanoid.require_humanoid(own)
     return own, clip.angles_rad[:, dofs]
 
 
 def _best_offset_m(residual_m: Floats, world_from_root: Floats) -> Floats:
-    """(T, 3) the move, constant in the root's frame, that leaves the least of residuals (T, B, 3) in square [m]."""
+    """(T, 3) offset, constant in the root's frame, that minimises the squared residuals (T, B, 3) [m]."""
     in_root = rotations.rotate(rotations.inverse(world_from_root), np.mean(residual_m, axis=1))
     return rotations.rotate(world_from_root, np.mean(in_root, axis=0))
 
 
-def _proportions_mm(own: Skeleton, seen: Pose, target: Skeleton, scale: float, clip: Clip) -> float:
-    """Mean deviation if every bone, hip bones too, could point exactly as the performer's: lengths alone [mm]."""
-    ends_m = np.empty_like(seen.end_m)
+def _proportions_mm(own: Skeleton, pose: Pose, target: Skeleton, scale: float, clip: Clip) -> float:
+    """Mean deviation from bone lengths alone, if every bone pointed exactly as the performer's [mm]."""
+    ends_m = np.empty_like(pose.end_m)
     for bone, parent in enumerate(target.parents):
         at = scale * clip.root_m if parent < 0 else ends_m[:, parent]
         stretch = target.length_m[bone] / own.length_m[bone] if own.length_m[bone] > 0.0 else 0.0
-        ends_m[:, bone] = at + stretch * (seen.end_m[:, bone] - seen.start_m[:, bone])
-    residual_m = scale * seen.end_m - ends_m
+        ends_m[:, bone] = at + stretch * (pose.end_m[:, bone] - pose.start_m[:, bone])
+    residual_m = scale * pose.end_m - ends_m
     residual_m -= _best_offset_m(residual_m, clip.world_from_root)[:, None]
     return float(1e3 * np.mean(np.linalg.norm(residual_m, axis=2)))
 
 
 def _percentile95(error_mm: Floats) -> float:
-    """The 95th percentile, not below 0; NaN of nothing."""
+    """The 95th percentile, at least 0; NaN for an empty array."""
     return max(0.0, float(np.percentile(error_mm, 95))) if error_mm.size else float("nan")
 
 

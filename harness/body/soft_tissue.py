@@ -1,8 +1,8 @@
-"""How much soft tissue lies between a bone and the skin over it, where trackers are worn.
+"""Thickness of the soft tissue between a bone and the skin under a tracker.
 
-Muscle and fat over the middle of the thigh are 28 + 10 mm, by ultrasound of 17 adults (Mechelli 2019, J. Cachexia,
-Sarcopenia and Muscle - Clinical Reports 4). All other numbers are ours, set beside that one by what anybody can feel:
-nothing but skin lies over forehead, breastbone, shin and the back of the hand. They grow or shrink evenly along a bone.
+Muscle and fat over the middle of the thigh are 28 + 10 mm thick, by ultrasound of 17 adults (Mechelli 2019,
+J. Cachexia, Sarcopenia and Muscle - Clinical Reports 4). All other numbers are our choice relative to that one.
+Only skin lies over forehead, breastbone, shin and the back of the hand. The thickness is linear along a bone.
 """
 
 from collections.abc import Mapping
@@ -33,11 +33,11 @@ THICKNESS_M: Mapping[str, tuple[float, float]] = MappingProxyType(
         "toes": (0.005, 0.005),
     }
 )
-"""Bone, of both sides -> at its joint and at its far end [m]."""
+"""Thickness at the joint and at the far end, by bone of either side [m]."""
 
 
 def tissue_thickness_m(bone: str, along: float) -> float:
-    """Between the bone and the skin at this place along it, 0 at its joint to 1 at its far end [m]; UnknownName."""
+    """Thickness at a place along a bone, 0 at its joint to 1 at its far end [m]; UnknownName for the bone."""
     if bone not in humanoid24.BONES:
         raise UnknownName("bone", bone, humanoid24.BONES)
     at_joint, at_end = THICKNESS_M[bone if bone in THICKNESS_M else bone[1:]]

@@ -1,4 +1,4 @@
-"""The thread that reads the tracker and does nothing else, so that no byte waits for a pose to be solved."""
+"""The capture thread, which only reads the tracker, so that no byte waits while a pose is solved."""
 
 import time
 from collections.abc import Callable
@@ -11,15 +11,15 @@ from harness.stream.frame import TrackerFrame, TrackerStream
 
 @dataclass(frozen=True, slots=True)
 class CapturedFrame:
-    """A frame as it came out of the stream."""
+    """A frame, and when it came out of the stream."""
 
     frame: TrackerFrame
     captured_s: float
-    """Host monotonic clock then [s]."""
+    """Host monotonic clock when the stream delivered the frame [s]."""
 
 
 class CaptureThread:
-    """Iterates a stream into a queue; the queue ends with the stream."""
+    """Moves frames from a stream to a queue; the queue ends when the stream ends."""
 
     def __init__(
         self, stream: TrackerStream, queue: DroppingQueue[CapturedFrame], clock: Callable[[], float] = time.monotonic
@@ -28,13 +28,13 @@ class CaptureThread:
         self._thread = Thread(target=self._run, name="capture")
         self.frames = 0
         self.error: Exception | None = None
-        """What ended the stream, if it was not its own end."""
+        """The error that ended the stream; None after a normal end."""
 
     def start(self) -> None:
         self._thread.start()
 
     def stop(self) -> None:
-        """Close the stream and wait until its thread has ended; may be called again, and before `start`."""
+        """Close the stream and wait for the thread to end; may be called repeatedly, and before `start`."""
         self._stream.close()
         if self._thread.ident is not None:
             self._thread.join()
@@ -44,7 +44,7 @@ class CaptureThread:
             for frame in self._stream:
                 self.frames += 1
                 self._queue.put(CapturedFrame(frame, self._clock()))
-        except Exception as error:  # whoever waits for frames raises it again
+        except Exception as error:  # `run_session` raises it again
             self.error = error
         finally:
             self._queue.end()

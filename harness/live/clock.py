@@ -1,34 +1,35 @@
-"""When a frame was measured, by this computer's clock."""
+"""Times of measurement on the host's clock, estimated from the device's time stamps."""
 
 import numpy as np
 
 from harness.stream.frame import TrackerFrame
 
 _MAX_DRIFT = 1e-4
-"""How much one clock may gain on the other, as a share: crystals do a tenth of it."""
+"""Greatest relative drift of the two clocks; that of quartz crystals is a tenth of it."""
 _CLOCK_RESET_S = 1.0
+"""A larger jump of the clock difference is a reset of the device's clock [s]."""
 
 
 class HostClockEstimator:
-    """Maps the device's stamps to the host's clock by the quickest frames so far.
+    """Maps device time stamps to the host's clock by the frames with the least delay so far.
 
-    A frame can be held up but never comes early, so the least difference of the two clocks is the truest; it is let go
-    of as fast as clocks may drift. What even the quickest frame takes from sample to last byte stays in it.
+    A frame may be delayed but never comes early, so the least difference of the two clocks is the best estimate. The
+    estimate increases at the largest drift of the clocks. The least delay from sample to last byte remains in it.
     """
 
     def __init__(self) -> None:
-        self._least_s = np.inf
-        """Of host minus device clock."""
-        self._before_s = 0.0
+        self._difference_s = np.inf
+        """Least difference of host minus device clock."""
+        self._received_s = 0.0
 
     def measured_s(self, frame: TrackerFrame) -> float:
-        """The mean of the stations' measuring times by the host's monotonic clock [s]; its reception without stamps."""
-        known = frame.measured_s[~np.isnan(frame.measured_s)]
-        if len(known) == 0:
+        """Mean time of measurement of stations on the host's monotonic clock [s]; that of reception without stamps."""
+        stamps_s = frame.measured_s[~np.isnan(frame.measured_s)]
+        if len(stamps_s) == 0:
             return frame.received_s
-        difference_s = frame.received_s - float(known[-1])
-        drifted_s = self._least_s + _MAX_DRIFT * max(frame.received_s - self._before_s, 0.0)
-        set_anew = abs(difference_s - drifted_s) > _CLOCK_RESET_S
-        self._least_s = difference_s if set_anew else min(difference_s, drifted_s)
-        self._before_s = frame.received_s
-        return float(known.mean()) + self._least_s
+        difference_s = frame.received_s - float(stamps_s[-1])
+        drifted_s = self._difference_s + _MAX_DRIFT * max(frame.received_s - self._received_s, 0.0)
+        clock_reset = abs(difference_s - drifted_s) > _CLOCK_RESET_S
+        self._difference_s = difference_s if clock_reset else min(difference_s, drifted_s)
+        self._received_s = frame.received_s
+        return float(stamps_s.mean()) + self._difference_s

@@ -1,4 +1,4 @@
-"""Hands what one thread has to another, which may be slower: the newest counts, and whoever puts never waits."""
+"""A queue between a fast and a slower thread that drops its oldest items, so that putting never blocks."""
 
 from queue import Empty, SimpleQueue
 from typing import Generic, TypeVar
@@ -7,41 +7,41 @@ T = TypeVar("T")
 
 
 class DroppingQueue(Generic[T]):
-    """A bounded queue of one putting and one taking thread; when it is full the oldest gives way and is counted."""
+    """A bounded queue for one producer and one consumer thread; a full queue drops and counts its oldest item."""
 
     def __init__(self, size: int) -> None:
         self.size = size
         self.dropped = 0
-        self._waiting: SimpleQueue[T | None] = SimpleQueue()
+        self._items: SimpleQueue[T | None] = SimpleQueue()
 
     def __len__(self) -> int:
-        return self._waiting.qsize()
+        return self._items.qsize()
 
     def put(self, item: T) -> None:
-        """Add the newest."""
-        if self._waiting.qsize() >= self.size:
+        """Add an item; never blocks."""
+        if self._items.qsize() >= self.size:
             try:
-                self._waiting.get_nowait()
+                self._items.get_nowait()
                 self.dropped += 1
-            except Empty:  # the other thread took it this very moment
+            except Empty:  # the consumer took it meanwhile
                 pass
-        self._waiting.put(item)
+        self._items.put(item)
 
     def take(self) -> T | None:
-        """The oldest that waits, or the next to come; None when nothing will come any more."""
-        item = self._waiting.get()
+        """Remove and return the oldest item, waiting for one; None after the end."""
+        item = self._items.get()
         if item is None:
-            self._waiting.put(None)  # for whoever asks again
+            self._items.put(None)  # for the next call
         return item
 
     def drop_all(self) -> None:
-        """Let go of all that waits and count it, for the taking thread to start afresh."""
+        """Drop and count all items in the queue; called by the consumer."""
         for _ in range(len(self)):
-            if self._waiting.get() is None:
+            if self._items.get() is None:
                 self.end()
             else:
                 self.dropped += 1
 
     def end(self) -> None:
-        """Nothing comes any more; what waits can still be taken."""
-        self._waiting.put(None)
+        """Mark the end; items in the queue can still be taken."""
+        self._items.put(None)

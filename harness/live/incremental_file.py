@@ -1,6 +1,6 @@
-"""Files that a live session writes: new ones, unless told; on the disk every second; none at all of no frame.
+"""Files that a live session appends to and saves every second; no file is left without a frame.
 
-One that is to be written over stays as it was until there is a frame to put in its place.
+An existing file is refused unless `force` is set, and is then replaced when the first frame is saved.
 """
 
 import os
@@ -13,18 +13,18 @@ _SAVE_PERIOD_S = 1.0
 
 
 class IncrementalFile:
-    """A file that grows by runs of bytes after a head."""
+    """A file with a head, to which bytes are appended."""
 
     def __init__(self, path: Path, head: bytes, *, force: bool) -> None:
-        """BadFile when there is one and it is not to be written over, or when it cannot be written."""
+        """BadFile if the file exists and `force` is not set, or if it cannot be written."""
         if force and path.exists() and not path.is_file():
-            raise BadFile(path, "it is no file", "one to write over", "Name another.")
-        self.path = path.resolve() if force else path  # what a link points to is replaced, not the link
-        self._at = self.path.with_name(f".unfinished-{self.path.name}") if force else path
+            raise BadFile(path, "it is not a regular file", "a file to replace", "Name another.")
+        self.path = path.resolve() if force else path  # the target of a link is replaced, not the link
+        self._written_path = self.path.with_name(f".unfinished-{self.path.name}") if force else path
         try:
-            self._file: BinaryIO = self._at.open("wb" if force else "xb")
+            self._file: BinaryIO = self._written_path.open("wb" if force else "xb")
         except FileExistsError as error:
-            advice = "Name another, or say --force to write over it."
+            advice = "Name another, or replace it with --force."
             raise BadFile(path, "it exists", "no such file yet", advice) from error
         except OSError as error:
             raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Name another.") from error
@@ -32,35 +32,35 @@ class IncrementalFile:
         self._saved_s: float | None = None
 
     def write(self, data: bytes, now_s: float) -> bool:
-        """Append; True when it is time to `save`, which is once a second."""
+        """Append bytes; True when it is time to call `save`, once a second."""
         self._file.write(data)
         due = self._saved_s is None or now_s - self._saved_s > _SAVE_PERIOD_S
         self._saved_s = now_s if due else self._saved_s
         return due
 
-    def save(self, patch: bytes = b"", at: int = 0) -> None:
-        """All that was written, and some bytes of the head anew."""
+    def save(self, patch: bytes = b"", offset: int = 0) -> None:
+        """Flush the file to disk, and overwrite bytes of the head at `offset` with `patch`."""
         if patch:
-            self._file.seek(at)
+            self._file.seek(offset)
             self._file.write(patch)
             self._file.seek(0, os.SEEK_END)
         self._file.flush()
-        if self._at != self.path and self._saved_s is not None:
-            self._take_place()
+        if self._written_path != self.path and self._saved_s is not None:
+            self._replace_existing()
 
     def close(self) -> None:
-        """A file that never got anything after its head is removed, and so is one that never took its place."""
+        """Close the file; remove it if nothing was saved after its head."""
         try:
             self._file.close()
         finally:
-            if self._saved_s is None or self._at != self.path:
-                self._at.unlink(missing_ok=True)
+            if self._saved_s is None or self._written_path != self.path:
+                self._written_path.unlink(missing_ok=True)
 
-    def _take_place(self) -> None:
-        """Of the file that is written over; closed meanwhile, since Windows moves no open file."""
+    def _replace_existing(self) -> None:
+        """Move the file to its final path; it is closed meanwhile, since Windows cannot move open files."""
         self._file.close()
-        os.replace(self._at, self.path)
-        self._at = self.path
+        os.replace(self._written_path, self.path)
+        self._written_path = self.path
         self._file = self.path.open("r+b")
         self._file.seek(0, os.SEEK_END)
 

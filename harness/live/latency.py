@@ -1,4 +1,4 @@
-"""How long frames take from the line to the pose: exact in the extremes, to a hundredth of a millisecond else."""
+"""Latencies of a live session: quantiles to 0.01 ms, exact maxima."""
 
 from dataclasses import dataclass, field
 
@@ -7,12 +7,12 @@ import numpy as np
 from harness.core.arrays import Ints
 
 _BIN_S, _BINS = 1e-5, 200_000
-"""Hundredths of a millisecond up to two seconds: as much memory for a day as for a minute."""
+"""Bins of 0.01 ms up to 2 s, so that memory does not grow with time."""
 _HALF_BIN_S = 0.5 * _BIN_S
 
 
 class DurationHistogram:
-    """Many times, of which quantiles are asked."""
+    """A histogram of durations, which gives their quantiles."""
 
     def __init__(self) -> None:
         self.count = 0
@@ -25,14 +25,14 @@ class DurationHistogram:
         self._bins[min(max(int(duration_s / _BIN_S), 0), _BINS)] += 1
 
     def quantile_s(self, share: float) -> float:
-        """The time that this share of all is not longer than [s]; NaN of none, the longest beyond two seconds."""
+        """Quantile of the durations [s]; NaN without any, and the longest duration for quantiles beyond 2 s."""
         if self.count == 0:
             return float("nan")
-        place = int(np.searchsorted(np.cumsum(self._bins), max(share * self.count, 1.0)))
-        return self.longest_s if place >= _BINS else min(place * _BIN_S + _HALF_BIN_S, self.longest_s)
+        index = int(np.searchsorted(np.cumsum(self._bins), max(share * self.count, 1.0)))
+        return self.longest_s if index >= _BINS else min(index * _BIN_S + _HALF_BIN_S, self.longest_s)
 
     def as_dict(self) -> dict[str, float | None]:
-        """Milliseconds; None where there is nothing to tell."""
+        """Median, 99th percentile and maximum [ms]; None without durations."""
         if self.count == 0:
             return {"p50_ms": None, "p99_ms": None, "max_ms": None}
         quantiles_s = (self.quantile_s(0.5), self.quantile_s(0.99), self.longest_s)
@@ -41,23 +41,23 @@ class DurationHistogram:
 
 @dataclass
 class StageLatencies:
-    """Of every frame: when its last byte was there, it was taken up, its pose was ready, the outputs had it."""
+    """Durations of the stages of each frame: last byte received, taken from the queue, pose ready, outputs sent."""
 
     deadline_s: float
-    """From the last byte to the pose."""
+    """Longest allowed time from the last byte to the pose [s]."""
     missed: int = 0
-    """Poses that were ready after it."""
+    """Number of poses after their deadline."""
     waiting: DurationHistogram = field(default_factory=DurationHistogram)
-    """Last byte to taken from the queue."""
+    """From the last byte until the frame is taken from the queue."""
     solving: DurationHistogram = field(default_factory=DurationHistogram)
-    """Taken to pose ready."""
+    """From taking the frame until the pose is ready."""
     sending: DurationHistogram = field(default_factory=DurationHistogram)
-    """Pose ready to outputs sent."""
+    """From the pose until all outputs have sent it."""
     to_pose: DurationHistogram = field(default_factory=DurationHistogram)
-    """Last byte to pose ready: what the deadline is for."""
+    """From the last byte until the pose is ready; the deadline applies to this."""
 
     def add(self, received_s: float, taken_s: float, ready_s: float, sent_s: float) -> None:
-        """One frame, by one clock [s]."""
+        """Add a frame by its times on one clock [s]."""
         self.waiting.add(taken_s - received_s)
         self.solving.add(ready_s - taken_s)
         self.sending.add(sent_s - ready_s)
@@ -65,7 +65,7 @@ class StageLatencies:
         self.missed += ready_s - received_s > self.deadline_s
 
     def by_name(self) -> dict[str, DurationHistogram]:
-        """In the order of the way."""
+        """The histograms by the name of the stage, in order of time."""
         return {
             "last byte to taken": self.waiting,
             "taken to pose": self.solving,

@@ -1,4 +1,4 @@
-"""Python kept from getting in the way of a session: no pauses for garbage, no thread that keeps others waiting."""
+"""Settings of Python that keep its own pauses short: garbage collection and switching of threads."""
 
 import gc
 import sys
@@ -6,26 +6,26 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _SWITCH_INTERVAL_S = 2e-4
-"""A thread that has something to do waits no longer than this for one that computes; Python's own is 5 ms [s]."""
+"""Longest time that a ready thread waits for a computing one [s]; Python's default is 5 ms."""
 
 
 @contextmanager
 def low_latency_mode() -> Iterator[None]:
-    """Garbage is collected by `collect_garbage` alone, and threads take turns quickly; afterwards all is as before."""
-    switch_s, collecting = sys.getswitchinterval(), gc.isenabled()
+    """Context in which only `collect_garbage` collects garbage, and threads switch quickly. Restores both settings."""
+    switch_interval_s, gc_enabled = sys.getswitchinterval(), gc.isenabled()
     gc.collect()
-    gc.freeze()  # what was learnt stays: no collection need look at it again
+    gc.freeze()  # objects of the trained method are permanent and need no further collection
     gc.disable()
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     try:
         yield
     finally:
-        sys.setswitchinterval(switch_s)
-        if collecting:
+        sys.setswitchinterval(switch_interval_s)
+        if gc_enabled:
             gc.enable()
         gc.unfreeze()
 
 
 def collect_garbage() -> None:
-    """Collect what was left since the session began, at a moment when nothing waits."""
+    """Collect the garbage of the session; called when no frame is waiting."""
     gc.collect(1)

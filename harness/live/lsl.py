@@ -1,10 +1,11 @@
-"""Poses as streams of the Lab Streaming Layer, beside EEG, eye trackers and markers of the same experiment.
+"""Live output as Lab Streaming Layer streams, to record poses together with EEG, eye trackers and event markers.
 
-Two streams: NAME-qpos, the configuration, and NAME-joints, the joints' places. Samples are stamped with the moment of
-the measurement by LSL's clock, which is the one of `time.monotonic` or runs beside it.
+There are two streams: NAME-qpos with the configuration, and NAME-joints with the positions of the joints. A sample's
+time stamp is the time of measurement on LSL's clock, which has a constant offset to `time.monotonic`.
 
-liblsl announces streams to the network by default, and it has no setting to serve them to this computer alone: what
-can be set here is that nobody on the network finds them (labstreaminglayer.readthedocs.io, "LSL configuration files").
+liblsl announces streams to the network by default, and has no setting to serve them to this computer only. The
+configuration here hides them from searches on the network (labstreaminglayer.readthedocs.io, "LSL configuration
+files").
 """
 
 import os
@@ -14,6 +15,7 @@ from typing import Any
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, MissingExtra
 from harness.live.pose import LivePose
+from harness.live.pose_table import hinges_in_qpos_order
 
 _LOOPBACK_CONFIG = """
 [multicast]
@@ -24,37 +26,35 @@ IPv6 = disable
 [log]
 level = -2
 """
-"""Announced on the loopback interface only; only errors are logged."""
+"""Announce streams on the loopback interface only, and log errors only."""
 _CONFIG_VARIABLE = "LSLAPICFG"
-"""The variable with which users name a configuration of their own."""
+"""Environment variable by which users name their own configuration."""
 
 
 class LslOutput:
-    """An `Output`."""
+    """An `Output` to two LSL streams."""
 
-    def __init__(self, name: str, own: Skeleton, rate_hz: float, *, network: bool = False) -> None:
-        """BadInput, MissingExtra. `network` leaves liblsl its own configuration."""
+    def __init__(self, name: str, skeleton: Skeleton, rate_hz: float, *, network: bool = False) -> None:
+        """Open the streams; `network` keeps liblsl's default configuration, which announces them to the network.
+
+        Raises BadInput for an empty name, MissingExtra without pylsl.
+        """
         pylsl = import_pylsl()
         if not name.strip():
-            raise BadInput("--lsl without a name.", "Receivers find the streams by it.")
+            raise BadInput("--lsl needs a name.", "Receivers find the streams by it.")
         self.name = f"--lsl {name}"
-        where = f"as {_CONFIG_VARIABLE} says"
+        where = f"configured by {_CONFIG_VARIABLE}"
         if network:
             where = "announced to the network"
         elif not os.environ.get(_CONFIG_VARIABLE):
-            where = "found on this computer alone, though liblsl's ports are open to the network"
-            pylsl.set_config_content(
-                _LOOPBACK_CONFIG
-            )  # counts until the first stream is made, and for the whole program
+            where = "announced on this computer only; liblsl's ports are open to the network"
+            pylsl.set_config_content(_LOOPBACK_CONFIG)  # has effect only before the first stream of the process
         self.description = f"LSL: {name}-qpos and {name}-joints, {where}"
         self._clock_offset_s = pylsl.local_clock() - time.monotonic()
-        root = [(f"root.{axis}", "metres") for axis in "xyz"] + [
-            (f"root.q{axis}", "unit quaternion") for axis in "wxyz"
-        ]
-        hinges = [
-            (own.dof_names[d], "radians") for run in own.dof_of_bone for d in reversed(range(run.start, run.stop))
-        ]
-        joints = [(f"{bone}.{axis}", "metres") for bone in ("root", *own.names) for axis in "xyz"]
+        root = [(f"root.{axis}", "metres") for axis in "xyz"]
+        root += [(f"root.q{axis}", "unit quaternion") for axis in "wxyz"]
+        hinges = [(skeleton.dof_names[d], "radians") for d in hinges_in_qpos_order(skeleton)]
+        joints = [(f"{bone}.{axis}", "metres") for bone in ("root", *skeleton.names) for axis in "xyz"]
         self._qpos = _make_outlet(pylsl, f"{name}-qpos", [*root, *hinges], rate_hz)
         self._joints = _make_outlet(pylsl, f"{name}-joints", joints, rate_hz)
 
@@ -64,11 +64,11 @@ class LslOutput:
         self._joints.push_sample(pose.joints_m.ravel(), stamp_s)
 
     def close(self) -> None:
-        self._qpos = self._joints = None  # liblsl closes what nobody holds
+        self._qpos = self._joints = None  # liblsl closes streams without references
 
 
 def import_pylsl() -> Any:
-    """The module pylsl; MissingExtra when it or its C library is not there."""
+    """Import pylsl; MissingExtra if it or its C library is missing."""
     try:
         import pylsl
     except (ImportError, RuntimeError, OSError) as error:  # RuntimeError: the wheel has no liblsl for this computer
@@ -78,9 +78,9 @@ def import_pylsl() -> Any:
 
 def _make_outlet(pylsl: Any, name: str, channels: list[tuple[str, str]], rate_hz: float) -> Any:
     info = pylsl.StreamInfo(name, "MoCap", len(channels), rate_hz, "double64", f"tracker-harness-{name}")
-    listed = info.desc().append_child("channels")
+    channel_list = info.desc().append_child("channels")
     for label, unit in channels:
-        channel = listed.append_child("channel")
+        channel = channel_list.append_child("channel")
         channel.append_child_value("label", label)
         channel.append_child_value("unit", unit)
     setup = info.desc().append_child("setup")

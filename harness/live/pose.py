@@ -1,4 +1,4 @@
-"""What outputs are given: one estimate, posed, with all that is known of when."""
+"""The input of outputs: an estimate with its posed body and its times."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,41 +16,41 @@ from harness.stream.frame import TrackerFrame
 
 @dataclass(frozen=True, eq=False)
 class LivePose:
-    """A pose at the moment it is ready."""
+    """One solved frame of a live session."""
 
     number: int
-    """From 0; what the queue dropped has none."""
+    """Number of the pose, from 0; dropped frames are not counted."""
     frame: TrackerFrame
     taken_s: float
     """Host monotonic clock when the frame was taken from the queue [s]."""
     ready_s: float
-    """The same when the pose was ready."""
+    """Host monotonic clock when the pose was ready [s]."""
     measured_s: float
-    """The same at the measurement, as far as stamps tell (`clock.HostTime`)."""
+    """Host monotonic clock at the time of measurement, by the device's stamps (`clock.HostClockEstimator`) [s]."""
     estimate: Estimate
     kinematics: Kinematics
-    """Shared by all poses of a session and set to this one when first needed; one thread."""
+    """Shared by all poses of a session and set to this pose on first use; for one thread only."""
 
     @cached_property
     def bones(self) -> tuple[Floats, Floats]:
-        """Joints (24, 3) [m] and `world_from_bone` (24, 4)."""
+        """Joint positions (24, 3) [m] and `world_from_bone` (24, 4)."""
         self.kinematics.set(self.estimate.qpos)
         return self.kinematics.bone_poses()
 
     @property
     def device_s(self) -> float:
-        """The mean of the stations' stamps by the device's clock [s]; the host's when there are none."""
-        known = self.frame.measured_s[~np.isnan(self.frame.measured_s)]
-        return float(known.mean()) if len(known) else self.frame.received_s
+        """Mean of the stations' stamps on the device's clock [s]; the time of reception without stamps."""
+        stamps_s = self.frame.measured_s[~np.isnan(self.frame.measured_s)]
+        return float(stamps_s.mean()) if len(stamps_s) else self.frame.received_s
 
     @property
     def root_m(self) -> Floats:
-        """(3,)"""
+        """(3,) position of the root [m]."""
         return self.estimate.qpos[:3]
 
     @cached_property
     def world_from_root(self) -> Floats:
-        """(4,) unit quaternion."""
+        """(4,) unit quaternion of the root."""
         quaternion = self.estimate.qpos[3:7]
         out: Floats = quaternion / np.sqrt(quaternion @ quaternion)
         return out
@@ -61,29 +61,29 @@ class LivePose:
 
     @cached_property
     def joints_m(self) -> Floats:
-        """(25, 3) the root, then each bone's far end [m]."""
+        """(25, 3) positions of the root, then of each bone's far end [m]."""
         start_m, world_from_bone = self.bones
         ends_m = start_m + rotations.rotate(world_from_bone, self.body.skeleton.bone_m)
         return np.concatenate([self.root_m[None], ends_m])
 
 
 class Output(Protocol):
-    """Somewhere poses go. Neither call may wait for whoever listens."""
+    """A receiver of poses. Neither `send` nor `close` may wait for the other side."""
 
     @property
     def name(self) -> str:
-        """As the user asked for it."""
+        """The option and argument by which the user asked for it."""
         ...
 
     @property
     def description(self) -> str:
-        """Where it goes, in a line for the user."""
+        """One line for the user about where the poses go."""
         ...
 
     def send(self, pose: LivePose) -> None:
-        """OSError, or what a library raises, when it cannot: the session goes on without this output."""
+        """Send a pose. Any error ends this output only; the session continues."""
         ...
 
     def close(self) -> None:
-        """Finish what was begun; also after an error, and as often as one likes."""
+        """Finish the output; may be called repeatedly, and after an error."""
         ...

@@ -1,4 +1,4 @@
-"""Poses as a table, with the times of every frame: for whoever joins them with what else was recorded."""
+"""Live output to a table of poses with the times of every frame, to join them with other recordings."""
 
 from pathlib import Path
 
@@ -8,17 +8,17 @@ from harness.live.pose import LivePose
 
 
 class PoseTableOutput:
-    """An `Output`: one row of comma-separated values for each frame, numbers such that they are read back exactly.
+    """An `Output` to comma-separated values, one row per frame; numbers are written so that they read back exactly.
 
-    Times are of this computer's monotonic clock, which all programs on it share under Linux; those that begin with
-    `device_s` are each station's stamps by the device's own.
+    Times are on the host's monotonic clock, which all programs share under Linux. Columns that begin with `device_s`
+    are the stations' time stamps on the device's clock.
     """
 
-    def __init__(self, path: Path, own: Skeleton, stations: tuple[str, ...], *, force: bool = False) -> None:
-        """BadFile when there is one and it is not to be written over, or when it cannot be written."""
+    def __init__(self, path: Path, skeleton: Skeleton, stations: tuple[str, ...], *, force: bool = False) -> None:
+        """BadFile if the file exists and `force` is not set, or if it cannot be written."""
         self.name, self.description = f"--poses {path}", f"table of poses: {path}"
         root = [f"root.{axis}_m" for axis in "xyz"] + [f"root.q{axis}" for axis in "wxyz"]
-        hinges = [f"{own.dof_names[d]}_rad" for d in _hinges_in_qpos_order(own)]
+        hinges = [f"{skeleton.dof_names[d]}_rad" for d in hinges_in_qpos_order(skeleton)]
         times = ["received_s", "taken_s", "ready_s", *(f"device_s.{name}" for name in stations)]
         head = ",".join(["frame", "status", *times, *root, *hinges]) + "\n"
         self._file = IncrementalFile(path, head.encode(), force=force)
@@ -35,6 +35,6 @@ class PoseTableOutput:
         self._file.close()
 
 
-def _hinges_in_qpos_order(own: Skeleton) -> list[int]:
-    """The skeleton's hinges in the order of a configuration, each bone's from the outermost (`core.humanoid24`)."""
-    return [d for where in own.dof_of_bone for d in reversed(range(where.start, where.stop))]
+def hinges_in_qpos_order(skeleton: Skeleton) -> list[int]:
+    """Indices of the skeleton's hinges in the order of `qpos`, where a bone's outermost hinge is first."""
+    return [d for dofs in skeleton.dof_of_bone for d in reversed(range(dofs.start, dofs.stop))]

@@ -1,8 +1,8 @@
-"""What this computer does to a program that only sleeps: nothing here can be quicker than that.
+"""Measurement of the operating system's scheduling jitter, the lower limit of a live session's latency.
 
-A process of its own, `python -m harness.live.scheduling_jitter`, so that it is no part of what it stands beside. It sleeps again
-and again, notes how late it wakes and how long a word takes to another of its threads, and prints both when its input
-ends.
+It runs in a process of its own, `python -m harness.live.scheduling_jitter`, so that the session does not disturb it.
+The process sleeps repeatedly and measures how late it wakes, and how long a message to another of its threads takes.
+It prints both when its standard input ends.
 """
 
 import json
@@ -17,33 +17,36 @@ _SLEEP_S = 0.02
 
 
 def main() -> None:
-    """Until the standard input ends."""
+    """Measure until the standard input ends, then print the durations as JSON."""
     from harness.live.latency import DurationHistogram
 
-    late, handed = DurationHistogram(), DurationHistogram()
-    words: SimpleQueue[float | None] = SimpleQueue()
-    ends: list[bool] = []
+    lateness, handover = DurationHistogram(), DurationHistogram()
+    messages: SimpleQueue[float | None] = SimpleQueue()
+    input_ended: list[bool] = []
 
     def listen() -> None:
-        while (said_s := words.get()) is not None:
-            handed.add(time.monotonic() - said_s)
+        while (sent_s := messages.get()) is not None:
+            handover.add(time.monotonic() - sent_s)
 
-    listener, waiter = Thread(target=listen), Thread(target=lambda: ends.append(not sys.stdin.read()), daemon=True)
+    listener, waiter = (
+        Thread(target=listen),
+        Thread(target=lambda: input_ended.append(not sys.stdin.read()), daemon=True),
+    )
     listener.start()
     waiter.start()
-    while not ends:
-        asked_s = time.monotonic() + _SLEEP_S
+    while not input_ended:
+        due_s = time.monotonic() + _SLEEP_S
         time.sleep(_SLEEP_S)
         woken_s = time.monotonic()
-        late.add(woken_s - asked_s)
-        words.put(woken_s)
-    words.put(None)
+        lateness.add(woken_s - due_s)
+        messages.put(woken_s)
+    messages.put(None)
     listener.join()
-    print(json.dumps({"timer": late.as_dict(), "handover": handed.as_dict(), "sleeps": late.count}))
+    print(json.dumps({"timer": lateness.as_dict(), "handover": handover.as_dict(), "sleeps": lateness.count}))
 
 
 class JitterProbe:
-    """Measures from now until `finish`; leaves nothing running behind when its block ends."""
+    """Runs the measurement from its creation until `finish`; its context manager ends the process."""
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
@@ -52,7 +55,7 @@ class JitterProbe:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            start_new_session=True,  # Ctrl-C is not for this one
+            start_new_session=True,  # Ctrl-C must not reach it
         )
 
     def __enter__(self) -> "JitterProbe":
@@ -63,12 +66,12 @@ class JitterProbe:
         self._process.communicate()
 
     def finish(self) -> dict[str, Any]:
-        """`timer` and `handover` in milliseconds, `sleeps` how many times; {} if it could not be measured."""
+        """End the measurement: `timer` and `handover` [ms] and the number of `sleeps`; {} if it failed."""
         try:
-            said, _ = self._process.communicate(timeout=10.0)
+            text, _ = self._process.communicate(timeout=10.0)
         except subprocess.TimeoutExpired:
             return {}
-        return dict(json.loads(said)) if said.strip() else {}
+        return dict(json.loads(text)) if text.strip() else {}
 
 
 if __name__ == "__main__":

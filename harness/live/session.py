@@ -1,7 +1,7 @@
-"""A live session: frames of a tracker into poses and out again, as they come.
+"""A live session: reads frames from a tracker, reconstructs poses and sends them to outputs, in real time.
 
-Two threads. One reads the tracker and never waits for anything else; the other takes frames from a queue that drops
-the oldest, solves and sends. Whoever calls waits, and ends it by Ctrl-C.
+It has two threads. One reads the tracker and never waits for anything else. The other takes frames from a queue that
+drops its oldest frames, solves and sends. The caller's thread waits, and Ctrl-C ends the session.
 """
 
 import time
@@ -25,45 +25,46 @@ from harness.reconstruct.contract import Reconstructor, Session
 from harness.stream.frame import TrackerFrame, TrackerStream
 
 QUEUE_FRAMES = 32
-"""What waits for a pose that takes long: a quarter of a second at 120 Hz. Solving is several times faster than frames
-come, so that it has soon caught up, and methods do not like gaps [choice]."""
+"""Length of the queue of frames, a quarter of a second at 120 Hz. Solving is several times faster than the frame rate,
+so the queue empties soon after a slow pose, without a gap in the frames [choice]."""
 _COLLECT_PERIOD_S = 1.0
 _POLL_PERIOD_S = 0.1
 
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """How a session goes."""
+    """Settings of a live session."""
 
     rate_hz: float
-    """Frames per second that the tracker is to send."""
+    """Expected frame rate of the tracker [Hz]."""
     deadline_s: float | None = None
-    """From the last byte to the pose; by default a period."""
+    """Longest allowed time from the last byte to the pose [s]; one frame period by default."""
     seconds: float | None = None
-    """After so long it ends by itself, calibration not counted."""
+    """Duration after which the session ends, without calibration [s]; unlimited by default."""
     queue_frames: int = QUEUE_FRAMES
+    """Length of the queue between the two threads."""
     host_timestamps: bool = True
-    """Whether frames are stamped by this computer's monotonic clock as they come. Those of a recording are not, and
-    their way is timed from where they leave the stream."""
+    """Whether `received_s` of the frames is on the host's monotonic clock. For a recording it is not, and latencies are
+    measured from the time at which the stream delivers a frame."""
 
 
 @dataclass(frozen=True, eq=False)
 class LiveResult:
-    """What became of a session."""
+    """Result of a live session."""
 
     captured: int
-    """Frames that the stream gave."""
+    """Frames that the stream delivered."""
     frames_before: int
-    """Those that went by until the trackers were calibrated and the method ready for them."""
+    """Frames before the calibration was done and the method was ready."""
     dropped: int
-    """Those that waited too long for their turn and were never solved."""
+    """Frames that the queue dropped."""
     status: dict[str, int]
-    """Poses by how far they rest on readings."""
+    """Number of poses by status."""
     seconds: float
-    """From the first pose to the last."""
+    """Time from the first to the last pose [s]."""
     stages: StageLatencies
     failed: dict[str, str]
-    """Outputs that could not go on, and why."""
+    """Error of each output that failed, by its name."""
 
     @property
     def poses(self) -> int:
@@ -71,7 +72,7 @@ class LiveResult:
 
 
 def warm_up(reconstructor: Reconstructor, calibration: Calibration, frames: Sequence[TrackerFrame]) -> None:
-    """Step through frames in a session that is thrown away, so that everything is compiled and at hand."""
+    """Solve some frames in a discarded session, so that code is compiled and caches are filled."""
     session = reconstructor.begin(calibration)
     for frame in frames:
         session.step(frame)
@@ -81,21 +82,21 @@ def run_session(
     stream: TrackerStream,
     body: Body,
     reconstructor: Reconstructor,
-    worn: Calibration | Calibrator,
+    calibration: Calibration | Calibrator,
     outputs: Sequence[Output],
-    plan: LiveOptions,
+    options: LiveOptions,
     *,
     say: Notifier = lambda text: None,
     clock: Callable[[], float] = time.monotonic,
 ) -> LiveResult:
-    """Until the stream ends, the plan's time is over or Ctrl-C; stream and outputs are closed then.
+    """Run until the stream ends, the time of `options` is over or Ctrl-C; then close stream and outputs.
 
-    What ends a stream or a method unexpectedly is raised, after all is closed. An output that fails is left out, and
-    said so; the others go on.
+    A `Calibrator` calibrates from the first frames. An error of the stream or the method is raised after everything is
+    closed. An output that fails is closed and reported through `say`; the others continue.
     """
-    queue: DroppingQueue[CapturedFrame] = DroppingQueue(plan.queue_frames)
+    queue: DroppingQueue[CapturedFrame] = DroppingQueue(options.queue_frames)
     capture = CaptureThread(stream, queue, clock)
-    solver = _SolverThread(queue, body, reconstructor, worn, outputs, plan, say, clock)
+    solver = _SolverThread(queue, body, reconstructor, calibration, outputs, options, say, clock)
     thread = Thread(target=solver.run, name="reconstruct")
     try:
         with low_latency_mode():
@@ -103,7 +104,7 @@ def run_session(
             thread.start()
             capture.start()
             while not solver.done.wait(_POLL_PERIOD_S):
-                if plan.seconds is not None and clock() - solver.began_s >= plan.seconds:
+                if options.seconds is not None and clock() - solver.start_s >= options.seconds:
                     break
     except KeyboardInterrupt:
         say("stopped")
@@ -119,37 +120,37 @@ def run_session(
 
 
 class _SolverThread:
-    """What the second thread does, and what it has to tell afterwards."""
+    """The work of the solving thread, and its results."""
 
     def __init__(
         self,
         queue: DroppingQueue[CapturedFrame],
         body: Body,
         reconstructor: Reconstructor,
-        worn: Calibration | Calibrator,
+        calibration: Calibration | Calibrator,
         outputs: Sequence[Output],
-        plan: LiveOptions,
+        options: LiveOptions,
         say: Notifier,
         clock: Callable[[], float],
     ) -> None:
-        self._queue, self._reconstructor, self._calibration = queue, reconstructor, worn
-        self._outputs, self._plan, self._say, self._clock = list(outputs), plan, say, clock
+        self._queue, self._reconstructor, self._calibration = queue, reconstructor, calibration
+        self._outputs, self._options, self._say, self._clock = list(outputs), options, say, clock
         self._kinematics = Kinematics(body)
-        self._host_time = HostClockEstimator()
-        self._stages = StageLatencies(1.0 / plan.rate_hz if plan.deadline_s is None else plan.deadline_s)
+        self._host_clock = HostClockEstimator()
+        self._stages = StageLatencies(1.0 / options.rate_hz if options.deadline_s is None else options.deadline_s)
         self._status: Counter[str] = Counter()
         self._failed: dict[str, str] = {}
         self._session: Session | None = None
         self._frames_calibrated = self._frames_discarded = 0
-        """Frames that were calibrated from, and that went by meanwhile."""
+        """Frames that the calibration used, and frames that came while the method prepared."""
         self._first_s = self._last_s = 0.0
-        self.began_s = float("inf")
-        """When calibration was over [s]."""
+        self.start_s = float("inf")
+        """Time at which calibration was done [s]."""
         self.done = Event()
         self.error: Exception | None = None
 
     def prepare(self) -> None:
-        """What can be done before the first frame."""
+        """Begin the method's session now if the calibration is known."""
         if isinstance(self._calibration, Calibration):
             self._session = self._reconstructor.begin(self._calibration)
 
@@ -159,22 +160,22 @@ class _SolverThread:
             if not isinstance(self._calibration, Calibration):
                 session = self._calibrate(self._calibration)
             if session is not None:
-                self.began_s = self._clock()
+                self.start_s = self._clock()
                 self._solve(session)
-        except Exception as error:  # whoever waits for this thread raises it again
+        except Exception as error:  # `run_session` raises it again
             self.error = error
         finally:
             self.done.set()
 
     def close(self) -> None:
-        """Finish what the outputs have begun."""
+        """Close all outputs."""
         while self._outputs:
             self._close(self._outputs.pop())
 
     def _close(self, output: Output) -> None:
         try:
             output.close()
-        except Exception as error:  # whatever it is, the others are closed too
+        except Exception as error:  # the other outputs must be closed too
             self._failed.setdefault(output.name, _error_text(error))
 
     def result(self, captured: int) -> LiveResult:
@@ -189,45 +190,45 @@ class _SolverThread:
         )
 
     def _calibrate(self, calibrator: Calibrator) -> Session | None:
-        """A session for trackers as the stream shows them to be worn; None when it ended before."""
+        """Calibrate from the first frames and begin a session; None if the stream ends before."""
         calibrator.begin(self._say)
-        found: Calibration | None = None
-        while found is None:
+        calibration: Calibration | None = None
+        while calibration is None:
             if (captured := self._queue.take()) is None:
                 self._say("calibration: the stream ended before it was done")
                 return None
             self._frames_calibrated += 1
-            found = calibrator.add(captured.frame, self._say)
-        session = self._reconstructor.begin(found)  # a method may take its time to learn how trackers are worn
+            calibration = calibrator.add(captured.frame, self._say)
+        session = self._reconstructor.begin(calibration)  # a method may need some time for it
         self._queue.drop_all()
         self._frames_discarded = self._queue.dropped
         return session
 
     def _solve(self, session: Session) -> None:
-        number, tidied_s = 0, self._clock()
+        number, collected_s = 0, self._clock()
         while (captured := self._queue.take()) is not None:
             taken_s = self._clock()
             frame = captured.frame
             estimate = session.step(frame)
             ready_s = self._clock()
-            measured_s = self._host_time.measured_s(frame)
+            measured_s = self._host_clock.measured_s(frame)
             pose = LivePose(number, frame, taken_s, ready_s, measured_s, estimate, self._kinematics)
             self._send(pose)
             sent_s = self._clock()
-            came_s = frame.received_s if self._plan.host_timestamps else captured.captured_s
-            self._stages.add(came_s, taken_s, ready_s, sent_s)
+            received_s = frame.received_s if self._options.host_timestamps else captured.captured_s
+            self._stages.add(received_s, taken_s, ready_s, sent_s)
             self._status[estimate.status.name] += 1
             self._first_s, self._last_s = self._first_s or ready_s, ready_s
             number += 1
-            if len(self._queue) == 0 and sent_s - tidied_s > _COLLECT_PERIOD_S:
-                tidied_s = sent_s
+            if len(self._queue) == 0 and sent_s - collected_s > _COLLECT_PERIOD_S:
+                collected_s = sent_s
                 collect_garbage()
 
     def _send(self, pose: LivePose) -> None:
         for output in list(self._outputs):
             try:
                 output.send(pose)
-            except Exception as error:  # a library's own too: no output ends the session
+            except Exception as error:  # no error of an output ends the session
                 self._failed[output.name] = _error_text(error)
                 self._outputs.remove(output)
                 self._say(f"{output.name}: {_error_text(error)}; the session goes on without it")
@@ -235,5 +236,5 @@ class _SolverThread:
 
 
 def _error_text(error: Exception) -> str:
-    """An OSError speaks for itself; of others the kind has to be said."""
+    """The message of an OSError; type and message of another error."""
     return str(error) if isinstance(error, OSError) else f"{type(error).__name__}: {error}"

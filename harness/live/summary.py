@@ -1,4 +1,4 @@
-"""What a live session came to, for people and for programs."""
+"""Summary of a live session, for JSON and for a terminal."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,36 +7,36 @@ from harness.live.latency import DurationHistogram
 from harness.live.session import LiveResult
 
 
-def as_dict(done: LiveResult, floor: Mapping[str, Any]) -> dict[str, Any]:
-    """Counts; times in milliseconds."""
-    stages = done.stages
+def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
+    """Counts, and times in milliseconds; `jitter` is the result of `JitterProbe.finish`."""
+    stages = result.stages
     return {
-        "seconds": done.seconds,
-        "frames": done.captured,
-        "frames_before": done.frames_before,
-        "frames_dropped": done.dropped,
-        "poses": done.poses,
-        "status": done.status,
+        "seconds": result.seconds,
+        "frames": result.captured,
+        "frames_before": result.frames_before,
+        "frames_dropped": result.dropped,
+        "poses": result.poses,
+        "status": result.status,
         "deadline_ms": 1e3 * stages.deadline_s,
         "deadline_missed": stages.missed,
         "latency": {name: durations.as_dict() for name, durations in stages.by_name().items()},
-        "floor": dict(floor),
-        "outputs_failed": done.failed,
+        "floor": dict(jitter),
+        "outputs_failed": result.failed,
     }
 
 
-def lines(done: LiveResult, floor: Mapping[str, Any]) -> list[str]:
-    """A table of the times, with what the computer itself takes below, and the counts."""
-    stages = done.stages
+def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
+    """A table of latencies with the computer's scheduling jitter below, and the counts, as lines of text."""
+    stages = result.stages
     rows = [_stage_row(name, durations) for name, durations in stages.by_name().items()]
-    rows += [_time_row(name, floor[key]) for name, key in _JITTER_LABELS.items() if floor.get(key)]
-    states = ", ".join(f"{count} {name}" for name, count in done.status.items())
-    counts = f"{done.poses} poses in {done.seconds:.1f} s ({states}); {done.dropped} frames dropped"
-    if done.frames_before:
-        counts += f", {done.frames_before} before the first"
-    share = stages.missed / done.poses if done.poses else 0.0
+    rows += [_time_row(name, jitter[key]) for name, key in _JITTER_LABELS.items() if jitter.get(key)]
+    states = ", ".join(f"{count} {name}" for name, count in result.status.items())
+    counts = f"{result.poses} poses in {result.seconds:.1f} s ({states}); {result.dropped} frames dropped"
+    if result.frames_before:
+        counts += f", {result.frames_before} before the first"
+    share = stages.missed / result.poses if result.poses else 0.0
     late = f"{stages.missed} poses ({share:.2%}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
-    failed = [f"{name}: {why}" for name, why in done.failed.items()]
+    failed = [f"{name}: {why}" for name, why in result.failed.items()]
     return [f"{'milliseconds':<32}{'p50':>8}{'p99':>8}{'max':>8}", *rows, "", counts, late, *failed]
 
 

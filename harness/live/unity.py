@@ -1,19 +1,19 @@
-"""A pose as Unity's humanoid has it: bones of its HumanBodyBones, local in their parents, no turn in the T-pose.
+"""Conversion of a pose to Unity's humanoid: local poses of its HumanBodyBones.
 
-Unity's axes are left-handed: x right, y up, z forward. VRM avatars, and so the VMC protocol, have every rotation none
-in the T-pose. See docs/device.md for the table of bones.
+Unity's axes are left-handed: x right, y up, z forward. In VRM avatars, and so in the VMC protocol, every rotation is
+the identity in the T-pose. docs/device.md has the table of bones.
 """
 
 import numpy as np
 
 from harness.body import humanoid
-from harness.core import humanoid24, rotations, skeleton
+from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats, Ints
-from harness.core.skeleton import Skeleton
+from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.live.pose import LivePose
 
 HIPS = "Hips"
-"""Unity's root bone: the humanoid's root."""
+"""Unity's root bone, which is the root of the model."""
 UNITY_BONES: dict[str, tuple[str, str]] = {
     "Spine": ("lowerback", HIPS),
     "Chest": ("upperback", "Spine"),
@@ -21,9 +21,9 @@ UNITY_BONES: dict[str, tuple[str, str]] = {
     "Neck": ("lowerneck", "UpperChest"),
     "Head": ("head", "Neck"),
     **{
-        f"{side}{bone}": (f"{letter}{ours}", parent if parent in ("UpperChest", HIPS) else f"{side}{parent}")
+        f"{side}{bone}": (f"{letter}{model_bone}", parent if parent in ("UpperChest", HIPS) else f"{side}{parent}")
         for side, letter in (("Left", "l"), ("Right", "r"))
-        for bone, ours, parent in (
+        for bone, model_bone, parent in (
             ("Shoulder", "clavicle", "UpperChest"),
             ("UpperArm", "humerus", "Shoulder"),
             ("LowerArm", "radius", "UpperArm"),
@@ -34,40 +34,42 @@ UNITY_BONES: dict[str, tuple[str, str]] = {
         )
     },
 }
-"""Name in Unity's HumanBodyBones -> our bone that turns with it, and its parent in Unity. Ours that are missing: what
-upperneck and the wrists turn is in Head and Hand, and the hip joints do not turn."""
+"""Bone of the model with the same rotation, and parent in Unity, by the name in Unity's HumanBodyBones.
+
+The rotations of upperneck and of the wrist bones are part of Head and Hand; the hip joints do not rotate.
+"""
 
 
 def unity_vector(v: Floats) -> Floats:
-    """Ours (..., 3), x forward, y left, z up, in Unity's axes: x right, y up, z forward."""
+    """Vectors (..., 3) in world axes (x forward, y left, z up) in Unity's axes (x right, y up, z forward)."""
     return np.stack([-v[..., 1], v[..., 2], v[..., 0]], axis=-1)
 
 
 def unity_quaternion(q: Floats) -> Floats:
-    """Ours (..., 4), w first, in Unity's axes and order x, y, z, w; the mirrored axes turn the other way round."""
+    """Quaternions (..., 4), w first, in Unity's axes and order x, y, z, w; mirrored axes invert rotations."""
     return np.stack([q[..., 2], -q[..., 3], -q[..., 1], q[..., 0]], axis=-1)
 
 
 class UnityPose:
-    """Local positions and rotations of Unity's bones for a body, one pose at a time."""
+    """Local positions and rotations of Unity's bones for one body."""
 
-    def __init__(self, own: Skeleton) -> None:
+    def __init__(self, skeleton: Skeleton) -> None:
         self.names = (HIPS, *UNITY_BONES)
-        rest = skeleton.forward_kinematics(own, *(part[None] for part in humanoid24.unpack(humanoid.tpose(own))))
-        ours = [own.index(bone) for bone, _ in UNITY_BONES.values()]
-        self._ours = np.array(ours, dtype=np.int64)
+        rest = forward_kinematics(skeleton, *(part[None] for part in humanoid24.unpack(humanoid.tpose(skeleton))))
+        bones = [skeleton.index(bone) for bone, _ in UNITY_BONES.values()]
+        self._bones = np.array(bones, dtype=np.int64)
         self._parents: Ints = np.array([self.names.index(p) for _, p in UNITY_BONES.values()], dtype=np.int64)
-        self._bone_from_tpose = rotations.from_matrix(np.swapaxes(rest.world_from_bone[0, ours], -1, -2))
+        self._bone_from_tpose = rotations.from_matrix(np.swapaxes(rest.world_from_bone[0, bones], -1, -2))
 
     def local(self, pose: LivePose) -> Floats:
         """(21, 7) position x, y, z [m] and quaternion x, y, z, w of each bone in its parent, in Unity's axes."""
         start_m, world_from_bone = pose.bones
-        turned = rotations.multiply(world_from_bone[self._ours], self._bone_from_tpose)
-        turned = np.concatenate([pose.world_from_root[None], turned])
-        at_m = np.concatenate([pose.root_m[None], start_m[self._ours]])
-        above = rotations.inverse(turned[self._parents])
-        offset_m = rotations.rotate(above, at_m[1:] - at_m[self._parents])
-        out = np.empty((len(at_m), 7))
-        out[:, :3] = unity_vector(np.concatenate([at_m[:1], offset_m]))
-        out[:, 3:] = unity_quaternion(np.concatenate([turned[:1], rotations.multiply(above, turned[1:])]))
+        rotation = rotations.multiply(world_from_bone[self._bones], self._bone_from_tpose)
+        rotation = np.concatenate([pose.world_from_root[None], rotation])
+        position_m = np.concatenate([pose.root_m[None], start_m[self._bones]])
+        above = rotations.inverse(rotation[self._parents])
+        offset_m = rotations.rotate(above, position_m[1:] - position_m[self._parents])
+        out = np.empty((len(position_m), 7))
+        out[:, :3] = unity_vector(np.concatenate([position_m[:1], offset_m]))
+        out[:, 3:] = unity_quaternion(np.concatenate([rotation[:1], rotations.multiply(above, rotation[1:])]))
         return out

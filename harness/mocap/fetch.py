@@ -1,9 +1,9 @@
-"""Downloading skeletons and motions of CMU's library, through pooch, one file after another.
+"""Download of skeletons and motions of CMU's library, with pooch, one file after another.
 
-The site (http://mocap.cs.cmu.edu) keeps a subject's files in subjects/13/: 13.asf, 13_01.amc and so on; which trials
-there are is read from its search page, or from the folder's own listing. A file is put in place only when it parses
-and, if it is on the shipped list, has the listed SHA-256, so what is there is whole and is not fetched again. CMU asks
-not to crawl its site: name the subjects that are needed.
+The site (http://mocap.cs.cmu.edu) keeps a subject's files in subjects/13/: 13.asf, 13_01.amc and so on. The trials are
+read from its search page, or from the listing of that folder. A file is put in place only if it parses and, if it is
+on the shipped list, has the listed SHA-256. So every file in place is complete and is not fetched again. CMU asks not
+to crawl its site: name the subjects that are needed.
 """
 
 import csv
@@ -18,16 +18,16 @@ from urllib.parse import urlsplit
 
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
-from harness.mocap.library import INDEX_NAME, read_index
+from harness.mocap.index import INDEX_NAME, read_index
 from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
 
 CMU_URL = "http://mocap.cs.cmu.edu"
 SHIPPED_RATE_HZ = 120.0
-"""Of every clip on the shipped list; CMU's other clips have 120 or 60, which no file tells."""
+"""Frame rate of every clip on the shipped list [Hz]; CMU's other clips have 120 or 60, which no file records."""
 TIMEOUT_S = 30.0
 
 FetchProgress = Callable[[str, int, int], None]
-"""Called with a file's name, how many are done, and how many there will be."""
+"""Called with a file's name, the number of files done, and the number of all files."""
 
 
 def fetch_cmu(
@@ -37,44 +37,44 @@ def fetch_cmu(
     base_url: str = CMU_URL,
     progress: FetchProgress = lambda name, done, planned: None,
 ) -> list[Path]:
-    """The skeleton and all motions of each subject below `folder`, with an index; those in place are kept.
+    """Download the skeleton and all motions of each subject to `folder`, and write the index; returns the files.
 
-    Raises BadInput for a subject or site that cannot be reached, BadFile for bytes that cannot be trusted; files that
-    were finished before stay.
+    Files that are in place already are kept. Raises BadInput for a subject or a site that cannot be reached, and
+    BadFile for a file that does not parse or has another SHA-256 than listed; files finished before that stay.
     """
     top = Path(folder)
-    wanted: list[str] = []
+    names: list[str] = []
     for subject in subjects:
         if not re.fullmatch(r"[0-9]{1,3}", subject):
-            raise BadInput(f"{subject!r} is no subject of CMU.", "Subjects are numbers, such as 02 or 13.")
-        wanted += _list_subject_files(subject.zfill(2), base_url)
-    if not wanted:
-        raise BadInput("No subjects are named.", "For example: --subjects 13,14.")
+            raise BadInput(f"{subject!r} is not a subject of CMU.", "Subjects are numbers, such as 02 or 13.")
+        names += _list_subject_files(subject.zfill(2), base_url)
+    if not names:
+        raise BadInput("No subject is named.", "For example: --subjects 13,14.")
     fetched = []
-    for done, name in enumerate(wanted):
-        progress(name, done, len(wanted))
+    for done, name in enumerate(names):
+        progress(name, done, len(names))
         fetched.append(_fetch_file(name, top, base_url))
-    progress("", len(wanted), len(wanted))
-    _write_index(top, wanted)
+    progress("", len(names), len(names))
+    _write_index(top, names)
     return fetched
 
 
 def shipped_sha256() -> dict[str, str]:
-    """SHA-256 by name ("13/13_17.amc") of files whose origin is known, taken with LF line ends.
+    """SHA-256 of files of known origin by name ("13/13_17.amc"), computed with LF line ends.
 
-    Copies of CMU's files differ in their line ends, so these are evened out first.
+    Copies of CMU's files differ in their line ends only, so line ends are converted first.
     """
     lines = files("harness.mocap").joinpath("cmu_sha256.txt").read_text(encoding="ascii").splitlines()
     return {name: digest for digest, name in (line.split() for line in lines if not line.startswith("#"))}
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a text file with LF line ends."""
+    """SHA-256 of a text file, with its line ends converted to LF."""
     return hashlib.sha256(path.read_bytes().replace(b"\r\n", b"\n")).hexdigest()
 
 
 def _list_subject_files(subject: str, base_url: str) -> list[str]:
-    """A subject's files by the site's search page, or by the listing of its folder; the skeleton first."""
+    """Names of a subject's files, the skeleton first, from the search page of the site or the listing of its folder."""
     pages = (f"{base_url}/search.php?subjectnumber={subject}", f"{base_url}/subjects/{subject}/")
     with tempfile.TemporaryDirectory() as folder:
         for page in pages:
@@ -85,7 +85,7 @@ def _list_subject_files(subject: str, base_url: str) -> list[str]:
             trials = sorted(set(re.findall(rf"\b{subject}_[0-9]{{2,3}}\.amc\b", text)))
             if trials:
                 return [f"{subject}/{name}" for name in (f"{subject}.asf", *trials)]
-    raise BadInput(f"{urlsplit(base_url).netloc} lists no motions of subject {subject}.", f"Looked at {pages[0]}.")
+    raise BadInput(f"{urlsplit(base_url).netloc} lists no motions of subject {subject}.", f"The page was {pages[0]}.")
 
 
 class _NotFound(Exception):
@@ -93,7 +93,7 @@ class _NotFound(Exception):
 
 
 def _download(url: str, path: Path) -> Path:
-    """One page or file, to `path`; _NotThere if the site has none, BadInput if there is no such site."""
+    """Download a page or file to `path`; _NotFound if the site has none, BadInput if the site cannot be reached."""
     import pooch
 
     pooch.get_logger().setLevel("WARNING")
@@ -102,46 +102,46 @@ def _download(url: str, path: Path) -> Path:
     except OSError as error:
         if getattr(error, "response", None) is not None:
             raise _NotFound(url) from error
-        where = urlsplit(url).netloc
+        site = urlsplit(url).netloc
         raise BadInput(
-            f"{where} cannot be reached ({type(error).__name__}).", "Check the network, or name a mirror (--url)."
+            f"{site} cannot be reached ({type(error).__name__}).", "Check the network, or name a mirror (--url)."
         ) from error
     return path
 
 
 def _fetch_file(name: str, top: Path, base_url: str) -> Path:
-    """One file, checked, then put in place in one step; a file that is in place already is kept if it is as listed."""
-    place = top / name
+    """Download and check one file, then move it into place; a file in place is kept if its SHA-256 is as listed."""
+    path = top / name
     listed = shipped_sha256().get(name)
-    if place.is_file() and listed in (None, sha256_of(place)):
-        return place
+    if path.is_file() and listed in (None, sha256_of(path)):
+        return path
     try:
-        place.parent.mkdir(parents=True, exist_ok=True)
+        path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise BadInput(
-            f"{place.parent} cannot be made ({error.strerror}).", "Name another folder with --out."
+            f"{path.parent} cannot be created ({error.strerror}).", "Name another folder with --out."
         ) from error
-    with tempfile.TemporaryDirectory(dir=place.parent, prefix=".fetch-") as folder:
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=".fetch-") as folder:
         url = f"{base_url}/subjects/{name}"
         try:
-            new = _download(url, Path(folder) / place.name)
+            new = _download(url, Path(folder) / path.name)
         except _NotFound:
-            raise BadInput(f"There is no {url}.", "Is the site laid out like CMU's?") from None
-        _check_file(new, url, listed, place.parent)
-        os.replace(new, place)
-    return place
+            raise BadInput(f"There is no {url}.", "Check that the site has the layout of CMU's.") from None
+        _check_file(new, url, listed, path.parent)
+        os.replace(new, path)
+    return path
 
 
 def _check_file(new: Path, url: str, listed: str | None, beside: Path) -> None:
-    """BadFile, naming the address, unless the file parses and is as listed."""
+    """Raise BadFile with the address unless the file parses and has the listed SHA-256."""
     try:
         _parse_file(new, beside)
     except BadFile as error:
-        raise BadFile(url, error.found, error.expected, "Nothing was kept of it; try again.", error.line) from error
-    found = sha256_of(new)
-    if listed not in (None, found):
-        advice = "Nothing was kept of it; try again, or another mirror."
-        raise BadFile(url, f"a file with SHA-256 {found[:12]}...", f"{listed[:12]}... as shipped", advice)
+        raise BadFile(url, error.found, error.expected, "It was not kept; try again.", error.line) from error
+    sha256 = sha256_of(new)
+    if listed not in (None, sha256):
+        advice = "It was not kept; try again, or use another mirror."
+        raise BadFile(url, f"a file with SHA-256 {sha256[:12]}...", f"{listed[:12]}... as shipped", advice)
 
 
 def _parse_file(path: Path, beside: Path) -> AsfFile | Clip:
@@ -152,13 +152,13 @@ def _parse_file(path: Path, beside: Path) -> AsfFile | Clip:
 
 
 def _write_index(top: Path, names: list[str]) -> None:
-    """Add the motions to the folder's index, with the rate of those whose rate is known; replaced in one step."""
+    """Add the motions to the folder's index, with their rate where it is known. The index is replaced in one step."""
     rows = read_index(top / INDEX_NAME)
-    known = shipped_sha256()
+    listed = shipped_sha256()
     for name in names:
         if name.endswith(".amc"):
             subject, trial = Path(name).stem.split("_")
-            fps = f"{SHIPPED_RATE_HZ:g}" if name in known else ""
+            fps = f"{SHIPPED_RATE_HZ:g}" if name in listed else ""
             rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
     columns = list(dict.fromkeys(column for row in rows.values() for column in row))
     with tempfile.NamedTemporaryFile("w", dir=top, delete=False, newline="", encoding="utf-8") as file:

@@ -1,4 +1,4 @@
-"""What a motion file is found to be, and how that is told."""
+"""The report of an inspection: facts and findings about a motion file, for JSON and for a terminal."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -6,12 +6,12 @@ from typing import Any
 from harness.mocap.motion_checks import Spike
 
 MAX_LISTED_SPIKES = 8
-"""So many spikes are spelled out; the rest are counted."""
+"""Number of spikes that are listed; the others are counted."""
 
 
 @dataclass(frozen=True)
 class Inspection:
-    """Facts with their evidence, and findings: what should be looked at before the motion is used."""
+    """Facts about a motion with their evidence, and findings to check before the motion is used."""
 
     name: str
     format: str
@@ -20,7 +20,7 @@ class Inspection:
     rate_hz: float
     rate_evidence: str
     height_m: float | None
-    """Of the skeleton, sole to top joint [m]; None where the file holds no bones."""
+    """Height of the skeleton from sole to top joint [m]; None where the file holds no bones."""
     up: str
     """The file's axis that points up, with the evidence."""
     unit_m: float
@@ -31,21 +31,22 @@ class Inspection:
     contact_share: float
     """Share of frames with a foot on the floor."""
     fastest_m_s: float
+    """Highest speed of any joint [m/s]; the next two fields name the joint and the frame, counted from 1."""
     fastest_joint: str
     fastest_frame: int
     spikes: tuple[Spike, ...]
     frozen: tuple[tuple[int, int], ...]
     """First and last frame of each run of equal frames, counted from 1."""
     missing_share: float
-    """Share of marker positions that were not seen; 0 for skeletons."""
+    """Share of marker positions that are missing; 0 for skeletons."""
     missing_markers: tuple[str, ...]
-    """Markers of which positions are missing."""
+    """Markers with missing positions."""
     limits_share: float | None
     """Share of frames with a hinge outside the model's limits; None where there are no hinges."""
     limits_worst: str
-    """The hinge that is furthest outside, and by how much."""
+    """The hinge that exceeds its limits most, and by how much."""
     doubts: tuple[str, ...]
-    """What the numbers say against the unit or the axes."""
+    """Evidence against the unit or the axes."""
     notes: tuple[str, ...]
 
     @property
@@ -54,24 +55,26 @@ class Inspection:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What is wrong, in words; () is a clean bill."""
-        found = [f"frame {s.frame}: {s.joint} is off by {s.speed_m_s:.1f} m/s" for s in self.spikes[:MAX_LISTED_SPIKES]]
+        """Problems of the motion, each in a sentence; empty if there are none."""
+        findings = [
+            f"frame {s.frame}: {s.joint} is off by {s.speed_m_s:.1f} m/s" for s in self.spikes[:MAX_LISTED_SPIKES]
+        ]
         if len(self.spikes) > MAX_LISTED_SPIKES:
-            found.append(f"and {len(self.spikes) - MAX_LISTED_SPIKES} more frames with spikes")
-        found += [f"frames {first} to {last} are all the same" for first, last in self.frozen]
+            findings.append(f"and {len(self.spikes) - MAX_LISTED_SPIKES} more frames with spikes")
+        findings += [f"frames {first} to {last} are all the same" for first, last in self.frozen]
         if self.missing_share > 0.0:
             labels = ", ".join(self.missing_markers[:MAX_LISTED_SPIKES])
-            found.append(f"{100 * self.missing_share:.2g} % of the marker positions are missing ({labels})")
+            findings.append(f"{100 * self.missing_share:.2g} % of the marker positions are missing ({labels})")
         if self.limits_share:
-            found.append(f"{100 * self.limits_share:.1f} % of the frames break a joint limit ({self.limits_worst})")
-        return (*found, *self.doubts)
+            findings.append(f"{100 * self.limits_share:.1f} % of the frames break a joint limit ({self.limits_worst})")
+        return (*findings, *self.doubts)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """All fields, duration and findings, for JSON."""
         return asdict(self) | {"duration_s": self.duration_s, "findings": list(self.findings)}
 
     def lines(self) -> list[str]:
-        """For a terminal."""
+        """The report as lines of text for a terminal."""
         height = "not in the file" if self.height_m is None else f"{self.height_m:.2f} m (from its bones)"
         outside = "not checked, there are no hinges"
         if self.limits_share is not None:
@@ -86,7 +89,7 @@ class Inspection:
             "fastest": f"{self.fastest_joint}, {self.fastest_m_s:.1f} m/s at frame {self.fastest_frame}",
             "limits": outside,
         }
-        told = [f"{key:<9} {value}" for key, value in facts.items()]
-        told += [f"{'note':<9} {note}" for note in self.notes]
-        told += [f"{'finding':<9} {finding}" for finding in self.findings] or [f"{'finding':<9} none"]
-        return told
+        lines = [f"{key:<9} {value}" for key, value in facts.items()]
+        lines += [f"{'note':<9} {note}" for note in self.notes]
+        lines += [f"{'finding':<9} {finding}" for finding in self.findings] or [f"{'finding':<9} none"]
+        return lines

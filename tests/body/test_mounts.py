@@ -112,7 +112,7 @@ def test_a_place_off_the_bone_is_refused() -> None:
 
 
 def test_two_trackers_of_one_name_are_refused() -> None:
-    with pytest.raises(BadInput, match="twice"):
+    with pytest.raises(BadInput, match="has two mounts"):
         humanoid.build_body(None, [Mount("a", "head", 1.0), Mount("a", "thorax")])
 
 

@@ -344,5 +344,5 @@ def test_a_performer_is_told_what_to_do_and_may_stop(recording: Path) -> None:
 
     collector = posing.collect_poses(RecordingStream(recording), told.append, show)
     assert shown == [1]
-    assert told[1] == "its window was closed; the poses are told in words from here on"
+    assert told[1] == "its window was closed; from here on, poses are described in words only"
     assert len(collector.holds) == 1

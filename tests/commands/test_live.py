@@ -133,7 +133,7 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--scenario", "nothing"], "no scenario called 'nothing'"),
         (["--stations", "nose"], "no station called 'nose'"),
         (["--stations", "9"], "9 stations of 6"),
-        (["--vmc", "nowhere"], "no address"),
+        (["--vmc", "nowhere"], "is not an address"),
         (["--view", "frames"], "needs a folder"),
         (["--bvh", "/no/such/folder/x.bvh"], "cannot be written"),
         (["--lsl", ""], "without a name"),

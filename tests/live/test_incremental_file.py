@@ -162,7 +162,7 @@ def test_what_cannot_take_its_place_leaves_the_old_file(
         output.close()
         assert path.read_text() == "mine"
         assert list(tmp_path.iterdir()) == [path]
-    with pytest.raises(BadFile, match="it is no file"):
+    with pytest.raises(BadFile, match="it is not a regular file"):
         PoseTableOutput(tmp_path, BODY.skeleton, (), force=True)
 
 

@@ -48,5 +48,5 @@ def test_samples_arrive_with_their_times(rng: np.random.Generator) -> None:
 
 
 def test_a_stream_has_a_name() -> None:
-    with pytest.raises(BadInput, match="without a name"):
+    with pytest.raises(BadInput, match="needs a name"):
         LslOutput(" ", humanoid.build_body().skeleton, 75.0)

@@ -81,7 +81,7 @@ def test_what_cannot_be_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(BadInput, match="there is no screen"):
         ViewerOutput("window", OWN, force=False)
     (tmp_path / "file").write_text("")
-    with pytest.raises(BadFile, match="cannot be made"):
+    with pytest.raises(BadFile, match="cannot be created"):
         ViewerOutput("frames", OWN, tmp_path / "file", force=False)
 
 

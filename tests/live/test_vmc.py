@@ -129,7 +129,7 @@ def test_a_raised_forearm_turns_as_in_unity() -> None:
     "text", ["", "here", "localhost:", "localhost:0", "127.0.0.1:99999", ":x", "127.0.0.1:²", "٣٩"]
 )
 def test_no_address(text: str) -> None:
-    with pytest.raises(BadInput, match="no address"):
+    with pytest.raises(BadInput, match="is not an address"):
         parse_address(text)
 
 

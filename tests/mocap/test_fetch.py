@@ -89,7 +89,7 @@ def test_bytes_that_do_not_parse_never_stay(site: Site, tmp_path: Path, spoil: b
     with pytest.raises(BadFile) as error:
         fetch_cmu(["91"], out, base_url=site.url)
     assert error.value.path == f"{site.url}/subjects/91/91_02.amc"
-    assert "Nothing was kept" in error.value.advice
+    assert "It was not kept" in error.value.advice
     assert "\n" not in str(error.value)
     assert _names(out) == ["91/91.asf", "91/91_01.amc"]
 
@@ -137,19 +137,19 @@ def test_an_index_that_is_there_is_added_to(site: Site, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("subject", ["../13", "13;14", "", "all", "1234"])
 def test_a_subject_is_a_number(tmp_path: Path, subject: str) -> None:
-    with pytest.raises(BadInput, match="is no subject of CMU"):
+    with pytest.raises(BadInput, match="is not a subject of CMU"):
         fetch_cmu([subject], tmp_path / "out", base_url="http://127.0.0.1:1")
     assert not (tmp_path / "out").exists()
 
 
 def test_some_subject_must_be_named(tmp_path: Path) -> None:
-    with pytest.raises(BadInput, match="No subjects"):
+    with pytest.raises(BadInput, match="No subject is named"):
         fetch_cmu([], tmp_path / "out")
 
 
 def test_a_file_in_the_place_of_the_folder_is_one_clear_line(site: Site, tmp_path: Path) -> None:
     (tmp_path / "out").write_text("mine")
-    with pytest.raises(BadInput, match="cannot be made"):
+    with pytest.raises(BadInput, match="cannot be created"):
         fetch_cmu(["91"], tmp_path / "out", base_url=site.url)
 
 

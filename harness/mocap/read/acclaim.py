@@ -1,4 +1,4 @@
-"""Acclaim ASF and AMC files under one name."""
+"""Readers of Acclaim files, skeletons (ASF) and motions (AMC), in one namespace."""
 
 from harness.mocap.read.amc import read_amc, read_amc_clip
 from harness.mocap.read.asf import AsfFile, read_asf, read_asf_file

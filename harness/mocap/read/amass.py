@@ -4,9 +4,9 @@ A file has `poses` (T, 3 J) axis-angle vectors, `trans` (T, 3) and its rate. J i
 the first 22 joints are the same body in all three (https://github.com/vchoutas/smplx, joint_names.py), and only these
 are used. The rest pose is a T: x left, y up, z forward; the root vector turns it into a world with z up.
 
-What is not in a file: bone lengths and the pelvis's place, which follow from `betas` through a licensed body model.
-So the motion is played on the mean skeleton of the 24 bones, the root stands at `trans` (the true pelvis is a constant
-vector of up to 0.25 m away), and the model's rest pose is taken to have its legs straight down and its arms along x.
+A file does not hold bone lengths and the position of the pelvis, which follow from `betas` by a licensed body model.
+So the motion is applied to the mean skeleton of the 24 bones, and the root is placed at `trans` (the true pelvis is a
+constant vector of up to 0.25 m away). The model's rest pose is taken to have legs straight down and arms along x.
 """
 
 import lzma
@@ -57,7 +57,7 @@ _ARCHIVE_ERRORS = (
     *(zipfile.BadZipFile, zlib.error, lzma.LZMAError, struct.error),
     *(OSError, EOFError, ValueError, OverflowError, NotImplementedError, RuntimeError),
 )
-"""What zipfile raises, as far as it is known, for damaged archives."""
+"""Known exceptions of zipfile for damaged archives."""
 _POSE_WIDTHS = (72, 156, 165)
 _RATE_KEYS = ("mocap_framerate", "mocap_frame_rate")
 
@@ -68,8 +68,11 @@ def _axis_quaternion(axis: int, angle_deg: float) -> tuple[float, float, float, 
 
 
 def _smpl_map() -> dict[str, BoneMapping]:
-    """In the skeleton's rest pose the legs stand 20 deg out, and elbows bend forward and 30 deg up; in SMPL's not."""
-    drives = {
+    """The mapping, with the differences of the rest poses.
+
+    In the skeleton's rest pose the legs are 20 deg abducted and the elbows' axes rotated by 30 deg; in SMPL's not.
+    """
+    mapping = {
         "root": BoneMapping("pelvis"),
         "lowerback": BoneMapping("spine1"),
         "upperback": BoneMapping("spine2"),
@@ -79,26 +82,26 @@ def _smpl_map() -> dict[str, BoneMapping]:
         "head": BoneMapping("head"),
     }
     for side, s, out_deg in (("left", "l", -20.0), ("right", "r", 20.0)):
-        drives[f"{s}clavicle"] = BoneMapping(f"{side}_collar")
-        drives[f"{s}humerus"] = BoneMapping(f"{side}_shoulder", joint_from_bone=_axis_quaternion(1, 30.0))
-        drives[f"{s}radius"] = BoneMapping(f"{side}_elbow", joint_from_bone=_axis_quaternion(1, 30.0))
-        drives[f"{s}wrist"] = BoneMapping(f"{side}_elbow")
-        drives[f"{s}hand"] = BoneMapping(f"{side}_wrist")
-        drives[f"{s}hipjoint"] = BoneMapping("pelvis")
-        drives[f"{s}femur"] = BoneMapping(f"{side}_hip", joint_from_bone=_axis_quaternion(0, out_deg))
-        drives[f"{s}tibia"] = BoneMapping(f"{side}_knee", joint_from_bone=_axis_quaternion(0, out_deg))
-        drives[f"{s}foot"] = BoneMapping(f"{side}_ankle", joint_from_bone=_axis_quaternion(0, out_deg))
-    return drives
+        mapping[f"{s}clavicle"] = BoneMapping(f"{side}_collar")
+        mapping[f"{s}humerus"] = BoneMapping(f"{side}_shoulder", joint_from_bone=_axis_quaternion(1, 30.0))
+        mapping[f"{s}radius"] = BoneMapping(f"{side}_elbow", joint_from_bone=_axis_quaternion(1, 30.0))
+        mapping[f"{s}wrist"] = BoneMapping(f"{side}_elbow")
+        mapping[f"{s}hand"] = BoneMapping(f"{side}_wrist")
+        mapping[f"{s}hipjoint"] = BoneMapping("pelvis")
+        mapping[f"{s}femur"] = BoneMapping(f"{side}_hip", joint_from_bone=_axis_quaternion(0, out_deg))
+        mapping[f"{s}tibia"] = BoneMapping(f"{side}_knee", joint_from_bone=_axis_quaternion(0, out_deg))
+        mapping[f"{s}foot"] = BoneMapping(f"{side}_ankle", joint_from_bone=_axis_quaternion(0, out_deg))
+    return mapping
 
 
 SMPL_MAP: JointMap = _smpl_map()
-"""The forearm's twist goes to the wrist bone; toes are left out, for the 24 bones have none."""
+"""Joint of each of the 24 bones. The forearm's twist goes to the wrist bone; toes are left out."""
 
 
 def read_amass(path: Path | str) -> JointClip:
-    """The motion of an AMASS file on the 22 body joints; offsets are zero, for the file has none. Raises BadFile.
+    """Read the motion of an AMASS file on the 22 body joints; joint offsets are zero, since the file has none.
 
-    Only the named arrays are read, as plain numbers; nothing in the archive is ever unpickled.
+    Only the named arrays are read, as plain numbers; nothing in the archive is unpickled. Raises BadFile.
     """
     path = Path(path)
     check_size(path, _FORMAT)
@@ -116,8 +119,8 @@ def read_amass(path: Path | str) -> JointClip:
         or poses.ndim != 2
         or poses.shape not in [(frames, w) for w in _POSE_WIDTHS]
     ):
-        found = f"poses {poses.shape} and trans {trans.shape}"
-        raise BadFile(path, found, "(T, 72, 156 or 165) and (T, 3), T at least 1", "Is it another kind of npz?")
+        shapes = f"poses {poses.shape} and trans {trans.shape}"
+        raise BadFile(path, shapes, "(T, 72, 156 or 165) and (T, 3), T at least 1", "Is it another kind of npz?")
     turn = rotations.exp(poses[:, : 3 * len(JOINTS)].reshape(frames, len(JOINTS), 3))
     local = np.concatenate([turn[..., :1], turn[..., 1:] @ WORLD_FROM_ASF.T], axis=-1)
     local[:, 0] = rotations.multiply(turn[:, 0], rotations.from_matrix(WORLD_FROM_ASF.T))
@@ -137,7 +140,7 @@ def read_amass(path: Path | str) -> JointClip:
 
 
 def read_amass_clip(path: Path | str) -> Clip:
-    """An AMASS file as a clip on the mean skeleton of the 24 bones."""
+    """Read an AMASS file as a clip on the mean skeleton of the 24 bones. Raises BadFile."""
     return to_clip(read_amass(path), SMPL_MAP)
 
 
@@ -152,7 +155,7 @@ def _rate_hz(path: Path, archive: zipfile.ZipFile) -> float:
 
 
 def _read_array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
-    """One array of real, finite numbers, the size that its header says and within the limit."""
+    """Read one array of finite real numbers; BadFile unless its size agrees with its header and is within the limit."""
     if f"{key}.npy" not in archive.namelist():
         have = ", ".join(name.removesuffix(".npy") for name in archive.namelist()[:12])
         raise BadFile(
@@ -173,5 +176,5 @@ def _read_array(path: Path, archive: zipfile.ZipFile, key: str) -> Floats:
         flat = np.frombuffer(file.read(), dtype=dtype)
     values: Floats = flat.reshape(shape, order="F" if fortran else "C").astype(float)
     if not bool(np.all(np.abs(values) < MAX_VALUE)):
-        raise BadFile(path, f"a value of {key} that is no finite number", "finite numbers", "Fetch it again.")
+        raise BadFile(path, f"a value of {key} that is not a finite number", "finite numbers", "Fetch it again.")
     return values

@@ -1,7 +1,7 @@
-"""Acclaim motion files (AMC): the root's place and every bone's angles, frame by frame, on the skeleton of an ASF.
+"""Acclaim motion files (AMC): position of the root and angles of the bones, frame by frame, for the skeleton of an ASF.
 
-An AMC holds neither its rate nor its unit of length: the rate comes from outside, the unit from the ASF. A bone's
-row has its `dof` angles in that order, in degrees, the last one outermost.
+An AMC file records neither its frame rate nor its unit of length: the caller gives the rate, the ASF file the unit. A
+bone's row has the angles of its `dof` in that order, in degrees, the last one outermost.
 """
 
 from array import array
@@ -22,30 +22,30 @@ from harness.mocap.read.asf import INCH_M, ROOT_ORDER, WORLD_FROM_ASF, read_asf_
 from harness.mocap.read.file_checks import MAX_VALUE, check_last_line, check_size, parse_numbers
 
 CMU_UNIT_M = INCH_M / 0.45
-"""Length of 1 in every file of the CMU library, 0.056444 m."""
+"""Length of 1 in every file of the CMU library [m], 0.056444."""
 
 _FORMAT = "an AMC motion"
-_FETCH_AGAIN = "The file is cut; fetch it again."
+_FETCH_AGAIN = "The file is truncated; fetch it again."
 
 _Line = tuple[int, str]
 
 
 def read_amc_clip(asf: Path | str, amc: Path | str, *, rate_hz: float) -> Clip:
-    """A motion on its skeleton, in the unit of the skeleton's file; see `read_amc`."""
+    """Read an AMC file with its ASF file, in the unit of the latter; see `read_amc`."""
     file = read_asf_file(asf)
     return read_amc(amc, file.skeleton, rate_hz=rate_hz, unit_m=file.unit_m)
 
 
 def read_amc(path: Path | str, skeleton: Skeleton, *, rate_hz: float, unit_m: float = CMU_UNIT_M) -> Clip:
-    """The motion of an AMC file on `skeleton`; angles are the file's own, not unwrapped.
+    """Read the motion of an AMC file for `skeleton`; angles are those in the file, not unwrapped.
 
-    The clip is called like the file ("13_17"), its subject by what stands before the underscore. Memory is bounded by
-    the size limit of `files.LIMIT_BYTES`. Raises BadFile with the line for rows that are missing, repeated, unknown,
-    of the wrong length or no numbers, for frames that are cut, repeated or left out.
+    The clip has the name of the file ("13_17"); its subject is the part before the underscore. Memory is bounded by
+    `file_checks.LIMIT_BYTES`. Raises BadFile with the line for rows that are missing, repeated, unknown, of the wrong
+    length or not numbers, and for frames that are cut, repeated or left out; BadInput for a rate not above 0.
     """
     path = Path(path)
     if not (np.isfinite(rate_hz) and rate_hz > 0.0):
-        raise BadInput(f"a rate of {rate_hz} Hz for {path.name}.", "CMU's clips have 120, some 60.")
+        raise BadInput(f"{path.name} cannot have a rate of {rate_hz} Hz.", "CMU's clips have 120 Hz, some 60.")
     check_size(path, _FORMAT)
     names = ("root", *(name for name, channels in zip(skeleton.names, skeleton.hinges, strict=True) if channels))
     counts = dict(zip(skeleton.names, map(len, skeleton.hinges), strict=True)) | {"root": len(ROOT_ORDER)}
@@ -68,7 +68,7 @@ def read_amc(path: Path | str, skeleton: Skeleton, *, rate_hz: float, unit_m: fl
 
 
 def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str, ...], Floats]:
-    """The order of a frame's rows, and every frame's values (T, sum of counts) in that order."""
+    """Names of a frame's rows in order, and the values of every frame (T, sum of counts) in that order."""
     lines = _content_lines(file)
     block = _read_first_frame(path, lines, 1 + len(counts))
     order = tuple(text.split(None, 1)[0] for _, text in block[1:])
@@ -95,7 +95,7 @@ def _parse(path: Path, counts: dict[str, int], file: TextIO) -> tuple[tuple[str,
 
 
 def _content_lines(file: TextIO) -> Iterator[_Line]:
-    """Numbered lines, stripped, without comments and blank ones."""
+    """Line numbers and stripped lines, without comments and blank lines."""
     for line, text in enumerate(file, start=1):
         text = text.strip()
         if text and text[0] != "#":
@@ -103,7 +103,7 @@ def _content_lines(file: TextIO) -> Iterator[_Line]:
 
 
 def _read_first_frame(path: Path, lines: Iterator[_Line], lines_in_frame: int) -> list[_Line]:
-    """Read past the keywords; the lines of the first frame."""
+    """Skip the keywords and return the lines of the first frame."""
     keywords = set()
     for line, text in lines:
         if not text.startswith(":"):
@@ -115,7 +115,7 @@ def _read_first_frame(path: Path, lines: Iterator[_Line], lines_in_frame: int) -
 
 
 def _parse_floats(words: tuple[str, ...]) -> list[float] | None:
-    """The numbers, unless one is none or of no sensible size."""
+    """The words as numbers; None if one is not a number or is too large."""
     try:
         row = list(map(float, words))
     except ValueError:
@@ -124,14 +124,14 @@ def _parse_floats(words: tuple[str, ...]) -> list[float] | None:
 
 
 def _is_frame_number(text: str) -> bool:
-    """Whether a line can be a frame's number."""
+    """Whether a line is a frame number."""
     return text.isascii() and text.isdecimal() and len(text) < 10
 
 
 def _raise_frame_error(
     path: Path, counts: dict[str, int], order: tuple[str, ...], block: list[_Line], expected: int | None
 ) -> NoReturn:
-    """What is wrong with a frame that does not read as all the others."""
+    """Raise BadFile with what is wrong in a frame that does not match the first one."""
     line, text = block[0]
     if expected is not None and text != str(expected):
         again = _is_frame_number(text) and int(text) < expected
@@ -153,11 +153,11 @@ def _raise_frame_error(
             raise BadFile(path, f"bone {found}", f"{name}, as in the first frame", "Rows are mixed up.", line)
         parse_numbers(path, values, counts[found], f"{found} (does the ASF belong to this AMC?)", line)
         seen.add(found)
-    where = f"the end of the file inside frame {block[0][1]}"
-    raise BadFile(path, where, f"{len(counts)} rows", _FETCH_AGAIN, line)
+    cut = f"the end of the file inside frame {block[0][1]}"
+    raise BadFile(path, cut, f"{len(counts)} rows", _FETCH_AGAIN, line)
 
 
 def _root_rotation(angles_rad: Floats) -> Floats:
-    """World quaternions (T, 4) of RX RY RZ [rad], the last outermost, with signs that do not flip."""
+    """World quaternions (T, 4) of angles RX RY RZ (T, 3) [rad], the last outermost, with continuous signs."""
     x, y, z = (rotations.exp(angles_rad[:, k, None] * WORLD_FROM_ASF[:, k]) for k in range(3))
     return rotations.continuous(rotations.multiply(z, rotations.multiply(y, x)))

@@ -2,9 +2,9 @@
 
 Lengths divided by the header's `length` unit are inches (CMU: 0.45, so a value of 1 is 56.444 mm). A bone's
 `direction` is in the file's world axes (x left, y up, z forward) in the rest pose; its `axis` angles give the
-frame whose coordinate axes are the bone's hinges. Here everything is turned to the world of the core: x forward,
-y left, z up, metres. https://research.cs.wisc.edu/graphics/Courses/cs-838-1999/Jeff/ASF-AMC.html describes the
-format; the unit was checked against the free fall of recorded jumps.
+frame whose coordinate axes are the bone's hinges. The reader converts everything to the world axes of `core`:
+x forward, y left, z up, metres. https://research.cs.wisc.edu/graphics/Courses/cs-838-1999/Jeff/ASF-AMC.html
+describes the format; the unit was checked against the free fall of recorded jumps.
 """
 
 from collections.abc import Sequence
@@ -43,7 +43,7 @@ class _BoneData:
 
 @dataclass
 class _AsfSections:
-    """What the sections of a file said, before it is checked as a whole."""
+    """Contents of the sections of a file, before they are checked against each other."""
 
     length_unit: float = 0.0
     degrees: bool = True
@@ -54,7 +54,7 @@ class _AsfSections:
 
 @dataclass(frozen=True, eq=False)
 class AsfFile:
-    """What an ASF file says: the skeleton, and the unit that its motions share."""
+    """Contents of an ASF file: the skeleton, and the unit of length that its motions share."""
 
     skeleton: Skeleton
     unit_m: float
@@ -62,14 +62,14 @@ class AsfFile:
 
 
 def read_asf(path: Path | str) -> Skeleton:
-    """The skeleton of an ASF file in metres and world axes, all of its bones (CMU: 30); see `read_asf_file`."""
+    """Read the skeleton of an ASF file with all its bones (CMU: 30), in metres and world axes; see `read_asf_file`."""
     return read_asf_file(path).skeleton
 
 
 def read_asf_file(path: Path | str, *, unit_m: float | None = None) -> AsfFile:
-    """Skeleton and unit of an ASF file; bones are depth first in the order of its hierarchy.
+    """Read skeleton and unit of an ASF file; bones are depth first in the order of its hierarchy.
 
-    `unit_m` overrules the unit of length in the file [m].
+    `unit_m` replaces the unit of length in the file [m].
 
     Raises BadFile with the line for anything that cannot be understood: units, unknown or repeated bones, a bone
     with two parents, none, or among its own ancestors.
@@ -150,12 +150,12 @@ def _parse_bone(
             advice = "Bones that slide or stretch are not supported."
             raise BadFile(path, f"dof {' '.join(values)}", "each of rx, ry, rz at most once", advice, line)
     elif key not in ("id", "limits", "bodymass", "cofmass") and not key.startswith("("):
-        raise BadFile(path, f"{words[0][:40]!r} in a bone", "a keyword of the format", "Is the line whole?", line)
+        raise BadFile(path, f"{words[0][:40]!r} in a bone", "a keyword of the format", "Is the line complete?", line)
     return bone
 
 
 def _add_bone(path: Path, draft: _AsfSections, bone: _BoneData, line: int) -> None:
-    """A bone has been read: whole, new, and of a length that its direction can carry."""
+    """Add a finished bone; BadFile unless it is complete, new, and its direction is a unit vector."""
     lacking = [
         key
         for key, missing in (
@@ -197,7 +197,7 @@ def _build_file(path: Path, draft: _AsfSections, unit_m: float | None) -> AsfFil
         (not draft.parent_of, ":hierarchy with bones"),
     ):
         if missing:
-            raise BadFile(path, f"no {what}", f"{_FORMAT} with one", "Is the file whole?")
+            raise BadFile(path, f"no {what}", f"{_FORMAT} with one", "Is the file complete?")
     names = _depth_first(draft.parent_of)
     lost = [name for name in draft.bones if name not in names]
     if lost:
@@ -217,7 +217,7 @@ def _build_file(path: Path, draft: _AsfSections, unit_m: float | None) -> AsfFil
 
 
 def _depth_first(parent_of: dict[str, str]) -> tuple[str, ...]:
-    """Bones that can be reached from the root, parents first."""
+    """Names of the bones below the root, parents first."""
     children: dict[str, list[str]] = {}
     for child, parent in parent_of.items():
         children.setdefault(parent, []).append(child)
@@ -229,7 +229,7 @@ def _depth_first(parent_of: dict[str, str]) -> tuple[str, ...]:
 
 
 def _hinge_axes(bone: _BoneData, degrees: bool) -> list[Floats]:
-    """World axes of a bone's hinges: the axes of its own frame, the angles of `axis` applied first to last."""
+    """World axes of a bone's hinges: the axes of its frame, which the angles of `axis` rotate in order."""
     angles = np.deg2rad(bone.axis_deg) if degrees else np.asarray(bone.axis_deg)
     turn = np.eye(3)
     for angle, letter in zip(angles, bone.axis_order, strict=True):
@@ -238,7 +238,7 @@ def _hinge_axes(bone: _BoneData, degrees: bool) -> list[Floats]:
 
 
 def _check_longest(path: Path, skeleton: Skeleton) -> None:
-    """A wrong unit shows in the size: a person's largest bone (thigh or shin) is 0.2 to 0.8 m long."""
+    """BadFile if the longest bone shows a wrong unit: a person's longest bone (thigh or shin) has 0.2 to 0.8 m."""
     longest = float(skeleton.length_m.max())
     if not 0.1 <= longest <= 1.0:
         found = f"a longest bone of {longest:.3g} m"

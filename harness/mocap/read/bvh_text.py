@@ -1,4 +1,4 @@
-"""The text of a BVH file, checked line by line: a tree of joints, then frames of numbers."""
+"""Parser of the text of a BVH file: a tree of joints, then frames of numbers, checked line by line."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,7 +7,7 @@ from harness.errors import BadFile
 from harness.mocap.read.file_checks import check_last_line, parse_number, parse_numbers, read_lines
 
 LIMIT_BYTES = 64 * 2**20
-"""Largest BVH file that is read; about 80,000 frames of CMU's skeleton. Its words take ten times that in memory."""
+"""Largest BVH file that is read: about 80,000 frames of CMU's skeleton, which need ten times that in memory."""
 MAX_JOINTS = 1000
 
 _FORMAT = "a BVH motion"
@@ -23,22 +23,22 @@ class BvhJoint:
     parent: int
     """Index of the parent; -1 for the root."""
     offset: tuple[float, ...]
-    """From the parent [the file's unit]."""
+    """Offset from the parent [the file's unit]."""
     channels: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class BvhText:
-    """A whole BVH file, known to be sound."""
+    """The contents of a checked BVH file."""
 
     joints: tuple[BvhJoint, ...]
-    """Parents before children, as in the file; End Sites among them."""
+    """Joints and End Sites, parents before children, as in the file."""
     frame_time_s: float
     frames: tuple[str, ...]
-    """One line of numbers each."""
+    """One line of numbers per frame."""
 
     def canonical(self) -> str:
-        """The same motion for a simple reader: a keyword a line, plain names, no End Sites, no blank lines."""
+        """The motion as simple BVH text: one keyword per line, plain names, no End Sites, no blank lines."""
         lines = ["HIERARCHY"]
         chain: list[int] = []
         for j, joint in enumerate(self.joints):
@@ -57,7 +57,7 @@ class BvhText:
 
 
 def parse_bvh(path: Path) -> BvhText:
-    """Read and check a BVH file; BadFile with the line for anything amiss."""
+    """Read and check a BVH file; BadFile with the line of the first error."""
     lines = [
         (line, text.split())
         for line, text in enumerate(read_lines(path, _FORMAT, LIMIT_BYTES), start=1)
@@ -65,7 +65,7 @@ def parse_bvh(path: Path) -> BvhText:
     ]
     motion = next((k for k, (_, words) in enumerate(lines) if words == ["MOTION"]), None)
     if motion is None:
-        raise BadFile(path, "no line MOTION", _FORMAT, "Is the file whole, and BVH?")
+        raise BadFile(path, "no line MOTION", _FORMAT, "Is the file complete, and BVH?")
     joints = _parse_joints(_TokenReader(path, lines[: motion + 1]))
     frame_time_s, frames = _parse_frames(path, lines[motion + 1 :], sum(len(joint.channels) for joint in joints))
     check_last_line(path)
@@ -73,7 +73,7 @@ def parse_bvh(path: Path) -> BvhText:
 
 
 class _TokenReader:
-    """The words of the hierarchy one by one, braces standing alone; the last is MOTION."""
+    """The tokens of the hierarchy, with braces as tokens of their own; the last one is MOTION."""
 
     def __init__(self, path: Path, lines: list[tuple[int, list[str]]]) -> None:
         self.path = path
@@ -85,21 +85,22 @@ class _TokenReader:
         )
 
     def next(self) -> str:
-        """The next word; MOTION again at the end."""
+        """The next token; MOTION at the end."""
         self.line, self.word = next(self._rest, (self.line, "MOTION"))
         return self.word
 
-    def expect(self, *wanted: str) -> None:
-        for want in wanted:
-            if self.next() != want:
-                raise self.unexpected(want)
+    def expect(self, *tokens: str) -> None:
+        """Read these tokens; BadFile for others."""
+        for token in tokens:
+            if self.next() != token:
+                raise self.unexpected(token)
 
     def triple(self, what: str) -> tuple[float, ...]:
         return tuple(parse_number(self.path, self.next(), what, self.line) for _ in range(3))
 
     def unexpected(self, expected: str) -> BadFile:
-        """The error that the word read last is not what was expected."""
-        return BadFile(self.path, f"{self.word[:40]!r}", expected, "Is the file whole, and BVH?", self.line)
+        """The error for the last token, which is not the expected one."""
+        return BadFile(self.path, f"{self.word[:40]!r}", expected, "Is the file complete, and BVH?", self.line)
 
 
 def _parse_joints(words: _TokenReader) -> tuple[BvhJoint, ...]:
@@ -130,7 +131,7 @@ def _parse_joints(words: _TokenReader) -> tuple[BvhJoint, ...]:
 
 
 def _parse_channels(words: _TokenReader, root: bool) -> tuple[str, ...]:
-    """Three rotations, for the root after three positions."""
+    """The channels of a joint: three rotations; for the root, three positions before them."""
     count = 6 if root else 3
     words.expect("CHANNELS", str(count))
     channels = tuple(words.next() for _ in range(count))
@@ -141,17 +142,17 @@ def _parse_channels(words: _TokenReader, root: bool) -> tuple[str, ...]:
 
 
 def _parse_frames(path: Path, lines: list[tuple[int, list[str]]], width: int) -> tuple[float, tuple[str, ...]]:
-    """Frame time [s] and the frames' lines: as many as announced, of `width` numbers each."""
+    """Frame time [s] and the lines of the frames; BadFile unless number and `width` agree with the header."""
     last = lines[-1][0] if lines else None
     if len(lines) < 2 or lines[0][1][0] != "Frames:" or lines[1][1][:2] != ["Frame", "Time:"]:
-        raise BadFile(path, "no frame count and time", "Frames: and Frame Time: after MOTION", "Is it whole?", last)
+        raise BadFile(path, "no frame count and time", "Frames: and Frame Time: after MOTION", "Is it complete?", last)
     (count,) = parse_numbers(path, lines[0][1][1:], 1, "the frame count", lines[0][0])
     (frame_time_s,) = parse_numbers(path, lines[1][1][2:], 1, "the frame time", lines[1][0])
     if not 1e-5 < frame_time_s < 10.0:
         raise BadFile(path, f"a frame time of {frame_time_s:g} s", "1e-5 to 10 s", "Correct it.", lines[1][0])
     frames = lines[2:]
     if not frames or len(frames) != count:
-        advice = "The file is cut; fetch it again." if len(frames) < count else "Correct the frame count."
+        advice = "The file is truncated; fetch it again." if len(frames) < count else "Correct the frame count."
         raise BadFile(path, f"{len(frames)} frames", f"the {count:g} announced, at least 1", advice, last)
     for line, words in frames:
         parse_numbers(path, words, width, "a frame", line)

@@ -1,9 +1,9 @@
 """C3D files: positions of markers, read by ezc3d (extra `c3d`), in world axes and metres.
 
-The header is checked first, and ezc3d runs in a process of its own, because it trusts its input. Unit and axes come
-from the file's own parameters (POINT:UNITS, POINT:X_SCREEN and Y_SCREEN;
-https://www.c3d.org/HTML/Documents/parameterslist.htm): in CMU's files millimetres, x across the screen and z up, which
-are the world's x and z.
+The header is checked first, and ezc3d runs in a process of its own, because it does not check its input. Unit and axes
+come from the file's parameters (POINT:UNITS, POINT:X_SCREEN and Y_SCREEN;
+https://www.c3d.org/HTML/Documents/parameterslist.htm). CMU's files are in millimetres, with x across the screen and z
+up, which are the world's x and z.
 """
 
 import subprocess
@@ -27,8 +27,8 @@ from harness.mocap.read.file_checks import MAX_VALUE, check_size
 UNITS_M = {"mm": 0.001, "cm": 0.01, "m": 1.0, "in": 0.0254}
 
 TIMEOUT_S = 20.0
+"""Time limit for ezc3d [s], to which `BYTES_PER_SECOND` adds for large files; it needs 0.1 s for CMU's."""
 BYTES_PER_SECOND = 2e6
-"""ezc3d gets so long, and longer for large files; it needs 0.1 s for CMU's."""
 
 _FORMAT = "a C3D marker file"
 _FETCH_AGAIN = "Fetch or export it again."
@@ -37,7 +37,7 @@ _WORLD_FROM_FILE = {
     ("+Y", "+Z"): np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]),
     ("+X", "+Y"): np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
 }
-"""By the axes across and up the screen."""
+"""Rotation to world axes by the file's axes across and up the screen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +47,15 @@ class MarkerClip:
     name: str
     subject: str
     labels: tuple[str, ...]
-    """Without the subject's prefix ("LFHD")."""
+    """(M,) names without the subject's prefix ("LFHD")."""
     rate_hz: float
     position_m: Floats
-    """(T, M, 3) NaN where a marker was not seen [m]."""
+    """(T, M, 3) positions [m]; NaN where a marker was not seen."""
     unit_m: float
     unit_evidence: str
-    """Why the unit is what it is."""
+    """Evidence for the unit."""
     up_evidence: str
-    """Which axis of the file is up, and why."""
+    """The file's axis that points up, with the evidence."""
 
     def __post_init__(self) -> None:
         freeze(self, position_m=("T", len(self.labels), 3))
@@ -65,7 +65,10 @@ class MarkerClip:
 
 
 def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
-    """The markers of a C3D file; BadFile for what is none, or has no unit or axes; MissingExtra without ezc3d."""
+    """Read the markers of a C3D file; `unit_m` is the length of 1 in it, if the file does not say it [m].
+
+    Raises BadFile for a damaged file or one without unit or axes, and MissingExtra without ezc3d.
+    """
     path = Path(path)
     check_size(path, _FORMAT)
     check_header(path)
@@ -97,16 +100,16 @@ def read_c3d(path: Path | str, *, unit_m: float | None = None) -> MarkerClip:
 
 
 def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
-    """The arrays that `ezc3d_process` writes; BadFile if ezc3d refuses the file, crashes on it or does not finish."""
+    """Run `ezc3d_process` and read its arrays; BadFile if ezc3d refuses the file, crashes or does not finish."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "content.npz"
-        patience_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
+        timeout_s = TIMEOUT_S + path.stat().st_size / BYTES_PER_SECOND
         command = [sys.executable, "-m", ezc3d_process.__name__, str(path), str(out)]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=patience_s)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=timeout_s)
         except subprocess.TimeoutExpired as error:
             raise BadFile(
-                path, f"a file that keeps ezc3d busy over {patience_s:.0f} s", _FORMAT, _FETCH_AGAIN
+                path, f"a file that keeps ezc3d busy over {timeout_s:.0f} s", _FORMAT, _FETCH_AGAIN
             ) from error
         if done.returncode == ezc3d_process.NO_EZC3D:
             raise MissingExtra("Reading C3D files", "ezc3d", "c3d")
@@ -120,18 +123,18 @@ def _load_with_ezc3d(path: Path) -> dict[str, NDArray[Any]]:
 
 @dataclass(frozen=True)
 class MarkerSpread:
-    """How firmly a marker sits on the bone that it follows best."""
+    """Spread of a marker about the bone that it follows best."""
 
     label: str
     bone: str
     spread_m: float
-    """Standard deviation of its place in the bone's frame, over all three axes [m]."""
+    """Standard deviation of its position in the bone's frame, over all three axes [m]."""
 
 
 def measure_marker_spreads(markers: MarkerClip, clip: Clip) -> tuple[MarkerSpread, ...]:
-    """Each marker's bone, found by the least spread, in a clip of the same take (frame by frame).
+    """The bone of least spread for each marker, in a clip of the same take with the same frames.
 
-    Markers seen in fewer than two frames are left out.
+    Markers that were seen in fewer than two frames are left out.
     """
     frames = min(len(markers), len(clip))
     pose = forward_kinematics(
@@ -151,7 +154,7 @@ def measure_marker_spreads(markers: MarkerClip, clip: Clip) -> tuple[MarkerSprea
 
 
 def _length_unit(path: Path, units: list[str], given_m: float | None) -> tuple[float, str]:
-    """The unit of length [m] and its evidence; BadFile if the file names none and none is given."""
+    """Unit of length [m] and the evidence; BadFile if neither the file nor the caller gives one."""
     if given_m is not None:
         return given_m, "unit as given"
     if not units or units[0].lower() not in UNITS_M:

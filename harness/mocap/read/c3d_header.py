@@ -1,4 +1,4 @@
-"""Whether a C3D file hangs together: header, parameter chain and size, before a library that trusts them sees it.
+"""Consistency check of a C3D file: header, parameter chain and size, before ezc3d, which trusts them, reads it.
 
 Layout: https://www.c3d.org/docs/C3D_User_Guide.pdf (header record, parameter format).
 """
@@ -18,12 +18,12 @@ _FETCH_AGAIN = "Fetch or export it again."
 _BYTE_ORDER = {84: "<", 85: "<", 86: ">"}
 """Byte order of integers by processor: Intel, DEC, MIPS."""
 _SIGN_BYTE_OFFSET = {84: 3, 85: 1, 86: 0}
-"""Where a four-byte real has its sign."""
+"""Offset of the byte with the sign of a four-byte real, by processor."""
 
 
 @dataclass(frozen=True)
 class C3dHeader:
-    """What the first block says."""
+    """Contents of the header block."""
 
     markers: int
     frames: int
@@ -31,7 +31,7 @@ class C3dHeader:
 
 
 def check_header(path: Path) -> C3dHeader:
-    """Read the header; BadFile if it, the parameters or the file's size contradict each other."""
+    """Read the header; BadFile if header, parameters and file size contradict each other."""
     data = path.read_bytes()
     if len(data) < 2 * BLOCK_BYTES or data[1] != 0x50:
         raise BadFile(path, "no C3D header", _FORMAT, "Is it another format under this name?")
@@ -46,19 +46,22 @@ def check_header(path: Path) -> C3dHeader:
     if not (0 < markers <= MAX_MARKERS and frames > 0):
         found = f"{markers} markers in {frames} frames"
         raise BadFile(path, found, f"1 to {MAX_MARKERS} markers, and frames", _FETCH_AGAIN)
-    whole = bool(data[12 + _SIGN_BYTE_OFFSET[processor]] & 0x80)
-    needed = (data_block - 1) * BLOCK_BYTES + frames * (4 * markers + analog) * (4 if whole else 2)
+    real = bool(data[12 + _SIGN_BYTE_OFFSET[processor]] & 0x80)
+    needed = (data_block - 1) * BLOCK_BYTES + frames * (4 * markers + analog) * (4 if real else 2)
     if data_block < 2 or (len(data) < needed and last != 0xFFFF):
         found = f"{len(data)} bytes"
         raise BadFile(
-            path, found, f"at least {needed}, for {frames} frames of {markers} markers", "It is cut. " + _FETCH_AGAIN
+            path,
+            found,
+            f"at least {needed}, for {frames} frames of {markers} markers",
+            "The file is truncated. " + _FETCH_AGAIN,
         )
     _check_parameters(path, data[start : start + data[start + 2] * BLOCK_BYTES], order)
     return C3dHeader(markers, frames, processor)
 
 
 def _check_parameters(path: Path, block: bytes, order: str) -> None:
-    """Follow the chain of groups and parameters: each must end where, or before, the next begins."""
+    """Follow the chain of groups and parameters; BadFile unless each ends before the next one begins."""
     at = 4
     while at + 2 <= len(block) and block[at] != 0:
         length, group = struct.unpack_from("bb", block, at)

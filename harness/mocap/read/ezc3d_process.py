@@ -1,8 +1,8 @@
-"""ezc3d in a process of its own: `python -m harness.mocap.read.ezc3d_process FILE OUT` writes what it read as npz.
+"""Program that reads a C3D file with ezc3d: `python -m harness.mocap.read.ezc3d_process FILE OUT` writes an npz file.
 
-ezc3d is C++ that trusts its input: of files with a few damaged bytes in the header about one in 200 crashes it, and
-some keep it busy for ever. Neither may take the program along. Exit 3 means that ezc3d is not installed, 4 that it
-refused the file, for the reason on stderr; memory is limited where the system can.
+ezc3d is C++ that does not check its input. About one in 200 files with a few damaged bytes in the header crashes it,
+and some keep it busy for ever, so it runs in a process of its own. Exit code 3 means that ezc3d is not installed, 4
+that it refused the file; the reason is on stderr. Memory is limited where the system supports it.
 """
 
 import sys
@@ -16,6 +16,7 @@ TEXT_PARAMETERS = ("UNITS", "X_SCREEN", "Y_SCREEN")
 
 
 def main(file: str, out: str) -> int:
+    """Read `file`, write its arrays to `out`, and return the exit code."""
     try:
         import ezc3d
     except ImportError:
@@ -45,7 +46,7 @@ def main(file: str, out: str) -> int:
 
 
 def _label_order(key: str) -> int:
-    """LABELS, LABELS2, LABELS3, ...: 255 labels fit in each."""
+    """Sort key of LABELS, LABELS2, LABELS3, ..., which hold 255 labels each."""
     digits = key.removeprefix("LABELS")
     return int(digits) if digits.isdecimal() else 1
 

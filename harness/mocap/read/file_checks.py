@@ -1,4 +1,4 @@
-"""Reading a motion file: refused before it is parsed when it is missing, empty, huge or not text."""
+"""Checks of a motion file before it is parsed (missing, empty, too large, not text), and parsers of numbers."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -6,13 +6,13 @@ from pathlib import Path
 from harness.errors import BadFile
 
 LIMIT_BYTES = 256 * 2**20
-"""Largest motion file that is read; about 330,000 AMC frames, or 46 minutes at 120 a second."""
+"""Largest motion file that is read: about 330,000 AMC frames, or 46 minutes at 120 Hz."""
 MAX_VALUE = 1e6
-"""Numbers beyond this size [the file's own unit] are taken for damage."""
+"""Larger numbers are treated as damage [the file's unit]."""
 
 
 def check_size(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> None:
-    """BadFile unless `path` is a file that is neither empty nor larger than the limit; reads nothing."""
+    """Raise BadFile unless `path` is a file that is neither empty nor larger than the limit; reads nothing."""
     if not path.is_file():
         found = "a folder" if path.is_dir() else "no regular file" if path.exists() else "no such file"
         raise BadFile(path, found, expected, "Check the path.")
@@ -25,11 +25,11 @@ def check_size(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> Non
 
 
 def check_last_line(path: Path) -> None:
-    """A file cut inside its last number still parses; that it does not end its last line gives it away."""
+    """Raise BadFile if the last line has no line break: a file that is cut inside its last number still parses."""
     with path.open("rb") as file:
         file.seek(-1, 2)
         if file.read(1) not in b"\r\n":
-            advice = "The file may be cut: fetch it again, or add a line break if it is whole."
+            advice = "The file may be truncated: fetch it again, or add a line break if it is complete."
             raise BadFile(path, "a last line without an end", "a line break at the end of the file", advice)
 
 
@@ -48,10 +48,10 @@ def read_lines(path: Path, expected: str, limit_bytes: int = LIMIT_BYTES) -> lis
 
 
 def parse_numbers(path: Path, words: Sequence[str], count: int, what: str, line: int) -> list[float]:
-    """`count` numbers of sensible size out of the words of a line; BadFile names the one that is not."""
+    """Exactly `count` numbers from the words of a line; BadFile names a word that is not a number below MAX_VALUE."""
     if len(words) != count:
         plural = "" if len(words) == 1 else "s"
-        raise BadFile(path, f"{len(words)} number{plural} for {what}", str(count), "Is the line whole?", line)
+        raise BadFile(path, f"{len(words)} number{plural} for {what}", str(count), "Is the line complete?", line)
     return [parse_number(path, word, what, line) for word in words]
 
 

@@ -1,4 +1,4 @@
-"""The built-in performer: procedural, seeded full-body motion, so that nothing needs a download."""
+"""The motion generator: procedural, seeded full-body motion of eight performers, which needs no download."""
 
 from harness.mocap.synthetic.performers import performer_names, performer_skeleton, sample_skeletons
 from harness.mocap.synthetic.takes import BEHAVIOURS, SOURCE, generate, take_names

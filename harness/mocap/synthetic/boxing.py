@@ -1,4 +1,4 @@
-"""Shadow boxing: a bladed stance that steps about, a guard, and combinations of punches thrown from the floor up.
+"""Shadow boxing: footwork in a bladed stance, a guard, and combinations of punches driven by legs and trunk.
 
 Distances are relative to the top of the chest, facing the opponent; `lead` is the arm and foot in front.
 """
@@ -27,6 +27,7 @@ from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
 
 def _out_and_back(value: float, wind_up: float = 0.0, hit_s: float = 0.24, back_s: float = 0.58) -> Keyframes:
+    """Keyframes of a punch: a short wind-up, `value` at the hit, and back to 0."""
     return [(0.0, 0.0), (0.3 * hit_s, -wind_up * value), (hit_s, value), (hit_s + 0.05, 0.97 * value), (back_s, 0.0)]
 
 
@@ -118,11 +119,11 @@ _GUARD_DOWN: Mapping[str, Keyframes] = {
     "dip": [(0.0, 0.0), (0.5, -0.04), (1.8, -0.04), (2.4, 0.0)],
     "bend": [(0.0, 0.0), (0.5, -0.10), (1.8, -0.10), (2.4, 0.0)],
 }
-"""Guard down, on the toes."""
+"""A pause with the guard down, on the toes."""
 
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
-    """One take; each favours some of the combinations."""
+    """Generate one take at times `t` (T,) [s]; its random frequencies of combinations depend on the take."""
     rear = habits.hand
     lead = "l" if rear == "r" else "r"
     s = SIDE_SIGN[lead]
@@ -190,7 +191,7 @@ def _pose_arm(
     act: Mapping[str, Floats],
     drop: Floats,
 ) -> None:
-    """One arm from its guard: ahead, out and up of the chest for an arm of 0.58 m [m]."""
+    """Pose one arm from its guard: the wrist's place ahead, out and up of the chest, for an arm of 0.58 m [m]."""
     sign, reach = SIDE_SIGN[side], figure.arm_m(side) / 0.58
     x, y, z = guard + rng.normal(0.0, 0.025, 3)
     wrist = figure.point_near_chest_m(
@@ -210,7 +211,7 @@ def _pose_arm(
 
 
 def _plan_footwork(rng: np.random.Generator, t: Floats, slow: float) -> tuple[StanceShift, list[StanceShift]]:
-    """Steps in and out and round the opponent, within a metre or so of the middle."""
+    """Steps around the opponent, within about a metre of the origin."""
     yaw = float(rng.uniform(-np.pi, np.pi))
     start = StanceShift(0.0, (float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.1))), yaw)
     shifts: list[StanceShift] = []
@@ -226,6 +227,7 @@ def _plan_footwork(rng: np.random.Generator, t: Floats, slow: float) -> tuple[St
 
 
 def _plan_combinations(rng: np.random.Generator, t: Floats, size: float, slow: float, take: int) -> list[Gesture]:
+    """Punches and evasions over the take, with pauses."""
     gestures: list[Gesture] = []
     favour = rng.dirichlet(np.full(len(_COMBINATIONS), 1.5))
     favour[(take * 3) % len(_COMBINATIONS)] += 0.15

@@ -1,6 +1,6 @@
-"""Smooth curves of time: every joint speed and acceleration of the performer comes out of these, so none may jump.
+"""Smooth curves of time, from which the motion generator composes every joint's motion.
 
-Each returns twice continuously differentiable functions of its argument.
+Each curve is twice continuously differentiable, so that joint speeds and accelerations do not jump.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,10 @@ def minimum_jerk(share: Floats) -> Floats:
 
 
 def smooth_trapezoid(share: Floats, ramp: float = 0.35) -> Floats:
-    """0 to 1 with eased ends and an even middle: speed peaks at 1 / (1 - ramp) of its mean, as a swinging foot's."""
+    """0 to 1 with eased ends and constant speed between: the peak speed is 1 / (1 - ramp) of the mean.
+
+    This is the speed profile of a swinging foot.
+    """
     x = np.clip(share, 0.0, 1.0)
     out: Floats = (
         (_minimum_jerk_integral(x / ramp) - _minimum_jerk_integral((x - 1.0 + ramp) / ramp)) * ramp / (1.0 - ramp)
@@ -44,7 +47,7 @@ def pulse(share: Floats, peak: float = 0.5) -> Floats:
 
 
 def interpolate_keys(t: Floats, key_s: Sequence[float] | Floats, key: Sequence[float] | Floats) -> Floats:
-    """A curve through keys at rising times that never overshoots them; constant before the first and after the last.
+    """A curve through keys at increasing times without overshoot; constant before the first and after the last.
 
     Quintic between keys, at rest at every extreme, with the slopes of Fritsch and Butland (1984) elsewhere.
     """
@@ -60,7 +63,7 @@ def interpolate_keys(t: Floats, key_s: Sequence[float] | Floats, key: Sequence[f
 
 
 def quintic_spline(t: Floats, at: Floats, value: Floats, slope: Floats, bend: Floats) -> Floats:
-    """The curve with these values, first and second derivatives at the times `at`; held outside them."""
+    """Quintic spline with these values, first and second derivatives at the times `at`; constant outside them."""
     inside = np.clip(t, at[0], at[-1])
     k = np.clip(np.searchsorted(at, inside, side="right") - 1, 0, len(at) - 2)
     h = at[k + 1] - at[k]
@@ -79,7 +82,7 @@ def quintic_spline(t: Floats, at: Floats, value: Floats, slope: Floats, bend: Fl
 
 
 def smooth_noise(rng: np.random.Generator, t: Floats, period_s: float, rms: float) -> Floats:
-    """Smooth aimless drift of the given root mean square: waves with periods from half to three times `period_s`."""
+    """Smooth random drift (T,) of the given root mean square: sines with periods of 0.5 to 3 times `period_s`."""
     waves = 6
     turns = 1.0 / (period_s * np.geomspace(0.5, 3.0, waves) * rng.uniform(0.9, 1.1, waves))
     weight = np.geomspace(0.5, 1.0, waves)
@@ -90,18 +93,18 @@ def smooth_noise(rng: np.random.Generator, t: Floats, period_s: float, rms: floa
 
 
 def smooth_minimum(a: Floats, b: Floats, softness: float) -> Floats:
-    """A smooth lower envelope: below both everywhere, by at most half of `softness` where they meet."""
+    """A smooth minimum of two curves: below both everywhere, by at most half of `softness` where they are equal."""
     out: Floats = 0.5 * (a + b - np.sqrt((a - b) ** 2 + softness**2))
     return out
 
 
 def smooth_maximum(a: Floats, b: Floats, softness: float) -> Floats:
-    """A smooth upper envelope."""
+    """A smooth maximum of two curves, the mirror image of `smooth_minimum`."""
     return -smooth_minimum(-a, -b, softness)
 
 
 def gaussian_smooth(curve: Floats, frames: float) -> Floats:
-    """The curve (T,) under a bell of the given standard deviation; ends are held."""
+    """The curve (T,) smoothed by a Gaussian of `frames` standard deviation; the ends are padded with the end values."""
     half = int(3.0 * frames)
     bell = np.exp(-0.5 * (np.arange(-half, half + 1) / frames) ** 2)
     out: Floats = np.convolve(np.pad(curve, half, mode="edge"), bell / bell.sum(), mode="valid")

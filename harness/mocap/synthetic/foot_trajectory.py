@@ -1,7 +1,7 @@
-"""Feet that stand where they were put: trajectories of ankle and ball from a plan of plants.
+"""Trajectories of the feet from a plan of contacts with the floor; a foot in contact does not slide.
 
-While it is planted a foot first turns about its heel (toes up), then lies flat, then turns about its ball (heel up);
-the ball does not move from the moment the foot lies flat until it leaves. Between plants the ball travels smoothly.
+In contact a foot first rotates about its heel (toes up), then lies flat, then rotates about its ball (heel up). The
+ball does not move from the moment that the foot lies flat until it leaves. Between contacts the ball moves smoothly.
 """
 
 from collections.abc import Sequence
@@ -16,37 +16,37 @@ from harness.mocap.synthetic.articulated_figure import FootTarget
 from harness.mocap.synthetic.curves import interpolate_keys, minimum_jerk, pulse, smooth_trapezoid
 
 ANKLE_M = 0.080
-"""Height of the ankle of a flat foot [m]; the ankles of real clips in stance are at 0.07 to 0.09 ..."""
+"""Height of the ankle of a flat foot [m]; in stance, ankles of real clips are at 0.07 to 0.09 m."""
 BALL_M = 0.047
-"""... and the balls at 0.03 to 0.05; a flat foot of the body (`body.anatomy`) has its ball at 0.049."""
+"""Height of the ball of a flat foot [m]; real clips have 0.03 to 0.05 m, the body (`body.anatomy`) 0.049 m."""
 HEEL_BEHIND_M = 0.045
-"""How far the heel's sole lies behind the ankle [m]."""
+"""Distance of the sole at the heel behind the ankle [m]."""
 
 _CLEARANCE_M = 0.022
-"""How high the heel of a walker's swinging foot passes."""
+"""Height of the heel of a swinging foot in walking [m]."""
 
 
 @dataclass(frozen=True)
 class FootContact:
-    """A foot on the floor."""
+    """One contact of a foot with the floor, and the swing after it."""
 
     on_s: float
     off_s: float
     ball_m: tuple[float, float]
-    """Where the ball stands."""
+    """Position of the ball on the floor [m]."""
     yaw_rad: float
     land_rad: float = 0.0
-    """How far the toes point up when the heel comes down."""
+    """Angle of the toes above the floor when the heel lands [rad]."""
     push_rad: float = 0.0
-    """How far the heel is up when the ball leaves."""
+    """Angle of the heel above the floor when the ball leaves [rad]."""
     lift_m: float = 0.05
-    """How high the ball is carried to the next plant."""
+    """Greatest height of the ball on the way to the next contact [m]."""
     lift_peak: float = 0.5
-    """Where on that way it is highest, 0.5 at most."""
+    """Share of that way at which the ball is highest, 0.5 at most."""
 
 
 def flat_pitch_rad(skeleton: Skeleton, side: str) -> float:
-    """How far below the horizon the foot bone of a flat foot points."""
+    """Angle below the horizon of the foot bone of a flat foot [rad]."""
     return float(np.arcsin((ANKLE_M - BALL_M) / skeleton.length_m[skeleton.index(f"{side}foot")]))
 
 
@@ -59,10 +59,11 @@ def plan_foot(
     heel_up: Floats | float = 0.0,
     pivot: Floats | float = 0.0,
 ) -> FootTarget:
-    """The foot's movement (T,) through its plants, in order of time; it rests on the first before and the last after.
+    """Target of a foot at times `t` (T,) from its contacts in order of time.
 
-    `heel_up` adds to the pitch and `pivot` to the heading, both about the ball: a boxer's or golfer's rear foot.
-    `knee_out_rad` turns the knee outwards of the foot.
+    The foot rests on the first contact before it and on the last one after it. `heel_up` adds to the pitch and `pivot`
+    to the heading, both about the ball, as in a boxer's or golfer's rear foot [rad]. `knee_out_rad` is the heading of
+    the knee outwards of the foot.
     """
     ball = np.empty((len(t), 3))
     yaw = np.full(len(t), plants[0].yaw_rad)
@@ -95,7 +96,10 @@ def pose_foot(
     heel_first: Floats | float,
     knee_out_rad: float | Floats = 0.0,
 ) -> FootTarget:
-    """A foot of heel-up `pitch` about the ball (T, 3), or about the heel as far as `heel_first` says."""
+    """Target of a foot with its ball at `ball` (T, 3) [m], heading `yaw` and heel-up `pitch` (T,) [rad].
+
+    The pitch is about the ball where `heel_first` is 0, and about the heel where it is 1.
+    """
     ahead = np.stack([np.cos(yaw), np.sin(yaw), np.zeros_like(yaw)], axis=-1)
     up = np.array([0.0, 0.0, 1.0])
     steep = flat_pitch_rad(skeleton, side)
@@ -109,18 +113,19 @@ def pose_foot(
 
 
 def _pitch_keyframes(plants: Sequence[FootContact]) -> tuple[list[float], list[float]]:
+    """Times [s] and heel-up pitch [rad] of a foot's keyframes."""
     at: list[float] = []
     value: list[float] = []
     for k, plant in enumerate(plants):
-        stand = plant.off_s - plant.on_s
+        contact_s = plant.off_s - plant.on_s
         if k and plant.land_rad:
             at += [plant.on_s - 0.25 * (plant.on_s - plants[k - 1].off_s), plant.on_s]
             value += [-1.15 * plant.land_rad, -plant.land_rad]
-        at += [plant.on_s + (min(0.2 * stand, 0.15) if plant.land_rad else -0.01)]
+        at += [plant.on_s + (min(0.2 * contact_s, 0.15) if plant.land_rad else -0.01)]
         value += [0.0]
         if k + 1 < len(plants) and plant.push_rad:
             swing = plants[k + 1].on_s - plant.off_s
-            at += [plant.off_s - 0.5 * stand, plant.off_s, plant.off_s + 0.12 * swing]
+            at += [plant.off_s - 0.5 * contact_s, plant.off_s, plant.off_s + 0.12 * swing]
             value += [0.0, 0.9 * plant.push_rad, plant.push_rad]
         else:
             at += [plant.off_s]

@@ -1,4 +1,4 @@
-"""Gestures: punches, strokes, swings as sums of short curves on named channels, so that they may overlap."""
+"""Gestures such as punches, strokes and swings: short curves on named channels, which add up where they overlap."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,12 +10,12 @@ from harness.core.arrays import Floats
 from harness.mocap.synthetic.curves import interpolate_keys
 
 Keyframes = Sequence[tuple[float, float]]
-"""(time after the start [s], value); values rest on the first before and the last after."""
+"""(time after the start [s], value) in order of time; constant before the first and after the last."""
 
 
 @dataclass(frozen=True)
 class Gesture:
-    """What one movement adds to each channel."""
+    """One movement: when it starts, and the curve that it adds to each channel."""
 
     at_s: float
     channels: Mapping[str, Keyframes]
@@ -25,7 +25,10 @@ class Gesture:
         return self.at_s + max(keys[-1][0] for keys in self.channels.values())
 
     def vary(self, rng: np.random.Generator, size: float, slowness: float, spread: float = 0.06) -> "Gesture":
-        """The same movement at another size and speed, and never twice alike: `spread` is the relative variation."""
+        """The gesture with its values scaled by `size` and its times by `slowness`, varied at random.
+
+        `spread` is the relative standard deviation of each value. The order of the channels decides the random draws.
+        """
         slow = slowness * rng.normal(1.0, 0.5 * spread)
         big = size * rng.normal(1.0, 0.5 * spread)
         return Gesture(
@@ -38,14 +41,14 @@ class Gesture:
 
 
 def keyframes_at(moments: Mapping[str, float], lag_s: float = 0.0, **values: float) -> Keyframes:
-    """Keys at named moments [s], at rest (0) at the first and last of them; `lag_s` delays those in between."""
+    """Keyframes at named moments [s], 0 at the first and the last; `lag_s` delays those in between."""
     names = list(moments)
     keys = [(moments[name] + lag_s, value) for name, value in values.items()]
     return sorted([(moments[names[0]], 0.0), *keys, (moments[names[-1]], 0.0)])
 
 
 def sum_gestures(t: Floats, gestures: Iterable[Gesture]) -> Mapping[str, Floats]:
-    """Every channel (T,) as the sum of the gestures on it; a channel that nothing moves is 0."""
+    """The sum (T,) of the gestures on each channel; 0 for a channel without gestures."""
     out: defaultdict[str, Floats] = defaultdict(lambda: np.zeros(len(t)))
     for gesture in gestures:
         for name, keys in gesture.channels.items():

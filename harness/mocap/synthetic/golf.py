@@ -1,8 +1,9 @@
-"""Golf swings: address, backswing, top, downswing, impact, follow-through, hold, and back to the next ball.
+"""Golf swings: address, backswing, top, downswing, impact, follow-through, hold, and return to the next ball.
 
-The hands ride on a tilted circle about the top of the chest, the wrists cock the club around them; hips lead the
-downswing and the eyes stay on the ball until it is gone. Backswing 0.75 to 1.0 s, downswing 0.23 to 0.3 s, near the 3:1
-tempo of Grober (2009). Written for a right-hander facing the ball, target on the left; `s` mirrors it.
+The hands move on a tilted circle about the top of the chest, and the wrists cock the club. The hips lead the downswing,
+and the gaze stays on the ball until after impact. The backswing takes 0.75 to 1.0 s and the downswing 0.23 to 0.3 s,
+near the 3:1 tempo of Grober (2009). Signs are those of a right-hander who faces the ball with the target on the left;
+the factor `s` mirrors them.
 """
 
 from collections.abc import Mapping
@@ -28,11 +29,11 @@ from harness.mocap.synthetic.performers import Habits
 from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
 _WRIST_SEPARATION_M = 0.075
-"""Between the two wrists along the grip."""
+"""Distance of the two wrists along the grip [m]."""
 
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
-    """One take: a swing every eight seconds or so, full or three quarters."""
+    """Generate one take at times `t` (T,) [s]: a swing about every eight seconds, full or three-quarter."""
     trail = habits.hand
     lead = "l" if trail == "r" else "r"
     s = SIDE_SIGN[lead]
@@ -58,7 +59,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     bend = habits.bend_rad + float(rng.uniform(0.26, 0.38)) + act["bend"] + smooth_noise(rng, t, 2.5, 0.015)
     turn = s * (act["pelvis"] + smooth_noise(rng, t, 2.5, 0.015))
     twist = s * (0.10 + act["twist"] + smooth_noise(rng, t, 2.5, 0.02))
-    # bends are towards the ball whichever way hips and chest have turned
+    # the trunk bends towards the ball, whatever the rotation of hips and chest
     pelvis = stack_columns(facing + turn, tilt * np.cos(turn), tilt * np.sin(turn) + s * act["drop"])
     over = turn + 0.5 * twist
     breath = 0.01 * np.sin(2.0 * np.pi * t * rng.uniform(0.25, 0.33) + rng.uniform(0.0, 6.0))
@@ -95,7 +96,7 @@ def _pose_arms(
     lead: str,
     trail: str,
 ) -> None:
-    """Both hands on the club: `swing` is the angle of the arms on their plane, `cock` what the wrists add."""
+    """Pose both arms on the club: `swing` is the angle of the arms in the swing plane, `cock` that of the wrists."""
     s = SIDE_SIGN[lead]
     arm = figure.arm_m(lead) / 0.58
     swing = act["swing"] + smooth_noise(rng, t, 2.5, 0.015)
@@ -110,7 +111,7 @@ def _pose_arms(
     shaft = np.cos(cocked)[:, None] * away + np.sin(cocked)[:, None] * target
     strike = cos * target - sin * away
     ends = {lead: -0.5 * _WRIST_SEPARATION_M * shaft, trail: 0.5 * _WRIST_SEPARATION_M * shaft}
-    for side in (trail, lead, trail, lead):  # draw the grip in until both hands are on it
+    for side in (trail, lead, trail, lead):  # move the grip towards the shoulders until both arms reach it
         line = grip + ends[side] - figure.shoulder_m(side)
         distance = np.sqrt(np.sum(line**2, axis=1))
         over = smooth_maximum(distance - 0.965 * figure.arm_m(side), np.array(0.0), 0.01) / distance
@@ -129,7 +130,7 @@ def _pose_arms(
 
 
 def _plan_swings(rng: np.random.Generator, t: Floats, habits: Habits, full: float) -> tuple[list[Gesture], list[float]]:
-    """The swings, and when each return to the ball begins [s]."""
+    """The swings, and the times at which the returns to the ball start [s]."""
     gestures: list[Gesture] = []
     begins: list[float] = []
     now = float(t[0]) - rng.uniform(0.0, 3.0)
@@ -179,7 +180,7 @@ def _swing_channels(at: Mapping[str, float], size: float) -> Mapping[str, Keyfra
         "side": keyframes_at(at, 0.0, top=-0.045, hit=0.09, finish=0.15, hold=0.15),
         "ahead": keyframes_at(at, 0.0, hit=0.02, finish=0.06, hold=0.06),
         "up": keyframes_at(at, 0.0, top=0.0, late=-0.03, hit=0.01, finish=0.03, hold=0.03),
-        # the elbow of the arm that crosses the chest points ahead
+        # the elbow of the arm that crosses the chest points forward
         "lead elbow": keyframes_at(at, 0.0, top=0.8, hit=0.0),
         "trail elbow": keyframes_at(at, 0.0, top=0.0, hit=0.0, finish=1.3, hold=1.3),
         "lead heel": keyframes_at(at, 0.0, top=0.10, hit=0.0),
@@ -193,7 +194,7 @@ def _swing_channels(at: Mapping[str, float], size: float) -> Mapping[str, Keyfra
 
 
 def _relax_gesture(rng: np.random.Generator, at_s: float, lasts_s: float) -> Gesture:
-    """Upright, club down, a look to where the ball went."""
+    """Stand upright with the club down and look after the ball."""
 
     def hold(value: float) -> list[tuple[float, float]]:
         return [(0.0, 0.0), (0.9, value), (0.9 + lasts_s, 0.95 * value), (1.9 + lasts_s, 0.0)]
@@ -210,7 +211,7 @@ def _waggle_keyframes(rng: np.random.Generator, lasts_s: float, size: float = 1.
 
 
 def _plan_footwork(rng: np.random.Generator, start: StanceShift, begins: list[float]) -> list[StanceShift]:
-    """Small steps to the next ball after each swing."""
+    """Small steps to the next ball, starting at the times `begins` [s]."""
     shifts: list[StanceShift] = []
     place, yaw = np.array(start.place_m), start.yaw_rad
     for at_s in begins:

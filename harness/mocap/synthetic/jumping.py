@@ -1,7 +1,7 @@
 """Jumping: countermovement, push, ballistic flight, landing; upwards, forwards, sideways, turning, and in series.
 
-Timing after Bobbert and van Ingen Schenau (1988): the push takes 0.25 to 0.35 s, the arms swing up with it. In flight
-the root falls with gravity exactly; push and landing join it with the same position, speed and acceleration.
+Timing follows Bobbert and van Ingen Schenau (1988): the push takes 0.25 to 0.35 s, and the arms swing up with it. In
+flight the root accelerates with gravity exactly; push and landing match its position, speed and acceleration.
 """
 
 import numpy as np
@@ -29,7 +29,7 @@ from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
-    """One take; each favours one kind of jump."""
+    """Generate one take at times `t` (T,) [s]; the take's number decides its most frequent kind of jump."""
     jumps, yaw0 = plan_jumps(rng, t, habits, JUMP_KINDS[take % len(JUMP_KINDS)])
     leg = leg_length_m(skeleton)
     act = sum_gestures(t, [_jump_gesture(rng, jump, habits) for jump in jumps])
@@ -74,7 +74,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     stand = float(np.quantile(top[pitch < 0.01], 0.8)) - 0.012 if np.any(pitch < 0.01) else float(np.min(top))
     air = _flight_weight(t, jumps)
     root = stack_columns(*place.T, smooth_minimum(_root_height(t, jumps, stand, leg), top + 0.5 * air, 0.02))
-    # the legs follow the body up, tucked a little
+    # in flight the feet rise with the body, and a little more: a tuck
     feet = feet_at(air * smooth_maximum(tuck, root[:, 2] - top, 0.015))
     spine = stack_columns(
         habits.bend_rad + 0.03 + act["bend"] + 0.012 * breath + smooth_noise(rng, t, 2.5, 0.018),
@@ -91,13 +91,13 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
     figure = ArticulatedFigure(skeleton, root, pelvis, spine, gaze, shoulders, sample_posture_offsets(rng, t, habits))
     for side in SIDES:
         figure.pose_leg(side, feet[side])
-        own = float(rng.uniform(0.95, 1.05))
+        amplitude = float(rng.uniform(0.95, 1.05))
         figure.pose_hanging_arm(
             side,
-            0.06 + own * act["swing"] + smooth_noise(rng, t, 1.8, 0.04),
+            0.06 + amplitude * act["swing"] + smooth_noise(rng, t, 1.8, 0.04),
             habits.spread_rad + 0.05 + act["spread"] + smooth_noise(rng, t, 1.8, 0.03),
             0.20 + smooth_noise(rng, t, 1.8, 0.04),
-            habits.elbow_rad + own * act["elbow"] + smooth_noise(rng, t, 1.8, 0.04),
+            habits.elbow_rad + amplitude * act["elbow"] + smooth_noise(rng, t, 1.8, 0.04),
             0.08 + 0.15 * act["swing"] + smooth_noise(rng, t, 1.6, 0.04),
             (-0.20 + 0.06 * act["swing"], np.zeros(len(t))),
         )
@@ -105,7 +105,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
 
 
 def _ground_travel(t: Floats, jump: Jump) -> Floats:
-    """0 to 1: the root's way over the ground, at an even speed in flight."""
+    """(T,) share of the jump's displacement that the root has covered, at constant speed in flight."""
     push, slow = 0.8 * (jump.leave_s - jump.bottom_s), 1.1 * (jump.landing_bottom_s - jump.land_s)
     speed = 1.0 / (jump.flight_s + 0.4 * push + 0.4 * slow)
     at = np.array([jump.leave_s - push, jump.leave_s, jump.land_s, jump.land_s + slow])
@@ -114,7 +114,7 @@ def _ground_travel(t: Floats, jump: Jump) -> Floats:
 
 
 def _root_height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floats:
-    """(T,) the root's height: parabolas in flight, quintics that join them."""
+    """(T,) height of the root: parabolas in flight, joined by quintics [m]."""
     at, value, slope, bend = [t[0] - 10.0], [stand], [0.0], [0.0]
     rebound = False
     for jump in jumps:
@@ -143,7 +143,7 @@ def _root_height(t: Floats, jumps: list[Jump], stand: float, leg: float) -> Floa
 
 
 def _flight_weight(t: Floats, jumps: list[Jump]) -> Floats:
-    """(T,) 1 in flight, 0 on the floor, easing in the 80 ms around."""
+    """(T,) 1 in flight and 0 on the floor, with smooth transitions of 80 ms before and after."""
     out = np.zeros(len(t))
     for jump in jumps:
         out += minimum_jerk((t - jump.leave_s + 0.08) / 0.08) * minimum_jerk((jump.land_s + 0.08 - t) / 0.08)
@@ -151,7 +151,7 @@ def _flight_weight(t: Floats, jumps: list[Jump]) -> Floats:
 
 
 def _jump_gesture(rng: np.random.Generator, jump: Jump, habits: Habits) -> Gesture:
-    """What trunk and arms do in a jump."""
+    """Motion of trunk and arms in a jump."""
     start_s = jump.down_s - (0.3 if jump.bottom_s == jump.down_s else 0.0)
     at = {
         "start": 0.0,

@@ -8,6 +8,7 @@ Euler angles, and the elbow or knee turns about the same x as the bone above it.
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.rotations import wrap_angle
 from harness.core.skeleton import Skeleton
 
 
@@ -19,6 +20,13 @@ def normalize(v: Floats) -> Floats:
 def matrix_from_columns(x: Floats, y: Floats, z: Floats) -> Floats:
     """(..., 3, 3) with these columns (broadcast)."""
     return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+
+
+def yaw_pitch_roll_rotation(angles_rad: Floats) -> Floats:
+    """(T, 3, 3) rotations Rz(yaw) Ry(pitch) Rx(roll) of angles (T, 3) [rad]."""
+    yaw, pitch, roll = (axis_rotation(axis, angles_rad[:, k]) for k, axis in enumerate((2, 1, 0)))
+    out: Floats = yaw @ pitch @ roll
+    return out
 
 
 def axis_rotation(axis: int, angle_rad: float | Floats) -> Floats:
@@ -34,18 +42,18 @@ def axis_rotation(axis: int, angle_rad: float | Floats) -> Floats:
 
 
 def horizontal_vector(yaw_rad: float | Floats, ahead: float | Floats, left: float | Floats) -> Floats:
-    """(..., 2) the vector so far ahead and left when facing `yaw_rad`."""
+    """(..., 2) horizontal vector with these parts ahead and to the left, for the heading `yaw_rad`."""
     c, s = np.cos(yaw_rad), np.sin(yaw_rad)
     return np.stack([c * ahead - s * left, s * ahead + c * left], axis=-1)
 
 
 def stack_columns(*values: float | Floats) -> Floats:
-    """(T, N) curves (T,) and constants side by side."""
+    """(T, N) array whose columns are curves (T,) and constants."""
     return np.stack(np.broadcast_arrays(*values), axis=-1)
 
 
 def rotate_vectors(m: Floats, v: Floats) -> Floats:
-    """(..., 3) vectors v in the frame that m (..., 3, 3) comes from, taken through m."""
+    """(..., 3) vectors v (..., 3) rotated by m (..., 3, 3)."""
     out: Floats = np.einsum("...ij,...j->...i", m, v)
     return out
 
@@ -64,17 +72,17 @@ def hinge_frame(skeleton: Skeleton, bone: str) -> Floats:
     return out
 
 
-def middle_joint(top: Floats, end: Floats, towards: Floats, first_m: float, second_m: float) -> Floats:
-    """(T, 3) the knee or elbow of a limb from `top` to `end`, bent towards the direction `towards`.
+def middle_joint(top: Floats, end: Floats, bend: Floats, first_m: float, second_m: float) -> Floats:
+    """(T, 3) knee or elbow of a limb from `top` to `end` (T, 3) that bends in the direction `bend` (T, 3) [m].
 
-    A target out of reach is drawn in: callers keep within `reach`.
+    Where `end` is out of reach, the joint is that of a limb stretched towards it.
     """
     line = end - top
     distance = np.sqrt(np.sum(line**2, axis=-1, keepdims=True))
     along = line / distance
     distance = np.clip(distance, abs(first_m - second_m) + 1e-3, 0.9999 * (first_m + second_m))
     foot = (first_m**2 - second_m**2 + distance**2) / (2.0 * distance)
-    aside = normalize(towards - along * np.sum(towards * along, axis=-1, keepdims=True))
+    aside = normalize(bend - along * np.sum(bend * along, axis=-1, keepdims=True))
     out: Floats = top + along * foot + aside * np.sqrt(first_m**2 - foot**2)
     return out
 
@@ -93,16 +101,10 @@ def two_bone_angles(first: Floats, second: Floats, normal: Floats, rest: Floats)
 def universal_joint_angles(vector: Floats, direction: Floats) -> tuple[Floats, Floats]:
     """Angles (a, c) with Ry(c) Rx(a) taking `vector` (3,) to the unit `direction` (T, 3): a foot on its shank.
 
-    A direction nearer to the shank than the vector can come is met as nearly as it can.
+    A direction that the two hinges cannot reach is met as closely as possible.
     """
     v = normalize(vector)
     height = np.clip(direction[..., 1] / np.hypot(v[1], v[2]), -1.0, 1.0)
     a = wrap_angle(np.arccos(height) - np.arctan2(v[2], v[1]))
     forward = np.sin(a) * v[1] + np.cos(a) * v[2]
     return a, wrap_angle(np.arctan2(direction[..., 0], direction[..., 2]) - np.arctan2(v[0], forward))
-
-
-def wrap_angle(angle_rad: Floats) -> Floats:
-    """The same angle within ±pi."""
-    out: Floats = (angle_rad + np.pi) % (2.0 * np.pi) - np.pi
-    return out

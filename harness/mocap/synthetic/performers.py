@@ -1,7 +1,7 @@
-"""The built-in performers: bodies of different proportions, with habits of their own.
+"""Performers of the motion generator: skeletons of different proportions, and individual habits of movement.
 
-Bone lengths spread as the 20 CMU skeletons behind the standard one do (their standard deviations below), on top of a
-common stature; legs and arms stay mirror images.
+Bone lengths vary as in the 20 CMU skeletons behind the standard skeleton (their standard deviations are below), on top
+of a common stature. Left and right limbs are mirror images.
 """
 
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from harness.errors import UnknownName
 
 _NAMES = ("p1", "p2", "p3", "p4", "p5", "p6", "p7", "p8")
 _STATURE_STD = 0.035
-"""Relative standard deviation of what all bones share."""
+"""Relative standard deviation of the stature, which scales all bones."""
 _BONE_LENGTH_STD_M = {
     "humerus": 0.014,
     "radius": 0.017,
@@ -35,52 +35,55 @@ _BONE_LENGTH_STD_M = {
     "upperneck": 0.006,
     "head": 0.006,
 }
-"""Standard deviation of bone lengths among CMU's skeletons [m]; half of a leg's or arm's is shared with the stature."""
+"""Standard deviation of bone lengths among CMU's skeletons [m]; stature explains half of a leg's or an arm's."""
 _BONE_DIRECTION_STD_RAD = {"hipjoint": 0.06, "clavicle": 0.05, "lowerback": 0.02, "upperback": 0.02, "thorax": 0.02}
-"""Standard deviation of bone directions, in the plane of the body's symmetry or mirrored [rad]."""
+"""Standard deviation of bone directions, in the sagittal plane or mirrored about it [rad]."""
 
 
 @dataclass(frozen=True)
 class Habits:
-    """What a performer does in every take."""
+    """Properties of a performer's movement that all takes share."""
 
     hand: str
-    """`r` or `l`: the side that leads."""
+    """Dominant side, `r` or `l`."""
     pace: float
-    """Tempo of everything, about 1."""
+    """Relative tempo, about 1."""
     size: float
-    """Amplitude of everything, about 1."""
+    """Relative amplitude, about 1."""
     bend_rad: float
-    """How far the back is bent forward in quiet standing."""
+    """Forward bend of the back in quiet standing."""
     spread_rad: float
-    """How far the arms hang off the body."""
+    """Angle between a hanging arm and the body."""
     toes_out_rad: float
     pelvis_rad: float
     """Forward tilt of the pelvis."""
     elbow_rad: float
-    """How far the elbows of hanging arms are bent."""
+    """Flexion of the elbow of a hanging arm."""
     posture_rad: Mapping[str, tuple[float, ...]]
-    """Standing offsets of the hinges of back, neck and hands, by bone."""
+    """Constant offsets of the hinges of back, neck and hands, by bone."""
 
 
 def performer_names() -> tuple[str, ...]:
-    """Names of the performers; a take's name carries its performer's."""
+    """Names of the performers, which are part of the names of takes."""
     return _NAMES
 
 
 @cache
 def performer_skeleton(performer: str) -> Skeleton:
-    """The performer's skeleton; UnknownName."""
+    """The performer's skeleton; raises UnknownName."""
     return _sample_skeleton(_performer_rng(performer, "skeleton"))
 
 
 def sample_skeletons(count: int, seed: int) -> tuple[Skeleton, ...]:
-    """Skeletons of so many other people of the same spread; none is a performer's, and more leave the first as are."""
+    """`count` skeletons of other people, drawn from the performers' distribution.
+
+    None is a performer's skeleton. A larger count leaves the first skeletons unchanged.
+    """
     return tuple(_sample_skeleton(generator(seed, "population", which)) for which in range(count))
 
 
 def _sample_skeleton(rng: np.random.Generator) -> Skeleton:
-    """A draw from the spread."""
+    """One draw from the distribution of skeletons."""
     standard = humanoid24.standard_skeleton()
     stature = 1.0 + _STATURE_STD * float(np.clip(rng.normal(), -1.5, 1.5))
     scale, tilt = {}, {}
@@ -95,15 +98,15 @@ def _sample_skeleton(rng: np.random.Generator) -> Skeleton:
         sine, cosine = np.sin(tilt[part]), np.cos(tilt[part])
         x, y, z = bones[b]
         if part in ("clavicle", "hipjoint"):
-            turned = (x, y * cosine - np.sign(y) * sine * z, z * cosine + sine * abs(y))
+            rotated = (x, y * cosine - np.sign(y) * sine * z, z * cosine + sine * abs(y))
         else:
-            turned = (x * cosine + z * sine, y, z * cosine - x * sine)
-        bones[b] = turned
+            rotated = (x * cosine + z * sine, y, z * cosine - x * sine)
+        bones[b] = rotated
     return standard.with_bones(bones)
 
 
 def performer_habits(performer: str) -> Habits:
-    """The performer's ways; UnknownName."""
+    """The performer's habits; raises UnknownName."""
     rng = _performer_rng(performer, "habits")
     return Habits(
         hand="l" if performer in ("p3", "p6") else "r",
@@ -119,13 +122,13 @@ def performer_habits(performer: str) -> Habits:
 
 
 def _sample_posture(rng: np.random.Generator) -> dict[str, tuple[float, ...]]:
-    """Offsets that leave the carriage of chest and head about as it is: what one bone adds, the next takes away."""
+    """Hinge offsets of neighbouring bones that cancel, so that chest and head keep their orientation approximately."""
     back, neck = np.deg2rad(rng.normal(0.0, (2.5, 0.5, 0.8))), np.deg2rad(rng.normal(0.0, (4.0, 1.0, 1.5)))
-    low = float(rng.uniform(0.3, 0.7))
+    share = float(rng.uniform(0.3, 0.7))
     out = {
         "lowerback": back,
-        "upperback": -low * back,
-        "thorax": (low - 1.0) * back,
+        "upperback": -share * back,
+        "thorax": (share - 1.0) * back,
         "lowerneck": neck,
         "upperneck": -0.8 * neck,
         "head": -0.2 * neck,

@@ -1,7 +1,7 @@
-"""A performer's manner: the offsets and small play of joints that no plan of hands and feet decides.
+"""Posture noise: offsets and drift of hinges that targets of hands and feet do not determine.
 
-How a bend is shared out along the back and neck, and how hands hang, differs from person to person, a little from take
-to take, and drifts all the time. No tracker sees most of it, so this is what keeps reconstruction honest.
+How a bend is shared along back and neck, and how the hands hang, differs between performers, a little between takes,
+and drifts within a take. Trackers observe little of it, so a reconstruction cannot recover it exactly.
 """
 
 from collections.abc import Mapping
@@ -26,19 +26,19 @@ _OFFSET_STD_DEG: dict[str, tuple[tuple[float, float], ...]] = {
     "wrist": ((1.8, 1.5),),
     "hand": ((1.8, 1.5), (1.8, 1.5)),
 }
-"""Standard deviation of the take's own offset and of the drift within it, for each hinge [deg]."""
+"""Standard deviations of a take's offset and of the drift within the take, for each hinge [deg]."""
 
 
 def sample_posture_offsets(
     rng: np.random.Generator, t: Floats, habits: Habits, looseness: float = 1.0
 ) -> PostureOffsets:
-    """The offsets of one take; `looseness` scales the take's own part and the drift."""
+    """The offsets of one take; `looseness` scales the take's offset and the drift, not the performer's posture."""
     out: dict[str, Floats] = {}
     for part, hinges in _OFFSET_STD_DEG.items():
         for side in ("l", "r") if part in ("wrist", "hand") else ("",):
-            usual = habits.posture_rad[side + part]
+            posture = habits.posture_rad[side + part]
             columns = [
-                usual[k]
+                posture[k]
                 + looseness
                 * np.deg2rad(fixed * np.clip(rng.normal(), -2.0, 2.0) + smooth_noise(rng, t, _DRIFT_PERIOD_S, drift))
                 for k, (fixed, drift) in enumerate(hinges)

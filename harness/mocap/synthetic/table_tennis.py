@@ -1,7 +1,7 @@
-"""Table tennis: a low ready stance, forehand and backhand strokes turned from the hips, side steps between them.
+"""Table tennis: a low ready stance, strokes that start from the hips, and side steps between them.
 
-Distances are relative to the top of the chest, facing the table; `bat` is the arm that holds the bat, `in` is towards
-the other side. A rally plays a ball every 1.1 to 1.6 s.
+Distances are relative to the top of the chest, facing the table; `bat` is the arm that holds the bat, `in` is the
+direction towards the other arm. In a rally a ball is played every 1.1 to 1.6 s.
 """
 
 from collections.abc import Mapping
@@ -82,7 +82,7 @@ _STROKE_FREQUENCIES = (
     (0.35, 0.2, 0.35, 0.1),
     (0.3, 0.3, 0.0, 0.4),
 )
-"""How often each stroke is played, by kind of take."""
+"""Relative frequency of each stroke, by kind of take."""
 
 
 _BETWEEN_RALLIES: Mapping[str, Keyframes] = {
@@ -90,7 +90,7 @@ _BETWEEN_RALLIES: Mapping[str, Keyframes] = {
     "bend": [(0.0, 0.0), (0.6, -0.26), (1.5, -0.24), (2.2, 0.0)],
     "dip": [(0.0, 0.0), (0.6, -0.09), (1.5, -0.09), (2.2, 0.0)],
 }
-"""Upright between rallies, hands low."""
+"""Upright stance with low hands between rallies."""
 _SERVE: Mapping[str, Keyframes] = {
     "free ahead": [(0.0, 0.0), (0.5, 0.05), (0.9, 0.08), (1.5, 0.0)],
     "free up": [(0.0, 0.0), (0.5, -0.06), (0.85, 0.30), (1.05, 0.24), (1.5, 0.0)],
@@ -107,10 +107,10 @@ _SERVE: Mapping[str, Keyframes] = {
 
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
-    """One take: rallies of some strokes, each begun with a serve."""
+    """Generate one take at times `t` (T,) [s]: rallies of several strokes, each started with a serve."""
     bat = habits.hand
     free = "l" if bat == "r" else "r"
-    s = SIDE_SIGN[free]  # the bat's side is -s
+    s = SIDE_SIGN[free]  # the side of the bat has the sign -s
     leg = leg_length_m(skeleton)
     size, slow = habits.size * float(rng.uniform(0.95, 1.15)), float(rng.uniform(0.92, 1.12)) / habits.pace
     crouch = float(rng.uniform(0.06, 0.13))
@@ -166,10 +166,10 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
         bat: (act["elbow"], act["pronate"], act["lay"]),
         free: (0.6 * act["free out"], 0.2 * act["free out"] - 2.0 * act["free up"], 0.0 * t),
     }
-    turned = {bat: facing, free: facing + 0.75 * s * (act["pelvis"] + act["twist"])}
+    heading = {bat: facing, free: facing + 0.75 * s * (act["pelvis"] + act["twist"])}
     for side in (bat, free):
         figure.pose_leg(side, feet[side])
-        _pose_arm(figure, side, rng, t, turned[side], wrists[side], forearm[side])
+        _pose_arm(figure, side, rng, t, heading[side], wrists[side], forearm[side])
     return figure
 
 
@@ -182,7 +182,10 @@ def _pose_arm(
     wrist_m: tuple[Floats, Floats, Floats],
     forearm: tuple[Floats, Floats, Floats],
 ) -> None:
-    """The wrist ahead, out and up of the chest for an arm of 0.58 m [m]; elbow raised, pronated, laid back [rad]."""
+    """Pose one arm: `wrist_m` is ahead, out and up of the chest for an arm of 0.58 m [m].
+
+    `forearm` is the raise of the elbow, the pronation and the extension of the wrist [rad].
+    """
     sign, reach = SIDE_SIGN[side], figure.arm_m(side) / 0.58
     ahead, out, up = (x + rng.normal(0.0, 0.02) + smooth_noise(rng, t, 1.4, 0.018) for x in wrist_m)
     elbow, pronate, lay = forearm
@@ -199,7 +202,7 @@ def _pose_arm(
 def _plan_rallies(
     rng: np.random.Generator, t: Floats, size: float, slow: float, style: tuple[float, ...], bat_side: float
 ) -> tuple[StanceShift, list[StanceShift], list[Gesture]]:
-    """Where the player goes and what is played there; the ball comes to the forehand or the backhand corner."""
+    """Start, side steps and strokes of a take; balls come to the forehand or the backhand corner."""
     yaw = float(rng.uniform(-np.pi, np.pi))
     start = StanceShift(0.0, (0.0, 0.0), yaw)
     shifts: list[StanceShift] = []

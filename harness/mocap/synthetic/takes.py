@@ -1,4 +1,4 @@
-"""Takes of the built-in performer: named, seeded, made on demand."""
+"""Takes of the motion generator, by behaviour, performer and number; they are generated on demand."""
 
 from collections.abc import Callable
 
@@ -15,6 +15,7 @@ from harness.mocap.synthetic.articulated_figure import ArticulatedFigure
 from harness.mocap.synthetic.performers import Habits, performer_habits, performer_names, performer_skeleton
 
 SOURCE = "built-in performer"
+"""Name of the motion source in results; a condition that comparisons require to agree."""
 TAKES_PER_PERFORMER = 6
 
 _SYNTHESIZERS: dict[str, Callable[[Skeleton, Habits, np.random.Generator, Floats, int], ArticulatedFigure]] = {
@@ -28,28 +29,35 @@ BEHAVIOURS = tuple(_SYNTHESIZERS)
 
 
 def take_names(behaviour: str) -> tuple[str, ...]:
-    """Names of the takes, such as "walking_p1_03"; UnknownName."""
+    """Names of a behaviour's takes, such as "walking_p1_03"; raises UnknownName."""
     _check_behaviour(behaviour)
-    return tuple(f"{behaviour}_{who}_{n:02d}" for who in performer_names() for n in range(1, TAKES_PER_PERFORMER + 1))
+    numbers = range(1, TAKES_PER_PERFORMER + 1)
+    return tuple(f"{behaviour}_{performer}_{n:02d}" for performer in performer_names() for n in numbers)
 
 
 def generate(
     behaviour: str, performer: str, take: int, *, seed: int, duration_s: float = 20.0, rate_hz: float = 120.0
 ) -> Clip:
-    """One take; the same arguments give the same bytes. UnknownName; BadInput for a take below 1 or no duration."""
+    """Generate one take of `duration_s` at `rate_hz`; the same arguments give the same bytes.
+
+    Raises UnknownName for the behaviour or performer, and BadInput for a take number below 1 or fewer than two frames.
+    """
     _check_behaviour(behaviour)
     if take < 1 or duration_s * rate_hz < 2.0:
-        raise BadInput(f"take {take} of {duration_s} s at {rate_hz} Hz.", "Takes count from 1 and need two frames.")
+        raise BadInput(
+            f"Take {take} of {duration_s} s at {rate_hz} Hz cannot be generated.",
+            "Takes count from 1 and need two frames.",
+        )
     t = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
-    body = performer_skeleton(performer)
+    skeleton = performer_skeleton(performer)
     rng = generator(seed, "performer", behaviour, performer, take)
-    figure = _SYNTHESIZERS[behaviour](body, performer_habits(performer), rng, t, take)
+    figure = _SYNTHESIZERS[behaviour](skeleton, performer_habits(performer), rng, t, take)
     return Clip(
         name=f"{behaviour}_{performer}_{take:02d}",
         subject=performer,
         source=SOURCE,
         behaviour=behaviour,
-        skeleton=body,
+        skeleton=skeleton,
         rate_hz=rate_hz,
         root_m=figure.root_m,
         world_from_root=rotations.continuous(rotations.from_matrix(figure.pelvis)),

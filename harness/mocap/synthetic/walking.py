@@ -1,7 +1,7 @@
-"""Walking: footsteps laid along a path, a pelvis that rides over them, arms that swing against the legs.
+"""Walking: footsteps along a path, a pelvis that moves over them, and arms that swing opposite to the legs.
 
-Timing and amplitudes after Perry, Gait Analysis (1992): stance 62 % of the cycle, pelvis turn and list of about 5 deg,
-steps that grow and quicken with speed.
+Timing and amplitudes follow Perry, Gait Analysis (1992): stance of 62 % of the cycle, pelvic rotation and list of about
+5 deg, and step length and cadence that grow with speed.
 """
 
 from collections.abc import Mapping
@@ -22,24 +22,25 @@ from harness.mocap.synthetic.posture_noise import sample_posture_offsets
 from harness.mocap.synthetic.walking_path import WalkingPath, sample_walking_path
 
 STANCE_SHARE = 0.59
-"""Share of the gait cycle after which the ball of the foot starts to leave; it is away for good at 0.62."""
+"""Share of the gait cycle at which the ball of the foot starts to leave the floor; it has left at 0.62."""
 _PASSING_SHARE = 0.53
-"""The pelvis passes the ankle so many steps after the heel came down."""
+"""Time from heel strike until the pelvis passes the ankle [steps]."""
 _PAD_S = 3.0
+"""Time that is planned before and after a take [s]."""
 
 
 @dataclass(frozen=True)
 class Gait:
-    """How one take is walked."""
+    """Gait parameters of one take."""
 
     effort: float
-    """Speed over 1.3 m/s."""
+    """Speed relative to 1.3 m/s."""
     swing: float
-    """Size of the arm swing, about 1."""
+    """Relative amplitude of the arm swing, about 1."""
     elbow_rad: float
     stoop_rad: float
     crouch: float
-    """How much lower the pelvis rides, as a share of the leg."""
+    """Lowering of the pelvis, as a share of the leg."""
     land_rad: float
     push_rad: float
     lift_m: float
@@ -47,24 +48,24 @@ class Gait:
 
 
 def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: Floats, take: int) -> ArticulatedFigure:
-    """One take along one of six kinds of path."""
+    """Generate one take along one of six kinds of path, at times `t` (T,) [s]."""
     step_s = float(t[1] - t[0])
     pad = int(_PAD_S / step_s)
-    long = (np.arange(len(t) + 2 * pad) - pad) * step_s + t[0]
-    way = sample_walking_path(rng, long, take)
-    gait = _sample_gait(rng, habits, float(way.speed_m_s.mean()), take)
+    padded_t = (np.arange(len(t) + 2 * pad) - pad) * step_s + t[0]
+    path = sample_walking_path(rng, padded_t, take)
+    gait = _sample_gait(rng, habits, float(path.speed_m_s.mean()), take)
     # cadence: step length grows as speed to the power 0.55
-    rhythm = 1.88 * habits.pace * rng.uniform(0.97, 1.03) * (way.speed_m_s / 1.3) ** 0.45
-    rhythm *= 1.0 + smooth_noise(rng, long, 1.5, 0.012)
+    rhythm = 1.88 * habits.pace * rng.uniform(0.97, 1.03) * (path.speed_m_s / 1.3) ** 0.45
+    rhythm *= 1.0 + smooth_noise(rng, padded_t, 1.5, 0.012)
     steps = np.concatenate([[0.0], np.cumsum(0.5 * (rhythm[1:] + rhythm[:-1]) * step_s)]) + rng.uniform(0.0, 2.0)
-    plants = _plan_footsteps(rng, skeleton, habits, gait, long, way, steps)
+    plants = _plan_footsteps(rng, skeleton, habits, gait, padded_t, path, steps)
     feet = {side: plan_foot(t, skeleton, side, plants[side], 0.03) for side in SIDES}
 
     inside = slice(pad, pad + len(t))
     stride = np.pi * steps[inside]
-    """Phase [rad]: 0 when the left heel comes down, pi when the right one does."""
-    yaw = way.yaw_rad[inside]
-    lean = np.clip(np.gradient(yaw, step_s) * way.speed_m_s[inside] / GRAVITY_M_S2, -0.3, 0.3)
+    """Phase of the gait cycle [rad]: 0 at left heel strike, pi at right heel strike."""
+    yaw = path.yaw_rad[inside]
+    lean = np.clip(np.gradient(yaw, step_s) * path.speed_m_s[inside] / GRAVITY_M_S2, -0.3, 0.3)
     pelvis = stack_columns(
         yaw - 0.085 * gait.effort * np.cos(stride + 0.15) + smooth_noise(rng, t, 2.5, 0.012),
         habits.pelvis_rad
@@ -75,7 +76,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
         0.055 * np.cos(stride - 0.4 * np.pi) - 0.5 * lean + smooth_noise(rng, t, 3.0, 0.008),
     )
     sway = rng.uniform(0.016, 0.026) * np.cos(stride - 0.6 * np.pi) + smooth_noise(rng, t, 2.0, 0.004)
-    place = way.place_m[inside] + horizontal_vector(yaw, -0.03, sway)
+    place = path.place_m[inside] + horizontal_vector(yaw, -0.03, sway)
     top = highest_root_m(skeleton, place, pelvis, feet, 0.994)
     root = stack_columns(
         *place.T,
@@ -90,7 +91,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
         -0.065 * np.cos(stride - 0.4 * np.pi) + 0.2 * lean + smooth_noise(rng, t, 3.0, 0.012),
     )
     look = sum_gestures(t, _sample_glances(rng, t))
-    bearing = np.clip(1.1 * (np.interp(t + 0.35, long, way.yaw_rad) - yaw), -0.7, 0.7)
+    bearing = np.clip(1.1 * (np.interp(t + 0.35, padded_t, path.yaw_rad) - yaw), -0.7, 0.7)
     gaze = stack_columns(
         yaw + np.tanh(bearing + look["yaw"]) + smooth_noise(rng, t, 2.5, 0.05),
         0.06 + rng.uniform(-0.04, 0.12) + look["pitch"] + smooth_noise(rng, t, 2.5, 0.03),
@@ -106,7 +107,7 @@ def synthesize(skeleton: Skeleton, habits: Habits, rng: np.random.Generator, t: 
 
 
 def _sample_gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, take: int) -> Gait:
-    """Takes go through an easy, a brisk, a tired and a marching walk."""
+    """Gait of a take: easy, brisk, tired or marching, by the take's number."""
     effort = float(np.clip(speed_m_s / 1.3, 0.6, 1.4))
     style = ("easy", "brisk", "tired", "marching")[(take - 1) % 4]
     swing, elbow, stoop, crouch, lift = {
@@ -129,9 +130,15 @@ def _sample_gait(rng: np.random.Generator, habits: Habits, speed_m_s: float, tak
 
 
 def _plan_footsteps(
-    rng: np.random.Generator, skeleton: Skeleton, habits: Habits, gait: Gait, t: Floats, way: WalkingPath, steps: Floats
+    rng: np.random.Generator,
+    skeleton: Skeleton,
+    habits: Habits,
+    gait: Gait,
+    t: Floats,
+    path: WalkingPath,
+    steps: Floats,
 ) -> Mapping[str, list[FootContact]]:
-    """A plant for each whole number of `steps` (T,), the steps made by the time t."""
+    """A contact for each whole number of `steps` (T,), the count of steps made by time t; by side."""
 
     def at(step: float, curve: Floats) -> float:
         return float(np.interp(step, steps, curve))
@@ -140,9 +147,9 @@ def _plan_footsteps(
     ahead_m = 0.92 * float(skeleton.length_m[skeleton.index("lfoot")])
     for k in range(int(np.ceil(steps[0])), int(steps[-1] - 2.0 * STANCE_SHARE)):
         side = SIDES[k % 2]
-        yaw = at(k + STANCE_SHARE, way.yaw_rad)
+        yaw = at(k + STANCE_SHARE, path.yaw_rad)
         toes = yaw + SIDE_SIGN[side] * habits.toes_out_rad + float(rng.normal(0.0, 0.02))
-        ankle = np.array([at(k + _PASSING_SHARE, way.place_m[:, 0]), at(k + _PASSING_SHARE, way.place_m[:, 1])])
+        ankle = np.array([at(k + _PASSING_SHARE, path.place_m[:, 0]), at(k + _PASSING_SHARE, path.place_m[:, 1])])
         ankle += horizontal_vector(
             yaw, rng.normal(0.0, 0.008), SIDE_SIGN[side] * gait.half_width_m + rng.normal(0.0, 0.006)
         )
@@ -163,7 +170,7 @@ def _plan_footsteps(
 
 
 def _sample_glances(rng: np.random.Generator, t: Floats) -> list[Gesture]:
-    """Looks to the side or to the floor."""
+    """Glances to the side or to the floor at random times."""
     glances: list[Gesture] = []
     now = float(t[0]) - rng.uniform(0.0, 3.0)
     while now < t[-1]:
@@ -184,15 +191,15 @@ def _swing_arm(
     gait: Gait,
     forward: Floats,
 ) -> None:
-    """`forward` (T,) is 1 when the arm is most forward, -1 when it is most back."""
+    """Pose a swinging arm; `forward` (T,) is 1 where it is farthest forward, -1 where it is farthest back."""
     size = gait.swing * gait.effort * float(rng.uniform(0.9, 1.1))
-    bent = gait.elbow_rad
+    flexion = gait.elbow_rad
     figure.pose_hanging_arm(
         side,
-        0.26 * size * forward - 0.08 + 0.10 * bent + smooth_noise(rng, t, 2.5, 0.03),
+        0.26 * size * forward - 0.08 + 0.10 * flexion + smooth_noise(rng, t, 2.5, 0.03),
         habits.spread_rad + 0.02 * forward + smooth_noise(rng, t, 2.5, 0.02),
-        0.20 + 0.15 * bent + 0.08 * forward + smooth_noise(rng, t, 2.5, 0.03),
-        bent + 0.20 * size * forward + 0.05 * forward**2 + smooth_noise(rng, t, 2.0, 0.03),
+        0.20 + 0.15 * flexion + 0.08 * forward + smooth_noise(rng, t, 2.5, 0.03),
+        flexion + 0.20 * size * forward + 0.05 * forward**2 + smooth_noise(rng, t, 2.0, 0.03),
         0.05 + 0.08 * forward + smooth_noise(rng, t, 2.0, 0.04),
         (-0.22 + 0.08 * forward + smooth_noise(rng, t, 1.5, 0.02), smooth_noise(rng, t, 1.5, 0.02)),
     )

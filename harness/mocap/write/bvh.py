@@ -1,7 +1,8 @@
-"""BVH: centimetres, x left, y up, z forward as in the common conversion of CMU's library; every bone is a joint.
+"""Writer of BVH files: centimetres; x left, y up, z forward, as in the common conversion of CMU's library.
 
-The joint called after a bone stands at the bone's near end; End Sites are the far ends of head, hands and feet. BVH has
-no times, so a frame without an estimate repeats the one before it, in truth and estimate alike.
+Every bone is a joint of the same name at the bone's near end; End Sites are the far ends of head, hands and feet. BVH
+has no times, so a frame without an estimate repeats the frame before it, in truth and estimate alike.
+`harness.mocap.read.bvh` reads these files back.
 """
 
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ _ROTATION = "Zrotation Yrotation Xrotation"
 
 
 def bvh_files(motion: PosedMotion) -> dict[str, str]:
-    """Ending -> text of the file."""
+    """Text of the file by its ending."""
     return {".bvh": "\n".join([*hierarchy_lines(motion.skeleton), *_motion_lines(motion)]) + "\n"}
 
 
@@ -36,19 +37,19 @@ def euler_zyx_deg(rotation: Floats) -> Floats:
 
 
 def hierarchy_lines(skeleton: Skeleton) -> Iterator[str]:
-    """The first part of a file, line by line."""
+    """The lines of the hierarchy, the first part of a file."""
     offset_cm = skeleton.bone_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
     children = {
         p: [b for b, parent in enumerate(skeleton.parents) if parent == p] for p in (-1, *range(len(offset_cm)))
     }
 
-    def joint(bone: int, at_cm: Floats, tab: str) -> Iterator[str]:
+    def joint_lines(bone: int, start_cm: Floats, tab: str) -> Iterator[str]:
         yield f"{tab}JOINT {skeleton.names[bone]}"
         yield f"{tab}{{"
-        yield f"{tab}\tOFFSET {format_row(at_cm)}"
+        yield f"{tab}\tOFFSET {format_row(start_cm)}"
         yield f"{tab}\tCHANNELS 3 {_ROTATION}"
         for child in children[bone]:
-            yield from joint(child, offset_cm[bone], tab + "\t")
+            yield from joint_lines(child, offset_cm[bone], tab + "\t")
         if not children[bone]:
             yield f"{tab}\tEnd Site"
             yield f"{tab}\t{{"
@@ -59,31 +60,35 @@ def hierarchy_lines(skeleton: Skeleton) -> Iterator[str]:
     yield from ("HIERARCHY", "ROOT root", "{", "\tOFFSET 0.000000 0.000000 0.000000")
     yield f"\tCHANNELS 6 Xposition Yposition Zposition {_ROTATION}"
     for bone in children[-1]:
-        yield from joint(bone, np.zeros(3), "\t")
+        yield from joint_lines(bone, np.zeros(3), "\t")
     yield "}"
 
 
 def _motion_lines(motion: PosedMotion) -> Iterator[str]:
     grid = np.arange(motion.frame_index[0], motion.frame_index[-1] + 1)
-    shown = np.searchsorted(motion.frame_index, grid, side="right") - 1
+    source = np.searchsorted(motion.frame_index, grid, side="right") - 1
     table = channel_values(
         motion.skeleton, motion.joints_m[:, 0], rotations.to_matrix(motion.world_from_root), motion.world_from_bone
     )
     table[:, 3:] = np.unwrap(table[:, 3:], period=360.0, axis=0)
     yield from ("MOTION", f"Frames: {len(grid)}", f"Frame Time: {1.0 / motion.rate_hz:.9f}")
-    yield from map(format_row, table[shown])
+    yield from map(format_row, table[source])
 
 
 def channel_values(skeleton: Skeleton, root_m: Floats, world_from_root: Floats, world_from_bone: Floats) -> Floats:
-    """The numbers (F, 6 + 3 B) of frames: root (F, 3) [m], rotations (F, 3, 3), (F, B, 3, 3); angles within +-180."""
+    """Channel values (F, 6 + 3 B) of frames, in centimetres and degrees within +-180.
+
+    `root_m` (F, 3) is the root's position [m]; `world_from_root` (F, 3, 3) and `world_from_bone` (F, B, 3, 3) are
+    rotation matrices.
+    """
     local = [world_from_root]
     for bone, parent in enumerate(skeleton.parents):
         above = world_from_root if parent < 0 else world_from_bone[:, parent]
         local.append(np.swapaxes(above, -1, -2) @ world_from_bone[:, bone])
-    # joints are listed depth first, which the skeleton's order need not be
+    # BVH lists joints depth first; the skeleton may have another order
     order = [0, *(1 + bone for bone in _depth_first(skeleton))]
-    turned = np.stack([local[j] for j in order], axis=1)
-    angles_deg = euler_zyx_deg(WORLD_FROM_ASF.T @ turned @ WORLD_FROM_ASF)
+    rotation = np.stack([local[j] for j in order], axis=1)
+    angles_deg = euler_zyx_deg(WORLD_FROM_ASF.T @ rotation @ WORLD_FROM_ASF)
     root_cm = root_m @ WORLD_FROM_ASF * CENTIMETRES_PER_METRE
     return np.concatenate([root_cm, angles_deg.reshape(len(root_cm), -1)], axis=1)
 
@@ -99,5 +104,5 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
 
 
 def format_row(values: Floats) -> str:
-    """As it stands in the file."""
+    """One line of a file: numbers with six decimals."""
     return " ".join(f"{value:.6f}" for value in values)

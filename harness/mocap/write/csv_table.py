@@ -1,4 +1,4 @@
-"""CSV: one row a frame, units in the column names; the estimate's table ends with its status and errors."""
+"""Writer of CSV tables: one row per frame, units in the column names; estimates also have status and errors."""
 
 import csv
 import io
@@ -9,7 +9,7 @@ from harness.mocap.write.posed_motion import PosedMotion
 
 
 def csv_files(motion: PosedMotion) -> dict[str, str]:
-    """Ending -> text of the file. World axes x forward, y left, z up; a value that is undefined is empty."""
+    """Text of the file by its ending. World axes are x forward, y left, z up; an undefined value is empty."""
     columns = ["frame", "time_s", *(f"root_q{c}" for c in "wxyz")]
     columns += [f"{name}_{axis}_m" for name in motion.joint_names for axis in "xyz"]
     columns += [f"{name}_deg" for name in motion.skeleton.dof_names]

@@ -1,4 +1,4 @@
-"""Write truth and estimates of a run for other programs: BVH players, OpenSim, tables, evo."""
+"""Export of truth and estimates of a run to other programs: BVH players, OpenSim, tables, evo."""
 
 import os
 import re
@@ -22,11 +22,11 @@ _UNFINISHED = ".unfinished-"
 
 
 def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bool = False) -> list[Path]:
-    """Write every cell in one of FORMATS, `CLIP-METHOD-INPUTS.truth.*` and `.estimate.*`; returns the files.
+    """Write every cell in one of FORMATS as `CLIP-METHOD-INPUTS.truth.*` and `.estimate.*`; returns the files.
 
-    The seconds of warm-up, which scores leave out, are written too. All files are written, or none. A cell without a
-    finite estimate has nothing to write and is left out. Raises UnknownName for another format, and
-    BadInput when a file exists (unless `force`), when the folder cannot be written and when there is nothing to write.
+    The warm-up seconds, which scores leave out, are written too. Either all files are written or none. A cell without
+    a finite estimate is left out. Raises UnknownName for another format, and BadInput if a file exists (unless
+    `force`), if the folder cannot be written, and if there is nothing to write.
     """
     if fmt not in FORMATS:
         raise UnknownName("export format", fmt, FORMATS)
@@ -40,13 +40,13 @@ def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bo
                     for ending, text in FORMATS[fmt](motion).items():
                         path = folder / f"{stem}.{kind}{ending}"
                         ready[path] = _write_unfinished(path, text, force)
-        for path, beside in ready.items():
-            os.replace(beside, path)
+        for path, unfinished in ready.items():
+            os.replace(unfinished, path)
     except OSError as error:
         raise BadInput(f"{folder} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
     finally:
-        for beside in folder.glob(f"{_UNFINISHED}{os.getpid()}-*"):
-            beside.unlink()
+        for unfinished in folder.glob(f"{_UNFINISHED}{os.getpid()}-*"):
+            unfinished.unlink()
     if not ready:
         raise BadInput("No cell of this run has an estimate to export.", "Run the scenario first.")
     return list(ready)
@@ -58,9 +58,9 @@ def _file_stem(cell: ExportableCell, taken: set[str]) -> str:
 
 
 def _write_unfinished(path: Path, text: str, force: bool) -> Path:
-    """The text under another name: all files take their own at once, or none does."""
+    """Write the text under a temporary name, so that all files can be renamed at once."""
     if path.exists() and not force:
-        raise BadInput(f"{path} exists.", "Name another folder with --out, or write over it with --force.")
-    beside = path.with_name(f"{_UNFINISHED}{os.getpid()}-{path.name}")
-    beside.write_text(text, encoding="utf-8", newline="")
-    return beside
+        raise BadInput(f"{path} exists.", "Name another folder with --out, or replace it with --force.")
+    unfinished = path.with_name(f"{_UNFINISHED}{os.getpid()}-{path.name}")
+    unfinished.write_text(text, encoding="utf-8", newline="")
+    return unfinished

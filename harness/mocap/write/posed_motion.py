@@ -1,4 +1,4 @@
-"""What is written for other programs: truth and estimate of a cell, posed once for all formats."""
+"""Truth and estimate of a cell as posed skeletons, the common input of all export formats."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from harness.core.skeleton import Skeleton, forward_kinematics
 
 
 class ExportableCell(Protocol):
-    """The part of a run's cell that is written: F frames (see `harness.results.cell.Cell`)."""
+    """The part of a run's cell that is exported: F frames (see `harness.results.cell.Cell`)."""
 
     @property
     def key(self) -> str: ...
@@ -45,43 +45,43 @@ class ExportableCell(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class PosedMotion:
-    """F posed frames; world axes x forward, y left, z up, metres and radians."""
+    """F posed frames in world axes (x forward, y left, z up), metres and radians."""
 
     skeleton: Skeleton
     rate_hz: float
     frame_index: Ints
     """(F,) strictly increasing; a step of more than one is a gap."""
     time_s: Floats
-    """(F,)."""
+    """(F,) [s]."""
     world_from_root: Floats
     """(F, 4) unit quaternion (w, x, y, z)."""
     angles_rad: Floats
-    """(F, D)."""
+    """(F, D) hinge angles [rad]."""
     joints_m: Floats
-    """(F, B + 1, 3) the root, then each bone's far end."""
+    """(F, B + 1, 3) positions of the root, then of each bone's far end [m]."""
     world_from_bone: Floats
-    """(F, B, 3, 3)."""
+    """(F, B, 3, 3) rotation matrices."""
     extra: Mapping[str, Floats]
-    """(F,) each: what a table may add, by column name."""
+    """(F,) additional columns of a table, by name."""
 
     def __len__(self) -> int:
         return len(self.time_s)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
-        """(B + 1,) a bone's name stands for its far end."""
+        """(B + 1,) names of `joints_m`; a bone's name stands for its far end."""
         return ("root", *self.skeleton.names)
 
 
 def pose_truth_and_estimate(cell: ExportableCell) -> dict[str, PosedMotion]:
-    """Both motions of a cell, each on its own skeleton, at the frames whose estimate is finite."""
-    known = np.isfinite(cell.estimate_qpos).all(axis=1)
-    extra = {"status": cell.status[known].astype(float)} | {name: e[known] for name, e in cell.errors.items()}
-    time_s, frame_index = cell.time_s[known], cell.frame_index[known]
+    """Truth and estimate of a cell, each on its own skeleton, in the frames with a finite estimate."""
+    finite = np.isfinite(cell.estimate_qpos).all(axis=1)
+    extra = {"status": cell.status[finite].astype(float)} | {name: e[finite] for name, e in cell.errors.items()}
+    time_s, frame_index = cell.time_s[finite], cell.frame_index[finite]
 
     def motion(qpos: Floats, bone_m: Floats, extra: Mapping[str, Floats]) -> PosedMotion:
         skeleton = standard_skeleton().with_bones(bone_m)
-        root_m, quaternion, angles_rad = unpack(qpos[known])
+        root_m, quaternion, angles_rad = unpack(qpos[finite])
         world_from_root = quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)
         pose = forward_kinematics(skeleton, root_m, world_from_root, angles_rad)
         joints_m = np.concatenate([root_m[:, None], pose.end_m], axis=1)

@@ -1,4 +1,4 @@
-"""OpenSim: joint centres as markers (TRC, mm) and hinge angles (MOT, deg); x forward, y up, z right."""
+"""Writer of OpenSim files: joint centres as markers (TRC, mm), hinge angles (MOT, deg); x forward, y up, z right."""
 
 import numpy as np
 
@@ -9,13 +9,13 @@ OPENSIM_FROM_WORLD: Floats = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -
 
 
 def trc_files(motion: PosedMotion) -> dict[str, str]:
-    """Ending -> text of the file; times are the true ones, so gaps stay visible."""
+    """Texts of the files by their endings; frames keep their times, so gaps stay visible."""
     return {".trc": _trc_text(motion), ".mot": _mot_text(motion)}
 
 
 def _trc_text(motion: PosedMotion) -> str:
     names, rate, frames = motion.joint_names, f"{motion.rate_hz:g}", len(motion)
-    places_mm = 1e3 * motion.joints_m @ OPENSIM_FROM_WORLD.T
+    joints_mm = 1e3 * motion.joints_m @ OPENSIM_FROM_WORLD.T
     head = [
         "PathFileType\t4\t(X/Y/Z)\tjoints.trc",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
@@ -25,8 +25,8 @@ def _trc_text(motion: PosedMotion) -> str:
         "",
     ]
     rows = [
-        f"{n}\t{time_s:.6f}\t" + "\t".join(f"{value:.4f}" for value in place.ravel())
-        for n, (time_s, place) in enumerate(zip(motion.time_s, places_mm, strict=True), start=1)
+        f"{n}\t{time_s:.6f}\t" + "\t".join(f"{value:.4f}" for value in joints.ravel())
+        for n, (time_s, joints) in enumerate(zip(motion.time_s, joints_mm, strict=True), start=1)
     ]
     return "\n".join([*head, *rows]) + "\n"
 

@@ -77,7 +77,7 @@ def test_an_unknown_up_axis_is_not_guessed(tmp_path: Path, position_mm: Floats) 
         (lambda b: b"\x00\x00" + b[2:], "no C3D header"),
         (lambda b: b"\xff" + b[1:], "parameters at block 255"),
         (lambda b: b[:2] + b"\x00\x00" + b[4:], "0 markers"),
-        (lambda b: b[:-600], "It is cut"),
+        (lambda b: b[:-600], "is truncated"),
         (lambda b: b"", "an empty file"),
     ],
 )

@@ -10,7 +10,7 @@ from harness.errors import BadInput
 from harness.mocap import synthetic
 from harness.report.kit.contact_sheet import contact_sheet
 
-DOCS = Path(__file__).parents[3] / "docs" / "performer"
+DOCS = Path(__file__).parents[3] / "docs" / "motion_generator"
 
 
 def test_a_sheet_shows_figures_of_both_sides(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Draw the contact sheets of this folder: python docs/performer/render.py"""
+"""Draw the contact sheets of this folder: python docs/motion_generator/render.py"""
 
 from pathlib import Path
 
@@ -16,9 +16,9 @@ SHEETS = (
 
 
 def main() -> None:
-    for behaviour, who, take, start_s, every_s, faces in SHEETS:
-        clip = synthetic.generate(behaviour, who, take, seed=7)
-        title = f"{behaviour.replace('_', ' ')}: built-in performer {who}, take {take}, seed 7"
+    for behaviour, performer, take, start_s, every_s, faces in SHEETS:
+        clip = synthetic.generate(behaviour, performer, take, seed=7)
+        title = f"{behaviour.replace('_', ' ')}: built-in performer {performer}, take {take}, seed 7"
         path = Path(__file__).parent / f"{behaviour}.png"
         contact_sheet(clip, path, start_s=start_s, every_s=every_s, rows=2, title=title, faces=faces)
 
