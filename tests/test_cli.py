@@ -28,7 +28,7 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     verbs = "demo run list inspect mocap export report check bench doctor paper compare baseline sweep status placement"
     for verb in verbs.split():
-        assert re.search(rf"^    {verb}\s", text, re.MULTILINE), verb
+        assert re.search(rf"^  {verb}\s", text, re.MULTILINE), verb
 
 
 def test_help_imports_nothing_heavy() -> None:

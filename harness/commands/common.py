@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -133,3 +134,8 @@ def print_result(
     """Print the lines, or with --json the content and the outcome's word; returns the outcome."""
     print(json.dumps({**content, "outcome": outcome.word}) if args.json else "\n".join(lines))
     return outcome
+
+
+def this_command() -> str:
+    """The command as typed, to print where it can be copied."""
+    return shlex.join(["harness", *sys.argv[1:]])

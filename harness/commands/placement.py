@@ -5,8 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result
-from harness.commands.run import this_command
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, this_command
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 

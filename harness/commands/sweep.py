@@ -1,4 +1,4 @@
-"""Verbs about sweeps: make one, and say how far the work in a folder is."""
+"""The verb `sweep`: run many scenarios, clips, methods, seeds and values."""
 
 import argparse
 import os
@@ -6,16 +6,11 @@ import shlex
 import sys
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from harness.commands.common import Verbs, add_verb, positive_int, print_result, sigterm_as_interrupt
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
-if TYPE_CHECKING:
-    from harness.experiment.status import RunStatus
-
-_MAX_FAILURES = 10
 _DEFAULT_CLUSTER_WORKERS = 64
 """Workers for whom the cells are shared out when those of a scheduler may come and go."""
 
@@ -77,48 +72,3 @@ def _resume_command(args: argparse.Namespace, out: Path) -> str:
     parts = ["harness", "sweep", args.study, "--out", str(out)]
     parts += [] if args.mocap is None else ["--mocap", str(args.mocap)]
     return shlex.join(parts if args.seed is None else [*parts, "--seed", str(args.seed)])
-
-
-def add_status(verbs: Verbs) -> None:
-    text = "say how far a sweep, a placement or a run is, also while it goes on"
-    verb = add_verb(verbs, "status", text, run_status)
-    verb.add_argument("folder", type=Path, metavar="DIR", help="folder that it writes")
-
-
-def run_status(args: argparse.Namespace) -> Outcome:
-    from harness.experiment.status import read_status
-
-    found = read_status(args.folder)
-    content = {
-        "kind": found.kind,
-        "name": found.name,
-        "cells_planned": found.planned,
-        "cells_finished": found.finished,
-        "cells_failed": len(found.failures),
-        "running": found.running,
-        "left_s": found.left_s,
-        "failures": found.failures,
-    }
-    outcome = Outcome.PASS if found.finished == found.planned else Outcome.INCOMPLETE
-    return print_result(args, content, *_status_lines(found, args.folder), outcome=outcome)
-
-
-def _status_lines(found: "RunStatus", out: Path) -> list[str]:
-    counted = f"{found.finished:,} of {found.planned:,} cells finished, {len(found.failures):,} failed"
-    state = "running" if found.running else "finished" if not found.remaining else "not running"
-    left = f", about {_format_duration(found.left_s)} left" if found.left_s is not None else ""
-    lines = [f"{found.kind} {found.name}: {state}, {counted}{left}"]
-    lines += [f"FAILED {cell}: {text.strip().splitlines()[-1]}" for cell, text in found.failures.items()][
-        :_MAX_FAILURES
-    ]
-    if len(found.failures) > _MAX_FAILURES:
-        lines.append(f"and {len(found.failures) - _MAX_FAILURES:,} more")
-    if found.failures and (out / "failures.json").is_file():
-        lines.append(f"with the commands that make them again: {out / 'failures.json'}")
-    return lines
-
-
-def _format_duration(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
