@@ -1,13 +1,13 @@
 """Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
 
 import itertools
-import tomllib
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
 from harness.core.fields import build, replace_fields
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
@@ -136,10 +136,7 @@ class Scenario:
 def load_scenario(path: Path | str) -> Scenario:
     """The scenario in a TOML file, or the shipped one of that name. BadFile and UnknownName name the place."""
     path = find_scenario(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", "a scenario", "`harness list` names the shipped ones.") from error
+    content = read_toml(path, "a scenario", "`harness list` names the shipped ones.")
     if content.get("kind") == "placement":
         raise BadFile(path, "a placement study", "a scenario", "`harness placement` does it.")
     content.setdefault("name", path.stem)

@@ -1,12 +1,12 @@
 """A sweep as its TOML file has it, and the scenarios that it comes to: scenario x clip x method x seed x any key."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from harness.core.fields import build
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.split import ClipPart
@@ -45,10 +45,7 @@ class Sweep:
 def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
     """The sweep in a TOML file, or the shipped one of that name, and where it stands. BadFile, UnknownName."""
     path = find_sweep(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", _EXPECTED, _ADVICE) from error
+    content = read_toml(path, _EXPECTED, _ADVICE)
     if "motion" in content:
         raise BadFile(path, "a scenario", _EXPECTED, "`harness run` runs it; a sweep names it in `scenarios`.")
     content.setdefault("name", path.stem)

@@ -16,6 +16,7 @@ from harness.body.rendering import BodyMesh, RenderScene
 from harness.core import humanoid24, rotations, skeleton
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
+from harness.core.files import atomic_path
 from harness.core.skeleton import Skeleton
 from harness.live.viewer import CLOSED, READY, SharedPose, ViewerConfig
 
@@ -72,7 +73,6 @@ def run_viewer(screen: ViewerConfig, shared: SharedPose, told: Any) -> None:
 
 
 def _save_picture(picture: "np.ndarray[Any, Any]", path: Path) -> None:
-    """There whole or not at all."""
-    beside = path.with_name(f".unfinished-{path.name}")
-    Image.fromarray(picture).save(beside, format="png", compress_level=1)
-    os.replace(beside, path)
+    """Write a picture atomically."""
+    with atomic_path(path) as temporary:
+        Image.fromarray(picture).save(temporary, format="png", compress_level=1)

@@ -6,7 +6,6 @@ a folder that is there is finished.
 
 import io
 import json
-import os
 import shutil
 import zipfile
 from collections.abc import Mapping
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.files import TEMPORARY, read_json, to_json, to_json_types
+from harness.core.files import flush, move_into_place, read_json, temporary_path, to_json, to_json_types
 from harness.errors import BadFile, ShapeError
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
@@ -160,7 +159,7 @@ def has_cell(out: Path, key: str) -> bool:
 def write_cell(out: Path, cell: Cell) -> Path:
     """Add a finished cell to a run; one that is there already stays as it is."""
     folder = cell_folder(out, cell.key)
-    beside = folder.with_name(f"{TEMPORARY}{os.getpid()}-{cell.key}")
+    beside = temporary_path(folder)
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir(parents=True)
     content = {name: getattr(cell, name) for name in _TEXTS}
@@ -172,10 +171,9 @@ def write_cell(out: Path, cell: Cell) -> Path:
     for name, data in whole.items():
         (beside / name).write_bytes(data)
     for name in whole:  # when both are written: the disk is asked once for most of it
-        with open(beside / name, "rb") as file:
-            os.fsync(file.fileno())
+        flush(beside / name)
     try:
-        os.rename(beside, folder)
+        move_into_place(beside, folder)
     except OSError:
         if not folder.is_dir():
             raise

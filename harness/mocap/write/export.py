@@ -1,10 +1,10 @@
 """Write truth and estimates of a run for other programs: BVH players, OpenSim, tables, evo."""
 
-import os
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from harness.core.files import move_into_place, temporary_path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.bvh import bvh_files
 from harness.mocap.write.csv_table import csv_files
@@ -18,7 +18,6 @@ FORMATS: dict[str, Callable[[PosedMotion], dict[str, str]]] = {
     "csv": csv_files,
     "tum": tum_files,
 }
-_UNFINISHED = ".unfinished-"
 
 
 def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bool = False) -> list[Path]:
@@ -41,11 +40,11 @@ def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bo
                         path = folder / f"{stem}.{kind}{ending}"
                         ready[path] = _write_unfinished(path, text, force)
         for path, beside in ready.items():
-            os.replace(beside, path)
+            move_into_place(beside, path)
     except OSError as error:
         raise BadInput(f"{folder} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
     finally:
-        for beside in folder.glob(f"{_UNFINISHED}{os.getpid()}-*"):
+        for beside in folder.glob(temporary_path(folder / "*").name):
             beside.unlink()
     if not ready:
         raise BadInput("No cell of this run has an estimate to export.", "Run the scenario first.")
@@ -61,6 +60,6 @@ def _write_unfinished(path: Path, text: str, force: bool) -> Path:
     """The text under another name: all files take their own at once, or none does."""
     if path.exists() and not force:
         raise BadInput(f"{path} exists.", "Name another folder with --out, or write over it with --force.")
-    beside = path.with_name(f"{_UNFINISHED}{os.getpid()}-{path.name}")
+    beside = temporary_path(path)
     beside.write_text(text, encoding="utf-8", newline="")
     return beside

@@ -1,6 +1,5 @@
 """A study of where trackers go, as its TOML file has it: candidates, what is tried, where else, and what papers say."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,6 +7,7 @@ from typing import Any, Literal
 
 from harness.compare.margins import MARGINS
 from harness.core.fields import build, replace_fields
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
@@ -161,10 +161,7 @@ def load_placement_study(path: Path | str) -> PlacementStudy:
     """BadFile and UnknownName name the place."""
     path = find_placement_study(path)
     expected, advice = "a placement study", "See scenarios/placement_walking.toml."
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", expected, advice) from error
+    content = read_toml(path, expected, advice)
     if content.get("kind") != "placement":
         raise BadFile(path, f"kind = {content.get('kind', 'scenario')!r}", f'{expected}, kind = "placement"', advice)
     content.setdefault("name", path.stem)
