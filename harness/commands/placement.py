@@ -13,7 +13,7 @@ from harness.errors import Outcome
 def add_placement(verbs: Verbs) -> None:
     text = "find out which trackers to wear and where: sets of candidates, ranked; resumes what was interrupted"
     verb = add_verb(verbs, "placement", text, run_placement, "out", "mocap")
-    verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as placement_walking")
+    verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as walking")
     verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
 
 
@@ -26,7 +26,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.report.placement.writer import write_placement_page
     from harness.study.placement.placement_study import FINDINGS, run_placement
 
-    out = args.out or Path("results") / Path(args.study).stem
+    out = args.out or Path("results") / f"placement_{Path(args.study).stem.removeprefix('placement_')}"
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
         each = process_executor(args.jobs)
         findings, outcome = run_placement(

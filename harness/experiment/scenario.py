@@ -3,10 +3,11 @@
 import itertools
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from harness.core.fields import build, replace_fields
+from harness.core.fields import NONE, build, replace_fields
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
@@ -19,6 +20,7 @@ from harness.simulate.parameter_ranges import require_ranges
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
+_STATION_SETS_FILE = "stations.toml"
 _NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault")
 
 
@@ -141,6 +143,8 @@ def load_scenario(path: Path | str) -> Scenario:
         raise BadFile(path, "a placement study", "a scenario", "`harness placement` does it.")
     content.setdefault("name", path.stem)
     try:
+        if "stations" in content:
+            content["stations"] = expand_station_set(content["stations"])
         scenario = build(Scenario, content, "scenario")
         scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in expand_alternatives(text)))
     except (TypeError, ValueError) as error:
@@ -148,6 +152,36 @@ def load_scenario(path: Path | str) -> Scenario:
     check_scenario(path, scenario)
     check_expected_orders(path, scenario)
     return scenario
+
+
+def expand_station_set(stations: Any) -> Any:
+    """The table of stations that a scenario means by `stations`: the name of a set, or a table.
+
+    A table whose key `set` names a set starts from that set: a table of a station changes the values it names, or adds
+    the station after the others; "none" leaves the station out. UnknownName for a set or a station that is not there.
+    """
+    if isinstance(stations, str):
+        stations = {"set": stations}
+    if not isinstance(stations, Mapping) or not isinstance(stations.get("set"), str):
+        return stations
+    sets = read_station_sets()
+    if stations["set"] not in sets:
+        raise UnknownName("set of stations", stations["set"], sets)
+    expanded = {name: dict(station) for name, station in sets[stations["set"]].items()}
+    for name, change in stations.items():
+        if change == NONE and name not in expanded:
+            raise UnknownName(f"station of {stations['set']}", name, expanded)
+        if change == NONE:
+            del expanded[name]
+        elif name != "set":
+            expanded[name] = {**expanded.get(name, {}), **change} if isinstance(change, Mapping) else change
+    return expanded
+
+
+@cache
+def read_station_sets() -> dict[str, dict[str, Any]]:
+    """The shipped sets of stations: set -> station -> its table (see `Station`)."""
+    return read_toml(data_folder("scenarios") / _STATION_SETS_FILE, "sets of stations", "Install the package again.")
 
 
 def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
@@ -194,7 +228,7 @@ def find_scenario(path: Path | str) -> Path:
     given = Path(path)
     if given.is_file():
         return given
-    shipped = {p.stem: p for p in (*shipped_scenarios(), *shipped_placements())}
+    shipped = {file.stem: file for file in shipped_scenarios()}
     if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
@@ -203,13 +237,8 @@ def find_scenario(path: Path | str) -> Path:
 
 
 def shipped_scenarios() -> list[Path]:
-    studies = shipped_placements()
-    return sorted(path for path in data_folder("scenarios").glob("*.toml") if path not in studies)
-
-
-def shipped_placements() -> list[Path]:
-    """Studies of where trackers go, which lie among the scenarios."""
-    return sorted(data_folder("scenarios").glob("placement_*.toml"))
+    """The files of the shipped scenarios that a bare name finds."""
+    return sorted(path for path in data_folder("scenarios").glob("*.toml") if path.name != _STATION_SETS_FILE)
 
 
 def check_scenario(path: Path, scenario: Scenario) -> None:

@@ -22,7 +22,7 @@ from harness.experiment.scenario import (
     variants,
 )
 
-_EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/studies/."
+_EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
 
 
 @dataclass(frozen=True)
@@ -73,15 +73,15 @@ def find_sweep(path: Path | str) -> Path:
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_sweeps()}
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/studies")):
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/sweeps")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
         raise UnknownName("sweep", str(path), shipped)
-    raise BadFile(given, "no such file", "a sweep in TOML", "Shipped ones are in scenarios/studies/.")
+    raise BadFile(given, "no such file", "a sweep in TOML", "Shipped ones are in scenarios/sweeps/.")
 
 
 def shipped_sweeps() -> list[Path]:
-    return sorted(data_folder("scenarios").glob("studies/*.toml"))
+    return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
 
 def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:

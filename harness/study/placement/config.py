@@ -11,7 +11,7 @@ from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario, shipped_placements
+from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
@@ -23,6 +23,8 @@ from harness.study.placement.candidates import (
 
 MAX_STATIONS = 12
 """Of an IS-900 (docs/is900.md)."""
+_OLD_PREFIX = "placement_"
+"""What names of shipped studies began with."""
 
 
 @dataclass(frozen=True)
@@ -150,17 +152,26 @@ def find_placement_study(path: Path | str) -> Path:
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_placements()}
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
+    folders = (Path(), Path("scenarios/placement"))
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in folders:
         return shipped[given.stem]
+    if given.stem.removeprefix(_OLD_PREFIX) in shipped:
+        new = given.stem.removeprefix(_OLD_PREFIX)
+        raise BadInput(f"The placement study {given.stem} is now called {new}.", f"Type: harness placement {new}")
     if given.parent == Path() and not given.suffix:
         raise UnknownName("placement study", str(path), shipped)
-    raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are scenarios/placement_*.toml.")
+    raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are in scenarios/placement/.")
+
+
+def shipped_placements() -> list[Path]:
+    """The files of the shipped placement studies."""
+    return sorted(data_folder("scenarios").glob("placement/*.toml"))
 
 
 def load_placement_study(path: Path | str) -> PlacementStudy:
     """BadFile and UnknownName name the place."""
     path = find_placement_study(path)
-    expected, advice = "a placement study", "See scenarios/placement_walking.toml."
+    expected, advice = "a placement study", "See scenarios/placement/walking.toml."
     content = read_toml(path, expected, advice)
     if content.get("kind") != "placement":
         raise BadFile(path, f"kind = {content.get('kind', 'scenario')!r}", f'{expected}, kind = "placement"', advice)

@@ -313,8 +313,10 @@ def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
 
 
 def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(UnknownName, match="Did you mean 'placement_walking'"):
-        load_placement_study("placement_walkin")
+    with pytest.raises(UnknownName, match="Did you mean 'walking'"):
+        load_placement_study("walkin")
+    with pytest.raises(BadInput, match="harness placement walking"):
+        load_placement_study("placement_walking")
     with pytest.raises(BadFile, match="no such file"):
         load_placement_study(tmp_path / "none.toml")
     with pytest.raises(BadFile, match="kind = 'scenario'"):
