@@ -24,7 +24,7 @@ from harness.core.split import ClipPart
 from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.playback import prepare_playback, select_stations
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario, expand_clips, load_scenario
 from harness.stream.frame import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
@@ -55,7 +55,7 @@ class CalibrationSession:
     @cached_property
     def resolved_scenario(self) -> Scenario:
         """With no other stations, in this order."""
-        scenario = load_scenario(self.scenario)
+        scenario = expand_clips(load_scenario(self.scenario), self.folder)
         worn = select_stations(scenario, self.stations)
         return replace(scenario, stations={name: scenario.stations[name] for name in worn}, worn=())
 

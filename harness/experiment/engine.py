@@ -17,7 +17,7 @@ from harness.experiment.cells import (
     open_scenario_motion,
     run_clip_task,
 )
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.scenario import Scenario, expand_clips, variants
 from harness.reconstruct import registry
 from harness.results import manifest, storage
 from harness.results.cell import varied_text
@@ -41,6 +41,7 @@ def run(
     Names that do not exist are refused before anything is written.
     """
     clear_caches()
+    scenario = expand_clips(scenario, folder)
     parts = [ClipPart.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
     todo = [ClipTask(scenario, part, b, folder, command) for part, b in zip(parts, behaviours, strict=True)]

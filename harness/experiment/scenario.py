@@ -1,7 +1,8 @@
 """Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
 
+import fnmatch
 import itertools
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
+from harness.mocap.sources import open_motion_source
 from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
@@ -184,6 +186,43 @@ def read_station_sets() -> dict[str, dict[str, Any]]:
     return read_toml(data_folder("scenarios") / _STATION_SETS_FILE, "sets of stations", "Install the package again.")
 
 
+def expand_clips(scenario: Scenario, folder: Path | None) -> Scenario:
+    """The scenario with every pattern in its clip lists, such as "13_*", replaced by the clips that match it.
+
+    Clips are those of the motion generator, or of the library in `folder` (by default HARNESS_MOCAP's), sorted by name.
+    "13_*@0.20-0.40" is that part of each. A clip that the list names itself is not repeated. BadInput for a pattern that
+    matches nothing.
+    """
+    motion = scenario.motion
+    lists = {key: getattr(motion, key) for key in ("test", "examples", "withheld")}
+    if not any(_is_pattern(text) for texts in lists.values() for text in texts):
+        return scenario
+    source = open_motion_source(motion.source, folder, seed=scenario.seed, rate_hz=motion.rate_hz or None)
+    expanded = {key: _match_clips(key, texts, source.names()) for key, texts in lists.items()}
+    scenario = replace(scenario, motion=replace(motion, **expanded))
+    check_scenario(Path(scenario.name), scenario)
+    return scenario
+
+
+def _is_pattern(text: str) -> bool:
+    return any(sign in text.partition("@")[0] for sign in "*?[")
+
+
+def _match_clips(key: str, texts: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
+    """The entries of one clip list with its patterns expanded."""
+    entries: list[str] = []
+    for text in texts:
+        if not _is_pattern(text):
+            entries.append(text)
+            continue
+        pattern, at, part = text.partition("@")
+        matches = sorted(name for name in names if fnmatch.fnmatchcase(name, pattern))
+        if not matches:
+            raise BadInput(f"motion.{key}: no clip matches {text!r}.", "`harness mocap list` names those of a library.")
+        entries += [f"{name}{at}{part}" for name in matches if f"{name}{at}{part}" not in (*texts, *entries)]
+    return tuple(entries)
+
+
 def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
     """Every combination of the varied values and the scenario that it makes; one and nothing varied without any.
     Only those at the places in `chosen`, if any are.
@@ -259,7 +298,8 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         refuse("no inputs", "names in inputs", "`harness list` names them.")
     if scenario.name != Path(scenario.name).name:
         refuse(f"name = {scenario.name!r}", "a plain name", "Results are written to a folder of that name.")
-    if len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
+    counted = not any(map(_is_pattern, scenario.motion.test))  # else `expand_clips` checks it
+    if counted and len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
         refuse(
             f"{len(scenario.motion.behaviours)} behaviours for {len(scenario.motion.test)} test clips",
             "one for all of them, or one for each",

@@ -17,6 +17,7 @@ from harness.experiment.scenario import (
     Scenario,
     check_scenario,
     dotted_keys,
+    expand_clips,
     find_scenario,
     load_scenario,
     variants,
@@ -84,12 +85,12 @@ def shipped_sweeps() -> list[Path]:
     return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
 
-def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
+def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None, folder: Path | None = None) -> list[Scenario]:
     """A scenario for each one named and each seed, whose variants, clips, inputs and methods are the sweep's cells.
 
-    `seed` replaces all seeds. BadFile, BadInput and UnknownName say what does not fit.
+    `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName say what does not fit.
     """
-    found = [load_scenario(_scenario_file(name, path.parent)) for name in sweep.scenarios]
+    found = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
     clips = dict.fromkeys(clip for scenario in found for clip in scenario.motion.test)
     for clip in sweep.clips:
         if clip not in clips:

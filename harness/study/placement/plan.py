@@ -11,7 +11,7 @@ from harness.compare.margins import margin_of
 from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import check_names, open_scenario_motion
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenario import Scenario, expand_clips
 from harness.results.placement_findings import StationPlacement
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
@@ -100,8 +100,8 @@ def plan_placement(path: Path | str, folder: Path | None) -> PlacementPlan:
     """Of a study's TOML file; BadFile, BadInput, UnknownName."""
     file = find_placement_study(path)
     study = load_placement_study(file)
-    scenario = base_scenario(study, file.parent)
-    elsewhere = {one.name: base_scenario(study, file.parent, one) for one in study.condition}
+    scenario = expand_clips(base_scenario(study, file.parent), folder)
+    elsewhere = {one.name: expand_clips(base_scenario(study, file.parent, one), folder) for one in study.condition}
     held_out = _held_out_scenario(study, scenario)
     source = open_scenario_motion(scenario.motion, folder, scenario.seed)
     made = PlacementPlan(study, study.groups(), scenario, held_out, elsewhere, source.title)
