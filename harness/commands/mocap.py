@@ -1,6 +1,7 @@
 """The verb `mocap`: list a library of real motion, or download one."""
 
 import argparse
+import sys
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
@@ -20,10 +21,13 @@ def add_mocap(verbs: Verbs) -> None:
 
 
 def run_mocap_list(args: argparse.Namespace) -> Outcome:
-    from harness.mocap.library import MotionLibrary
-    from harness.mocap.sources import find_library_folder
+    from harness.mocap.library import MotionLibrary, ignored_links_note
+    from harness.mocap.sources import find_library_folders
 
-    entries = MotionLibrary(find_library_folder(args.mocap)).entries()
+    library = MotionLibrary(find_library_folders(args.mocap))
+    entries = library.entries()
+    for note in ignored_links_note(library.ignored_links):
+        print(note, file=sys.stderr)
     if not entries:
         raise BadInput("There are no clips in it.", "Looked for .amc with .asf, .bvh, .npz and .c3d files.")
     return print_result(args, {"clips": [entry.as_dict() for entry in entries]}, *(entry.line() for entry in entries))

@@ -112,6 +112,12 @@ def yaw_rad(world_from_body: Floats) -> Floats:
     return out
 
 
+def wrap_angle(angle_rad: Floats) -> Floats:
+    """The same angles (...,) in [-pi, pi) [rad]."""
+    out: Floats = (angle_rad + np.pi) % (2.0 * np.pi) - np.pi
+    return out
+
+
 def about_z(angle_rad: float | Floats) -> Floats:
     """Unit quaternion (..., 4) of a turn about z."""
     half = 0.5 * np.asarray(angle_rad, dtype=float)

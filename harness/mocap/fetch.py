@@ -18,7 +18,7 @@ from urllib.parse import urlsplit
 from harness.core.files import atomic_path, move_into_place
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
-from harness.mocap.library import INDEX_NAME, read_index
+from harness.mocap.index import INDEX_NAME, read_index
 from harness.mocap.read.acclaim import AsfFile, read_amc, read_asf_file
 
 CMU_URL = "http://mocap.cs.cmu.edu"

@@ -1,6 +1,6 @@
-"""`harness inspect`: what a motion file is, with evidence, and what is wrong with it.
+"""Inspection of a motion file (`harness inspect`): what the file holds, with evidence, and what is wrong with it.
 
-Where the evidence is ambiguous nothing is guessed: the error says what was missing and which option settles it.
+Nothing is guessed where the evidence is ambiguous: the error says what is missing and which option gives it.
 """
 
 from collections.abc import Sequence
@@ -16,40 +16,38 @@ from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.errors import BadFile, BadInput
 from harness.mocap import motion_checks
+from harness.mocap.clip_file import find_skeleton_file, motion_format
+from harness.mocap.index import INDEX_NAME, rate_from_index, unknown_rate_error
 from harness.mocap.inspection import Inspection
-from harness.mocap.library import INDEX_NAME, MotionLibrary, find_skeleton_file, read_index
+from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
 from harness.mocap.read.file_checks import check_size
 from harness.mocap.read.joint_clip import LEG_BONES
 
 if TYPE_CHECKING:
     from harness.mocap.read.c3d import MarkerClip
 
-FORMATS = ("amc", "bvh", "npz", "c3d")
 LEG_M = (0.55, 1.15)
-"""Thigh and shin of people, together [m]; 20 skeletons of CMU have 0.74 to 0.90."""
+"""Range of people's leg lengths, thigh plus shin [m]; 20 skeletons of CMU have 0.74 to 0.90."""
 ROOT_HEIGHT_IN_LEGS = (0.05, 5.0)
-"""Median height of the root over z = 0 in leg lengths; CMU's clips have 0.82 to 1.50."""
+"""Range of the root's median height over z = 0, in leg lengths; CMU's clips have 0.82 to 1.50."""
 UPRIGHT_SHARE = 0.4
-"""Share of frames with the head over the feet; the cartwheels of 49_08 have 0.59."""
+"""Least share of frames with the head over the feet; the cartwheels of 49_08 have 0.59."""
 RATE_IN_FILE = "recorded in the file"
 FOOT_HEIGHT_SHARE = 0.12
 """Joints no higher in the rest pose than this share of its height belong to the feet."""
 
 
 def inspect_file(
-    path: Path | str, *, rate_hz: float | None = None, unit: float | None = None, library: Path | str | None = None
+    path: Path | str, *, rate_hz: float | None = None, unit: float | None = None, library: LibraryFolders | None = None
 ) -> Inspection:
-    """What the file is. `unit` is the length of 1 in it [m]; `library` holds an index that may name its rate,
-    and may hold the motion that the markers of a C3D file were recorded in.
+    """Inspect an AMC, BVH, AMASS npz or C3D file.
 
-    BadFile for what cannot be read or understood; BadInput where an option must settle what the file does not say.
+    `unit` is the length of 1 in the file [m]. The index of a folder of `library` may name the file's rate, and the
+    library may hold the motion that was recorded with the markers of a C3D file. Raises BadFile for a file that cannot
+    be read or understood, and BadInput where the caller must give what the file does not say.
     """
     path = Path(path)
-    kind = path.suffix.lower().lstrip(".")
-    if kind == "asf":
-        raise BadInput(f"{path.name} is a skeleton without motion.", "Name an AMC of it.")
-    if kind not in FORMATS:
-        raise BadFile(path, f"the suffix {path.suffix!r}", ", ".join(f".{known}" for known in FORMATS), "Rename it?")
+    kind = motion_format(path)
     if unit is not None and not 0.0 < unit < np.inf:
         raise BadInput(f"A unit of {unit} m cannot be.", "Give the length of 1 in the file in metres (--unit).")
     if kind == "amc":
@@ -64,26 +62,26 @@ def inspect_file(
         raise BadInput(f"{path.name} is in metres, as all AMASS files are.", "Leave out --unit.")
     from harness.mocap.read.amass import read_amass_clip
 
-    found = inspect_clip(read_amass_clip(path))
+    facts = inspect_clip(read_amass_clip(path))
     return replace(
-        found,
+        facts,
         format="npz",
         height_m=None,
         rate_evidence=RATE_IN_FILE,
         unit_evidence="AMASS is in metres",
-        up=f"z ({found.up})",
+        up=f"z ({facts.up})",
     )
 
 
 def inspect_clip(clip: Clip) -> Inspection:
-    """The same checks for a clip in memory.
+    """Inspect a clip in memory.
 
-    One that has the 24 bones is judged by these, toes, thumbs and fingers left out, and held to the joint limits.
+    If the clip has the 24 bones of `core.humanoid24`, only these are checked, and the joint limits too.
     """
     skeleton = clip.skeleton
     pose = forward_kinematics(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
-    whole = set(BONES) <= set(skeleton.names)
-    kept = [skeleton.index(bone) for bone in (BONES if whole else skeleton.names)]
+    humanoid = set(BONES) <= set(skeleton.names)
+    kept = [skeleton.index(bone) for bone in (BONES if humanoid else skeleton.names)]
     rest_m = _rest_positions_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in kept)]]
     points = PointTrajectories(
         names=("root", *(skeleton.names[b] for b in kept)),
@@ -93,7 +91,7 @@ def inspect_clip(clip: Clip) -> Inspection:
     facts = replace(
         _inspect_points(clip.name, points, clip.rate_hz), height_m=float(np.ptp(rest_m[:, 2])), notes=clip.notes
     )
-    if not whole:
+    if not humanoid:
         return facts
     leg = 0.5 * sum(float(skeleton.length_m[skeleton.index(bone)]) for bone in LEG_BONES)
     above = float(np.median(clip.root_m[:, 2])) / leg
@@ -111,57 +109,56 @@ def inspect_clip(clip: Clip) -> Inspection:
     return replace(facts, limits_share=share, limits_worst=worst)
 
 
-def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, library: Path | str | None) -> Inspection:
+def _inspect_amc(path: Path, rate_hz: float | None, unit_m: float | None, library: LibraryFolders | None) -> Inspection:
     from harness.mocap.read.acclaim import read_amc, read_asf_file
 
     check_size(path, "an AMC motion")
     rate, evidence = (rate_hz, "as given") if rate_hz is not None else _rate_from_index(path, library)
-    whole = path.resolve()
-    asf = read_asf_file(find_skeleton_file(whole, whole.parents[min(2, len(whole.parents) - 1)]), unit_m=unit_m)
-    found = inspect_clip(read_amc(path, asf.skeleton, rate_hz=rate, unit_m=asf.unit_m))
+    file = path.resolve()
+    asf = read_asf_file(find_skeleton_file(file, file.parents[min(2, len(file.parents) - 1)]), unit_m=unit_m)
+    facts = inspect_clip(read_amc(path, asf.skeleton, rate_hz=rate, unit_m=asf.unit_m))
     why = "as given" if unit_m is not None else "length in the ASF's :units"
     return replace(
-        found,
+        facts,
         format="amc",
         rate_evidence=evidence,
         unit_m=asf.unit_m,
-        unit_evidence=f"{why}; {found.unit_evidence}",
-        up=f"y ({found.up})",
+        unit_evidence=f"{why}; {facts.unit_evidence}",
+        up=f"y ({facts.up})",
     )
 
 
 def _inspect_bvh(path: Path, unit_m: float | None) -> Inspection:
-    from harness.mocap.read.bvh import is_cmu, read_bvh, to_cmu_clip
+    from harness.mocap.read.bvh import read_bvh, to_humanoid_clip
 
     joint_clip = read_bvh(path, unit_m=unit_m)
-    if is_cmu(joint_clip):
-        found = inspect_clip(to_cmu_clip(joint_clip))
+    clip = to_humanoid_clip(joint_clip)
+    if clip is not None:
+        facts = inspect_clip(clip)
     else:
-        position, _ = joint_clip.world()
-        found = _inspect_points(
-            path.stem, PointTrajectories(joint_clip.names, position, joint_clip.rest_m()), joint_clip.rate_hz
-        )
-        found = replace(found, height_m=float(np.ptp(joint_clip.rest_m()[:, 2])))
+        points = PointTrajectories(joint_clip.names, joint_clip.world()[0], joint_clip.rest_m())
+        facts = _inspect_points(path.stem, points, joint_clip.rate_hz)
+        facts = replace(facts, height_m=float(np.ptp(joint_clip.rest_m()[:, 2])))
     return replace(
-        found,
+        facts,
         format="bvh",
         rate_evidence=RATE_IN_FILE,
         unit_m=joint_clip.unit_m,
         unit_evidence=joint_clip.unit_evidence,
-        up=f"y ({found.up})",
+        up=f"y ({facts.up})",
     )
 
 
-def _inspect_c3d(path: Path, unit_m: float | None, library: Path | str | None) -> Inspection:
+def _inspect_c3d(path: Path, unit_m: float | None, library: LibraryFolders | None) -> Inspection:
     from harness.mocap.read.c3d import read_c3d
 
     markers = read_c3d(path, unit_m=unit_m)
     seen: Bools = np.isfinite(markers.position_m[..., 0])
     if not seen.any():
         raise BadFile(path, "no marker in any frame", "positions of markers", "Export it again.")
-    found = _inspect_points(path.stem, PointTrajectories(markers.labels, markers.position_m, None), markers.rate_hz)
+    facts = _inspect_points(path.stem, PointTrajectories(markers.labels, markers.position_m, None), markers.rate_hz)
     return replace(
-        found,
+        facts,
         format="c3d",
         rate_evidence=RATE_IN_FILE,
         unit_m=markers.unit_m,
@@ -180,21 +177,23 @@ def _marker_spread_notes(markers: "MarkerClip", library: MotionLibrary) -> tuple
     from harness.mocap.read.c3d import measure_marker_spreads
 
     spreads = measure_marker_spreads(markers, library.load(markers.name))
-    told = ", ".join(f"{s.label} {s.bone} {1000.0 * s.spread_m:.0f}" for s in spreads)
-    return (f"standard deviation of each marker about the bone that it follows in {markers.name} [mm]: {told}",)
+    text = ", ".join(f"{s.label} {s.bone} {1000.0 * s.spread_m:.0f}" for s in spreads)
+    return (f"standard deviation of each marker about the bone that it follows in {markers.name} [mm]: {text}",)
 
 
 @dataclass(frozen=True, eq=False)
 class PointTrajectories:
-    """Positions (T, P, 3) of joints or markers, and where the joints are in the rest pose, if that is known."""
+    """Positions of P joints or markers over T frames."""
 
     names: tuple[str, ...]
     position_m: Floats
+    """(T, P, 3) [m]."""
     rest_m: Floats | None
+    """(P, 3) positions in the rest pose [m]; None where they are unknown."""
 
 
 def _inspect_points(name: str, points: PointTrajectories, rate_hz: float) -> Inspection:
-    """The checks that need nothing but positions."""
+    """The checks that need positions only."""
     feet, up, doubts = _feet_and_up(points)
     floor_m, contact_share = motion_checks.estimate_floor(points.position_m, feet)
     speed_m_s, joint, frame = motion_checks.find_fastest_joint(points.names, points.position_m, rate_hz)
@@ -225,7 +224,7 @@ def _inspect_points(name: str, points: PointTrajectories, rate_hz: float) -> Ins
 
 
 def _feet_and_up(points: PointTrajectories) -> tuple[Ints, str, tuple[str, ...]]:
-    """Points of the feet, what says that z is up, and what says that it is not."""
+    """Indices of the feet's points, the evidence that z is up, and the evidence against it."""
     if points.rest_m is None:
         return np.arange(len(points.names)), "", ()
     height = points.rest_m[:, 2]
@@ -246,7 +245,7 @@ def _feet_and_up(points: PointTrajectories) -> tuple[Ints, str, tuple[str, ...]]
 
 
 def _rest_positions_m(parents: Sequence[int], bone_m: Floats) -> Floats:
-    """(B + 1, 3) root and far ends in the rest pose [m]."""
+    """(B + 1, 3) positions of the root and of the bones' far ends in the rest pose [m]."""
     rest = np.zeros((len(parents) + 1, 3))
     for b, parent in enumerate(parents):
         rest[b + 1] = rest[parent + 1] + bone_m[b]
@@ -263,15 +262,9 @@ def _standing_height_m(skeleton: Skeleton) -> float:
     return sum(length[bone] for bone in back) + 0.5 * (sum(length[bone] for bone in LEG_BONES) + drop)
 
 
-def _rate_from_index(path: Path, library: Path | str | None) -> tuple[float, str]:
-    """The rate [Hz] by the index of `library`, or of a folder above the file; BadInput if none names the file."""
-    above = [folder for folder in path.resolve().parents if (folder / INDEX_NAME).is_file()]
-    for folder in [Path(library).resolve()] if library is not None else above[:1]:
-        if path.resolve().is_relative_to(folder):
-            row = read_index(folder / INDEX_NAME).get(path.resolve().relative_to(folder).as_posix(), {})
-            if row.get("fps"):
-                return float(row["fps"]), f"from {INDEX_NAME} of the library"
-    raise BadInput(
-        f"{path.name} does not say how many frames a second it has, as no AMC does, and no {INDEX_NAME} names it.",
-        "Give the rate (--rate HZ; CMU's clips have 120, some 60).",
-    )
+def _rate_from_index(path: Path, library: LibraryFolders | None) -> tuple[float, str]:
+    """The rate in the index [Hz] and the evidence; BadInput if no index names it."""
+    rate_hz = rate_from_index(path, () if library is None else as_folders(library))
+    if rate_hz is None:
+        raise unknown_rate_error(path.name)
+    return rate_hz, f"from {INDEX_NAME} of the library"

@@ -1,33 +1,29 @@
-"""A folder of motion files, found by clip name wherever they lie below it, and loaded when asked for.
+"""A motion library: motion files in one or several folders, found by clip name and loaded on request.
 
-A clip's name is its subject and trial, such as "13_17"; copies of it in several formats share the name, and the one
-that says most is loaded: AMC (with its ASF), then BVH, then AMASS npz. C3D files are listed; they hold markers, not
-motion of a skeleton. What files do not say (behaviour, rate) comes from an index, `manifest.csv` at the top of the
-folder with the columns path, subject, trial, behaviour, frames, fps and note, as far as it has them.
+A clip's name is its subject and trial, such as "13_17". Copies in several formats share the name; the format that
+says most is loaded: AMC (with its ASF), then BVH, then AMASS npz. C3D files are listed, but hold markers instead of the
+motion of a skeleton. What the files do not say (behaviour, rate) comes from the index of each folder
+(`harness.mocap.index`).
 """
 
-import csv
-import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from filecmp import cmp
 from pathlib import Path
 
 from harness.core.motion import Clip
-from harness.core.skeleton import unwrap_angles
-from harness.errors import BadFile, BadInput, UnknownName
-from harness.mocap.read.file_checks import check_size
+from harness.errors import BadInput, UnknownName
+from harness.mocap.clip_file import CMU_NAME, FORMATS, clip_name, read_library_file
+from harness.mocap.folder_scan import scan_folder
+from harness.mocap.index import INDEX_NAME, read_index
 
-INDEX_NAME = "manifest.csv"
-FORMATS = ("amc", "bvh", "npz", "c3d")
-"""By preference when a clip comes in several; the last holds markers and cannot be loaded as a clip."""
-
-_INDEX_LIMIT_BYTES = 16 * 2**20
-_CMU_NAME = re.compile(r"(\d+_\d+)(_poses|_stageii)?")
+LibraryFolders = Path | str | Sequence[Path | str]
+"""One folder, or several."""
 
 
 @dataclass(frozen=True)
 class LibraryEntry:
-    """One clip of a library: its preferred file, and what the index knows."""
+    """One clip of a library: its preferred file, and what the index says about it."""
 
     name: str
     format: str
@@ -37,156 +33,151 @@ class LibraryEntry:
     behaviour: str = ""
     frames: int | None = None
     rate_hz: float | None = None
-    """From the index; files themselves may know better."""
+    """Frame rate in the index [Hz]; the rate in a file itself goes before it."""
     note: str = ""
     copies: tuple[Path, ...] = ()
-    """The same clip in other formats or places."""
+    """Further files of the clip, in other formats or places."""
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON; paths as text."""
+        """The fields for JSON; paths as text."""
         return asdict(self) | {"path": str(self.path), "copies": [str(path) for path in self.copies]}
 
     def line(self) -> str:
-        """For a list on a terminal."""
+        """One line for a list on a terminal."""
         frames = "?" if self.frames is None else str(self.frames)
         rate = "? Hz" if self.rate_hz is None else f"{self.rate_hz:g} Hz"
         words = f"{self.name:<10} {self.format:<4} {self.behaviour or '?':<14} {frames:>6} frames at {rate}"
         return f"{words}  {self.note}".rstrip()
 
 
-class MotionLibrary:
-    """Clips below `folder`; `rate_hz` is that of AMC files of which the index does not know the rate."""
+class UnknownClip(UnknownName):
+    """A clip that a library does not hold. The message names the links that were ignored while it was searched."""
 
-    def __init__(self, folder: Path | str, *, rate_hz: float | None = None) -> None:
-        self.folder = Path(folder)
-        if not self.folder.is_dir():
-            raise BadInput(f"{folder} is no folder.", "Name the folder of a motion library.")
+    def __init__(self, name: str, known: Sequence[str], ignored_links: Sequence[str] = ()) -> None:
+        super().__init__("clip", name, known)
+        self.args = name, tuple(known), tuple(ignored_links)
+        self.ignored_links = tuple(ignored_links)
+
+    def __str__(self) -> str:
+        return " ".join([super().__str__(), *ignored_links_note(self.ignored_links)])
+
+
+def ignored_links_note(links: Sequence[Path | str]) -> list[str]:
+    """A sentence that names the ignored links of a library; [] if there are none."""
+    if not links:
+        return []
+    names = ", ".join(map(str, links))
+    return [f"Ignored, because they lead outside the library's folder or to nothing: {names}."]
+
+
+class MotionLibrary:
+    """The clips in one or several folders, at any depth.
+
+    A name that two folders hold must stand for identical files; the index of the first folder counts.
+    """
+
+    def __init__(self, folders: LibraryFolders, *, rate_hz: float | None = None) -> None:
+        """`rate_hz` is the rate of AMC files whose rate no index names [Hz].
+
+        Raises BadInput for a path that is no folder and for a name that stands for different motions in two folders,
+        BadFile for an index that cannot be read.
+        """
+        self.folders = as_folders(folders)
         self._rate_hz = rate_hz
-        self._entries = _find_entries(self.folder.resolve())
+        self._entries: dict[str, LibraryEntry] = {}
+        self._folder_of: dict[str, Path] = {}
+        ignored: list[Path] = []
+        for folder in self.folders:
+            entries, links = _scan_entries(folder.resolve())
+            ignored += links
+            for entry in entries.values():
+                self._add(entry, folder)
+        self._entries = dict(sorted(self._entries.items()))
+        self.ignored_links = tuple(ignored)
+        """Symbolic links that lead outside their library folder, or to nothing."""
+
+    def _add(self, entry: LibraryEntry, folder: Path) -> None:
+        other = self._entries.get(entry.name)
+        motions = other is not None and "c3d" not in (entry.format, other.format)
+        if other is not None and motions and not cmp(other.path, entry.path, shallow=False):
+            raise BadInput(
+                f"The clip {entry.name} differs between two folders: {other.path} and {entry.path}.",
+                "Rename or remove one of them, or name only one of the folders.",
+            )
+        if other is None or (other.format == "c3d" and entry.format != "c3d"):
+            best, rest, self._folder_of[entry.name] = entry, other, folder
+        else:
+            best, rest = other, entry
+        copies = () if rest is None else (rest.path, *rest.copies)
+        self._entries[entry.name] = replace(best, copies=(*best.copies, *copies))
 
     def entries(self) -> tuple[LibraryEntry, ...]:
         """Every clip, sorted by name."""
         return tuple(self._entries.values())
 
     def names(self) -> tuple[str, ...]:
-        """Clips that `load` can load."""
+        """Names of the clips that `load` can load."""
         return tuple(entry.name for entry in self.entries() if entry.format != "c3d")
 
     def entry(self, name: str) -> LibraryEntry:
-        """What is known about a clip; UnknownName if there is none."""
+        """The entry of a clip; UnknownName if the library has no such clip."""
         if name not in self._entries:
-            raise UnknownName("clip", name, self._entries)
+            raise UnknownClip(name, tuple(self._entries), tuple(map(str, self.ignored_links)))
         return self._entries[name]
 
     def load(self, name: str) -> Clip:
-        """The clip in world axes, angles unwrapped: on its own 30-bone skeleton (AMC), else on the 24 bones.
+        """The clip in world axes with unwrapped angles: an AMC on its own skeleton (30 bones), others on the 24 bones.
 
-        UnknownName, BadFile; BadInput where the rate is not known or the file holds markers only.
+        Raises UnknownName, BadFile, and BadInput where the rate is unknown or the file holds markers only.
         """
-        entry = self.entry(name)
-        clip = replace(
-            self._read(entry),
+        entry, folder = self.entry(name), self._folder_of[name]
+        clip = read_library_file(entry.path, folder.resolve(), entry.rate_hz or self._rate_hz)
+        return replace(
+            clip,
             name=entry.name,
             subject=entry.subject,
-            source="cmu" if _CMU_NAME.fullmatch(entry.name) else self.folder.name,
+            source="cmu" if CMU_NAME.fullmatch(entry.name) else folder.name,
             behaviour=entry.behaviour,
+            notes=(entry.note, *clip.notes) if entry.note else clip.notes,
         )
-        notes = (entry.note, *clip.notes) if entry.note else clip.notes
-        return replace(clip, notes=notes, angles_rad=unwrap_angles(clip.skeleton, clip.angles_rad))
-
-    def _read(self, entry: LibraryEntry) -> Clip:
-        if entry.format == "c3d":
-            raise BadInput(f"{entry.name} is a C3D file, which holds markers.", "Give its AMC, BVH or npz.")
-        if entry.format == "bvh":
-            from harness.mocap.read.bvh import read_bvh_clip
-
-            return read_bvh_clip(entry.path)
-        if entry.format == "npz":
-            from harness.mocap.read.amass import read_amass_clip as read_npz_clip
-
-            return read_npz_clip(entry.path)
-        from harness.mocap.read.acclaim import read_amc_clip
-
-        rate_hz = entry.rate_hz or self._rate_hz
-        if rate_hz is None:
-            raise BadInput(
-                f"The rate of {entry.name} is not known: AMC files record none, and no {INDEX_NAME} names it.",
-                "Give the rate (--rate); CMU's clips have 120, some 60.",
-            )
-        return read_amc_clip(find_skeleton_file(entry.path, self.folder.resolve()), entry.path, rate_hz=rate_hz)
 
 
-def find_skeleton_file(amc: Path, top: Path) -> Path:
-    """The ASF of an AMC: called like its subject, beside it or above as far as `top`; else the only one beside it."""
-    subject = amc.stem.split("_", 1)[0]
-    for folder in amc.parents:
-        for stem in (amc.stem, subject):
-            for suffix in (".asf", ".ASF"):
-                if (folder / f"{stem}{suffix}").is_file():
-                    return folder / f"{stem}{suffix}"
-        if folder == top:
-            break
-    beside = sorted(path for path in amc.parent.iterdir() if path.suffix.lower() == ".asf")
-    if len(beside) == 1:
-        return beside[0]
-    found = "no skeleton" if not beside else f"{len(beside)} skeletons, none called {subject}.asf,"
-    raise BadFile(amc, f"{found} beside it", f"{subject}.asf", "Put the ASF of this subject beside the AMC.")
+def as_folders(folders: LibraryFolders) -> tuple[Path, ...]:
+    """The folders as a tuple of paths, each once; BadInput for none, and for a path that is no folder."""
+    paths = tuple(dict.fromkeys(map(Path, [folders] if isinstance(folders, Path | str) else folders)))
+    if not paths:
+        raise BadInput("No folder of a motion library is named.", "Name one with --mocap DIR.")
+    for path in paths:
+        if not path.is_dir():
+            raise BadInput(f"{path} is no folder.", "Name the folder of a motion library.")
+    return paths
 
 
-def clip_name(path: Path) -> str:
-    """The name of the clip in a file: its stem, without what AMASS adds to subject and trial."""
-    match = _CMU_NAME.fullmatch(path.stem)
-    return match[1] if match else path.stem
-
-
-def _find_entries(top: Path) -> dict[str, LibraryEntry]:
+def _scan_entries(top: Path) -> tuple[dict[str, LibraryEntry], tuple[Path, ...]]:
+    """Entries by clip name, and the ignored links, of a resolved folder."""
     index = read_index(top / INDEX_NAME)
+    rows = {(top / path).resolve(): row for path, row in index.items()}
+    scan = scan_folder(top, {f".{kind}" for kind in FORMATS})
     files: dict[str, list[Path]] = {}
-    for path in sorted(top.rglob("*")):
-        if path.suffix.lower().lstrip(".") in FORMATS and path.is_file() and path.resolve().is_relative_to(top):
-            files.setdefault(clip_name(path), []).append(path)
-    return {name: _make_entry(name, files[name], top, index) for name in sorted(files)}
+    for path in scan.files:
+        files.setdefault(clip_name(path), []).append(path)
+    entries = {}
+    for name in sorted(files):
+        best, *others = sorted(files[name], key=lambda path: (FORMATS.index(path.suffix.lower().lstrip(".")), path))
+        row = index.get(best.relative_to(top).as_posix()) or rows.get(best.resolve(), {})
+        entries[name] = _make_entry(name, best, tuple(others), row)
+    return entries, scan.ignored_links
 
 
-def _make_entry(name: str, files: list[Path], top: Path, index: Mapping[str, Mapping[str, str]]) -> LibraryEntry:
-    best, *others = sorted(files, key=lambda path: (FORMATS.index(path.suffix.lower().lstrip(".")), path))
-    row = index.get(best.relative_to(top).as_posix(), {})
+def _make_entry(name: str, path: Path, copies: tuple[Path, ...], row: Mapping[str, str]) -> LibraryEntry:
     return LibraryEntry(
         name=name,
-        format=best.suffix.lower().lstrip("."),
-        path=best,
+        format=path.suffix.lower().lstrip("."),
+        path=path,
         subject=row.get("subject") or name.split("_", 1)[0],
         behaviour=row.get("behaviour") or "",
         frames=int(row["frames"]) if row.get("frames") else None,
         rate_hz=float(row["fps"]) if row.get("fps") else None,
         note=row.get("note") or "",
-        copies=tuple(others),
+        copies=copies,
     )
-
-
-def read_index(path: Path) -> dict[str, dict[str, str]]:
-    """Rows of a library's index by their path; {} if there is no such file, BadFile if it is none."""
-    if not path.exists():
-        return {}
-    check_size(path, "an index of motion files", _INDEX_LIMIT_BYTES)
-    with path.open(encoding="utf-8", newline="") as file:
-        try:
-            reader = csv.DictReader(file, strict=True)
-            rows = [(reader.line_num, row) for row in reader]
-        except (csv.Error, UnicodeDecodeError) as error:
-            raise BadFile(path, str(error), "a table of comma-separated values", "Repair or remove it.") from error
-    for line, row in rows:
-        if not row.get("path"):
-            raise BadFile(path, "a row without a path", "columns path, subject, behaviour, ...", "Repair it.", line)
-        for column, kind in (("frames", int), ("fps", float)):
-            _check_number(path, row.get(column) or "", column, kind, line)
-    return {row["path"]: row for _, row in rows}
-
-
-def _check_number(path: Path, word: str, column: str, kind: type[int] | type[float], line: int) -> None:
-    try:
-        good = not word or 0 < kind(word) < 1e9
-    except ValueError:
-        good = False
-    if not good:
-        raise BadFile(path, f"{column} {word[:40]!r}", "a number above 0", "Repair the index.", line)

@@ -13,6 +13,7 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.hinges import equivalent_euler_angles
 from harness.core.humanoid24 import BONES, limits_rad, standard_skeleton
+from harness.core.rotations import wrap_angle
 from harness.core.skeleton import Skeleton
 
 JUMP_M_S = 12.0
@@ -107,16 +108,11 @@ def measure_limit_violations(skeleton: Skeleton, angles_rad: Floats) -> tuple[fl
 
 def principal_angles(skeleton: Skeleton, angles_rad: Floats) -> Floats:
     """The same rotations (T, D) with every angle in [-pi, pi) and the middle one of three in [-pi/2, pi/2]."""
-    out = _wrap_angles(np.array(angles_rad, dtype=float))
+    out = wrap_angle(np.array(angles_rad, dtype=float))
     for where in skeleton.dof_of_bone:
         if where.stop - where.start == 3:
             over = np.abs(out[:, where.start + 1]) > 0.5 * np.pi
-            out[over, where] = _wrap_angles(equivalent_euler_angles(out[over, where]))
-    return out
-
-
-def _wrap_angles(angles_rad: Floats) -> Floats:
-    out: Floats = (angles_rad + np.pi) % (2.0 * np.pi) - np.pi
+            out[over, where] = wrap_angle(equivalent_euler_angles(out[over, where]))
     return out
 
 

@@ -1,4 +1,4 @@
-"""Where a scenario's motion comes from: the built-in performer, or a library of files that the user names."""
+"""Sources of a scenario's motion: the motion generator, or a library of files that the user names."""
 
 import os
 from functools import cache
@@ -9,12 +9,12 @@ from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
 from harness.mocap import synthetic
-from harness.mocap.library import MotionLibrary
+from harness.mocap.library import LibraryFolders, MotionLibrary, as_folders
 from harness.mocap.skeletons import read_skeletons
 
 MOCAP_VARIABLE = "HARNESS_MOCAP"
 POPULATION_SIZE = 100
-"""So many others there are beside the built-in performers: modes and spreads are then known to a tenth [choice]."""
+"""Number of synthetic skeletons besides the performers': modes and spreads are then known to a tenth [choice]."""
 
 
 class MotionSource(Protocol):
@@ -22,45 +22,49 @@ class MotionSource(Protocol):
 
     @property
     def title(self) -> str:
-        """As it stands in tables and on the page."""
+        """Name of the source in tables and on pages."""
         ...
 
     def names(self) -> tuple[str, ...]: ...
     def check(self, name: str) -> None:
-        """UnknownName unless there is such a clip."""
+        """Raise UnknownName unless there is such a clip."""
         ...
 
     def subject(self, name: str) -> str: ...
     def behaviour(self, name: str) -> str:
-        """What the clip shows, "" where nobody knows."""
+        """What the performer does in the clip; "" where it is unknown."""
         ...
 
     def load(self, name: str) -> Clip:
-        """The same object each time."""
+        """The clip; the same object each time."""
         ...
 
     def other_skeletons(self, without: str) -> dict[str, Skeleton]:
-        """Skeletons by subject, to learn from what people's bones are like: of all whom the source knows but one."""
+        """Skeletons by subject of everybody but the subject `without`, to learn how people's bones vary."""
         ...
 
 
-def open_motion_source(kind: str, folder: Path | None, *, seed: int, rate_hz: float | None) -> MotionSource:
-    """`builtin`, or `cmu` from `folder` or else from HARNESS_MOCAP; BadInput when neither names one."""
+def open_motion_source(kind: str, folders: LibraryFolders | None, *, seed: int, rate_hz: float | None) -> MotionSource:
+    """The source `builtin` (the motion generator), or `cmu`: a library in one or several folders.
+
+    Without `folders`, HARNESS_MOCAP names the library. `rate_hz` is the rate of AMC files whose rate no index names.
+    Raises UnknownName for another kind, and BadInput when no folder is named or the library cannot be used.
+    """
     if kind == "builtin":
         return SyntheticSource(seed)
     if kind != "cmu":
         raise UnknownName("motion source", kind, ("builtin", "cmu"))
-    return LibrarySource(MotionLibrary(find_library_folder(folder), rate_hz=rate_hz))
+    return LibrarySource(MotionLibrary(find_library_folders(folders), rate_hz=rate_hz))
 
 
 class SyntheticSource:
-    """The built-in performer's takes; the seed is the scenario's."""
+    """Takes of the motion generator; `seed` is the scenario's."""
 
     title = synthetic.SOURCE
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._made: dict[str, Clip] = {}
+        self._clips: dict[str, Clip] = {}
 
     def names(self) -> tuple[str, ...]:
         return tuple(name for behaviour in synthetic.BEHAVIOURS for name in synthetic.take_names(behaviour))
@@ -76,13 +80,13 @@ class SyntheticSource:
         return _parse_take_name(name)[0]
 
     def load(self, name: str) -> Clip:
-        if name not in self._made:
-            behaviour, who, take = _parse_take_name(name)
-            self._made[name] = synthetic.generate(behaviour, who, take, seed=self._seed)
-        return self._made[name]
+        if name not in self._clips:
+            behaviour, performer, take = _parse_take_name(name)
+            self._clips[name] = synthetic.generate(behaviour, performer, take, seed=self._seed)
+        return self._clips[name]
 
     def other_skeletons(self, without: str) -> dict[str, Skeleton]:
-        """Drawn from the performers' spread, whatever the seed; no performer is among them."""
+        """Skeletons drawn from the performers' distribution, the same for every seed; no performer is among them."""
         return _synthetic_population()
 
 
@@ -96,19 +100,19 @@ def _synthetic_population() -> dict[str, Skeleton]:
 
 def _parse_take_name(name: str) -> tuple[str, str, int]:
     """Behaviour, performer and number of a built-in take such as "table_tennis_p1_03"."""
-    behaviour, who, take = name.rsplit("_", 2)
-    return behaviour, who, int(take)
+    behaviour, performer, take = name.rsplit("_", 2)
+    return behaviour, performer, int(take)
 
 
 class LibrarySource:
-    """Clips of a library."""
+    """Clips of a motion library."""
 
     title = "cmu"
 
     def __init__(self, library: MotionLibrary) -> None:
         self._library = library
-        self._read: dict[str, Clip] = {}
-        self._people: dict[str, Skeleton] | None = None
+        self._clips: dict[str, Clip] = {}
+        self._skeletons: dict[str, Skeleton] | None = None
 
     def names(self) -> tuple[str, ...]:
         return self._library.names()
@@ -123,26 +127,28 @@ class LibrarySource:
         return self._library.entry(name).behaviour
 
     def load(self, name: str) -> Clip:
-        if name not in self._read:
-            self._read[name] = self._library.load(name)
-        return self._read[name]
+        if name not in self._clips:
+            self._clips[name] = self._library.load(name)
+        return self._clips[name]
 
     def other_skeletons(self, without: str) -> dict[str, Skeleton]:
-        """The library's ASF skeletons; BadInput when there is none."""
-        if self._people is None:
-            self._people = read_skeletons(self._library.folder)
-        return {subject: skeleton for subject, skeleton in self._people.items() if subject != without}
+        """Skeletons of the library's ASF files; BadInput when there is none."""
+        if self._skeletons is None:
+            self._skeletons = read_skeletons(self._library.folders)
+        return {subject: skeleton for subject, skeleton in self._skeletons.items() if subject != without}
 
 
-def find_library_folder(folder: Path | None) -> Path:
-    """The folder of real motion that --mocap or HARNESS_MOCAP names; BadInput when there is none."""
-    named = folder or (Path(os.environ[MOCAP_VARIABLE]) if os.environ.get(MOCAP_VARIABLE) else None)
-    if named is None:
+def find_library_folders(folders: LibraryFolders | None) -> tuple[Path, ...]:
+    """The folders of real motion that --mocap names, or else the folder that HARNESS_MOCAP names.
+
+    Raises BadInput when neither names one, or when a named path is no folder.
+    """
+    if not folders:
+        folders = os.environ.get(MOCAP_VARIABLE)
+    if not folders:
         raise BadInput(
             "This needs real motion, and no library was named.",
             f"Give --mocap DIR or set {MOCAP_VARIABLE}; `harness mocap fetch cmu --subjects 13,14` downloads some; "
             "`harness demo` needs none.",
         )
-    if not named.is_dir():
-        raise BadInput(f"{named} is no folder.", f"--mocap or {MOCAP_VARIABLE} names the folder of the motion library.")
-    return named
+    return as_folders(folders)

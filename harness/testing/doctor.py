@@ -17,7 +17,7 @@ from harness.core.motion import Clip
 from harness.errors import HarnessError
 from harness.mocap import synthetic
 from harness.mocap.library import MotionLibrary
-from harness.mocap.sources import MOCAP_VARIABLE, find_library_folder
+from harness.mocap.sources import MOCAP_VARIABLE, find_library_folders
 from harness.report.kit.render_process import RenderJob, RenderProcess
 from harness.simulate import noise
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
@@ -89,7 +89,7 @@ def _check_library(folder: Path | None) -> InstallationCheck:
     if folder is None and not os.environ.get(MOCAP_VARIABLE):
         return InstallationCheck("real motion", True, f"none named (--mocap DIR or {MOCAP_VARIABLE})")
     try:
-        names = MotionLibrary(find_library_folder(folder)).names()
+        names = MotionLibrary(find_library_folders(folder)).names()
     except HarnessError as error:
         return InstallationCheck("real motion", False, str(error))
     return InstallationCheck("real motion", bool(names), f"{len(names)} clips")

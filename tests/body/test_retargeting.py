@@ -14,7 +14,8 @@ from harness.core import humanoid24, rotations, skeleton
 from harness.core.motion import Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, UnknownName
-from harness.mocap.library import MotionLibrary, find_skeleton_file
+from harness.mocap.clip_file import find_skeleton_file
+from harness.mocap.library import MotionLibrary
 from harness.mocap.read.acclaim import read_amc_clip
 from tests.body.conftest import clip_on, random_qpos
 

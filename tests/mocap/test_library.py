@@ -1,5 +1,6 @@
 """The library: names, copies, rates and skeletons, and nothing outside its folder."""
 
+from copy import copy
 from pathlib import Path
 
 import numpy as np
@@ -70,7 +71,7 @@ def test_markers_are_no_motion(folder: Path) -> None:
 
 def test_without_a_rate_an_amc_is_refused_until_it_is_given(folder: Path) -> None:
     (folder / "manifest.csv").unlink()
-    with pytest.raises(BadInput, match="--rate"):
+    with pytest.raises(BadInput, match=r"`motion\.rate_hz` in the scenario"):
         MotionLibrary(folder).load("91_01")
     assert MotionLibrary(folder, rate_hz=120.0).load("91_01").rate_hz == 120.0
 
@@ -90,16 +91,64 @@ def test_the_skeleton_may_lie_above_or_alone(folder: Path) -> None:
         library.load("91_01")
 
 
-def test_links_out_of_the_folder_are_not_followed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_links_out_of_the_folder_are_ignored_and_named(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     outside = tmp_path_factory.mktemp("outside")
     motion = clip(name="92_01")
     target = write_clip(outside, motion)
-    (folder / "92_01.amc").symlink_to(target)
-    (folder / "92").symlink_to(outside / "92", target_is_directory=True)
+    links = [folder / name for name in ("92", "92_01.amc", "nowhere.amc")]
+    links[0].symlink_to(outside / "92", target_is_directory=True)
+    links[1].symlink_to(target)
+    links[2].symlink_to(folder / "absent.amc")
     library = MotionLibrary(folder)
+    assert library.ignored_links == tuple(links)
     assert "92_01" not in library.names()
+    with pytest.raises(UnknownName, match=r"Ignored, because they lead outside .*/92, .*/92_01\.amc") as error:
+        library.load("92_01")
+    assert str(copy(error.value)) == str(error.value)  # as on the way out of a worker process
     with pytest.raises(UnknownName):
         library.load("../outside/92_01")
+
+
+def test_links_inside_the_folder_are_followed_and_loops_end(folder: Path) -> None:
+    (folder / "walk.amc").symlink_to(Path("91") / "91_01.amc")
+    (folder / "again").symlink_to("deep", target_is_directory=True)
+    (folder / "deep" / "loop").symlink_to(folder, target_is_directory=True)
+    library = MotionLibrary(folder)
+    assert library.ignored_links == ()
+    assert library.names() == ("91_01", "91_02", "91_03", "walk")
+    assert len(library.entry("91_01").copies) == 2
+    walk = library.load("walk")
+    assert (walk.name, walk.rate_hz, walk.behaviour) == ("walk", 60.0, "walking")
+    np.testing.assert_array_equal(walk.angles_rad, library.load("91_01").angles_rad)
+
+
+def test_a_folder_that_is_a_link_is_a_library(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    link = tmp_path_factory.mktemp("links") / "mocap"
+    link.symlink_to(folder, target_is_directory=True)
+    assert MotionLibrary(link).names() == MotionLibrary(folder).names()
+    assert MotionLibrary(link).load("91_02").name == "91_02"
+
+
+def test_a_library_of_two_folders_has_the_clips_of_both(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    other = tmp_path_factory.mktemp("other")
+    write_clip(other, clip(name="92_01"))
+    (other / "91_02.bvh").write_bytes((folder / "deep" / "91_02.bvh").read_bytes())
+    library = MotionLibrary([folder, other], rate_hz=100.0)
+    assert library.names() == ("91_01", "91_02", "91_03", "92_01")
+    assert (library.load("91_01").rate_hz, library.load("92_01").rate_hz) == (60.0, 100.0)
+    assert library.entry("91_02").copies == (other / "91_02.bvh",)
+    assert MotionLibrary((folder, str(folder))).entries() == MotionLibrary(folder).entries()
+
+
+def test_one_name_for_two_motions_is_refused_with_both_files(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    other = tmp_path_factory.mktemp("other")
+    (other / "91_02.bvh").write_text(bvh_text(clip(12)))
+    with pytest.raises(BadInput) as error:
+        MotionLibrary([folder, other])
+    assert str(folder / "deep" / "91_02.bvh") in str(error.value)
+    assert str(other / "91_02.bvh") in str(error.value)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.mocap.synthetic.limb_ik import horizontal_vector, wrap_angle
+from harness.core.rotations import wrap_angle
+from harness.mocap.synthetic.limb_ik import horizontal_vector
 from harness.mocap.synthetic.performers import Habits
 
 JUMP_KINDS = ("up", "forward", "side", "turning", "series")

@@ -8,6 +8,7 @@ Euler angles, and the elbow or knee turns about the same x as the bone above it.
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.rotations import wrap_angle
 from harness.core.skeleton import Skeleton
 
 
@@ -100,9 +101,3 @@ def universal_joint_angles(vector: Floats, direction: Floats) -> tuple[Floats, F
     a = wrap_angle(np.arccos(height) - np.arctan2(v[2], v[1]))
     forward = np.sin(a) * v[1] + np.cos(a) * v[2]
     return a, wrap_angle(np.arctan2(direction[..., 0], direction[..., 2]) - np.arctan2(v[0], forward))
-
-
-def wrap_angle(angle_rad: Floats) -> Floats:
-    """The same angle within ±pi."""
-    out: Floats = (angle_rad + np.pi) % (2.0 * np.pi) - np.pi
-    return out

@@ -11,8 +11,10 @@ import pytest
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
-from harness.core.skeleton import Skeleton, forward_kinematics
+from harness.core.skeleton import Skeleton, forward_kinematics, unwrap_angles
 from harness.errors import BadInput, UnknownName
+from harness.mocap import synthetic
+from harness.mocap.clip_file import read_clip
 from harness.mocap.read.bvh import read_bvh
 from harness.mocap.write.bvh import euler_zyx_deg
 from harness.mocap.write.export import FORMATS, export
@@ -88,13 +90,48 @@ def test_pymotion_reads_the_same_joint_centres_from_bvh(cell: Written, tmp_path:
         assert sorted(NAMES[p] for p in end_parents) == ["head", "lfoot", "lhand", "rfoot", "rhand"]
 
 
-def test_our_own_reader_takes_its_bvh_for_a_persons(cell: Written, tmp_path: Path) -> None:
-    truth, _ = export([cell], "bvh", tmp_path)
-    back = read_bvh(truth)
-    assert back.rate_hz == RATE_HZ
-    np.testing.assert_allclose(back.root_m, cell.truth_qpos[:, :3], atol=1e-7)
-    turn = rotations.angle_between_rad(back.parent_from_joint[:, 0], cell.truth_qpos[:, 3:7])
-    assert turn.max() < 1e-6
+@pytest.mark.parametrize("behaviour", ["walking", "golf"])
+def test_bvh_is_read_back_to_the_precision_of_its_numbers(
+    behaviour: str, tmp_path: Path, rng: np.random.Generator
+) -> None:
+    """A clip of the motion generator, and an estimate of it on other bones; pymotion rounds angles to float32."""
+    motion = synthetic.generate(behaviour, "p2", 1, seed=7, duration_s=1.0, rate_hz=RATE_HZ)
+    truth = pack(motion.root_m, motion.world_from_root, motion.angles_rad)
+    angles_rad = motion.angles_rad + 0.1 * rng.normal(size=motion.angles_rad.shape)
+    turns = rotations.multiply(rotations.exp(0.1 * rng.normal(size=(len(motion), 3))), motion.world_from_root)
+    cell = Written(
+        truth,
+        pack(motion.root_m + 0.01 * rng.normal(size=(len(motion), 3)), turns, angles_rad),
+        bone_m=motion.skeleton.bone_m,
+        frame_index=np.arange(len(motion)),
+        status=np.zeros(len(motion), dtype=np.int64),
+        errors={},
+    )
+    skeletons = motion.skeleton, BELIEVED
+    for file, qpos, skeleton in zip(
+        export([cell], "bvh", tmp_path), (truth, cell.estimate_qpos), skeletons, strict=True
+    ):
+        back = read_clip(file)
+        root_m, quaternion, angles_rad = unpack(qpos)
+        assert (back.rate_hz, len(back)) == (RATE_HZ, len(motion))
+        np.testing.assert_allclose(back.root_m, root_m, atol=1e-8)
+        np.testing.assert_allclose(back.skeleton.bone_m, skeleton.bone_m, atol=1e-8)
+        assert np.rad2deg(rotations.angle_between_rad(back.world_from_root, quaternion)).max() < 1e-4
+        np.testing.assert_allclose(np.rad2deg(back.angles_rad - unwrap_angles(skeleton, angles_rad)), 0.0, atol=2e-4)
+        joints = joints_m(pack(back.root_m, back.world_from_root, back.angles_rad), back.skeleton)
+        np.testing.assert_allclose(joints, joints_m(qpos, skeleton), atol=1e-6)
+
+
+def test_arbitrary_rotations_in_bvh_are_read_back(cell: Written, tmp_path: Path) -> None:
+    for file, qpos in zip(export([cell], "bvh", tmp_path), (cell.truth_qpos, cell.estimate_qpos), strict=True):
+        back, clip = read_bvh(file), read_clip(file)
+        assert back.rate_hz == RATE_HZ
+        assert back.unit_evidence == "centimetres, as this package writes"
+        np.testing.assert_allclose(back.root_m, qpos[:, :3], atol=1e-7)
+        assert rotations.angle_between_rad(back.parent_from_joint[:, 0], qpos[:, 3:7]).max() < 1e-6
+        joints = joints_m(pack(clip.root_m, clip.world_from_root, clip.angles_rad), clip.skeleton)
+        skeleton = SKELETON if qpos is cell.truth_qpos else BELIEVED
+        np.testing.assert_allclose(joints, joints_m(qpos, skeleton), atol=1e-4)
 
 
 def test_euler_angles_rebuild_every_rotation(rng: np.random.Generator) -> None:

@@ -1,0 +1,34 @@
+"""Files of a motion library, with symbolic links followed inside the library's folder only."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class FolderScan:
+    """What a folder holds, at any depth."""
+
+    files: tuple[Path, ...]
+    """Files with one of the suffixes, sorted; links to files inside the folder are among them."""
+    ignored_links: tuple[Path, ...]
+    """Links that lead outside the folder or to nothing, sorted."""
+
+
+def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
+    """Search a folder for files with lower-case `suffixes` such as ".amc".
+
+    A link to a folder inside is not walked again: its files are found where they lie, so loops of links are harmless.
+    """
+    top = folder.resolve()
+    files, ignored, waiting = [], [], [top]
+    while waiting:
+        for path in waiting.pop().iterdir():
+            link = path.is_symlink()
+            if link and not (path.exists() and path.resolve().is_relative_to(top)):
+                ignored.append(path)
+            elif path.is_dir():
+                waiting += [] if link else [path]
+            elif path.suffix.lower() in suffixes and path.is_file():
+                files.append(path)
+    return FolderScan(tuple(sorted(files)), tuple(sorted(ignored)))

@@ -1,0 +1,65 @@
+"""The index of a motion library: `manifest.csv` at the top of its folder, which says what motion files do not record.
+
+Columns: path (relative to the folder), subject, trial, behaviour, frames, fps and note. Only path is required.
+"""
+
+import csv
+from pathlib import Path
+
+from harness.errors import BadFile, BadInput
+from harness.mocap.read.file_checks import check_size
+
+INDEX_NAME = "manifest.csv"
+_LIMIT_BYTES = 16 * 2**20
+
+
+def read_index(path: Path) -> dict[str, dict[str, str]]:
+    """Rows of an index by the path of their file; {} if there is no index. BadFile if it cannot be read."""
+    if not path.exists():
+        return {}
+    check_size(path, "an index of motion files", _LIMIT_BYTES)
+    with path.open(encoding="utf-8", newline="") as file:
+        try:
+            reader = csv.DictReader(file, strict=True)
+            rows = [(reader.line_num, row) for row in reader]
+        except (csv.Error, UnicodeDecodeError) as error:
+            raise BadFile(path, str(error), "a table of comma-separated values", "Repair or remove it.") from error
+    for line, row in rows:
+        if not row.get("path"):
+            raise BadFile(path, "a row without a path", "columns path, subject, behaviour, ...", "Repair it.", line)
+        for column, kind in (("frames", int), ("fps", float)):
+            _check_number(path, row.get(column) or "", column, kind, line)
+    return {row["path"]: row for _, row in rows}
+
+
+def rate_from_index(path: Path, folders: tuple[Path, ...] = ()) -> float | None:
+    """Frame rate of a motion file by the index of one of `folders`, or of the nearest folder above the file [Hz].
+
+    None if no index names a rate for the file.
+    """
+    file = path.resolve()
+    above = [folder for folder in file.parents if (folder / INDEX_NAME).is_file()]
+    for folder in [folder.resolve() for folder in folders] or above[:1]:
+        if file.is_relative_to(folder):
+            row = read_index(folder / INDEX_NAME).get(file.relative_to(folder).as_posix(), {})
+            if row.get("fps"):
+                return float(row["fps"])
+    return None
+
+
+def unknown_rate_error(name: str) -> BadInput:
+    """The error for an AMC file of unknown rate; it names every place where the rate can be given."""
+    return BadInput(
+        f"The frame rate of {name} is unknown: AMC files do not record it, and no {INDEX_NAME} has it.",
+        f"Give it as `motion.rate_hz` in the scenario, in the column fps of {INDEX_NAME}, with --rate (`inspect`) "
+        "or as `rate_hz` (`read_clip`). CMU's clips have 120 Hz, some 60.",
+    )
+
+
+def _check_number(path: Path, word: str, column: str, kind: type[int] | type[float], line: int) -> None:
+    try:
+        good = not word or 0 < kind(word) < 1e9
+    except ValueError:
+        good = False
+    if not good:
+        raise BadFile(path, f"{column} {word[:40]!r}", "a number above 0", "Repair the index.", line)
