@@ -1,7 +1,6 @@
 """The verb `inspect`: describe a motion file and what is wrong with it."""
 
 import argparse
-import os
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
@@ -17,8 +16,8 @@ def add_inspect(verbs: Verbs) -> None:
 
 def run_inspect(args: argparse.Namespace) -> Outcome:
     from harness.mocap.file_inspection import inspect_file as inspect
-    from harness.mocap.sources import MOCAP_VARIABLE
+    from harness.mocap.sources import folders_of_environment
 
-    library = args.mocap or (Path(os.environ[MOCAP_VARIABLE]) if os.environ.get(MOCAP_VARIABLE) else None)
+    library = args.mocap or folders_of_environment() or None
     found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
     return print_result(args, found.as_dict(), *found.lines())

@@ -7,7 +7,7 @@ import sys
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, sigterm_as_interrupt
+from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, sigterm_as_interrupt
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
@@ -18,7 +18,7 @@ _DEFAULT_CLUSTER_WORKERS = 64
 def add_sweep(verbs: Verbs) -> None:
     text = "run scenario x clip x method x seed x any value; resumes what was interrupted"
     verb = add_verb(verbs, "sweep", text, run_sweep, "out", "mocap")
-    verb.add_argument("study", help="a TOML file, or the name of a shipped one (see `harness list`)")
+    verb.add_argument("sweep", help="a TOML file, or the name of a shipped one (see `harness list`)")
     verb.add_argument("--seed", type=int, help="replaces all seeds of the sweep")
     verb.add_argument("--jobs", type=positive_int, metavar="N", help="worker processes (default 1)")
     text = "workers of the Dask scheduler at this address, or `local` for some of its own, instead of --jobs"
@@ -38,8 +38,8 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
 
     if args.dask and args.jobs and args.dask != "local":
         raise BadInput("--jobs with --dask.", "A scheduler's workers are started by whoever starts it: leave it out.")
-    sweep, path = load_sweep(args.study)
-    scenarios = expand_sweep(sweep, path, args.seed)
+    sweep, path = load_sweep(args.sweep)
+    scenarios = expand_sweep(sweep, path, args.seed, args.mocap)
     out = args.out or Path("results") / sweep.name
     with ExitStack() as stack:
         stack.enter_context(sigterm_as_interrupt())
@@ -69,6 +69,5 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
 
 def _resume_command(args: argparse.Namespace, out: Path) -> str:
     """The command that goes on with the sweep, wherever else its cells were made."""
-    parts = ["harness", "sweep", args.study, "--out", str(out)]
-    parts += [] if args.mocap is None else ["--mocap", str(args.mocap)]
+    parts = ["harness", "sweep", args.sweep, "--out", str(out), *mocap_words(args.mocap)]
     return shlex.join(parts if args.seed is None else [*parts, "--seed", str(args.seed)])
