@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from harness import __version__
 from harness.commands.baseline import add_baseline
 from harness.commands.bench import add_bench
 from harness.commands.calibrate import add_calibrate
@@ -32,6 +31,7 @@ from harness.commands.report import add_report
 from harness.commands.run import add_run
 from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
+from harness.core.package_data import VERSION
 from harness.errors import HarnessError, Outcome, was_interrupted
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
@@ -120,7 +120,7 @@ def build_parser() -> argparse.ArgumentParser:
         description="Measure how well body-worn 6-DOF trackers are turned into full-body motion.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--version", action="version", version=f"harness {__version__}")
+    parser.add_argument("--version", action="version", version=f"harness {VERSION}")
     subparsers = parser.add_subparsers(metavar="VERB", required=True, help=argparse.SUPPRESS)
     paragraphs = []
     for title, adders in _VERB_GROUPS.items():

@@ -25,22 +25,20 @@ def add_compare(verbs: Verbs) -> None:
 def run_compare(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.compare.comparison import compare_results
+    from harness.compare.comparison import compare_runs
     from harness.compare.margins import GATED_METRICS
     from harness.core.files import to_json_types
     from harness.core.options import split_outside_brackets
     from harness.report.comparison.writer import text, write_comparison_page
-    from harness.results.reader import load_results
 
     if args.b is None and not args.methods:
         raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
     methods = split_outside_brackets(args.methods, ",") if args.methods else []
     if len(methods) > 2:
         raise BadInput(f"--methods {args.methods} names {len(methods)} methods.", "Name one or two.")
-    a = load_results(args.a)
-    comparison = compare_results(
-        a,
-        a if args.b is None else load_results(args.b),
+    comparison = compare_runs(
+        args.a,
+        args.b,
         methods=(methods[0], methods[-1]) if methods else None,
         metrics=args.metrics.split(",") if args.metrics else GATED_METRICS,
         allow=args.allow.split(",") if args.allow else None,

@@ -5,7 +5,6 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
-from harness import __version__
 from harness.commands.common import (
     Verbs,
     add_line_flags,
@@ -19,6 +18,7 @@ from harness.commands.common import (
     show_progress,
     sigterm_as_interrupt,
 )
+from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
 
 SIMULATION_PREFIX = "sim:"
@@ -90,7 +90,7 @@ def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
         "stations": list(asked.stations),
         "rate_hz": asked.tracker.rate_hz,
         "posing": rehearsal.posing,
-        "harness": __version__,
+        "harness": VERSION,
     }
     seconds = math.inf if args.seconds is None else args.seconds
     written = record_capture(args.file, simulation.wire_format, simulation.wire, note, seconds=seconds)
@@ -104,7 +104,7 @@ def _record_port(args: argparse.Namespace) -> Outcome:
 
     stations = None if args.stations is None else tuple(parse_names(args.stations))
     wanted = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
-    note = {"source": "port", "port": args.port, "harness": __version__}
+    note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
         record_port(args.port, wanted, writer, seconds=args.seconds, say=print_status, progress=show_progress)
     return _print_recording(args, writer.counts)

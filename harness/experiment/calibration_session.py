@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from harness import __version__
 from harness.body.humanoid import Body, build_body
 from harness.body.mounts import Mount
 from harness.calibrate import calibration_report
@@ -20,6 +19,7 @@ from harness.calibrate.poses import POSES, CalibrationPose, configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core.arrays import Floats
+from harness.core.package_data import VERSION
 from harness.core.split import ClipPart
 from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import mounts_of
@@ -117,7 +117,7 @@ class CalibrationSession:
                 self.body.skeleton,
                 calibration_report.report_tpose_calibration(tpose),
             )
-        made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {__version__}"}
+        made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {VERSION}"}
         made |= {"source": source, "scenario": self.resolved_scenario.name}
         made |= {"others": self.space.source} if self.kind == "poses" else {}
         return CalibrationOutcome(CalibrationFile(calibration, skeleton, {**made, **words}), lines)

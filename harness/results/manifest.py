@@ -15,8 +15,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import harness
 from harness.core.files import read_json, to_json_types
+from harness.core.package_data import PACKAGE_FOLDER, VERSION
 from harness.errors import BadFile
 from harness.score.metrics import VERSIONS
 
@@ -78,9 +78,9 @@ def describe_run(
 def current_circumstances() -> dict[str, Any]:
     """Source, commit, versions and machine."""
     return {
-        "harness": harness.__version__,
+        "harness": VERSION,
         "source_hash": source_hash(),
-        **_commit(Path(harness.__file__).parent.parent),
+        **_commit(PACKAGE_FOLDER.parent),
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in PACKAGES},
         "platform": platform.platform(),
@@ -92,7 +92,7 @@ def current_circumstances() -> dict[str, Any]:
 @cache
 def source_hash() -> str:
     """16 hex digits that stand for every Python file of the package."""
-    package = Path(harness.__file__).parent
+    package = PACKAGE_FOLDER
     state = blake2b(digest_size=8)
     for file in sorted(package.rglob("*.py")):
         state.update(f"{file.relative_to(package).as_posix()}\0".encode())
