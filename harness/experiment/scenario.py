@@ -189,17 +189,18 @@ def read_station_sets() -> dict[str, dict[str, Any]]:
 def expand_clips(scenario: Scenario, folder: Path | None) -> Scenario:
     """The scenario with every pattern in its clip lists, such as "13_*", replaced by the clips that match it.
 
-    Clips are those of the motion generator, or of the library in `folder` (by default HARNESS_MOCAP's), sorted by name.
-    "13_*@0.20-0.40" is that part of each. A clip that the list names itself is not repeated. BadInput for a pattern that
-    matches nothing.
+    Clips are the takes of the motion generator, or those of the library in `folder` (by default HARNESS_MOCAP), sorted
+    by name. "13_*@0.20-0.40" is that part of each. A clip that the list also names itself is not repeated. BadInput for
+    a pattern that matches nothing.
     """
     motion = scenario.motion
-    lists = {key: getattr(motion, key) for key in ("test", "examples", "withheld")}
-    if not any(_is_pattern(text) for texts in lists.values() for text in texts):
+    if not any(map(_is_pattern, (*motion.test, *motion.examples, *motion.withheld))):
         return scenario
     source = open_motion_source(motion.source, folder, seed=scenario.seed, rate_hz=motion.rate_hz or None)
-    expanded = {key: _match_clips(key, texts, source.names()) for key, texts in lists.items()}
-    scenario = replace(scenario, motion=replace(motion, **expanded))
+    test, examples, withheld = (
+        _match_clips(key, getattr(motion, key), source.names()) for key in ("test", "examples", "withheld")
+    )
+    scenario = replace(scenario, motion=replace(motion, test=test, examples=examples, withheld=withheld))
     check_scenario(Path(scenario.name), scenario)
     return scenario
 

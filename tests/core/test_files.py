@@ -1,6 +1,7 @@
 """Atomic writers and the readers of JSON and TOML."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -27,8 +28,9 @@ def test_a_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
     def fail() -> str:
         raise RuntimeError
 
+    parts: list[Callable[[], str]] = [lambda: "half", fail]
     with pytest.raises(RuntimeError):
-        files.write_parts(path, (part() for part in (lambda: "half", fail)))
+        files.write_parts(path, (part() for part in parts))
     assert path.read_text() == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["a.txt"]
 

@@ -261,7 +261,8 @@ def test_a_scenario_names_a_set_of_stations(tmp_path: Path) -> None:
 def test_a_set_of_stations_is_changed_station_by_station(tmp_path: Path) -> None:
     stations = with_stations(
         tmp_path,
-        '[stations]\nset = "liu2011"\ntorso = "none"\nhead = { along = 0.5 }\npelvis = { bone = "lhipjoint", along = 0.0 }\n',
+        '[stations]\nset = "liu2011"\ntorso = "none"\nhead = { along = 0.5 }\n'
+        'pelvis = { bone = "lhipjoint", along = 0.0 }\n',
     )
     assert list(stations) == ["left_hand", "right_hand", "left_ankle", "right_ankle", "head", "pelvis"]
     assert stations["head"] == Station("head", along=0.5)

@@ -11,12 +11,12 @@ import pytest
 import harness
 from harness.cli import main
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.scenario import load_scenario, shipped_placements
+from harness.experiment.scenario import load_scenario
 from harness.results.placement_findings import PlacementFindings, read_placement
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
 from harness.study.placement.cell_cache import link_rate_hz
-from harness.study.placement.config import load_placement_study
+from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import FINDINGS, run_placement
 from harness.study.placement.plan import plan_placement
 
