@@ -14,7 +14,8 @@ PACKAGE = Path(harness.__file__).parent
 FOLDERS = {p.name for p in PACKAGE.iterdir() if p.is_dir() and (p / "__init__.py").exists()}
 LOOSE_FILES = {"__init__.py", "__main__.py", "cli.py", "errors.py", "py.typed"}
 
-# The import table of docs/architecture.md. `core` and `errors` are open to all and not listed; a folder may import itself.
+# The import table of docs/architecture.md. `core` and `errors` are open to all and not listed; a folder may import
+# itself.
 # The truth wall: `calibrate` and `reconstruct` see no simulation, motion file or score.
 EXPERIMENT_SEES = {
     *("mocap", "body", "stream", "simulate", "calibrate", "reconstruct", "score", "results", "compare", "measure"),

@@ -299,7 +299,7 @@ def test_every_shipped_study_is_ready_to_be_done(path: Path) -> None:
     assert ready.held_out is not None
     assert len(ready.held_out.motion.test) >= 6
     with pytest.raises(BadFile, match="a placement study; expected a scenario"):
-        load_scenario(path.stem)
+        load_scenario(path)
 
 
 def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
