@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.body.humanoid import Body, tpose
+from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
 from harness.core.motion import BodyMotion
@@ -48,7 +49,7 @@ class TrainedTPose:
 class TPoseSession:
     """A `Session`: one performer, one take, frame by frame."""
 
-    def __init__(self, qpos: np.ndarray, height_m: float, calibration: Calibration) -> None:
+    def __init__(self, qpos: Floats, height_m: float, calibration: Calibration) -> None:
         self.qpos, self.calibration = qpos.copy(), calibration
         self.qpos[2] = height_m
 
