@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from harness.experiment.cell_scheduler import cell_names
+from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.mocap import synthetic

@@ -27,8 +27,11 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.study.placement.placement_study import FINDINGS, run_placement
 
     out = args.out or Path("results") / f"placement_{Path(args.study).stem.removeprefix('placement_')}"
-    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
-        each = process_executor(args.jobs)
+    with (
+        ProgressBar("cells") as bar,
+        redirect_stdout(sys.stderr),  # what a method prints is talk
+        process_executor(args.jobs) as each,
+    ):
         findings, outcome = run_placement(
             args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
         )

@@ -22,7 +22,7 @@ def add_report(verbs: Verbs) -> None:
 
 def run_report(args: argparse.Namespace) -> Outcome:
     from harness.report.paper.writer import FINDINGS
-    from harness.results.index import INDEX_FILE
+    from harness.results.storage import read_kind
 
     if (args.run / FINDINGS).is_file():
         return _report_findings(args)
@@ -30,7 +30,7 @@ def run_report(args: argparse.Namespace) -> Outcome:
         raise BadInput(
             f"--readme with {args.run}, where no {FINDINGS} is.", "Name the folder that `harness paper` wrote."
         )
-    if (args.run / INDEX_FILE).is_file():
+    if read_kind(args.run) == "sweep":
         return _report_sweep(args)
     from harness.report.run.writer import write_run_page
 

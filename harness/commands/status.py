@@ -1,6 +1,7 @@
 """The verb `status`: tell how much of a sweep, study or run is finished."""
 
 import argparse
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -33,12 +34,13 @@ def run_status(args: argparse.Namespace) -> Outcome:
         "running": found.running,
         "left_s": found.left_s,
         "failures": found.failures,
+        "command": found.command,
     }
     outcome = Outcome.PASS if found.finished == found.planned else Outcome.INCOMPLETE
-    return print_result(args, content, *_status_lines(found, args.folder), outcome=outcome)
+    return print_result(args, content, *_status_lines(found), outcome=outcome)
 
 
-def _status_lines(found: "RunStatus", out: Path) -> list[str]:
+def _status_lines(found: "RunStatus") -> list[str]:
     counted = f"{found.finished:,} of {found.planned:,} cells finished, {len(found.failures):,} failed"
     state = "running" if found.running else "finished" if not found.remaining else "not running"
     left = f", about {_format_duration(found.left_s)} left" if found.left_s is not None else ""
@@ -48,8 +50,8 @@ def _status_lines(found: "RunStatus", out: Path) -> list[str]:
     ]
     if len(found.failures) > _MAX_FAILURES:
         lines.append(f"and {len(found.failures) - _MAX_FAILURES:,} more")
-    if found.failures and (out / "failures.json").is_file():
-        lines.append(f"with the commands that make them again: {out / 'failures.json'}")
+    if found.failures and found.kind == "sweep":
+        lines.append(f"one of them again: {found.command} --cell {shlex.quote(next(iter(found.failures)))}")
     return lines
 
 

@@ -23,14 +23,14 @@ def add_sweep(verbs: Verbs) -> None:
     verb.add_argument("--jobs", type=positive_int, metavar="N", help="worker processes (default 1)")
     text = "workers of the Dask scheduler at this address, or `local` for some of its own, instead of --jobs"
     verb.add_argument("--dask", metavar="ADDRESS", help=text)
-    text = "make only the cell of this name, as failures.json has it, and print why it fails"
+    text = "make only the cell of this name, as `harness status` prints it, and print why it fails"
     verb.add_argument("--cell", metavar="NAME", default="", help=text)
 
 
 def run_sweep(args: argparse.Namespace) -> Outcome:
     from harness.core.files import read_json
+    from harness.experiment.engine import run_sweep as run
     from harness.experiment.executors import dask_executor, process_executor
-    from harness.experiment.sweep import run_sweep as run
     from harness.experiment.sweep_config import expand_sweep, load_sweep
     from harness.report.sweep.page import write_sweep_page
     from harness.report.sweep.reader import read_sweep
@@ -46,25 +46,25 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
         bar = stack.enter_context(ProgressBar("cells"))
         stack.enter_context(redirect_stdout(sys.stderr))  # what a method prints is talk
         workers = args.jobs or {None: 1, "local": os.cpu_count() or 1}.get(args.dask, _DEFAULT_CLUSTER_WORKERS)
+        executor = dask_executor(args.dask, args.jobs) if args.dask else process_executor(workers)
         outcome = run(
             sweep,
             scenarios,
             out,
             folder=args.mocap,
-            each=stack.enter_context(dask_executor(args.dask, args.jobs)) if args.dask else process_executor(workers),
+            executor=stack.enter_context(executor),
             workers=workers,
             command=_resume_command(args, out),
             only=args.cell,
             progress=bar,
         )
-    failures = read_json(out / "failures.json", "the failures of a sweep")
-    if args.cell in failures:
-        print(failures[args.cell]["failure"], file=sys.stderr)
-    page = write_sweep_page(out)
     summary = read_json(out / "summary.json", "the summary of a sweep")
-    files = (f"table: {out / 'table.csv'}", *([f"failures: {out / 'failures.json'}"] if failures else []))
-    content = {**summary, "failures": failures, "out": str(out), "report": str(page)}
-    return print_result(args, content, text(read_sweep(out)), *files, f"report: {page}", outcome=outcome)
+    if args.cell in summary["failures"]:
+        print(summary["failures"][args.cell], file=sys.stderr)
+    page = write_sweep_page(out)
+    files = (f"table: {out / 'summary.csv'}", f"report: {page}")
+    content = {**summary, "out": str(out), "report": str(page)}
+    return print_result(args, content, text(read_sweep(out)), *files, outcome=outcome)
 
 
 def _resume_command(args: argparse.Namespace, out: Path) -> str:

@@ -128,7 +128,7 @@ def prepare_playback(
     asked = replace(asked, vary={}, inputs=("pos+ori",), calibration="exact")
     part = ClipPart.parse(clip or asked.motion.test[0])
     source = open_scenario_motion(asked.motion, folder, asked.seed)
-    check_names(asked, source, [part])
+    check_names([replace(asked, motion=replace(asked.motion, test=(str(part),)))], folder)
     return Playback(
         ClipEvaluation(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
     )

@@ -1,6 +1,6 @@
 """A sweep as its TOML file has it, and the scenarios that it comes to: scenario x clip x method x seed x any key."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,9 +9,7 @@ from harness.core.fields import build
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import (
     SCHEMA,
     Scenario,
@@ -20,7 +18,6 @@ from harness.experiment.scenario import (
     expand_clips,
     find_scenario,
     load_scenario,
-    variants,
 )
 
 _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
@@ -106,14 +103,6 @@ def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None, folder: Path
     if len(set(names)) < len(names):
         raise BadFile(path, f"scenarios called {', '.join(names)}", "names of their own", "Rename one.")
     return out
-
-
-def check_scenario_names(scenarios: Sequence[Scenario], folder: Path | None) -> None:
-    """That everything exists which any variant names; BadInput, UnknownName. Hours of work are not begun in vain."""
-    for scenario in scenarios:
-        parts = [ClipPart.parse(text) for text in scenario.motion.test]
-        for _, made in variants(scenario):
-            check_names(made, open_scenario_motion(made.motion, folder, made.seed), parts)
 
 
 def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from harness.compare.margins import margin_of
-from harness.core.split import ClipPart
 from harness.errors import BadInput
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, expand_clips
@@ -107,8 +106,7 @@ def plan_placement(path: Path | str, folder: Path | None) -> PlacementPlan:
     made = PlacementPlan(study, study.groups(), scenario, held_out, elsewhere, source.title)
     for one in filter(None, (scenario, held_out, *elsewhere.values())):
         alone = replace(one, worn=names_of_places(station_set(made.groups[:1], made.groups)))
-        parts = [ClipPart.parse(text) for text in one.motion.test]
-        check_names(alone, open_scenario_motion(one.motion, folder, one.seed), parts)
+        check_names([alone], folder)
     if study.exhaustive:
         search.check_cell_count(study.exhaustive, made.groups, len(scenario.motion.test) * len(scenario.methods))
     if study.refine and study.refine.set:
