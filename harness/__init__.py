@@ -1,3 +1,83 @@
-"""Judges systems that turn a few body-worn 6-DOF trackers into full-body motion."""
+"""Measure how well body-worn 6-DOF trackers are turned into full-body motion.
 
-__version__ = "0.1.0"
+The public names, which are imported when they are first used:
+
+| name             | what it does                                                                          |
+|------------------|---------------------------------------------------------------------------------------|
+| `load_scenario`  | reads a scenario: a TOML file, or the name of a shipped one                           |
+| `run`            | runs a scenario into a folder: every test clip with every method                      |
+| `load`           | loads the folder of a run or sweep: results of each cell, arrays of each frame        |
+| `compare_runs`   | compares two results and tells whether the second is worse                            |
+| `methods`        | lists the registered methods by name                                                  |
+| `read_clip`      | reads a motion file: AMC, BVH or AMASS npz                                            |
+| `simulate_clip`  | simulates what a tracker reports while a clip is performed                            |
+| `score_estimate` | scores an estimated motion against the truth                                          |
+| `Is900`          | reads frames from an IS-900 at a serial port or TCP address                           |
+| `Emulator`       | plays readings as an IS-900 would, byte by byte, without a port                       |
+| `serve_emulator` | puts such an emulator at a pseudo terminal or TCP port                                |
+| `HarnessError`   | the base class of every error that the package raises on purpose                      |
+"""
+
+from typing import TYPE_CHECKING
+
+from harness.core.package_data import VERSION as __version__
+
+if TYPE_CHECKING:
+    from harness.compare.comparison import compare_runs
+    from harness.errors import HarnessError
+    from harness.experiment.clip_simulation import simulate_clip
+    from harness.experiment.engine import run
+    from harness.experiment.scenario import load_scenario
+    from harness.mocap.clip_file import read_clip
+    from harness.reconstruct.registry import methods
+    from harness.results.loaded_run import load_run as load
+    from harness.score.score import score_estimate
+    from harness.stream.driver.is900 import Is900
+    from harness.stream.emulator.emulator import Emulator
+    from harness.stream.emulator.server import serve_emulator
+else:
+    _MODULES = {
+        "Emulator": "harness.stream.emulator.emulator",
+        "HarnessError": "harness.errors",
+        "Is900": "harness.stream.driver.is900",
+        "compare_runs": "harness.compare.comparison",
+        "load": "harness.results.loaded_run",
+        "load_scenario": "harness.experiment.scenario",
+        "methods": "harness.reconstruct.registry",
+        "read_clip": "harness.mocap.clip_file",
+        "run": "harness.experiment.engine",
+        "score_estimate": "harness.score.score",
+        "serve_emulator": "harness.stream.emulator.server",
+        "simulate_clip": "harness.experiment.clip_simulation",
+    }
+    """Public name -> module that defines it."""
+
+    def __getattr__(name):
+        """Import a public name when it is first used (PEP 562)."""
+        if name not in _MODULES:
+            raise AttributeError(f"module 'harness' has no attribute {name!r}")
+        from importlib import import_module
+
+        attribute = "load_run" if name == "load" else name
+        globals()[name] = getattr(import_module(_MODULES[name]), attribute)
+        return globals()[name]
+
+    def __dir__():
+        return sorted({*globals(), *_MODULES})
+
+
+__all__ = [
+    "Emulator",
+    "HarnessError",
+    "Is900",
+    "__version__",
+    "compare_runs",
+    "load",
+    "load_scenario",
+    "methods",
+    "read_clip",
+    "run",
+    "score_estimate",
+    "serve_emulator",
+    "simulate_clip",
+]

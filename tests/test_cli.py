@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli import main
+from harness.cli import build_parser, main
+from harness.commands.common import mocap_words
 from tests.short_demo import short_demo
 
 
@@ -28,7 +29,7 @@ def test_help_names_every_verb(capsys: pytest.CaptureFixture[str]) -> None:
     text = capsys.readouterr().out
     verbs = "demo run list inspect mocap export report check bench doctor paper compare baseline sweep status placement"
     for verb in verbs.split():
-        assert re.search(rf"^    {verb}\s", text, re.MULTILINE), verb
+        assert re.search(rf"^  {verb}\s", text, re.MULTILINE), verb
 
 
 def test_help_imports_nothing_heavy() -> None:
@@ -118,3 +119,27 @@ def test_ctrl_c_is_the_normal_end_of_what_has_none_while_it_starts_too(
     assert main(verb.split()) == expected
     said = capsys.readouterr()
     assert "stopped" in said.out + said.err
+
+
+def test_mocap_may_be_given_more_than_once() -> None:
+    parse = build_parser().parse_args
+    assert parse(["run", "demo"]).mocap is None
+    assert parse(["run", "demo", "--mocap", "a"]).mocap == Path("a")
+    assert parse(["run", "demo", "--mocap", "a", "--mocap", "b", "--mocap", "c"]).mocap == tuple(map(Path, "abc"))
+    assert mocap_words(None) == []
+    assert mocap_words(Path("a")) == ["--mocap", "a"]
+    assert mocap_words((Path("a"), Path("b"))) == ["--mocap", "a", "--mocap", "b"]
+
+
+def test_the_package_is_a_program(tmp_path: Path) -> None:
+    ended = subprocess.run(
+        [sys.executable, "-m", "harness", "--version"], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert ended.stdout.startswith("harness ")
+
+
+@pytest.mark.parametrize("module", ["fcntl", "termios", "tty", "pwd", "grp", "resource", "pty"])
+def test_start_up_needs_no_module_of_posix(module: str) -> None:
+    """As on Windows, where these do not exist."""
+    code = f"import sys; sys.modules[{module!r}] = None; import harness.cli as c; c.build_parser()"
+    subprocess.run([sys.executable, "-c", code], check=True)

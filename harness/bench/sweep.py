@@ -123,7 +123,7 @@ def _parallel_rows(folder: Path, seed: int) -> list[BenchmarkRow]:
     study = folder / "shared.toml"
     study.write_text(PARALLEL_SWEEP)
     one, two = (float(_time_sweep(study, folder / f"jobs-{jobs}", seed, jobs)[0]) for jobs in (1, 2))
-    differing = _count_differing_lines(folder / "jobs-1" / "table.csv", folder / "jobs-2" / "table.csv")
+    differing = _count_differing_lines(folder / "jobs-1" / "summary.csv", folder / "jobs-2" / "summary.csv")
     return [
         BenchmarkRow(
             "two jobs against one", one / two, "x", f"{one:.1f} s by one, on {os.cpu_count()} cores", ">= 1.7"
@@ -149,7 +149,7 @@ def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
     _fabricate_cells(folder / "jobs-1", out, count)
     work: dict[str, Callable[[], Any]] = {
         "harness status": lambda: _run_harness("status", str(out), "--json"),
-        "table.csv and summary": lambda: _write_summary(out),
+        "summary.csv and groups": lambda: _write_summary(out),
         "harness report": lambda: _run_harness("report", str(out), "--json"),
     }
     rows = []
@@ -162,14 +162,14 @@ def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
 
 def _write_summary(out: Path) -> None:
     with CellIndex(out) as index:
-        write_table(index, out / "table.csv")
+        write_table(index, out / "summary.csv")
         compute_group_statistics(index)
 
 
 def _fabricate_cells(real: Path, out: Path, count: int) -> None:
     """Every row of a real sweep again and again, under other latencies and as other seeds."""
     (out / "cells").mkdir(parents=True)
-    for name in ("study.json", "manifest.json", "summary.json"):
+    for name in ("manifest.json", "summary.json"):
         shutil.copyfile(real / name, out / name)
     with CellIndex(real, read_only=True) as index:
         rows, facts = list(index.rows()), index.facts()

@@ -4,9 +4,7 @@ Metres and unit quaternions (w, x, y, z) in every key; a table for each station,
 What `[told]` holds is for whoever reads the file; nothing is taken from it.
 """
 
-import os
 import string
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,6 +14,7 @@ import numpy as np
 
 from harness.core.calibration import Calibration
 from harness.core.fields import build
+from harness.core.files import read_toml, write_bytes
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.skeleton import Skeleton
 from harness.errors import BadFile, BadInput, HarnessError
@@ -107,26 +106,17 @@ def write_calibration(path: Path, kept: CalibrationFile, *, force: bool = False)
     """There whole or not at all; BadFile as `require_writable` says, BadInput for a skeleton of other joints."""
     require_writable(path, force=force)
     target = path.resolve()  # what a link points to is replaced, not the link
-    beside = target.with_name(f".unfinished-{target.name}")
     text = "\n".join(_lines(kept)) + "\n"
     try:
-        beside.write_text(text, encoding="utf-8", errors="replace", newline="\n")
-        os.replace(beside, target)
+        write_bytes(target, text.encode("utf-8", errors="replace"))
     except OSError as error:
         raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Name another.") from error
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def read_calibration(path: Path | str) -> CalibrationFile:
     """BadFile for what is no calibration, comes from a newer version, or cannot be true."""
     path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise BadFile(path, f"it cannot be read ({error.strerror})", EXPECTED, _ADVICE) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", EXPECTED, _ADVICE) from error
+    content = read_toml(path, EXPECTED, _ADVICE)
     schema = content.get("schema")
     if schema != SCHEMA:
         advice = "This version of the harness reads no other."

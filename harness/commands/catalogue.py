@@ -2,14 +2,14 @@
 
 from pathlib import Path
 
-from harness.experiment.cell_scheduler import cell_names
-from harness.experiment.scenario import Scenario, load_scenario, shipped_placements, shipped_scenarios, variants
+from harness.experiment.planning import cell_names
+from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.score.metrics import DEFINITIONS
 from harness.stream.inputs import INPUT_COMBINATIONS
-from harness.study.placement.config import load_placement_study
+from harness.study.placement.config import load_placement_study, shipped_placements
 
 
 def build_catalogue() -> dict[str, dict[str, str]]:

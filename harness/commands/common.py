@@ -2,9 +2,10 @@
 
 import argparse
 import json
+import shlex
 import signal
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -34,9 +35,28 @@ def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) ->
         text = "clips at the same time (default 1; the demo's is 2)"
         verb.add_argument("--jobs", type=positive_int, default=1, metavar="N", help=text)
     if "mocap" in flags:
-        text = "library of real motion (default: the HARNESS_MOCAP variable)"
-        verb.add_argument("--mocap", type=Path, metavar="DIR", help=text)
+        add_mocap_flag(verb, "folder of real motion; may be repeated (default: those that HARNESS_MOCAP names)")
     return verb
+
+
+class _AddFolder(argparse.Action):
+    """Keeps one folder as its path, and several as a tuple of paths."""
+
+    def __call__(self, parser: Any, namespace: argparse.Namespace, values: Any, option: str | None = None) -> None:
+        earlier = getattr(namespace, self.dest)
+        several = earlier if isinstance(earlier, tuple) else (earlier,)
+        setattr(namespace, self.dest, values if earlier is None else (*several, values))
+
+
+def add_mocap_flag(verb: argparse.ArgumentParser, text: str) -> None:
+    """Add `--mocap DIR`, which may be given more than once (see `mocap_words`)."""
+    verb.add_argument("--mocap", type=Path, action=_AddFolder, metavar="DIR", help=text)
+
+
+def mocap_words(folders: Path | Sequence[Path] | None) -> list[str]:
+    """The words of a command line that name these folders of real motion."""
+    several = () if folders is None else (folders,) if isinstance(folders, Path) else folders
+    return [word for folder in several for word in ("--mocap", str(folder))]
 
 
 def add_line_flags(verb: argparse.ArgumentParser) -> None:
@@ -133,3 +153,8 @@ def print_result(
     """Print the lines, or with --json the content and the outcome's word; returns the outcome."""
     print(json.dumps({**content, "outcome": outcome.word}) if args.json else "\n".join(lines))
     return outcome
+
+
+def this_command() -> str:
+    """The command as typed, to print where it can be copied."""
+    return shlex.join(["harness", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""Verbs that tell whether something became worse: keep what a run measured, compare two of them."""
+"""The verb `compare`: tell whether one result is worse than another."""
 
 import argparse
 from pathlib import Path
@@ -8,22 +8,6 @@ from harness.errors import BadInput, Outcome
 
 _SIDE_HELP = "folder of a run or sweep, or of a baseline, or a baseline's name"
 _EVERYTHING = "everything"
-
-
-def add_baseline(verbs: Verbs) -> None:
-    text = "keep what a finished run measured, to compare with later"
-    verb = add_verb(verbs, "baseline", text, run_baseline)
-    verb.add_argument("what", choices=["save"], help="the one thing there is to do")
-    verb.add_argument("name", metavar="NAME", help="of the baseline; it becomes results/baselines/NAME")
-    verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
-    verb.add_argument("--force", action="store_true", help="replace a baseline of that name")
-
-
-def run_baseline(args: argparse.Namespace) -> Outcome:
-    from harness.compare.baseline import write_baseline
-
-    folder = write_baseline(args.run, args.name, force=args.force)
-    return print_result(args, {"baseline": str(folder)}, f"baseline: {folder}")
 
 
 def add_compare(verbs: Verbs) -> None:
@@ -41,22 +25,20 @@ def add_compare(verbs: Verbs) -> None:
 def run_compare(args: argparse.Namespace) -> Outcome:
     from dataclasses import asdict
 
-    from harness.compare.comparison import compare_results
+    from harness.compare.comparison import compare_runs
     from harness.compare.margins import GATED_METRICS
     from harness.core.files import to_json_types
     from harness.core.options import split_outside_brackets
     from harness.report.comparison.writer import text, write_comparison_page
-    from harness.results.reader import load_results
 
     if args.b is None and not args.methods:
         raise BadInput(f"{args.a} alone.", "Name two results, or two methods of one with --methods a,b.")
     methods = split_outside_brackets(args.methods, ",") if args.methods else []
     if len(methods) > 2:
         raise BadInput(f"--methods {args.methods} names {len(methods)} methods.", "Name one or two.")
-    a = load_results(args.a)
-    comparison = compare_results(
-        a,
-        a if args.b is None else load_results(args.b),
+    comparison = compare_runs(
+        args.a,
+        args.b,
         methods=(methods[0], methods[-1]) if methods else None,
         metrics=args.metrics.split(",") if args.metrics else GATED_METRICS,
         allow=args.allow.split(",") if args.allow else None,

@@ -1,29 +1,12 @@
-"""Verbs about recorded motion: look into a file, list a library, download one."""
+"""The verb `mocap`: list a library of real motion, or download one."""
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
-
-
-def add_inspect(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "inspect", "say what a motion file is, and what is wrong with it", run_inspect, "mocap")
-    verb.add_argument("file", type=Path)
-    verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second, for files that do not record it")
-    verb.add_argument("--unit", metavar="M", type=float, help="metres per unit of length, where files do not record it")
-
-
-def run_inspect(args: argparse.Namespace) -> Outcome:
-    from harness.mocap.file_inspection import inspect_file as inspect
-    from harness.mocap.sources import MOCAP_VARIABLE
-
-    library = args.mocap or (Path(os.environ[MOCAP_VARIABLE]) if os.environ.get(MOCAP_VARIABLE) else None)
-    found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
-    return print_result(args, found.as_dict(), *found.lines())
 
 
 def add_mocap(verbs: Verbs) -> None:

@@ -5,8 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result
-from harness.commands.run import this_command
+from harness.commands.common import Verbs, add_mocap_flag, add_verb, positive_int, print_result, this_command
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -15,8 +14,8 @@ def add_paper(verbs: Verbs) -> None:
     text = "rerun every experiment of a paper beside its published figures; resumes what was interrupted"
     verb = add_verb(verbs, "paper", text, run_paper, "out")
     verb.add_argument("paper", choices=["liu2011", "kim2012"], help="Liu et al. 2011, or Kim, Seol and Lee 2012")
-    text = "on the real motion in this library (default: on the built-in performer)"
-    verb.add_argument("--mocap", type=Path, metavar="DIR", help=text)
+    text = "use the real motion in this folder; may be repeated (default: synthetic motion)"
+    add_mocap_flag(verb, text)
     verb.add_argument("--seed", type=int, default=1, help="of all runs (default 1)")
     verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
 

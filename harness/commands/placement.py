@@ -5,8 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result
-from harness.commands.run import this_command
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, this_command
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -14,7 +13,7 @@ from harness.errors import Outcome
 def add_placement(verbs: Verbs) -> None:
     text = "find out which trackers to wear and where: sets of candidates, ranked; resumes what was interrupted"
     verb = add_verb(verbs, "placement", text, run_placement, "out", "mocap")
-    verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as placement_walking")
+    verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as walking")
     verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
 
 
@@ -27,9 +26,12 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     from harness.report.placement.writer import write_placement_page
     from harness.study.placement.placement_study import FINDINGS, run_placement
 
-    out = args.out or Path("results") / Path(args.study).stem
-    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
-        each = process_executor(args.jobs)
+    out = args.out or Path("results") / f"placement_{Path(args.study).stem.removeprefix('placement_')}"
+    with (
+        ProgressBar("cells") as bar,
+        redirect_stdout(sys.stderr),  # what a method prints is talk
+        process_executor(args.jobs) as each,
+    ):
         findings, outcome = run_placement(
             args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
         )

@@ -16,7 +16,16 @@ from typing import Any
 
 from harness.compare.margins import MARGINS
 from harness.compare.matching import PAIRING_KEYS
-from harness.core.files import TEMPORARY, content_key, read_json, to_json, to_json_types, write_json, write_text
+from harness.core.files import (
+    content_key,
+    move_into_place,
+    read_json,
+    temporary_path,
+    to_json,
+    to_json_types,
+    write_json,
+    write_text,
+)
 from harness.errors import BadInput
 from harness.results.reader import BASELINES, CELLS_FILE, COUNT_METRICS, SCHEMA, ResultSet, load_results
 from harness.score.metrics import DEFINITIONS
@@ -46,7 +55,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
         raise BadInput(
             f"There is a baseline {name} already ({target}).", "Choose another name, or replace it with --force."
         )
-    beside = folder / f"{TEMPORARY}{os.getpid()}-{name}"
+    beside = temporary_path(target)
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir(parents=True)
     summary = read_json(run / "summary.json", "the summary of a run or sweep")
@@ -56,7 +65,7 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
     before = beside.with_name(f"{beside.name}-before")
     if target.exists():
         os.rename(target, before)
-    os.rename(beside, target)
+    move_into_place(beside, target)
     shutil.rmtree(before, ignore_errors=True)
     return target
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import get_args
 
 from harness.compare.comparability import (
@@ -28,9 +29,9 @@ from harness.compare.significance import Verdict
 from harness.core.files import to_json_types
 from harness.errors import Outcome
 from harness.results.manifest import Manifest, flatten
-from harness.results.reader import ResultSet
+from harness.results.reader import ResultSet, load_results
 
-__all__ = ["EVERYTHING", "Comparison", "Difference", "Verdict", "compare_results"]
+__all__ = ["EVERYTHING", "Comparison", "Difference", "Verdict", "compare_results", "compare_runs"]
 
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
@@ -113,6 +114,23 @@ def compare_results(
         coverage=tuple(faults["coverage"]),
         failed=missing,
     )
+
+
+def compare_runs(
+    a: Path | str,
+    b: Path | str | None = None,
+    *,
+    methods: tuple[str, str] | None = None,
+    metrics: Sequence[str] = GATED_METRICS,
+    allow: Sequence[str] | None = None,
+) -> Comparison:
+    """Load two results and compare them, A as the reference; without B, two methods of A (see `compare_results`).
+
+    Each side is the folder of a run or sweep, the folder of a baseline, or the name of a baseline.
+    """
+    reference = load_results(a)
+    other = reference if b is None else load_results(b)
+    return compare_results(reference, other, methods=methods, metrics=metrics, allow=allow)
 
 
 def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:

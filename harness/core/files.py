@@ -1,10 +1,12 @@
-"""JSON that is the same for the same content, and files that are there whole or not at all."""
+"""JSON with the same text for the same content, atomic writers, and one reader each for JSON and TOML."""
 
 import hashlib
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from enum import Enum
 from pathlib import Path
 from typing import Any
@@ -15,11 +17,13 @@ from numpy.typing import NDArray
 from harness.errors import BadFile
 
 TEMPORARY = ".unfinished-"
-"""What names of things begin with that are still being written; a killed run leaves them behind."""
+"""Prefix of the names of files and folders that are still being written; a killed process leaves them behind."""
+MAX_TOML_BYTES = 4_000_000
+"""Larger files are refused before they are parsed [choice]: the largest that the harness writes has some 10 kB."""
 
 
 def to_json_types(value: Any) -> Any:
-    """The same value in JSON's own types; NaN and infinity become null."""
+    """Convert a value to JSON's types; NaN and infinity become null."""
     match value:
         case Mapping():
             return {str(key): to_json_types(item) for key, item in value.items()}
@@ -38,13 +42,13 @@ def to_json_types(value: Any) -> Any:
 
 
 def content_key(content: Any) -> str:
-    """32 hex digits that stand for the content, whatever the order of its keys."""
+    """Hash of some content, 32 hex digits, independent of the order of its keys."""
     text = json.dumps(to_json_types(content), sort_keys=True, separators=(",", ":"), allow_nan=False)
     return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def digest(*arrays: NDArray[Any]) -> str:
-    """16 hex digits that stand for the values and shapes of arrays."""
+    """Hash of the values and shapes of arrays, 16 hex digits."""
     state = hashlib.blake2b(digest_size=8)
     for array in arrays:
         state.update(str(array.shape).encode())
@@ -52,31 +56,79 @@ def digest(*arrays: NDArray[Any]) -> str:
     return state.hexdigest()
 
 
+def temporary_path(path: Path) -> Path:
+    """The name under which this process writes a file or folder before it moves it to `path`."""
+    return path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
+
+
+def move_into_place(temporary: Path, path: Path) -> None:
+    """Flush a finished file or folder to the disk and rename it: readers see the old state or the new one, never less.
+
+    An existing file is replaced; OSError when `path` is a folder with anything in it. Of a folder that is moved, the
+    files inside have to be flushed before (`flush`).
+    """
+    flush(temporary)
+    os.replace(temporary, path)
+    flush(path.parent)
+
+
+def flush(path: Path) -> None:
+    """Flush a file, or the list of names in a folder, to the disk (fsync); Windows flushes no folders."""
+    if os.name == "nt" and path.is_dir():
+        return
+    descriptor = os.open(path, os.O_RDWR if path.is_file() else os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """A temporary path to write a file to, which takes the place of `path` when the block ends without an error."""
+    temporary = temporary_path(path)
+    try:
+        yield temporary
+        move_into_place(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file atomically (see `move_into_place`)."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(data)
+
+
 def write_text(path: Path, text: str) -> None:
-    """Write beside, flush to the disk, rename: readers see the old file or the new one."""
+    """Write a text file in UTF-8 atomically, its line ends unchanged."""
     write_parts(path, [text])
 
 
 def write_parts(path: Path, texts: Iterable[str]) -> None:
-    """The same with a text that comes in parts."""
-    beside = path.with_name(f"{TEMPORARY}{os.getpid()}-{path.name}")
-    with open(beside, "w", encoding="utf-8", newline="") as file:
+    """Write a text file atomically from its parts, one after another."""
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="utf-8", newline="") as file:
         file.writelines(texts)
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(beside, path)
+
+
+def write_npz(path: Path, **arrays: Any) -> None:
+    """Write arrays by name atomically, as `numpy.savez` does."""
+    with atomic_path(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **arrays)
 
 
 def write_json(path: Path, content: Any) -> None:
+    """Write content as JSON atomically (see `to_json`)."""
     write_text(path, to_json(content))
 
 
 def to_json(content: Any) -> str:
+    """JSON text of the content, indented by one space; NaN and infinity become null."""
     return json.dumps(to_json_types(content), indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def read_json(path: Path, expected: str) -> dict[str, Any]:
-    """A JSON object; BadFile says what was expected of a file that is none."""
+    """Read a JSON object; BadFile, which says what was expected, when the file holds none."""
     advice = "Is this a folder written by `harness run`?"
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
@@ -87,3 +139,21 @@ def read_json(path: Path, expected: str) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise BadFile(path, f"a JSON {type(content).__name__}", expected, advice)
     return content
+
+
+def read_toml(path: Path, expected: str, advice: str) -> dict[str, Any]:
+    """Read a TOML file of at most MAX_TOML_BYTES; BadFile, in one line, when there is none or it is no TOML.
+
+    `expected` and `advice` complete the message: what the file should be, and what to try.
+    """
+    try:
+        with open(path, "rb") as file:
+            data = file.read(MAX_TOML_BYTES + 1)
+        if len(data) > MAX_TOML_BYTES:
+            raise BadFile(path, f"more than {MAX_TOML_BYTES} bytes", expected, advice)
+        return tomllib.loads(data.decode("utf-8").replace("\r\n", "\n"))
+    except OSError as error:
+        raise BadFile(path, f"it cannot be read ({error.strerror})", expected, advice) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise BadFile(path, f"not TOML: {reason}", expected, advice) from error

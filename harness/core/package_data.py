@@ -1,17 +1,19 @@
-"""Where the data files of the project lie: beside the package in a source checkout, inside it once installed."""
+"""The version of the package, and where its files lie: beside it in a source checkout, inside it once installed."""
 
 from pathlib import Path
 
-import harness
 from harness.errors import UnknownName
 
+VERSION = "0.1.0"
+"""Version of the package, as in pyproject.toml."""
+PACKAGE_FOLDER = Path(__file__).parents[1]
+"""The folder `harness` with the source."""
 _DATA_FOLDERS = ("models", "scenarios")
 
 
 def data_folder(name: str) -> Path:
-    """The folder `models` or `scenarios`; UnknownName for any other or when it was not installed."""
-    package = Path(harness.__file__).parent
-    for folder in (package / "share" / name, package.parent / name):
+    """The folder `models` or `scenarios`; UnknownName for any other, and for one that was not installed."""
+    for folder in (PACKAGE_FOLDER / "share" / name, PACKAGE_FOLDER.parent / name):
         if name in _DATA_FOLDERS and folder.is_dir():
             return folder
     raise UnknownName("data folder", name, _DATA_FOLDERS)

@@ -7,7 +7,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
-from harness import __version__
 from harness.body.humanoid import Body, build_body
 from harness.body.mounts import Mount
 from harness.calibrate import calibration_report
@@ -20,11 +19,12 @@ from harness.calibrate.poses import POSES, CalibrationPose, configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.calibrate.tpose_calibration import calibrate_tpose
 from harness.core.arrays import Floats
+from harness.core.package_data import VERSION
 from harness.core.split import ClipPart
 from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.playback import prepare_playback, select_stations
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario, expand_clips, load_scenario
 from harness.stream.frame import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
@@ -55,7 +55,7 @@ class CalibrationSession:
     @cached_property
     def resolved_scenario(self) -> Scenario:
         """With no other stations, in this order."""
-        scenario = load_scenario(self.scenario)
+        scenario = expand_clips(load_scenario(self.scenario), self.folder)
         worn = select_stations(scenario, self.stations)
         return replace(scenario, stations={name: scenario.stations[name] for name in worn}, worn=())
 
@@ -117,7 +117,7 @@ class CalibrationSession:
                 self.body.skeleton,
                 calibration_report.report_tpose_calibration(tpose),
             )
-        made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {__version__}"}
+        made = {"made": datetime.now(UTC).isoformat(timespec="seconds"), "by": f"harness {VERSION}"}
         made |= {"source": source, "scenario": self.resolved_scenario.name}
         made |= {"others": self.space.source} if self.kind == "poses" else {}
         return CalibrationOutcome(CalibrationFile(calibration, skeleton, {**made, **words}), lines)

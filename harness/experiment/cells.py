@@ -1,16 +1,17 @@
-"""Cells: which there are, how one is made, and what became of it.
+"""Cells: how one is planned, evaluated and written, and its outcome.
 
-A job is one test clip: simulated once for every combination of varied values, then shown to every method with every
-choice of inputs. Each of these is a cell, written whole or not at all, so that whoever runs jobs can be stopped at any
-moment and goes on where they were.
+A task is one test clip. It is simulated once for every combination of varied values, and every method reconstructs it
+from every choice of inputs. Each of these is a cell. A cell is written whole or not at all, so that a task can be
+stopped at any moment and resumed.
 """
 
 import time
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
+from platform import node
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import ClipPart
-from harness.errors import HarnessError, was_interrupted
+from harness.errors import BadInput, HarnessError, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.reference_workload import FRAMES_PER_TIMING, ReferenceWorkload
 from harness.experiment.scenario import Scenario, ScenarioMotion, variants
@@ -35,32 +36,34 @@ from harness.stream.codec.reader import WireFormat
 from harness.stream.inputs import Inputs, make_inputs
 
 ProgressCallback = Callable[[str, int, int], None]
-"""Called with what was done last, how many cells are finished and how many were planned."""
-
+"""Called with the name of the last cell, the number of cells that ended and the number that were planned."""
 
 VariedValues = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class PlannedCell:
-    """One cell to come."""
+    """A cell before it is evaluated."""
 
     scenario: Scenario
-    """With the varied values put in."""
+    """The variant of the scenario: the varied values are put in."""
     varied: VariedValues
     part: ClipPart
     method: str
     inputs: str
+    label: str = ""
+    """Name of the scenario in a folder of several scenarios."""
 
     def __str__(self) -> str:
-        """What the cell is called."""
-        besides = [text for text in (self.inputs, varied_text(self.varied)) if text not in ("", "pos+ori")]
-        return f"{self.method} on {self.part}" + (f" ({', '.join(besides)})" if besides else "")
+        """Name of the cell."""
+        details = [text for text in (self.inputs, varied_text(self.varied)) if text not in ("", "pos+ori")]
+        label = f"{self.label}: " if self.label else ""
+        return f"{label}{self.method} on {self.part}" + (f" ({', '.join(details)})" if details else "")
 
 
 @dataclass(frozen=True)
 class ClipTask:
-    """One test clip of a scenario; everything a worker process needs to know."""
+    """One test clip of a scenario: everything that a worker process needs."""
 
     scenario: Scenario
     part: ClipPart
@@ -70,12 +73,14 @@ class ClipTask:
     command: str
     """The command that reproduces the run."""
     chosen: tuple[int, ...] = ()
-    """Which of the scenario's variants, () for all: several workers may share the variants of one clip."""
+    """Indices of the scenario's variants, () for all: several workers may share the variants of one clip."""
+    label: str = ""
+    """See `PlannedCell.label`."""
 
     def cells(self) -> list[PlannedCell]:
         """One for each combination of varied values, inputs and methods."""
         return [
-            PlannedCell(scenario, varied, self.part, method, inputs)
+            PlannedCell(scenario, varied, self.part, method, inputs, self.label)
             for varied, scenario in variants(self.scenario, self.chosen)
             for inputs in scenario.inputs
             for method in scenario.methods
@@ -84,67 +89,80 @@ class ClipTask:
 
 @dataclass(frozen=True)
 class CellOutcome:
-    """What became of one cell."""
+    """Outcome of one cell."""
 
     cell: str
+    """Name of the cell."""
     key: str = ""
-    """Of the finished cell."""
+    """Key of the finished cell, "" if it failed."""
     failure: str = ""
-    """Why there is none: a refusal in one line, or a traceback."""
+    """A refusal in one line or a traceback, "" if the cell is finished."""
     refused: bool = False
     row: Mapping[str, Any] | None = None
-    """Of the finished cell, as `results.cell.as_row` has it; also of one that was finished before."""
+    """Row of the finished cell, as `results.cell.as_row` gives it; also of a cell that was finished before."""
     seconds: float = 0.0
-    """It took here, with what it made for the cells after it [s]; 0 for one that was finished before."""
+    """Wall time of this cell and of what it prepared for later cells [s]; 0 if it was finished before."""
 
 
-def run_clip_task(job: ClipTask, out: Path, stop: Path | None = None) -> Iterator[CellOutcome]:
-    """Every cell of one clip, in order; a failure is reported in its place. It ends early once the file `stop` is."""
-    for cell in job.cells():
-        if stop is not None and stop.exists():
+def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[CellOutcome]:
+    """Run the cells of one task in order, and yield each outcome; it ends early once the file `stop` exists.
+
+    BadInput on a computer that does not see the folder `out`. Workers clear their caches for each new `session`.
+    """
+    if not (out / "cells").is_dir():
+        raise BadInput(f"A worker on {node()} does not see {out}.", "Name a folder with --out that all workers share.")
+    _start_session(session)
+    for cell in task.cells():
+        if stop.exists():
             return
         start = time.perf_counter()
         try:
-            setting, method = _clip_evaluation(job, cell.scenario), _resolve_method(cell.method)
-            key = setting.key(method, cell.method, cell.inputs, cell.varied)
+            evaluation, method = _clip_evaluation(task, cell.scenario), _resolve_method(cell.method)
+            key = evaluation.key(method, cell.method, cell.inputs, cell.varied)
             if storage.has_cell(out, key):
                 yield CellOutcome(str(cell), key, row=read_row(cell_folder(out, key)))
                 continue
-            made = evaluate_cell(setting, method, cell, key, job.command)
-            storage.write_cell(out, made)
-            yield CellOutcome(str(cell), key, row=as_row(made), seconds=time.perf_counter() - start)
+            evaluated = evaluate_cell(evaluation, method, cell, key, task.command)
+            storage.write_cell(out, evaluated)
+            yield CellOutcome(str(cell), key, row=as_row(evaluated), seconds=time.perf_counter() - start)
         except HarnessError as error:
             yield CellOutcome(str(cell), failure=str(error), refused=True)
-        except (Exception, SystemExit) as error:  # a method may raise anything: its cell fails, the run goes on
+        except (Exception, SystemExit) as error:  # a method may raise anything: its cell alone fails
             if was_interrupted(error):
                 raise KeyboardInterrupt from error
             yield CellOutcome(str(cell), failure=traceback.format_exc())
 
 
+@cache
+def _start_session(session: str) -> None:
+    """A worker may live on from another session, and files that it has read may have changed since."""
+    clear_caches()
+
+
 _recent_evaluations: list[ClipEvaluation] = []
-"""What this process worked at, for the next job may be of the same clip."""
+"""The last evaluation of this process: the next cell may be of the same clip."""
 
 
-def _clip_evaluation(job: ClipTask, scenario: Scenario) -> ClipEvaluation:
-    """Shares with the one before what may be shared."""
-    source, now = open_scenario_motion(scenario.motion, job.folder, scenario.seed), None
+def _clip_evaluation(task: ClipTask, scenario: Scenario) -> ClipEvaluation:
+    """The evaluation of a task's clip, which shares with the last one what does not differ."""
+    source, evaluation = open_scenario_motion(scenario.motion, task.folder, scenario.seed), None
     for last in _recent_evaluations:
-        if last.source is source and (last.part, last.behaviour) == (job.part, job.behaviour):
-            now = last if last.scenario == scenario else last.with_conditions(scenario)
-    _recent_evaluations[:] = [now or ClipEvaluation(scenario, source, job.part, job.behaviour)]
+        if last.source is source and (last.part, last.behaviour) == (task.part, task.behaviour):
+            evaluation = last if last.scenario == scenario else last.with_conditions(scenario)
+    _recent_evaluations[:] = [evaluation or ClipEvaluation(scenario, source, task.part, task.behaviour)]
     return _recent_evaluations[0]
 
 
 @cache
 def _resolve_method(name: str) -> Method:
-    """Whatever package it is of: to look through all that are installed takes longer than to write a cell."""
+    """The method of that name. Searching the installed packages takes longer than writing a cell, hence the cache."""
     return registry.resolve(name)
 
 
 def evaluate_cell(
     setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
 ) -> storage.Cell:
-    """Fit, run causally over the stream, score."""
+    """Fit a method, run it causally over the simulated stream, and score its estimates."""
     scenario, simulation = setting.scenario, setting.simulation
     seen = make_inputs(planned.inputs, simulation.stations)
     known, fitted = setting.performer_calibration, setting.fit_method(method, planned.method)
@@ -205,10 +223,11 @@ def evaluate_cell(
 def run_method(
     reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
 ) -> tuple[Floats, Ints, Floats, tuple[Floats, Floats]]:
-    """Estimates (F, 55), status (F,), wall time of each step (F,), CPU time of each and of the reference (F,) [ms].
+    """Run a reconstructor over a stream. It never sees the truth.
 
-    Reference work follows every so many steps. The step after it finds the method's data gone from the caches and is
-    not timed, NaN: times are of steps that follow a step. The truth stays on this side.
+    Returns the estimates (F, 55), status (F,), wall time of each step (F,) [ms], and the CPU times (F,) of each step
+    and of the reference work [ms]. Reference work follows every `FRAMES_PER_TIMING` steps. It evicts the method's data
+    from the processor's caches, so the step after it is not timed (NaN).
     """
     session, work = reconstructor.begin(calibration), ReferenceWorkload()
     qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
@@ -232,7 +251,7 @@ def open_scenario_motion(motion: ScenarioMotion, folder: Path | None, seed: int)
 
 
 def clear_caches() -> None:
-    """Whoever begins a run calls this: files may have changed since the last one."""
+    """Forget motion, methods and evaluations: files may have changed since the last run."""
     _cached_source.cache_clear()
     _resolve_method.cache_clear()
     _recent_evaluations.clear()
@@ -240,14 +259,23 @@ def clear_caches() -> None:
 
 @lru_cache(maxsize=2)
 def _cached_source(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
-    """One for all the clips of a run: they share examples."""
+    """One source for all clips of a run, which share examples."""
     return open_motion_source(kind, folder, seed=seed, rate_hz=rate_hz)
 
 
-def check_names(scenario: Scenario, source: MotionSource, parts: list[ClipPart]) -> None:
-    """Everything that a scenario names exists: clips, methods, inputs, bones, components. UnknownName, BadInput."""
-    withheld = {ClipPart.parse(text).clip for text in scenario.motion.withheld}
-    for name in {part.clip for part in parts} | set(scenario.motion.examples) | withheld:
+def check_names(scenarios: Iterable[Scenario], folder: Path | None) -> None:
+    """Check that everything exists which the scenarios and their variants name, before hours of work begin.
+
+    These are clips, methods, inputs, bones and components. UnknownName, BadInput.
+    """
+    for scenario in scenarios:
+        for _, variant in variants(scenario):
+            _check_variant_names(variant, open_scenario_motion(variant.motion, folder, variant.seed))
+
+
+def _check_variant_names(scenario: Scenario, source: MotionSource) -> None:
+    parts = {ClipPart.parse(text).clip for text in (*scenario.motion.test, *scenario.motion.withheld)}
+    for name in parts | set(scenario.motion.examples):
         source.check(name)
     for name in scenario.methods:
         _resolve_method(name)

@@ -1,13 +1,22 @@
-"""The whole loop: mocap -> body -> simulate -> calibrate -> reconstruct -> score -> report, clip by clip."""
+"""The engine: it runs the cells of scenarios into one folder, for a run, a sweep or a placement study.
 
-from collections.abc import Iterator
+A run is a sweep of one scenario. Finished cells are kept, and the same command resumes an interrupted folder. Workers
+write cells, this process alone writes the index and the summary.
+"""
+
+import difflib
+import os
+import time
+import traceback
+from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
-from harness.core.split import ClipPart
-from harness.core.workers import run_in_workers
-from harness.errors import BadInput, Outcome
+from harness.core.files import TEMPORARY, content_key
+from harness.errors import BadInput, HarnessError, Outcome
 from harness.experiment.cells import (
     CellOutcome,
     ClipTask,
@@ -15,13 +24,32 @@ from harness.experiment.cells import (
     check_names,
     clear_caches,
     open_scenario_motion,
-    run_clip_task,
+    run_task,
 )
-from harness.experiment.scenario import Scenario, variants
+from harness.experiment.executors import TaskExecutor, process_executor
+from harness.experiment.interruption import graceful_stop
+from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
+from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
+from harness.experiment.sweep_config import Sweep
 from harness.reconstruct import registry
-from harness.results import manifest, storage
-from harness.results.cell import varied_text
+from harness.results import storage
+from harness.results.index import CellIndex
 from harness.results.lock import folder_lock
+from harness.results.manifest import Manifest, describe_run, source_hash
+
+_CIRCUMSTANCE_KEYS = ("name", "methods", "expected_order", "left_out", "fault")
+"""Keys of a scenario that are no inputs of a sweep; the name is in the scenario's label."""
+
+
+@dataclass(frozen=True)
+class CellResults:
+    """Results of the cells that `run_cells` was asked for."""
+
+    rows: tuple[Mapping[str, Any], ...]
+    """Rows of the finished cells in planned order, as `results.cell.as_row` gives them, and `seconds`."""
+    failures: Mapping[str, str]
+    """Cell -> a refusal in one line, or a traceback."""
+    planned: int
 
 
 def run(
@@ -33,64 +61,219 @@ def run(
     command: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,
 ) -> Outcome:
-    """Run what is not finished yet, and write summary.json and summary.csv of all of it.
+    """Run the cells of a scenario that are not finished yet, with `jobs` processes, and write the summary.
 
-    `out` is made, or resumed when it holds this very scenario, else refused (BadInput). A cell that fails is
-    listed with its traceback and never stops the rest; when nothing but refusals came out, the first one is raised.
-    NOT_COMPARABLE when every cell came below the floor of coverage, so that nothing was measured.
-    Names that do not exist are refused before anything is written.
+    The folder `out` is created, or resumed if it holds this scenario, else refused (BadInput). `folder` is the library
+    of real motion. A cell that fails is listed with its traceback and stops no other cell. Names that do not exist are
+    refused before anything is written. If every cell is refused, the first refusal is raised (BadInput). The first
+    Ctrl-C lets running cells finish before KeyboardInterrupt is raised, the second one stops at once.
+
+    Returns PASS; INCOMPLETE if cells are missing; NOT_COMPARABLE if no cell reached the floor of coverage.
     """
-    clear_caches()
-    parts = [ClipPart.parse(text) for text in scenario.motion.test]
-    behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
-    todo = [ClipTask(scenario, part, b, folder, command) for part, b in zip(parts, behaviours, strict=True)]
-    for _, made in reversed(variants(scenario)):
-        source = open_scenario_motion(made.motion, folder, made.seed)
-        check_names(made, source, parts)
+    scenario = expand_clips(scenario, folder)
     content = asdict(scenario)
-    del content["fault"]  # of an emulator alone: a run is the same with and without
-    constants = {name: repr(registry.resolve(name)) for name in scenario.methods}
-    described = manifest.describe_run(content, motion_source=source.title, command=command, constants=constants)
-    storage.open_run(out, described)
-    planned = _cells_in_table_order(todo)
-    ended: dict[str, CellOutcome] = {}
-    with folder_lock(out, alone=False):
+    del content["fault"]  # faults concern the emulator alone, a run does not depend on them
+    with process_executor(jobs) as executor:
+        return _run_folder(
+            "run",
+            scenario.name,
+            content,
+            [scenario],
+            out,
+            folder=folder,
+            executor=executor,
+            workers=jobs,
+            command=command,
+            progress=progress,
+        )
+
+
+def run_sweep(
+    sweep: Sweep,
+    scenarios: Sequence[Scenario],
+    out: Path,
+    *,
+    folder: Path | None,
+    executor: TaskExecutor,
+    workers: int,
+    command: str,
+    only: str = "",
+    progress: ProgressCallback = lambda cell, done, planned: None,
+) -> Outcome:
+    """Run the cells of a sweep's scenarios that are not finished yet, or `only` the cell of that name; see `run`.
+
+    `command` repeats the sweep; with `--cell` and a name it runs one cell.
+    """
+    content = {
+        "sweep": sweep.name,
+        "scenarios": {
+            scenario_label(scenario): {k: v for k, v in asdict(scenario).items() if k not in _CIRCUMSTANCE_KEYS}
+            for scenario in scenarios
+        },
+        "methods": list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)),
+    }
+    return _run_folder(
+        "sweep",
+        sweep.name,
+        content,
+        scenarios,
+        out,
+        folder=folder,
+        executor=executor,
+        workers=workers,
+        command=command,
+        only=only,
+        progress=progress,
+    )
+
+
+def run_cells(
+    scenarios: Sequence[Scenario],
+    out: Path,
+    *,
+    folder: Path | None,
+    executor: TaskExecutor,
+    command: str,
+    progress: ProgressCallback = lambda cell, done, planned: None,
+    workers: int | None = None,
+) -> CellResults:
+    """Run the cells of scenarios that the existing folder `out` does not have yet, and return the results of all.
+
+    A search calls this again and again in one folder; cells of earlier calls stay in the index. Tasks are planned for
+    `workers` workers, by default one per core. BadInput when two cells have the same name.
+    """
+    names = [name for scenario in scenarios for name in cell_names(scenario)]
+    tasks = plan_tasks(scenarios, folder, command, workers or os.cpu_count() or 1)
+    with folder_lock(out), CellIndex(out) as index:
+        outcomes = _run_tasks(index, names, tasks, out, executor, progress)
+        keys = [outcomes[name].key for name in names if name in outcomes and not outcomes[name].failure]
+        failures = {name: outcomes[name].failure for name in names if name in outcomes and outcomes[name].failure}
+        return CellResults(tuple(index.rows_of(keys)), failures, len(names))
+
+
+def _run_folder(
+    kind: str,
+    name: str,
+    content: Mapping[str, Any],
+    scenarios: Sequence[Scenario],
+    out: Path,
+    *,
+    folder: Path | None,
+    executor: TaskExecutor,
+    workers: int,
+    command: str,
+    progress: ProgressCallback,
+    only: str = "",
+) -> Outcome:
+    """Run scenarios into a folder of their own; `content` is what the manifest says of them."""
+    clear_caches()
+    check_names(scenarios, folder)
+    labelled = kind == "sweep"
+    names = [cell for scenario in scenarios for cell in cell_names(scenario, labelled=labelled)]
+    tasks = plan_tasks(scenarios, folder, command, workers, labelled=labelled)
+    if only:
+        tasks = [single for task in tasks for single in split_task(task) if str(single.cells()[0]) == only]
+        if not tasks:
+            near = difflib.get_close_matches(only, names, n=1)
+            hint = f" Did you mean {near[0]!r}?" if near else ""
+            raise BadInput(f"No cell is called {only!r}.{hint}", f"`harness status {out}` names those that failed.")
+    storage.open_run(out, _describe(content, scenarios, folder, command))
+    with folder_lock(out), CellIndex(out) as index:
+        index.add_from_folders()
+        index.plan(names)
+        index.note(kind=kind, name=name, command=command)
         try:
-            for cell in _run_cells(todo, out, jobs):
-                ended[cell.cell] = cell
-                progress(cell.cell, len(ended), len(planned))
+            outcomes = _run_tasks(index, [only] if only else names, tasks, out, executor, progress)
         finally:
-            in_order = [ended[cell] for cell in planned if cell in ended]
-            failed = {cell.cell: cell.failure for cell in in_order if cell.failure}
-            keys = [cell.key for cell in in_order if not cell.failure]
-            orders = scenario.expected_order
-            summary = storage.write_summary(out, keys=keys, planned=len(planned), failures=failed, orders=orders)
-    if failed and all(cell.refused for cell in in_order):
-        raise BadInput(f"Nothing could be run. {next(iter(failed.values()))}", "")
-    if failed:
-        return Outcome.INCOMPLETE
-    measured = any(row["joint_angle_mean_deg"] is not None for row in summary["cells"])
-    return Outcome.PASS if measured else Outcome.NOT_COMPARABLE
+            summary = storage.write_summary(
+                index,
+                out,
+                kind=kind,
+                name=name,
+                command=command,
+                scenarios=[scenario_label(scenario) for scenario in scenarios],
+                vary=dict(pair for scenario in scenarios for pair in dotted_keys(scenario.vary)),
+                orders=scenarios[0].expected_order if kind == "run" else None,
+            )
+        if outcomes and all(cell.refused for cell in outcomes.values()):
+            raise BadInput(f"Nothing could be run. {next(iter(outcomes.values())).failure}", "")
+        return next(outcome for outcome in Outcome if outcome.word == summary["outcome"])
 
 
-def _cells_in_table_order(todo: list[ClipTask]) -> list[str]:
-    """Every cell as tables list them: the varied values change slowest, then the clips."""
-    cells = [cell for job in todo for cell in job.cells()]
-    places = {varied_text(varied): place for place, (varied, _) in enumerate(variants(todo[0].scenario))}
-    return [str(cell) for cell in sorted(cells, key=lambda cell: places[varied_text(cell.varied)])]
+def _describe(content: Mapping[str, Any], scenarios: Sequence[Scenario], folder: Path | None, command: str) -> Manifest:
+    sources = list(dict.fromkeys(open_scenario_motion(s.motion, folder, s.seed).title for s in scenarios))
+    constants = {name: repr(registry.resolve(name)) for name in content["methods"]}
+    source = sources if "sweep" in content else sources[0]
+    return describe_run(content, motion_source=source, command=command, constants=constants)
 
 
-def _run_cells(todo: list[ClipTask], out: Path, jobs: int) -> Iterator[CellOutcome]:
-    if min(jobs, len(todo)) <= 1:
-        for job in todo:
-            yield from run_clip_task(job, out)
-        return
-    for which, done in run_in_workers(_run_whole_task, [(job, out) for job in todo], min(jobs, len(todo))):
-        try:
-            yield from done.result()
-        except BrokenExecutor:
-            yield from (CellOutcome(str(cell), failure="a worker process died") for cell in todo[which].cells())
+def _run_tasks(
+    index: CellIndex,
+    names: Sequence[str],
+    tasks: Sequence[ClipTask],
+    out: Path,
+    executor: TaskExecutor,
+    progress: ProgressCallback,
+) -> dict[str, CellOutcome]:
+    """Run tasks and record every cell in the index; the outcomes of the cells by name."""
+    if len(set(names)) < len(names):
+        twice = next(name for place, name in enumerate(names) if name in names[:place])
+        raise BadInput(f"Two cells are called {twice!r}.", "Scenarios of other content need other names.")
+    (out / "cells").mkdir(exist_ok=True)
+    storage.remove_leftovers(out)
+    index.expect(names)
+    # While the code is the same, cells of the last time count as finished before they are looked at again.
+    sources, failed = _source_hash(tasks), index.failures()
+    index.reset(names if index.facts().get("sources") != sources else [name for name in names if name in failed])
+    index.note(sources=sources, started_s=time.time(), made=0)
+    stop, outcomes, made = out / f"{TEMPORARY}{os.getpid()}-stop", dict[str, CellOutcome](), 0
+
+    def record(cell: CellOutcome) -> None:
+        nonlocal made
+        if cell.row is not None:
+            index.add([cell.row], [cell.seconds or None])
+        index.record_outcomes([(cell.cell, cell.key, cell.failure)])
+        made += cell.seconds > 0.0
+        index.note(made=made, seen_s=time.time())
+        outcomes[cell.cell] = replace(cell, row=None)  # the row is in the index
+        progress(cell.cell, len(outcomes), len(names))
+
+    def attempt(tasks: Sequence[ClipTask]) -> list[ClipTask]:
+        """Run tasks; those whose worker died."""
+        if not tasks or stop.exists():
+            return []
+        broken = []
+        arguments = [(_session_id(), task, out.absolute(), stop.absolute()) for task in tasks]
+        for which, future in executor(run_task, arguments):
+            try:
+                for cell in future.result():
+                    record(cell)
+            except BrokenExecutor:
+                broken.append(tasks[which])
+            except HarnessError:
+                raise
+            except Exception:  # the task could not be sent or answered: its cells fail, the others go on
+                failure = traceback.format_exc()
+                for planned in tasks[which].cells():
+                    if str(planned) not in outcomes:
+                        record(CellOutcome(str(planned), failure=failure))
+        return broken
+
+    with graceful_stop(stop):
+        broken = attempt(tasks)
+        # One cell of a task may be to blame for the worker's death: the cells are tried one by one.
+        for task in attempt([single for task in broken for single in split_task(task)]):
+            record(CellOutcome(str(task.cells()[0]), failure="a worker process died"))
+    return outcomes
 
 
-def _run_whole_task(job: ClipTask, out: Path) -> list[CellOutcome]:
-    return list(run_clip_task(job, out))
+@cache
+def _session_id() -> str:
+    """Name of this process for workers, which clear their caches when it changes."""
+    return f"{os.getpid()} {time.time_ns()}"
+
+
+def _source_hash(tasks: Sequence[ClipTask]) -> str:
+    """Hash of the source of the package and of all methods."""
+    names = sorted({name for task in tasks for name in task.scenario.methods})
+    return content_key([source_hash(), [registry.source_hash(registry.resolve(name)) for name in names]])

@@ -1,8 +1,8 @@
-"""Who runs the jobs of a study: this process, a pool of processes, or the workers of a Dask scheduler.
+"""Executors, which run tasks in this process, in a local pool of processes, or on the workers of a Dask scheduler.
 
-All of them are used in one way: `each(function, tasks)` gives, as each task ends, which it was and what came of it.
-Dask's own transport pickles what it carries, so whoever can reach a scheduler can run code on it and its workers:
-a local one listens on loopback alone, any other is used only where it is named.
+All have one interface: `executor(function, tasks)` yields the index and the future of each task as it ends.
+Dask's transport pickles what it carries, so everyone who reaches a scheduler can run code on it and its workers.
+A local scheduler listens on loopback alone; any other is used only if it is named.
 """
 
 import asyncio
@@ -50,9 +50,17 @@ class TaskExecutor(Protocol):
     ) -> Generator[tuple[int, Future[R]], None, None]: ...
 
 
-def process_executor(jobs: int) -> TaskExecutor:
-    """So many worker processes, which stay for the next call; a single job needs none and is done in this one."""
-    return run_in_process if jobs == 1 else partial(_run_on_pool, Pool(jobs))
+@contextmanager
+def process_executor(jobs: int) -> Iterator[TaskExecutor]:
+    """An executor of `jobs` worker processes, which are started when needed; with one job, this process."""
+    if jobs == 1:
+        yield run_in_process
+        return
+    pool = Pool(jobs)
+    try:
+        yield partial(_run_on_pool, pool)
+    finally:
+        pool.close()
 
 
 def _run_on_pool(
@@ -64,7 +72,7 @@ def _run_on_pool(
 def run_in_process(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    """One after another, in this process."""
+    """Run tasks one after another in this process. A result that is an iterator is run while it is read."""
     for which, task in enumerate(tasks):
         future = Future[R]()
         try:
@@ -202,11 +210,15 @@ _worker_lock = Lock()
 
 
 def _run_on_worker(source: str, folder: str, function: Callable[..., R], *task: Any) -> R:
-    """What a worker does, wherever it is; BadInput when it has other code, as after an edit, than whoever asks."""
+    """Run a task in a worker; BadInput when the worker's code differs from the caller's, as after an edit.
+
+    A result that is an iterator is returned as a list.
+    """
     if source_hash() != source:
         advice = "Start both anew with the same one; what was finished is kept."
         raise BadInput("A worker has another version of the harness than the program that it works for.", advice)
     with _worker_lock, redirect_stdout(sys.stderr):
         if folder not in sys.path:
             sys.path.append(folder)  # a user's own method may lie where they work
-        return function(*task)
+        result = function(*task)
+        return list(result) if isinstance(result, Iterator) else result  # type: ignore[return-value]  # both are iterable

@@ -19,7 +19,7 @@ from harness.core.split import ClipPart
 from harness.errors import BadInput, UnknownName
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
-from harness.experiment.scenario import Scenario, load_scenario
+from harness.experiment.scenario import Scenario, expand_clips, load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
 from harness.simulate.loop import simulate_loop
 from harness.simulate.simulation import Simulation, TrackerConfig
@@ -115,7 +115,7 @@ def prepare_playback(
     What is not given is as the scenario has it, but for the calibration: `exact`, until somebody calibrates.
     UnknownName, BadFile and BadInput as for a run of the scenario.
     """
-    asked = load_scenario(scenario)
+    asked = expand_clips(load_scenario(scenario), folder)
     asked = replace(asked, stations=asked.worn_stations, worn=())
     if stations is not None:
         asked = replace(asked, stations={name: asked.stations[name] for name in select_stations(asked, stations)})
@@ -128,7 +128,7 @@ def prepare_playback(
     asked = replace(asked, vary={}, inputs=("pos+ori",), calibration="exact")
     part = ClipPart.parse(clip or asked.motion.test[0])
     source = open_scenario_motion(asked.motion, folder, asked.seed)
-    check_names(asked, source, [part])
+    check_names([replace(asked, motion=replace(asked.motion, test=(str(part),)))], folder)
     return Playback(
         ClipEvaluation(asked, source, part, _behaviour(asked, part) or source.behaviour(part.clip)), posing=posing
     )

@@ -1,16 +1,19 @@
 """Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
 
+import fnmatch
 import itertools
-import tomllib
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-from harness.core.fields import build, replace_fields
+from harness.core.fields import NONE, build, replace_fields
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
+from harness.mocap.sources import open_motion_source
 from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
@@ -19,6 +22,7 @@ from harness.simulate.parameter_ranges import require_ranges
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
+_STATION_SETS_FILE = "stations.toml"
 _NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order", "left_out", "fault")
 
 
@@ -136,14 +140,13 @@ class Scenario:
 def load_scenario(path: Path | str) -> Scenario:
     """The scenario in a TOML file, or the shipped one of that name. BadFile and UnknownName name the place."""
     path = find_scenario(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", "a scenario", "`harness list` names the shipped ones.") from error
+    content = read_toml(path, "a scenario", "`harness list` names the shipped ones.")
     if content.get("kind") == "placement":
         raise BadFile(path, "a placement study", "a scenario", "`harness placement` does it.")
     content.setdefault("name", path.stem)
     try:
+        if "stations" in content:
+            content["stations"] = expand_station_set(content["stations"])
         scenario = build(Scenario, content, "scenario")
         scenario = replace(scenario, methods=tuple(n for text in scenario.methods for n in expand_alternatives(text)))
     except (TypeError, ValueError) as error:
@@ -151,6 +154,74 @@ def load_scenario(path: Path | str) -> Scenario:
     check_scenario(path, scenario)
     check_expected_orders(path, scenario)
     return scenario
+
+
+def expand_station_set(stations: Any) -> Any:
+    """The table of stations that a scenario means by `stations`: the name of a set, or a table.
+
+    A table whose key `set` names a set starts from that set: a table of a station changes the values it names, or adds
+    the station after the others; "none" leaves the station out. UnknownName for a set or a station that is not there.
+    """
+    if isinstance(stations, str):
+        stations = {"set": stations}
+    if not isinstance(stations, Mapping) or not isinstance(stations.get("set"), str):
+        return stations
+    sets = read_station_sets()
+    if stations["set"] not in sets:
+        raise UnknownName("set of stations", stations["set"], sets)
+    expanded = {name: dict(station) for name, station in sets[stations["set"]].items()}
+    for name, change in stations.items():
+        if change == NONE and name not in expanded:
+            raise UnknownName(f"station of {stations['set']}", name, expanded)
+        if change == NONE:
+            del expanded[name]
+        elif name != "set":
+            expanded[name] = {**expanded.get(name, {}), **change} if isinstance(change, Mapping) else change
+    return expanded
+
+
+@cache
+def read_station_sets() -> dict[str, dict[str, Any]]:
+    """The shipped sets of stations: set -> station -> its table (see `Station`)."""
+    return read_toml(data_folder("scenarios") / _STATION_SETS_FILE, "sets of stations", "Install the package again.")
+
+
+def expand_clips(scenario: Scenario, folder: Path | None) -> Scenario:
+    """The scenario with every pattern in its clip lists, such as "13_*", replaced by the clips that match it.
+
+    Clips are the takes of the motion generator, or those of the library in `folder` (by default HARNESS_MOCAP), sorted
+    by name. "13_*@0.20-0.40" is that part of each. A clip that the list also names itself is not repeated. BadInput for
+    a pattern that matches nothing.
+    """
+    motion = scenario.motion
+    if not any(map(_is_pattern, (*motion.test, *motion.examples, *motion.withheld))):
+        return scenario
+    source = open_motion_source(motion.source, folder, seed=scenario.seed, rate_hz=motion.rate_hz or None)
+    test, examples, withheld = (
+        _match_clips(key, getattr(motion, key), source.names()) for key in ("test", "examples", "withheld")
+    )
+    scenario = replace(scenario, motion=replace(motion, test=test, examples=examples, withheld=withheld))
+    check_scenario(Path(scenario.name), scenario)
+    return scenario
+
+
+def _is_pattern(text: str) -> bool:
+    return any(sign in text.partition("@")[0] for sign in "*?[")
+
+
+def _match_clips(key: str, texts: Sequence[str], names: Collection[str]) -> tuple[str, ...]:
+    """The entries of one clip list with its patterns expanded."""
+    entries: list[str] = []
+    for text in texts:
+        if not _is_pattern(text):
+            entries.append(text)
+            continue
+        pattern, at, part = text.partition("@")
+        matches = sorted(name for name in names if fnmatch.fnmatchcase(name, pattern))
+        if not matches:
+            raise BadInput(f"motion.{key}: no clip matches {text!r}.", "`harness mocap list` names those of a library.")
+        entries += [f"{name}{at}{part}" for name in matches if f"{name}{at}{part}" not in (*texts, *entries)]
+    return tuple(entries)
 
 
 def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
@@ -197,7 +268,7 @@ def find_scenario(path: Path | str) -> Path:
     given = Path(path)
     if given.is_file():
         return given
-    shipped = {p.stem: p for p in (*shipped_scenarios(), *shipped_placements())}
+    shipped = {file.stem: file for file in shipped_scenarios()}
     if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
@@ -206,13 +277,8 @@ def find_scenario(path: Path | str) -> Path:
 
 
 def shipped_scenarios() -> list[Path]:
-    studies = shipped_placements()
-    return sorted(path for path in data_folder("scenarios").glob("*.toml") if path not in studies)
-
-
-def shipped_placements() -> list[Path]:
-    """Studies of where trackers go, which lie among the scenarios."""
-    return sorted(data_folder("scenarios").glob("placement_*.toml"))
+    """The files of the shipped scenarios that a bare name finds."""
+    return sorted(path for path in data_folder("scenarios").glob("*.toml") if path.name != _STATION_SETS_FILE)
 
 
 def check_scenario(path: Path, scenario: Scenario) -> None:
@@ -233,7 +299,8 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         refuse("no inputs", "names in inputs", "`harness list` names them.")
     if scenario.name != Path(scenario.name).name:
         refuse(f"name = {scenario.name!r}", "a plain name", "Results are written to a folder of that name.")
-    if len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
+    counted = not any(map(_is_pattern, scenario.motion.test))  # else `expand_clips` checks it
+    if counted and len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
         refuse(
             f"{len(scenario.motion.behaviours)} behaviours for {len(scenario.motion.test)} test clips",
             "one for all of them, or one for each",

@@ -1,28 +1,26 @@
 """A sweep as its TOML file has it, and the scenarios that it comes to: scenario x clip x method x seed x any key."""
 
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from harness.core.fields import build
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import (
     SCHEMA,
     Scenario,
     check_scenario,
     dotted_keys,
+    expand_clips,
     find_scenario,
     load_scenario,
-    variants,
 )
 
-_EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/studies/."
+_EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
 
 
 @dataclass(frozen=True)
@@ -45,10 +43,7 @@ class Sweep:
 def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
     """The sweep in a TOML file, or the shipped one of that name, and where it stands. BadFile, UnknownName."""
     path = find_sweep(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", _EXPECTED, _ADVICE) from error
+    content = read_toml(path, _EXPECTED, _ADVICE)
     if "motion" in content:
         raise BadFile(path, "a scenario", _EXPECTED, "`harness run` runs it; a sweep names it in `scenarios`.")
     content.setdefault("name", path.stem)
@@ -76,23 +71,23 @@ def find_sweep(path: Path | str) -> Path:
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_sweeps()}
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/studies")):
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios/sweeps")):
         return shipped[given.stem]
     if given.parent == Path() and not given.suffix:
         raise UnknownName("sweep", str(path), shipped)
-    raise BadFile(given, "no such file", "a sweep in TOML", "Shipped ones are in scenarios/studies/.")
+    raise BadFile(given, "no such file", "a sweep in TOML", "Shipped ones are in scenarios/sweeps/.")
 
 
 def shipped_sweeps() -> list[Path]:
-    return sorted(data_folder("scenarios").glob("studies/*.toml"))
+    return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
 
-def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scenario]:
+def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None, folder: Path | None = None) -> list[Scenario]:
     """A scenario for each one named and each seed, whose variants, clips, inputs and methods are the sweep's cells.
 
-    `seed` replaces all seeds. BadFile, BadInput and UnknownName say what does not fit.
+    `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName say what does not fit.
     """
-    found = [load_scenario(_scenario_file(name, path.parent)) for name in sweep.scenarios]
+    found = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
     clips = dict.fromkeys(clip for scenario in found for clip in scenario.motion.test)
     for clip in sweep.clips:
         if clip not in clips:
@@ -108,14 +103,6 @@ def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None) -> list[Scen
     if len(set(names)) < len(names):
         raise BadFile(path, f"scenarios called {', '.join(names)}", "names of their own", "Rename one.")
     return out
-
-
-def check_scenario_names(scenarios: Sequence[Scenario], folder: Path | None) -> None:
-    """That everything exists which any variant names; BadInput, UnknownName. Hours of work are not begun in vain."""
-    for scenario in scenarios:
-        parts = [ClipPart.parse(text) for text in scenario.motion.test]
-        for _, made in variants(scenario):
-            check_names(made, open_scenario_motion(made.motion, folder, made.seed), parts)
 
 
 def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:

@@ -16,6 +16,7 @@ from harness.body.rendering import BodyMesh, RenderScene
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Floats
 from harness.core.estimate import Status
+from harness.core.files import atomic_path
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.live.shared_pose import CLOSED, READY, SharedPose, ViewerConfig
 
@@ -72,6 +73,5 @@ def run_viewer(config: ViewerConfig, shared: SharedPose, pipe: Any) -> None:
 
 def _save_picture(picture: "np.ndarray[Any, Any]", path: Path) -> None:
     """Write a PNG under another name, then rename it, so that a reader never sees half a picture."""
-    unfinished = path.with_name(f".unfinished-{path.name}")
-    Image.fromarray(picture).save(unfinished, format="png", compress_level=1)
-    os.replace(unfinished, path)
+    with atomic_path(path) as temporary:
+        Image.fromarray(picture).save(temporary, format="png", compress_level=1)

@@ -8,7 +8,6 @@ to crawl its site: name the subjects that are needed.
 
 import csv
 import hashlib
-import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable
@@ -16,6 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from harness.core.files import atomic_path, move_into_place
 from harness.core.motion import Clip
 from harness.errors import BadFile, BadInput
 from harness.mocap.index import INDEX_NAME, read_index
@@ -128,7 +128,7 @@ def _fetch_file(name: str, top: Path, base_url: str) -> Path:
         except _NotFound:
             raise BadInput(f"There is no {url}.", "Check that the site has the layout of CMU's.") from None
         _check_file(new, url, listed, path.parent)
-        os.replace(new, path)
+        move_into_place(new, path)
     return path
 
 
@@ -161,8 +161,7 @@ def _write_index(top: Path, names: list[str]) -> None:
             fps = f"{SHIPPED_RATE_HZ:g}" if name in listed else ""
             rows.setdefault(name, {"path": name, "subject": subject, "trial": trial, "fps": fps})
     columns = list(dict.fromkeys(column for row in rows.values() for column in row))
-    with tempfile.NamedTemporaryFile("w", dir=top, delete=False, newline="", encoding="utf-8") as file:
+    with atomic_path(top / INDEX_NAME) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, columns)
         table.writeheader()
         table.writerows(rows.values())
-    os.replace(file.name, top / INDEX_NAME)

@@ -139,12 +139,11 @@ class LibrarySource:
 
 
 def find_library_folders(folders: LibraryFolders | None) -> tuple[Path, ...]:
-    """The folders of real motion that --mocap names, or else the folder that HARNESS_MOCAP names.
+    """The folders of real motion that --mocap names, or else those that HARNESS_MOCAP names.
 
     Raises BadInput when neither names one, or when a named path is no folder.
     """
-    if not folders:
-        folders = os.environ.get(MOCAP_VARIABLE)
+    folders = folders or folders_of_environment()
     if not folders:
         raise BadInput(
             "This needs real motion, and no library was named.",
@@ -152,3 +151,8 @@ def find_library_folders(folders: LibraryFolders | None) -> tuple[Path, ...]:
             "`harness demo` needs none.",
         )
     return as_folders(folders)
+
+
+def folders_of_environment() -> tuple[Path, ...]:
+    """The folders that HARNESS_MOCAP names, separated as in PATH (by `os.pathsep`); empty when it names none."""
+    return tuple(Path(folder) for folder in os.environ.get(MOCAP_VARIABLE, "").split(os.pathsep) if folder)

@@ -1,12 +1,11 @@
-"""One cell of a run: one method on one clip with one choice of inputs, as a record and as a folder.
+"""One cell: one method on one clip with one choice of inputs, as a record and as a folder.
 
-On disk a cell is `cells/<key>/cell.json` and `frames.npz`, written under another name and renamed when whole:
-a folder that is there is finished.
+On disk a cell is `cells/<key>/cell.json` and `frames.npz`. The folder is written under a temporary name and renamed
+when it is complete, so that a folder that exists is finished.
 """
 
 import io
 import json
-import os
 import shutil
 import zipfile
 from collections.abc import Mapping
@@ -17,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, freeze
-from harness.core.files import TEMPORARY, read_json, to_json, to_json_types
+from harness.core.files import flush, move_into_place, read_json, temporary_path, to_json, to_json_types
 from harness.errors import BadFile, ShapeError
 from harness.score.metrics import FRAME_METRICS, VERSIONS
 from harness.score.score import Scores
@@ -36,11 +35,11 @@ IDENTITY = (
     "noise",
     "seed",
 )
-"""What a row of the summary says about its cell first, in this order."""
+"""First columns of a cell's row, in this order."""
 EXTRA_IDENTITY = ("scenario", "performer", "varied")
-"""What it says besides."""
+"""Further columns that identify a cell."""
 TRAILING_COLUMNS = (*EXTRA_IDENTITY, "key", "source_hash", "health", "calibration_errors")
-"""What a row has after the metrics."""
+"""Columns that follow the metrics in a row."""
 _TEXTS = (
     *(*IDENTITY, *EXTRA_IDENTITY, "key", "defined_by", "health", "calibration_errors", "bone_m", "estimate_bone_m"),
     *("source_hash", "reproduce", "notes"),
@@ -54,10 +53,10 @@ _ADVICE = "Delete the cell's folder and run again; finished cells are kept."
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """F matched frames of S stations, and what they scored."""
+    """A finished cell: F matched frames of S stations, and their scores."""
 
     key: str
-    """Hash of everything that defines the cell, see `results.cell_key`."""
+    """Hash of everything that defines the cell, see `results.storage.cell_key`."""
     method: str
     behaviour: str
     clip: str
@@ -74,49 +73,50 @@ class Cell:
     """Everything that two results must agree on to be comparable."""
     scores: Scores
     health: Mapping[str, Any]
-    """Counts of what the stream lost, repeated or doubted."""
+    """Counts of records that the stream lost, repeated or marked as suspect."""
     bone_m: Floats
-    """(B, 3) bone vectors of the true body, so that poses can be drawn again [m]."""
+    """(B, 3) bone vectors of the true body, from which poses can be drawn again [m]."""
     source_hash: str
-    """Of the package that computed it."""
+    """Hash of the source of the package that computed the cell."""
     reproduce: str
-    """Command line."""
+    """Command line that reproduces the cell."""
     notes: tuple[str, ...]
     time_s: Floats
-    """(F,) time of the true frame that each estimate is of [s]."""
+    """(F,) time of the true frame of each estimate [s]."""
     truth_qpos: Floats
-    """(F, 55)."""
+    """(F, 55) true MuJoCo configurations."""
     estimate_qpos: Floats
-    """(F, 55)."""
+    """(F, 55) estimated MuJoCo configurations."""
     frame_index: Ints
-    """(F,) which of the true frames."""
+    """(F,) index of the true frame of each estimate."""
     status: Ints
-    """(F,) see `core.estimate.Status`."""
+    """(F,) status of each estimate, see `core.estimate.Status`."""
     step_ms: Floats
-    """(F,) wall time [ms]; NaN where not timed."""
+    """(F,) wall time of each step [ms]; NaN where not timed."""
     quality: Floats
-    """(F, S) 0 lost to 1 best."""
+    """(F, S) quality of each reading, 0 (lost) to 1 (best)."""
     position_valid: Bools
-    """(F, S)."""
+    """(F, S) whether the position was usable."""
     orientation_valid: Bools
-    """(F, S)."""
+    """(F, S) whether the orientation was usable."""
     suspect: Bools
-    """(F, S)."""
+    """(F, S) whether order, time or plausibility of the reading is in doubt."""
     performer: str = ""
-    """"known" if another take of the performer, or the rest of this one, is among the examples, "new" if none is, ""
-    when there are no examples at all."""
+    """"known" if the examples include another take of the performer or the rest of this one, "new" if they do not,
+    "" without examples."""
     varied: Mapping[str, Any] = field(default_factory=dict)
     """Scenario key -> value, of the keys that the scenario varies."""
     scenario: str = ""
-    """Its name."""
+    """Name of the scenario."""
     step_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
-    """(F,) CPU time of each step [ms]; NaN, as by default, where not timed."""
+    """(F,) CPU time of each step [ms]; NaN (the default) where not timed."""
     reference_cpu_ms: Floats = field(default_factory=lambda: np.empty(0))
-    """(F,) CPU time of the work of `experiment.reference_workload` right after each step [ms]; NaN, as by default, where not done."""
+    """(F,) CPU time of the work of `experiment.reference_workload` right after each step [ms]; NaN (the default)
+    after steps that it did not follow."""
     calibration_errors: Mapping[str, float] = field(default_factory=dict)
-    """How far what calibration found is from the truth, by name (see `harness.experiment.simulated_calibration`); empty where it is exact."""
+    """Errors of the calibration by name (see `harness.experiment.simulated_calibration`); empty if it is exact."""
     estimate_bone_m: Floats = field(default_factory=lambda: np.empty((0, 3)))
-    """(B, 3) bone vectors of the body that the method believed in [m]; by default those of the true one."""
+    """(B, 3) bone vectors of the body that the method was given [m]; by default those of the true body."""
 
     def __post_init__(self) -> None:
         frames, stations = len(self.time_s), len(self.stations)
@@ -136,12 +136,12 @@ class Cell:
 
     @property
     def metrics(self) -> Mapping[str, float | None]:
-        """By name; None is "not measured"."""
+        """Metrics by name; None is "not measured"."""
         return self.scores.metrics
 
     @property
     def errors(self) -> Mapping[str, Floats]:
-        """(F,) each: the metrics that have a value in every frame."""
+        """Metrics that have a value in every frame, (F,) each."""
         return self.scores.per_frame
 
     def __len__(self) -> int:
@@ -153,14 +153,14 @@ def cell_folder(out: Path, key: str) -> Path:
 
 
 def has_cell(out: Path, key: str) -> bool:
-    """Whether a run has finished this cell."""
+    """Whether the cell is finished."""
     return cell_folder(out, key).is_dir()
 
 
 def write_cell(out: Path, cell: Cell) -> Path:
-    """Add a finished cell to a run; one that is there already stays as it is."""
+    """Write a finished cell into a folder; one that exists already stays as it is."""
     folder = cell_folder(out, cell.key)
-    beside = folder.with_name(f"{TEMPORARY}{os.getpid()}-{cell.key}")
+    beside = temporary_path(folder)
     shutil.rmtree(beside, ignore_errors=True)
     beside.mkdir(parents=True)
     content = {name: getattr(cell, name) for name in _TEXTS}
@@ -168,14 +168,13 @@ def write_cell(out: Path, cell: Cell) -> Path:
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
     columns |= {_ERROR_PREFIX + name: values.astype(np.float32) for name, values in cell.scores.per_frame.items()}
     columns["scored"] = cell.scores.scored
-    whole = {"cell.json": to_json(content).encode(), "frames.npz": _npz_bytes(columns)}
-    for name, data in whole.items():
+    files = {"cell.json": to_json(content).encode(), "frames.npz": _npz_bytes(columns)}
+    for name, data in files.items():
         (beside / name).write_bytes(data)
-    for name in whole:  # when both are written: the disk is asked once for most of it
-        with open(beside / name, "rb") as file:
-            os.fsync(file.fileno())
+    for name in files:  # after both writes, so that most data reach the disk in one flush
+        flush(beside / name)
     try:
-        os.rename(beside, folder)
+        move_into_place(beside, folder)
     except OSError:
         if not folder.is_dir():
             raise
@@ -184,20 +183,22 @@ def write_cell(out: Path, cell: Cell) -> Path:
 
 
 def _npz_bytes(columns: Mapping[str, np.ndarray[Any, Any]]) -> bytes:
-    """As `np.savez` has it. Only what is no measured number is compressed: of those deflate saves a tenth, in ten times
-    the time of all the rest of writing a cell."""
+    """Content of an npz file, as `np.savez` writes it.
+
+    Floats are not compressed: deflate would save a tenth of them, in ten times the time that the rest of writing takes.
+    """
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w") as archive:
         for name, values in columns.items():
-            one = io.BytesIO()
-            np.lib.format.write_array(one, values, allow_pickle=False)
-            how = zipfile.ZIP_STORED if values.dtype.kind == "f" else zipfile.ZIP_DEFLATED
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), one.getbuffer(), how)
+            array = io.BytesIO()
+            np.lib.format.write_array(array, values, allow_pickle=False)
+            method = zipfile.ZIP_STORED if values.dtype.kind == "f" else zipfile.ZIP_DEFLATED
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), array.getbuffer(), method)
     return packed.getvalue()
 
 
 def read_cell(folder: Path) -> Cell:
-    """A finished cell; BadFile when a file of it is missing, cut or not what it should be."""
+    """Read a finished cell; BadFile when one of its files is missing, truncated or malformed."""
     text, frames = folder / "cell.json", folder / "frames.npz"
     content = read_json(text, "a cell of a run")
     try:
@@ -221,7 +222,7 @@ def read_cell(folder: Path) -> Cell:
 
 
 def read_row(folder: Path) -> dict[str, Any]:
-    """The row of a finished cell, without its frames; BadFile."""
+    """Read the row of a finished cell, without its frames; BadFile."""
     text = folder / "cell.json"
     content = read_json(text, "a cell of a run")
     try:
@@ -232,7 +233,7 @@ def read_row(folder: Path) -> dict[str, Any]:
 
 
 def as_row(cell: Cell) -> dict[str, Any]:
-    """The cell in one row: identity, then every metric, then its key and the notes that it carries."""
+    """The row of a cell: identity, then every metric, then the trailing columns."""
     first, rest = (
         {name: to_json_types(getattr(cell, name)) for name in names} for names in (IDENTITY, TRAILING_COLUMNS)
     )
@@ -240,7 +241,7 @@ def as_row(cell: Cell) -> dict[str, Any]:
 
 
 def varied_text(varied: Mapping[str, Any]) -> str:
-    """As tables have it: "noise=clean worn=head+torso"; empty when nothing is varied."""
+    """Text of varied values, such as "noise=clean worn=head+torso"; empty when nothing is varied."""
     return " ".join(f"{key}={_short(value)}" for key, value in varied.items())
 
 

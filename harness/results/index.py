@@ -1,8 +1,8 @@
-"""The finished cells of a folder in one SQLite file, so that 100,000 of them are counted, listed and summed up at once.
+"""Index of a folder's cells in one SQLite file, so that 100,000 of them are counted, listed and summarised in seconds.
 
-What counts are the cells' own folders: the index is made of them anew where it is missing, damaged or of another
-version. Beside the cells it keeps the plan: which ones were asked for, in the order of the table, and what became of
-each. One process writes, any number read meanwhile.
+The cells' own folders are authoritative: an index that is missing, damaged or of another version is rebuilt from them.
+Besides the cells it holds the plan (the planned cells in the order of the table, and the outcome of each) and facts
+about the work. One process writes, any number may read meanwhile.
 """
 
 import json
@@ -20,20 +20,24 @@ from harness.results.cell import IDENTITY, TRAILING_COLUMNS, read_row
 from harness.score.metrics import DEFINITIONS
 
 INDEX_FILE = "index.sqlite"
-TEXTS = ("scenario", "clip", "behaviour", "method", "inputs", "split", "performer", "calibration", "noise")
-"""Columns to choose by, besides `seed`."""
-_COLUMNS = ("key", *TEXTS, "seed", "varied", "seconds", *DEFINITIONS, "rest")
+TEXTS = (
+    *("scenario", "clip", "behaviour", "method", "inputs", "split", "performer", "calibration", "noise"),
+    *("motion_source", "mount"),
+)
+"""Text columns that rows can be selected by, besides `seed`."""
+_JSON_COLUMNS = ("varied", "stations")
+_COLUMNS = ("key", *TEXTS, "seed", "rate_hz", *_JSON_COLUMNS, "seconds", *DEFINITIONS, "rest")
 _ROW_KEYS = (*IDENTITY, *DEFINITIONS, *TRAILING_COLUMNS, "seconds")
 _VERSION = int(content_key(_COLUMNS)[:7], 16)
-"""Goes into the file: an index with other columns is made anew."""
+"""Version number in the file. An index with other columns is rebuilt."""
 _PLAN_COLUMNS = "place INTEGER PRIMARY KEY, cell TEXT UNIQUE, key TEXT, failure TEXT"
 _KEYS_PER_QUERY = 500
-"""Keys in one question."""
+"""Number of keys in one SQL query."""
 
 
 @dataclass(frozen=True)
 class CellCounts:
-    """What became of the plan."""
+    """Counts of the planned cells by outcome."""
 
     planned: int
     finished: int
@@ -41,19 +45,19 @@ class CellCounts:
 
 
 class CellIndex:
-    """A folder's index, to be closed; `read_only` for whoever looks on while another process writes."""
+    """The index of a folder; a context manager. `read_only` is for readers while another process writes."""
 
     def __init__(self, out: Path, *, read_only: bool = False) -> None:
-        """BadFile when there is none to read."""
+        """BadFile when there is no index to read."""
         self.path, self._cells = out / INDEX_FILE, out / "cells"
         if read_only:
-            self._db = self._opened_to_read()
+            self._db = self._open_read_only()
         else:
             try:
-                self._db = self._opened()
-            except sqlite3.DatabaseError:  # damaged: all that is in it can be had again
+                self._db = self._open()
+            except sqlite3.DatabaseError:  # damaged or of another version: it is rebuilt
                 self._remove()
-                self._db = self._opened()
+                self._db = self._open()
 
     def __enter__(self) -> Self:
         return self
@@ -62,7 +66,7 @@ class CellIndex:
         self._db.close()
 
     def add(self, rows: Iterable[Mapping[str, Any]], seconds: Iterable[float | None] | None = None) -> None:
-        """Rows as `cell.as_row` has them, and how long each took; one that is there already stays as it is."""
+        """Add rows as `cell.as_row` gives them, and the wall time of each [s]. A row that exists stays as it is."""
         rows = list(rows)
         took = [None] * len(rows) if seconds is None else list(seconds)
         holes = ", ".join("?" * len(_COLUMNS))
@@ -71,8 +75,10 @@ class CellIndex:
             self._db.executemany(f"INSERT OR IGNORE INTO cells VALUES ({holes})", columns)  # noqa: S608  # holes alone
 
     def add_from_folders(self) -> int:
-        """Add the finished cells that lie in the folder and are not here; how many. Those of older versions, which
-        nobody can ask for any more, are left out."""
+        """Add the finished cells of the folder that the index lacks; returns their number.
+
+        Cells of older versions are left out, because no plan can ask for them any more.
+        """
         known = {key for (key,) in self._db.execute("SELECT key FROM cells")}
         found = []
         for key in sorted(self.folders() - known):
@@ -84,7 +90,7 @@ class CellIndex:
         return len(found)
 
     def folders(self) -> set[str]:
-        """Keys of the cells that are finished, whether they are here or not yet."""
+        """Keys of the finished cells in the folder, whether or not the index has them."""
         try:
             with os.scandir(self._cells) as entries:
                 return {entry.name for entry in entries if not entry.name.startswith(TEMPORARY)}
@@ -92,29 +98,29 @@ class CellIndex:
             return set()
 
     def expect(self, cells: Sequence[str]) -> None:
-        """Put cells at the end of the plan, by name; those that stand in it already stay where they are."""
+        """Append cells to the plan by name; planned cells keep their place."""
         with self._db:
             self._db.executemany("INSERT OR IGNORE INTO plan (cell) VALUES (?)", ((cell,) for cell in cells))
 
     def reset(self, cells: Sequence[str]) -> None:
-        """Nothing is known of these cells of the plan any more."""
+        """Forget the outcomes of these planned cells."""
         with self._db:
             self._db.executemany(
                 "UPDATE plan SET key = NULL, failure = NULL WHERE cell = ?", ((cell,) for cell in cells)
             )
 
     def plan(self, cells: Sequence[str]) -> None:
-        """These cells in this order are the plan, and no others; what is known of them is kept."""
-        known = {cell: rest for cell, *rest in self._db.execute("SELECT cell, key, failure FROM plan")}
+        """Replace the plan by these cells in this order; their outcomes are kept."""
+        outcomes = {cell: rest for cell, *rest in self._db.execute("SELECT cell, key, failure FROM plan")}
         with self._db:
             self._db.execute("DELETE FROM plan")
             self._db.executemany(
                 "INSERT INTO plan (cell, key, failure) VALUES (?, ?, ?)",
-                ((cell, *known.get(cell, (None, None))) for cell in cells),
+                ((cell, *outcomes.get(cell, (None, None))) for cell in cells),
             )
 
     def record_outcomes(self, what: Iterable[tuple[str, str, str]]) -> None:
-        """(cell, key, failure) of cells of the plan; one of the two is empty."""
+        """Record (cell, key, failure) of planned cells; either key or failure is empty."""
         with self._db:
             self._db.executemany(
                 "UPDATE plan SET key = nullif(?, ''), failure = nullif(?, '') WHERE cell = ?",
@@ -122,22 +128,22 @@ class CellIndex:
             )
 
     def counts(self) -> CellCounts:
-        """Of the plan, as far as it was written down."""
+        """Counts of the planned cells, as far as outcomes were recorded."""
         row = self._db.execute("SELECT count(*), count(key), count(failure) FROM plan").fetchone()
         return CellCounts(*row)
 
     def failures(self) -> dict[str, str]:
-        """Cell -> why it has no result, in planned order."""
+        """Failed cell -> reason, in planned order."""
         question = "SELECT cell, failure FROM plan WHERE failure IS NOT NULL ORDER BY place"
         return dict(self._db.execute(question).fetchall())
 
     def unwritten(self) -> int:
-        """Finished cells in the folder of which nothing is here: of a process that goes on, or was killed."""
+        """Number of finished cells in the folder that the index lacks, because a process runs or was killed."""
         known = {key for (key,) in self._db.execute("SELECT key FROM cells")}
         return len(self.folders() - known)
 
     def rows(self, **where: Any) -> Iterator[dict[str, Any]]:
-        """The plan's finished cells in planned order, those whose columns (`TEXTS`, `seed`) are as `where` says."""
+        """Rows of the plan's finished cells in planned order whose columns (`TEXTS`, `seed`) equal `where`."""
         if strange := [name for name in where if name not in (*TEXTS, "seed")]:
             raise ValueError(f"no column {strange[0]!r}")
         chosen = "".join(f" AND {name} = ?" for name in where)
@@ -145,7 +151,7 @@ class CellIndex:
         return map(_as_row, self._db.execute(question, tuple(where.values())))
 
     def rows_of(self, keys: Sequence[str]) -> Iterator[dict[str, Any]]:
-        """These cells, in this order; KeyError for one that is not here."""
+        """Rows of these cells in this order; KeyError for a cell that the index lacks."""
         for start in range(0, len(keys), _KEYS_PER_QUERY):
             some = keys[start : start + _KEYS_PER_QUERY]
             question = f"SELECT * FROM cells WHERE key IN ({', '.join('?' * len(some))})"  # noqa: S608  # holes alone
@@ -153,7 +159,7 @@ class CellIndex:
             yield from (_as_row(found[key]) for key in some)
 
     def columns(self, *names: str) -> Iterator[tuple[Any, ...]]:
-        """Some columns of the plan's finished cells in planned order; `varied` is JSON."""
+        """Columns of the plan's finished cells in planned order; `varied` and `stations` are JSON."""
         if strange := [name for name in names if name not in _COLUMNS]:
             raise ValueError(f"no column {strange[0]!r}")
         chosen = ", ".join(f"cells.{name}" for name in names)
@@ -161,7 +167,7 @@ class CellIndex:
         return iter(self._db.execute(question))
 
     def note(self, **facts: Any) -> None:
-        """Keep facts about the work, in JSON's types."""
+        """Store facts about the work, as values of JSON's types."""
         with self._db:
             self._db.executemany(
                 "INSERT OR REPLACE INTO facts VALUES (?, ?)",
@@ -171,13 +177,13 @@ class CellIndex:
     def facts(self) -> dict[str, Any]:
         return {name: json.loads(value) for name, value in self._db.execute("SELECT name, value FROM facts")}
 
-    def _opened(self) -> sqlite3.Connection:
+    def _open(self) -> sqlite3.Connection:
         db = sqlite3.connect(self.path, timeout=30.0)
         try:
             if db.execute("PRAGMA user_version").fetchone()[0] not in (0, _VERSION):
                 raise sqlite3.DatabaseError("another version")
             db.execute("PRAGMA journal_mode = WAL")
-            db.execute("PRAGMA synchronous = NORMAL")  # a crash of the machine may cost rows, which are in the folders
+            db.execute("PRAGMA synchronous = NORMAL")  # a crash of the machine may lose rows, which the folders have
             with db:
                 db.execute(f"CREATE TABLE IF NOT EXISTS cells ({', '.join(map(_column_declaration, _COLUMNS))})")
                 db.execute(f"CREATE TABLE IF NOT EXISTS plan ({_PLAN_COLUMNS})")
@@ -188,8 +194,8 @@ class CellIndex:
             raise
         return db
 
-    def _opened_to_read(self) -> sqlite3.Connection:
-        expected, advice = "the index of a sweep", "Give the command of the sweep again; finished cells are kept."
+    def _open_read_only(self) -> sqlite3.Connection:
+        expected, advice = "the index of a run or sweep", "Give its command again; finished cells are kept."
         if not self.path.is_file():
             raise BadFile(self.path, "no such file", expected, advice)
         db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, timeout=30.0)
@@ -211,21 +217,23 @@ class CellIndex:
 def _column_declaration(column: str) -> str:
     if column in DEFINITIONS:
         return f"{column} {'INTEGER' if DEFINITIONS[column].unit == 'frames' else 'REAL'}"
-    kinds = {"key": "TEXT PRIMARY KEY", "seed": "INTEGER", "seconds": "REAL"}
+    kinds = {"key": "TEXT PRIMARY KEY", "seed": "INTEGER", "rate_hz": "REAL", "seconds": "REAL"}
     return f"{column} {kinds.get(column, 'TEXT')}"
 
 
 def _as_columns(row: Mapping[str, Any], seconds: float | None) -> tuple[Any, ...]:
     rest = _json({name: value for name, value in row.items() if name not in _COLUMNS})
-    held = {**row, "varied": _json(row["varied"]), "seconds": seconds, "rest": rest}
-    return tuple(held.get(name) for name in _COLUMNS)
+    texts = {name: _json(row[name]) for name in _JSON_COLUMNS if name in row}
+    values = {**row, **texts, "seconds": seconds, "rest": rest}
+    return tuple(values.get(name) for name in _COLUMNS)
 
 
 def _as_row(columns: Sequence[Any]) -> dict[str, Any]:
-    """As it was added, and `seconds`."""
-    held = dict(zip(_COLUMNS, columns, strict=True))
-    held |= {**json.loads(held.pop("rest")), "varied": json.loads(held["varied"])}
-    return {name: held[name] for name in _ROW_KEYS}
+    """The row as it was added, and `seconds`."""
+    values = dict(zip(_COLUMNS, columns, strict=True))
+    values |= json.loads(values.pop("rest"))
+    values |= {name: json.loads(values[name] or "null") for name in _JSON_COLUMNS}
+    return {name: values[name] for name in _ROW_KEYS}
 
 
 def _json(value: Any) -> str:

@@ -1,10 +1,10 @@
-"""Who is at work in a folder: a lock that the system lets go of however its holder ended."""
+"""Lock of a results folder. The operating system releases it however the holding process ends."""
 
-import fcntl
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
+
+from filelock import FileLock, Timeout
 
 from harness.errors import BadInput
 
@@ -12,31 +12,22 @@ LOCK_FILE = ".lock"
 
 
 @contextmanager
-def folder_lock(out: Path, *, alone: bool = True) -> Iterator[None]:
-    """While this process works there, beside others only if none of them is `alone`; BadInput."""
-    handle = os.open(out / LOCK_FILE, os.O_RDWR | os.O_CREAT, 0o666)
+def folder_lock(out: Path) -> Iterator[None]:
+    """Hold the lock of a folder, so that one process at a time writes there; BadInput when another process holds it."""
     try:
-        try:
-            fcntl.flock(handle, (fcntl.LOCK_EX if alone else fcntl.LOCK_SH) | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise BadInput(
-                f"Another process is at work in {out}.", f"`harness status {out}` says how far it is; or name another."
-            ) from error
-        yield
-    finally:
-        os.close(handle)
+        with FileLock(out / LOCK_FILE, timeout=0):
+            yield
+    except Timeout as error:
+        advice = f"`harness status {out}` shows its progress. Wait for it, or name another folder."
+        raise BadInput(f"Another process is at work in {out}.", advice) from error
 
 
 def is_running(out: Path) -> bool:
-    """Whether any process works there, on this machine or on the same file system."""
-    try:
-        handle = os.open(out / LOCK_FILE, os.O_RDWR)
-    except FileNotFoundError:
+    """Whether a process holds the folder's lock, on this machine or on another one that shares the file system."""
+    if not (out / LOCK_FILE).is_file():
         return False
     try:
-        with suppress(BlockingIOError):
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        with FileLock(out / LOCK_FILE, timeout=0):
             return False
+    except Timeout:
         return True
-    finally:
-        os.close(handle)

@@ -1,4 +1,4 @@
-"""What a result rests on: inputs, which must agree for two results to be comparable, and circumstances, listed beside.
+"""Manifest of a run: its inputs, which must agree for two results to be comparable, and its circumstances.
 
 Circumstances (source, options, commit, versions, machine) are what a comparison of two results is about.
 """
@@ -7,7 +7,7 @@ import os
 import platform
 import shutil
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache
 from hashlib import blake2b
@@ -15,18 +15,18 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-import harness
 from harness.core.files import read_json, to_json_types
+from harness.core.package_data import PACKAGE_FOLDER, VERSION
 from harness.errors import BadFile
 from harness.score.metrics import VERSIONS
 
 PACKAGES = ("numpy", "scipy", "mujoco", "pyserial", "upc-pymotion", "matplotlib", "pyvista", "plotly", "ezc3d", "mink")
-"""Whose versions are listed; "absent" where not installed."""
+"""Packages whose versions are listed; "absent" if not installed."""
 
 
 @dataclass(frozen=True)
 class Manifest:
-    """Of one run."""
+    """Inputs and circumstances of one run or sweep."""
 
     inputs: Mapping[str, Any]
     """Motion, body, stations, mounts, rate, split, examples, calibration, noise, seed."""
@@ -40,7 +40,7 @@ class Manifest:
 
     @classmethod
     def read(cls, path: Path) -> "Manifest":
-        """From manifest.json; BadFile when it is none."""
+        """Read manifest.json; BadFile when it is missing or malformed."""
         content = read_json(path, "the manifest of a run")
         try:
             return cls(*(dict(content[name]) for name in ("inputs", "metric_versions", "circumstances")))
@@ -49,17 +49,21 @@ class Manifest:
             raise BadFile(path, f"no {error}", "inputs, metric_versions and circumstances", advice) from error
 
     def differences(self, other: "Manifest") -> list[str]:
-        """Names of the inputs in which two runs differ, such as "motion.test"; none for one and the same run."""
+        """Names of the inputs in which two runs differ, such as "motion.test"; empty for the same run."""
         mine, theirs = flatten(to_json_types(self.inputs)), flatten(to_json_types(other.inputs))
         return [name for name in {**mine, **theirs} if mine.get(name) != theirs.get(name)]
 
 
 def describe_run(
-    scenario: Mapping[str, Any], *, motion_source: str, command: str, constants: Mapping[str, str] | None = None
+    scenario: Mapping[str, Any],
+    *,
+    motion_source: str | Sequence[str],
+    command: str,
+    constants: Mapping[str, str] | None = None,
 ) -> Manifest:
-    """The manifest of running a scenario here and now.
+    """Manifest of running a scenario, or a sweep's scenarios, with this code on this machine.
 
-    Methods, their `constants`, orders and what was left out are circumstances, all else is input.
+    Methods, their `constants`, expected orders and omissions (`left_out`) are circumstances, all else is input.
     """
     inputs = {name: value for name, value in scenario.items() if name not in ("methods", "expected_order", "left_out")}
     return Manifest(
@@ -76,11 +80,11 @@ def describe_run(
 
 
 def current_circumstances() -> dict[str, Any]:
-    """Source, commit, versions and machine."""
+    """Source hash, commit, versions and machine."""
     return {
-        "harness": harness.__version__,
+        "harness": VERSION,
         "source_hash": source_hash(),
-        **_commit(Path(harness.__file__).parent.parent),
+        **_commit(PACKAGE_FOLDER.parent),
         "python": platform.python_version(),
         "packages": {name: _version(name) for name in PACKAGES},
         "platform": platform.platform(),
@@ -91,8 +95,8 @@ def current_circumstances() -> dict[str, Any]:
 
 @cache
 def source_hash() -> str:
-    """16 hex digits that stand for every Python file of the package."""
-    package = Path(harness.__file__).parent
+    """Hash of every Python file of the package, 16 hex digits."""
+    package = PACKAGE_FOLDER
     state = blake2b(digest_size=8)
     for file in sorted(package.rglob("*.py")):
         state.update(f"{file.relative_to(package).as_posix()}\0".encode())
@@ -101,28 +105,28 @@ def source_hash() -> str:
 
 
 def _commit(root: Path) -> dict[str, Any]:
-    """Commit and whether files differ from it, when the package lies in its own checkout."""
+    """Commit, and whether files differ from it, if the package lies in its own checkout."""
     git = shutil.which("git")
     if git is None or not (root / ".git").exists():
         return {"commit": None, "dirty": None}
 
-    def ask(*question: str) -> str | None:
-        done = subprocess.run([git, "-C", str(root), *question], capture_output=True, text=True, timeout=20)
+    def run_git(*arguments: str) -> str | None:
+        done = subprocess.run([git, "-C", str(root), *arguments], capture_output=True, text=True, timeout=20)
         return done.stdout.strip() if done.returncode == 0 else None
 
-    status = ask("status", "--porcelain", "--", "harness", "models", "scenarios")
-    return {"commit": ask("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
+    status = run_git("status", "--porcelain", "--", "harness", "models", "scenarios")
+    return {"commit": run_git("rev-parse", "HEAD"), "dirty": None if status is None else bool(status)}
 
 
 def _processor() -> str:
-    """Its name and numbers, for virtual machines call many kinds the same."""
+    """Name and numbers of the processor; on virtual machines many kinds share a name."""
     try:
         first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
     except OSError:
         return platform.processor() or platform.machine()
-    said = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in first.splitlines())}
-    numbers = [said[name] for name in ("cpu family", "model", "stepping") if name in said]
-    return " ".join([said.get("model name") or platform.machine(), *(["/".join(numbers)] if numbers else [])])
+    fields = {name.strip(): value.strip() for name, _, value in (line.partition(":") for line in first.splitlines())}
+    numbers = [fields[name] for name in ("cpu family", "model", "stepping") if name in fields]
+    return " ".join([fields.get("model name") or platform.machine(), *(["/".join(numbers)] if numbers else [])])
 
 
 def _version(package: str) -> str:
@@ -133,7 +137,7 @@ def _version(package: str) -> str:
 
 
 def flatten(content: Any, prefix: str = "") -> dict[str, Any]:
-    """Nested mappings as one, with dotted names."""
+    """One flat mapping with dotted names, from nested mappings."""
     if not isinstance(content, dict) or not content:
         return {prefix: content}
     parts = [flatten(value, f"{prefix}.{name}" if prefix else name) for name, value in content.items()]

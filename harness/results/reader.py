@@ -1,4 +1,4 @@
-"""One side of a comparison: what a run, a sweep or a baseline measured, cell by cell."""
+"""Results of a run, a sweep or a baseline, cell by cell, as comparisons use them."""
 
 import math
 from collections.abc import Mapping
@@ -9,14 +9,13 @@ from typing import Any
 from harness.core.files import read_json
 from harness.errors import BadFile, UnknownName
 from harness.results.cell import cell_folder
-from harness.results.index import INDEX_FILE, CellIndex
+from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
-from harness.results.storage import read_summary
 from harness.score.metrics import DEFINITIONS
 
 BASELINES = Path("results/baselines")
 CELLS_FILE = "cells.json"
-"""Of a baseline (see `baseline.save`)."""
+"""File of a baseline (see `compare.baseline.write_baseline`)."""
 SCHEMA = 1
 _TEXTS = ("scenario", "clip", "method", "inputs", "split", "noise", "behaviour", "performer")
 _KINDS = {**dict.fromkeys(_TEXTS, str), "seed": int, **dict.fromkeys(("varied", "defined_by", "metrics"), dict)}
@@ -26,7 +25,7 @@ _ADVICE = "Run, or save, it again."
 
 @dataclass(frozen=True)
 class CellResult:
-    """One method on one clip: what it is, what it rests on, what it scored."""
+    """Result of one cell: its identity, its conditions and its metrics."""
 
     scenario: str
     clip: str
@@ -48,22 +47,23 @@ class CellResult:
 
 @dataclass(frozen=True)
 class ResultSet:
-    """Everything that one side has."""
+    """All results of one side of a comparison."""
 
     title: str
-    """As the reader named it, such as "results/demo" or "baseline gate"."""
+    """Name for readers, such as "results/demo" or "baseline gate"."""
     manifest: Manifest
     cells: tuple[CellResult, ...]
-    """Those that are finished, in the order of their tables."""
+    """The finished cells in the order of their table."""
     planned: int
     failed: tuple[str, ...] = ()
     """Names of planned cells that failed."""
 
 
 def load_results(where: Path | str) -> ResultSet:
-    """A run's folder, a sweep's, a baseline's, or the name of a baseline below `BASELINES`; a folder goes first.
+    """Load the folder of a run, sweep or baseline, or the baseline of that name below `BASELINES`.
 
-    BadFile for what is none of these, was written by another version or is damaged; UnknownName for a name.
+    A folder takes precedence over a name. BadFile for any other folder and for one that is damaged or was written by
+    another version; UnknownName for an unknown name.
     """
     folder = Path(where)
     if not folder.is_dir():
@@ -75,26 +75,16 @@ def load_results(where: Path | str) -> ResultSet:
         folder = BASELINES / folder
     if (folder / CELLS_FILE).is_file():
         return _load_baseline(folder)
-    return _load_sweep(folder, str(where)) if (folder / INDEX_FILE).is_file() else _load_run(folder, str(where))
-
-
-def _load_run(folder: Path, title: str) -> ResultSet:
-    manifest, summary = Manifest.read(folder / "manifest.json"), read_summary(folder)
-    cells = tuple(_cell_from_row(folder, row) for row in summary["cells"])
-    return ResultSet(title, manifest, cells, int(summary["cells_planned"]), tuple(summary["failures"]))
-
-
-def _load_sweep(folder: Path, title: str) -> ResultSet:
     manifest = Manifest.read(folder / "manifest.json")
     with CellIndex(folder, read_only=True) as index:
         cells = tuple(_cell_from_row(folder, row) for row in index.rows())
-        return ResultSet(title, manifest, cells, index.counts().planned, tuple(index.failures()))
+        return ResultSet(str(where), manifest, cells, index.counts().planned, tuple(index.failures()))
 
 
 def _cell_from_row(folder: Path, row: Mapping[str, Any]) -> CellResult:
     if not row.get("scenario"):
-        found, advice = "cells that name no scenario", "An older version wrote it: run again with another --out."
-        raise BadFile(folder, found, "a run of this version of the harness", advice)
+        advice = "An older version wrote it: run again with another --out."
+        raise BadFile(folder, "cells that name no scenario", "a run of this version of the harness", advice)
     path = cell_folder(folder, row["key"]) / "cell.json"
     defined_by = read_json(path, "a cell of a run").get("defined_by")
     metrics = {name: row.get(name) for name in DEFINITIONS if name in row}
@@ -109,20 +99,20 @@ def _load_baseline(folder: Path) -> ResultSet:
         raise BadFile(path, f"schema {content.get('schema')}", f"schema {SCHEMA}", advice)
     try:
         shared, parts, planned = content["shared"], content["parts"], int(content["planned"])
-        names, whole = content["metrics"], []
+        names, complete = content["metrics"], []
         for cell in content["cells"]:
             metrics = dict(zip(names, cell["metrics"], strict=True))
-            whole.append({**cell, "metrics": metrics, "defined_by": {**shared, **parts[cell["part"]]}})
+            complete.append({**cell, "metrics": metrics, "defined_by": {**shared, **parts[cell["part"]]}})
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise BadFile(path, f"damaged ({error!r})", expected, _ADVICE) from error
-    cells = tuple(_check_cell(path, cell) for cell in whole)
+    cells = tuple(_check_cell(path, cell) for cell in complete)
     if planned != len(cells):
         raise BadFile(path, f"{len(cells)} cells of {planned}", expected, _ADVICE)
     return ResultSet(f"baseline {folder.name}", Manifest.read(folder / "manifest.json"), cells, planned)
 
 
 def _check_cell(path: Path, content: Mapping[str, Any]) -> CellResult:
-    """BadFile for one that lacks something or has it as something else."""
+    """The result of a cell; BadFile when a value is missing or has another type."""
     for name, kind in _KINDS.items():
         if not isinstance(content.get(name), kind):
             raise BadFile(path, f"{name} is {content.get(name)!r}", f"a cell with a {kind.__name__} there", _ADVICE)

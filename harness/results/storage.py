@@ -1,33 +1,37 @@
-"""The folder of a run: manifest.json, summary.json, summary.csv and atomic cells.
+"""The folder of a run or a sweep: manifest.json, cells/, index.sqlite, summary.json and summary.csv.
 
-Presence of a cell means that it is finished; the same run again goes on where it was. A cell's key holds its inputs,
-the method and the source of both, so edited code never meets stale results.
+A cell that is present is finished, so that running the same scenario again resumes it. A cell's key is a hash of its
+inputs, the method and the source of both, so that edited code never reuses stale results.
 """
 
-import os
 import re
 import shutil
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness.core.files import TEMPORARY, content_key, digest, read_json, write_json, write_text
+from harness.core.files import TEMPORARY, content_key, digest, read_json, write_json
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
+from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
 from harness.results.recovery import RecoveryCollector
-from harness.results.summary import GROUP_KEYS, SummaryStatistics, as_csv
+from harness.results.summary import GROUP_KEYS, SummaryStatistics
+from harness.results.table import compute_group_statistics, write_table
 
 __all__ = [
     "Cell",
     "cell_key",
     "digest",
     "has_cell",
+    "open_folder",
     "open_run",
     "read_cell",
     "read_cells",
+    "read_kind",
     "read_summary",
+    "remove_leftovers",
     "summary_rows",
     "write_cell",
     "write_summary",
@@ -38,36 +42,42 @@ _SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "failures", "meth
 
 
 def cell_key(inputs: Mapping[str, Any], method: Mapping[str, Any], source_hash: str) -> str:
-    """Name of a cell: a hash of all that defines it, so that equal keys mean equal results."""
+    """Key of a cell: a hash of everything that defines it, so that equal keys mean equal results."""
     return content_key({"inputs": inputs, "method": method, "source": source_hash})
 
 
-def open_run(out: Path, manifest: Manifest) -> None:
-    """Make the folder of a run, or go on with it; BadInput when it holds another run or other files.
+def open_folder(
+    out: Path, identity_file: str, identity: Mapping[str, Any], kind: str, differences: Callable[[Path], Sequence[str]]
+) -> None:
+    """Create a results folder and its `identity_file`, or open it to resume.
 
-    Leftovers of a killed run are cleared away.
+    `differences` names in what the identity file that is there differs. BadInput when it differs, when the folder
+    holds other files, and when it cannot be written.
     """
     advice = "Name another folder with --out, or delete this one."
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out} is a file.", "Name a folder with --out.")
-    held = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
-    if "manifest.json" in held:
-        found = Manifest.read(out / "manifest.json")
-        if differences := manifest.differences(found):
-            raise BadInput(f"{out} holds another run (differs in {', '.join(differences)}).", advice)
-    elif held:
-        raise BadInput(f"{out} holds files that are no run ({', '.join(sorted(held)[:3])}).", advice)
+    names = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
+    if identity_file in names:
+        if different := differences(out / identity_file):
+            raise BadInput(f"{out} holds another {kind} (differs in {', '.join(different)}).", advice)
+    elif names:
+        raise BadInput(f"{out} holds files that are no {kind} ({', '.join(sorted(names)[:3])}).", advice)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_json(out / "manifest.json", manifest.as_dict())  # first: without it a folder is no run
-        (out / "cells").mkdir(exist_ok=True)
-        _remove_leftovers(out)
+        write_json(out / identity_file, identity)  # first: it tells later that the folder is ours
     except OSError as error:
         raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
 
 
+def open_run(out: Path, manifest: Manifest) -> None:
+    """Create the folder of a run or sweep, or open it to resume; BadInput when it holds another run or other files."""
+    open_folder(out, "manifest.json", manifest.as_dict(), "run", lambda path: manifest.differences(Manifest.read(path)))
+    (out / "cells").mkdir(exist_ok=True)
+
+
 def read_summary(out: Path) -> dict[str, Any]:
-    """What `write_summary` wrote; BadFile when it is none, or names cells that are no folder of the run."""
+    """The summary of a run; BadFile when it is damaged, is a sweep's, or names cells outside the folder."""
     path, expected = out / "summary.json", "the summary of a run"
     content = read_json(path, expected)
     advice = "Give the command of the run again."
@@ -80,88 +90,77 @@ def read_summary(out: Path) -> dict[str, Any]:
 
 
 def read_cells(out: Path) -> Iterator[Cell]:
-    """The cells that the run's summary lists, one at a time; all finished ones while there is no summary yet.
+    """The finished cells of a run or sweep in planned order, read one at a time.
 
-    Refuses a folder that holds no run at once (BadFile), not when the first cell is asked for.
+    BadFile for a folder that holds no run, at once and not when the first cell is read.
     """
-    if (out / "summary.json").is_file():
-        keys = [str(row["key"]) for row in read_summary(out)["cells"]]
-    else:
-        Manifest.read(out / "manifest.json")
-        keys = sorted(path.name for path in (out / "cells").glob("*") if not path.name.startswith(TEMPORARY))
+    Manifest.read(out / "manifest.json")
+    with CellIndex(out, read_only=True) as index:
+        keys = [key for (key,) in index.columns("key")]
     return (read_cell(cell_folder(out, key)) for key in keys)
 
 
+def read_kind(out: Path) -> str:
+    """Kind of the work in a folder with an index: `run`, `sweep` or `placement`."""
+    with CellIndex(out, read_only=True) as index:
+        return str(index.facts().get("kind", "placement"))
+
+
 def summary_rows(cells: Iterable[Cell]) -> list[dict[str, Any]]:
-    """A row for each cell: identity, then every metric (None: not measured)."""
+    """One row per cell: identity, then every metric; None is "not measured"."""
     return [as_row(cell) for cell in cells]
 
 
 def write_summary(
-    out: Path,
-    *,
-    keys: Iterable[str],
-    planned: int,
-    failures: Mapping[str, str] | None = None,
-    orders: Sequence[ExpectedOrder] = (),
+    index: CellIndex, out: Path, *, orders: Sequence[ExpectedOrder] | None = None, **facts: Any
 ) -> dict[str, Any]:
-    """Write summary.csv (a row for each cell) and summary.json, whose content is returned.
+    """Write summary.csv (one row per finished cell) and summary.json, whose content is returned.
 
-    `keys` are the finished cells in the order of the table, `failures` cell -> what went wrong. summary.json has
-    outcome, cells_finished, cells_planned, failures, cells (rows), methods and behaviours (see `SummaryStatistics.rows`), recovery
-    (see `recovery.Recoveries`), which is empty unless the scenario varies a disturbance, and orders (see
-    `orders.judged`), empty unless it expects any.
+    summary.json has the given `facts`, outcome, cells_finished, cells_planned, failures (cell -> reason) and groups
+    (see `table.compute_group_statistics`). With `orders`, as a run has them, it also has statistics over frames, for
+    which every cell is read: methods and behaviours (see `SummaryStatistics.rows`), recovery (see
+    `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
+    and cells (the rows).
     """
-    failures = dict(failures or {})
-    methods, behaviours, recoveries = (
-        SummaryStatistics(*GROUP_KEYS),
-        SummaryStatistics(*GROUP_KEYS, "behaviour"),
-        RecoveryCollector(),
-    )
-    rows = []
-    for key in keys:
-        cell = read_cell(cell_folder(out, key))
-        rows.append(as_row(cell))
-        methods.add(cell)
-        behaviours.add(cell)
-        recoveries.add(cell)
-    whole = len(rows) == planned and not failures
+    counts = index.counts()
+    measured = any(value is not None for (value,) in index.columns("joint_angle_mean_deg"))
+    outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
     content = {
-        "outcome": (Outcome.PASS if whole else Outcome.INCOMPLETE).word,
-        "cells_finished": len(rows),
-        "cells_planned": planned,
-        "failures": failures,
-        "methods": methods.rows(),
-        "behaviours": behaviours.rows(),
-        "recovery": recoveries.rows(),
-        "expected_orders": evaluate_orders(orders, rows),
-        "cells": rows,
+        **facts,
+        "outcome": (outcome if counts.finished == counts.planned else Outcome.INCOMPLETE).word,
+        "cells_finished": counts.finished,
+        "cells_planned": counts.planned,
+        "failures": index.failures(),
+        "groups": compute_group_statistics(index),
     }
-    write_text(out / "summary.csv", as_csv(rows))
+    if orders is not None:
+        content |= _frame_statistics(index, out, orders)
+    write_table(index, out / "summary.csv")
     write_json(out / "summary.json", content)
     return content
 
 
-def _remove_leftovers(out: Path) -> None:
-    for folder in (out, out / "cells"):
-        for path in folder.glob(f"{TEMPORARY}*"):
-            if _writer_is_alive(path):
-                continue
-            if path.is_dir():
-                shutil.rmtree(path)
-            else:
-                path.unlink()
+def _frame_statistics(index: CellIndex, out: Path, orders: Sequence[ExpectedOrder]) -> dict[str, Any]:
+    rows, recovery = [], RecoveryCollector()
+    methods, behaviours = SummaryStatistics(*GROUP_KEYS), SummaryStatistics(*GROUP_KEYS, "behaviour")
+    for (key,) in index.columns("key"):
+        cell = read_cell(cell_folder(out, key))
+        rows.append(as_row(cell))
+        for statistics in (methods, behaviours, recovery):
+            statistics.add(cell)
+    return {
+        "methods": methods.rows(),
+        "behaviours": behaviours.rows(),
+        "recovery": recovery.rows(),
+        "expected_orders": evaluate_orders(orders, rows),
+        "cells": rows,
+    }
 
 
-def _writer_is_alive(path: Path) -> bool:
-    """Whether the process whose number is in the name lives: another run of the same scenario into the same folder."""
-    number = path.name.removeprefix(TEMPORARY).partition("-")[0]
-    if not number.isdigit() or int(number) == os.getpid():
-        return False
-    try:
-        os.kill(int(number), 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+def remove_leftovers(out: Path) -> None:
+    """Remove unfinished files of killed processes; for the process that holds the folder's lock."""
+    for path in (*out.glob(f"{TEMPORARY}*"), *(out / "cells").glob(f"{TEMPORARY}*")):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)  # a worker of another computer may still write there
+        else:
+            path.unlink()

@@ -1,11 +1,9 @@
-"""A run in one table: a row for each cell, and what each method comes to.
+"""Statistics of the methods of a run, computed from stored per-frame values.
 
-Statistics rest on stored per-frame values. Two means are given, since they differ when takes differ in length: over
-sequences (mean and standard deviation of sequence means, as public evaluators print it) and over frames.
+Two means are given, because they differ when takes differ in length: over sequences (mean and standard deviation of
+sequence means, as public evaluators print it) and over frames.
 """
 
-import csv
-import io
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -13,48 +11,18 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.files import to_json_types
-from harness.results.cell import EXTRA_IDENTITY, IDENTITY, Cell, as_row, varied_text
+from harness.results.cell import Cell, as_row, varied_text
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import pool_frames
 from harness.score.timing import step_relative, step_times_ms
 
-FIRST_METRICS = (
-    "frames_matched",
-    "frames_expected",
-    "joint_angle_mean_deg",
-    "joint_angle_rms_deg",
-    "mpjre_deg",
-    "mpjpe_mm",
-    "mpjpe_root_mm",
-    "jitter_m_s3",
-    "step_p50_ms",
-    "step_p99_ms",
-    "fps",
-)
-COLUMNS = (
-    *IDENTITY,
-    *FIRST_METRICS,
-    *(name for name in DEFINITIONS if name not in FIRST_METRICS),
-    *EXTRA_IDENTITY,
-    "key",
-)
-"""Of summary.csv."""
 _COUNTS = tuple(name for name, d in DEFINITIONS.items() if d.unit == "frames")
 GROUP_KEYS = ("method", "inputs", "split", "performer", "varied")
-"""Cells that differ in these are never pooled."""
-
-
-def as_csv(rows: Iterable[Mapping[str, Any]]) -> str:
-    """One line for each cell; empty where a metric was not measured, stations separated by blanks."""
-    out = io.StringIO()
-    table = csv.writer(out, lineterminator="\n")
-    table.writerow(COLUMNS)
-    table.writerows([_text(row[name]) for name in COLUMNS] for row in rows)
-    return out.getvalue()
+"""Cells that differ in one of these are never pooled."""
 
 
 class SummaryStatistics:
-    """Adds up cells one at a time, so that a run of any length fits in memory."""
+    """Statistics per group of cells. Cells are added one at a time, so that a run of any length fits in memory."""
 
     def __init__(self, *by: str) -> None:
         self.by = by
@@ -65,7 +33,7 @@ class SummaryStatistics:
         self._groups.setdefault(name, _GroupStatistics()).add(cell)
 
     def rows(self) -> list[dict[str, Any]]:
-        """One for each group: what it is, how many sequences, frames and the statistics of every metric."""
+        """One row per group: its identity, the numbers of sequences and frames, and the statistics of every metric."""
         return [{**group.named(self.by), **group.row()} for group in self._groups.values()]
 
 
@@ -87,7 +55,7 @@ class _GroupStatistics:
         self.cpu_ms.append(np.array([np.where(timed, cell.step_cpu_ms, np.nan), cell.reference_cpu_ms]))
 
     def named(self, fields: Iterable[str]) -> dict[str, Any]:
-        """What all its cells share."""
+        """Values of fields that all cells of the group share."""
         return {field: self.sequences[0][field] for field in fields}
 
     def row(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Many cells as one table: a row for each, and what the cells of each method come to in each place of a sweep."""
+"""The finished cells of a folder as a table with one row per cell, and statistics of groups of cells over clips."""
 
 import csv
 import json
@@ -10,25 +10,28 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.files import write_parts
+from harness.results.cell import EXTRA_IDENTITY, IDENTITY, varied_text
 from harness.results.index import CellIndex
-from harness.results.summary import FIRST_METRICS
 from harness.score.metrics import DEFINITIONS
 
-LEADING_COLUMNS = (
-    "scenario",
-    "clip",
-    "behaviour",
-    "method",
-    "inputs",
-    "split",
-    "performer",
-    "calibration",
-    "noise",
-    "seed",
+FIRST_METRICS = (
+    "frames_matched",
+    "frames_expected",
+    "joint_angle_mean_deg",
+    "joint_angle_rms_deg",
+    "mpjre_deg",
+    "mpjpe_mm",
+    "mpjpe_root_mm",
+    "jitter_m_s3",
+    "step_p50_ms",
+    "step_p99_ms",
+    "fps",
 )
 METRIC_COLUMNS = (*FIRST_METRICS, *(name for name in DEFINITIONS if name not in FIRST_METRICS))
+COLUMNS = (*IDENTITY, *METRIC_COLUMNS, *EXTRA_IDENTITY, "key", "seconds")
+"""Columns of summary.csv. A column `vary.KEY` for each varied key follows."""
 TIME_COLUMNS = (*(n for n in METRIC_COLUMNS if n.startswith(("step_", "first_step_"))), "fps", "seconds")
-"""Columns that are never twice the same."""
+"""Columns whose values differ from run to run."""
 SUMMARY_METRICS = (
     "joint_angle_mean_deg",
     "mpjre_deg",
@@ -38,36 +41,48 @@ SUMMARY_METRICS = (
     "coverage",
     "step_p50_ms",
 )
-"""Metrics of the summary; the table has the rest."""
+"""Metrics of the groups in summary.json; the table has all metrics."""
 TABLE_GROUP_KEYS = ("scenario", "method", "inputs", "split", "performer", "varied")
-"""Cells that differ in these are never pooled."""
+"""Cells that differ in one of these are never pooled."""
 
 
 def write_table(index: CellIndex, path: Path) -> None:
-    """The plan's finished cells in planned order; a column `vary.KEY` for each key, empty where a metric was not
-    measured. The same cells give the same bytes, apart from `TIME_COLUMNS`."""
+    """Write the plan's finished cells in planned order: `COLUMNS`, and one column `vary.KEY` for each varied key.
+
+    A field is empty where a metric was not measured. The same cells give the same bytes, apart from `TIME_COLUMNS`.
+    """
     write_parts(path, _csv_lines(index))
 
 
 def _csv_lines(index: CellIndex) -> Iterator[str]:
-    texts = sorted({text for (text,) in index.columns("varied")})
-    varied = {text: json.loads(text) for text in texts}
+    varied = {text: json.loads(text) for text in sorted({text for (text,) in index.columns("varied")})}
     keys = list(dict.fromkeys(key for values in varied.values() for key in values))
-    values = {
-        text: [_format_value(found[key]) if key in found else "" for key in keys] for text, found in varied.items()
+    fields = {
+        text: (varied_text(values), [_format_value(values[key]) if key in values else "" for key in keys])
+        for text, values in varied.items()
     }
-    lines, places = _LastLineWriter(), len(LEADING_COLUMNS)
+    lines, identities, metrics = _LastLineWriter(), len(IDENTITY), len(METRIC_COLUMNS)
+    stations, rate = IDENTITY.index("stations"), IDENTITY.index("rate_hz")
     table = csv.writer(lines, lineterminator="\n")
-    table.writerow([*LEADING_COLUMNS, *(f"vary.{key}" for key in keys), *METRIC_COLUMNS, "key", "seconds"])
+    table.writerow([*COLUMNS, *(f"vary.{key}" for key in keys)])
     yield lines.last
-    for columns in index.columns(*LEADING_COLUMNS, "varied", "key", "seconds", *METRIC_COLUMNS):
-        first, (text, key, seconds), figures = columns[:places], columns[places : places + 3], columns[places + 3 :]
-        table.writerow([*first, *values[text]])
-        yield f"{lines.last[:-1]},{_format_numbers(figures)},{key},{_format_numbers((seconds,))}\n"
+    for row in index.columns(*COLUMNS):
+        identity, figures, (scenario, performer, varied_json, key, seconds) = (
+            list(row[:identities]),
+            row[identities : identities + metrics],
+            row[identities + metrics :],
+        )
+        identity[stations] = " ".join(json.loads(identity[stations] or "[]"))
+        identity[rate] = _format_numbers((identity[rate],))
+        text, values = fields[varied_json]
+        table.writerow(identity)
+        first = lines.last[:-1]
+        table.writerow([scenario, performer, text, key, _format_numbers((seconds,)), *values])
+        yield f"{first},{_format_numbers(figures)},{lines.last}"
 
 
 class _LastLineWriter:
-    """What a csv writer wrote last."""
+    """File of a csv writer that keeps the last line."""
 
     last = ""
 
@@ -76,14 +91,14 @@ class _LastLineWriter:
 
 
 def _format_value(value: Any) -> str:
-    """One value of a key; lists of names as tables have them."""
+    """Text of one varied value; names of a list are joined by +."""
     if isinstance(value, list) and all(isinstance(name, str) for name in value):
         return "+".join(value)
     return value if isinstance(value, str) else json.dumps(value, separators=(",", ":"))
 
 
 def _format_numbers(values: Sequence[float | None]) -> str:
-    """Nine digits of each, empty where there is none; all at once, for there are millions."""
+    """Values with nine digits, separated by commas; empty for None. One format call, because there are millions."""
     try:
         return ",".join(["%.9g"] * len(values)) % tuple(values)
     except TypeError:
@@ -91,8 +106,11 @@ def _format_numbers(values: Sequence[float | None]) -> str:
 
 
 def compute_group_statistics(index: CellIndex) -> list[dict[str, Any]]:
-    """What each group of the plan's finished cells is, its clips and cells, and mean and standard deviation of `SUMMARY_METRICS`
-    over clips, each first averaged over its seeds; in planned order."""
+    """One record per group of the plan's finished cells, in planned order.
+
+    It has the group's identity, its numbers of clips and cells, and the mean and standard deviation over clips of
+    `SUMMARY_METRICS`. Each clip is first averaged over its seeds.
+    """
     found: dict[tuple[str, ...], int] = {}
     clips: dict[tuple[int, str], int] = {}
     group_of, clip_of, figures = [], [], []
@@ -119,7 +137,7 @@ def compute_group_statistics(index: CellIndex) -> list[dict[str, Any]]:
 
 
 def _statistics(values: Floats, clip_of: Ints, group_of: Ints) -> Sequence[dict[str, float | int | None]]:
-    """Of each group, from the values of its cells, which clip each cell is of, and which group each clip."""
+    """Statistics of each group; `clip_of` has the clip of each cell, `group_of` the group of each clip."""
     known = np.isfinite(values)
     counts = np.bincount(clip_of[known], minlength=len(group_of))
     measured = counts > 0

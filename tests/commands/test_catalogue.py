@@ -31,5 +31,5 @@ def test_a_method_of_a_package_is_listed_with_its_own_source(monkeypatch: pytest
 
 def test_a_scenario_says_what_it_varies() -> None:
     assert "varies noise" in build_catalogue()["scenarios"]["boxing"]
-    assert "walk" in build_catalogue()["placement studies"]["placement_walking"]
+    assert "walk" in build_catalogue()["placement studies"]["walking"]
     assert "noise default" in build_catalogue()["scenarios"]["demo"]

@@ -9,6 +9,8 @@ import numpy as np
 
 from harness.core.files import content_key, to_json_types
 from harness.core.seeds import generator
+from harness.results.cell import IDENTITY, TRAILING_COLUMNS
+from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
 from harness.results.reader import CellResult, ResultSet
 from harness.score.metrics import DEFINITIONS, VERSIONS
@@ -77,6 +79,13 @@ def write_run(out: Path, judged: ResultSet) -> Path:
         (out / "cells" / key).mkdir(parents=True)
         _write(out / "cells" / key / "cell.json", {"defined_by": cell.defined_by})
         rows.append({**identity, **cell.metrics, "key": key})
+    names = [f"{row['method']} on {row['clip']} of {row['key']}" for row in rows]
+    with CellIndex(out) as index:
+        index.plan([*names, *judged.failed])
+        index.add({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **row} for row in rows)
+        index.record_outcomes((name, row["key"], "") for name, row in zip(names, rows, strict=True))
+        index.record_outcomes((name, "", "Traceback: no pose") for name in judged.failed)
+        index.note(kind="run")
     _write(out / "manifest.json", judged.manifest.as_dict())
     summary = {
         "outcome": "incomplete" if judged.failed else "pass",

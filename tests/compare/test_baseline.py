@@ -13,10 +13,10 @@ from harness.compare.comparison import compare_results
 from harness.compare.margins import MARGINS
 from harness.errors import BadFile, BadInput, Outcome, UnknownName
 from harness.results import storage
-from harness.results.cell import IDENTITY, TRAILING_COLUMNS
 from harness.results.index import CellIndex
 from harness.results.reader import COUNT_METRICS, CellResult, ResultSet, load_results
 from tests.compare.sides import manifest, side, write_run
+from tests.results.finish import finish_run
 
 METHODS = {"mean_pose": 3.0, "ik": 1.0}
 
@@ -68,7 +68,7 @@ def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: C
     cells = [make_cell(off_m=0.01 * n, clip=f"walk_{n}", scenario="demo", varied={"noise": "clean"}) for n in (2, 1)]
     for cell in cells:
         storage.write_cell(run_folder, cell)
-    storage.write_summary(run_folder, keys=[cell.key for cell in cells], planned=3, failures={"ik on walk_3": "no"})
+    finish_run(run_folder, keys=[cell.key for cell in cells], planned=3, failures={"ik on walk_3": "no"})
     found = load_results(run_folder)
     assert [cell.clip for cell in found.cells] == ["walk_2", "walk_1"]
     assert found.cells[0].metrics == cells[0].metrics
@@ -77,11 +77,10 @@ def test_a_run_as_the_harness_writes_it_is_a_side(run_folder: Path, make_cell: C
 
 
 def test_a_sweep_is_a_side_and_makes_a_baseline(run: Path, baselines: Path) -> None:
-    rows = json.loads((run / "summary.json").read_text())["cells"]
     with CellIndex(run) as index:
-        index.add({**dict.fromkeys((*IDENTITY, *TRAILING_COLUMNS)), **row} for row in rows)
-        index.expect([f"demo seed 1: {row['method']} on {row['clip']}" for row in rows])
-        index.record_outcomes((f"demo seed 1: {row['method']} on {row['clip']}", row["key"], "") for row in rows)
+        names = {f"demo seed 1: {row['method']} on {row['clip']}": row["key"] for row in index.rows()}
+        index.plan(list(names))
+        index.record_outcomes((name, key, "") for name, key in names.items())
     changed(run / "summary.json", cells=None, groups=[{"method": "ik"}])
     assert kept(load_results(run)) == kept(side(methods=METHODS))
     summary = json.loads((write_baseline(run, "main") / "summary.json").read_text())
@@ -143,10 +142,8 @@ def changed(path: Path, **content: Any) -> None:
 
 
 def test_runs_of_older_versions_are_refused_with_advice(run: Path) -> None:
-    rows = json.loads((run / "summary.json").read_text())["cells"]
-    for row in rows:
-        del row["scenario"]
-    changed(run / "summary.json", cells=rows)
+    with CellIndex(run) as index, index._db as db:
+        db.execute("UPDATE cells SET scenario = NULL")
     with pytest.raises(BadFile, match=r"cells that name no scenario.*run again"):
         load_results(run)
 
@@ -189,7 +186,7 @@ def test_damaged_figures_are_refused(run: Path, baselines: Path, metric: str, va
         load_results("main")
 
 
-@pytest.mark.parametrize("name", ["manifest.json", "summary.json", "cells"])
+@pytest.mark.parametrize("name", ["manifest.json", "index.sqlite", "cells"])
 def test_runs_that_lack_something_are_refused(run: Path, name: str) -> None:
     (run / name).rename(run / "elsewhere")
     with pytest.raises(BadFile):

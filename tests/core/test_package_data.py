@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-import harness
+from harness.core import package_data
 from harness.core.package_data import data_folder
 from harness.errors import UnknownName
 
@@ -17,7 +17,7 @@ def test_an_installed_package_brings_its_own(tmp_path: Path, monkeypatch: pytest
     package = tmp_path / "site-packages" / "harness"
     (package / "share" / "models").mkdir(parents=True)
     (package.parent / "models").mkdir()  # some other package's
-    monkeypatch.setattr(harness, "__file__", str(package / "__init__.py"))
+    monkeypatch.setattr(package_data, "PACKAGE_FOLDER", package)
     assert data_folder("models") == package / "share" / "models"
     with pytest.raises(UnknownName):
         data_folder("scenarios")

@@ -1,7 +1,7 @@
 """Cells of one clip: which of them, in which order, with what kept from one job to the next."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import pytest
 
 from harness.core.split import ClipPart
 from harness.errors import BadFile
-from harness.experiment.cells import ClipTask, clear_caches, run_clip_task
+from harness.experiment.cells import CellOutcome, ClipTask, clear_caches, run_task
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario, variants
 from harness.results.cell import as_row, cell_folder, read_cell, read_row, write_cell
 from harness.results.storage import Cell
@@ -26,6 +26,11 @@ SMALL = Scenario(
 
 def job(**changes: object) -> ClipTask:
     return replace(ClipTask(SMALL, ClipPart("walking_p1_01"), "walking", None, "harness run small"), **changes)  # type: ignore[arg-type]
+
+
+def run_clip_task(task: ClipTask, out: Path, stop: Path | None = None) -> Iterator[CellOutcome]:
+    (out / "cells").mkdir(exist_ok=True)
+    return run_task("test", task, out, stop or out / "stop")
 
 
 def made(out: Path, *jobs: ClipTask) -> dict[str, Cell]:

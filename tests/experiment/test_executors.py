@@ -44,12 +44,13 @@ def dies() -> None:
 
 
 def test_a_single_job_is_done_here() -> None:
-    ended = process_executor(1)(divmod, [(7, 2), (9, 4)])
-    assert {which: future.result() for which, future in ended} == {0: (3, 1), 1: (2, 1)}
-    ((_, future),) = process_executor(1)(os.getpid, [()])
-    assert future.result() == os.getpid()
-    ((_, failed),) = process_executor(1)(fails, [()])
-    assert isinstance(failed.exception(), ZeroDivisionError)
+    with process_executor(1) as executor:
+        ended = executor(divmod, [(7, 2), (9, 4)])
+        assert {which: future.result() for which, future in ended} == {0: (3, 1), 1: (2, 1)}
+        ((_, process),) = executor(os.getpid, [()])
+        assert process.result() == os.getpid()
+        ((_, failed),) = executor(fails, [()])
+        assert isinstance(failed.exception(), ZeroDivisionError)
 
 
 def test_a_worker_that_was_started_after_an_edit_refuses() -> None:

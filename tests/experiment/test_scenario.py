@@ -7,8 +7,8 @@ import pytest
 
 from harness.core.fields import replace_fields
 from harness.core.split import ClipPart
-from harness.errors import BadFile, HarnessError, UnknownName
-from harness.experiment.scenario import Station, load_scenario, shipped_scenarios, variants
+from harness.errors import BadFile, BadInput, HarnessError, RenamedKey, UnknownName
+from harness.experiment.scenario import Station, expand_clips, load_scenario, shipped_scenarios, variants
 from harness.results.cell import varied_text
 from harness.simulate.components.echo import Echo
 from harness.simulate.components.lost_station import LostStation
@@ -97,11 +97,11 @@ def test_what_is_wrong_is_named(tmp_path: Path, old: str, new: str, message: str
 
 
 ORDER = """
-[[order]]
+[[expected_order]]
 source = "a paper"
 methods = ["mean_pose", "ik[loss.robust=false]", "ik"]
 why_not = { "mean_pose > ik[loss.robust=false]" = "because" }
-[[order]]
+[[expected_order]]
 source = "another paper"
 method = "ik"
 inputs = ["pos+ori", "pos"]
@@ -245,3 +245,70 @@ def test_what_cannot_be_varied_is_refused(tmp_path: Path, line: str, message: st
 def test_alternatives_of_a_method_are_methods(tmp_path: Path) -> None:
     scenario = load_scenario(written(tmp_path, MINIMAL.replace('"ik"', '"ik[limits=true|false]", "ik"')))
     assert scenario.methods == ("ik[limits=true]", "ik[limits=false]", "ik")
+
+
+def with_stations(folder: Path, stations: str) -> dict[str, Station]:
+    text = MINIMAL.replace('[stations]\nhead = { bone = "head" }\n', stations)
+    return load_scenario(written(folder, text)).stations
+
+
+def test_a_scenario_names_a_set_of_stations(tmp_path: Path) -> None:
+    path = written(tmp_path, 'stations = "kim2012"' + MINIMAL.replace('[stations]\nhead = { bone = "head" }\n', ""))
+    assert list(load_scenario(path).stations) == ["right_hand", "left_hand", "right_ankle", "left_ankle", "pelvis"]
+    assert load_scenario(path).stations["pelvis"] == Station("lhipjoint", along=0.0, around_deg=165.0)
+
+
+def test_a_set_of_stations_is_changed_station_by_station(tmp_path: Path) -> None:
+    stations = with_stations(
+        tmp_path,
+        '[stations]\nset = "liu2011"\ntorso = "none"\nhead = { along = 0.5 }\n'
+        'pelvis = { bone = "lhipjoint", along = 0.0 }\n',
+    )
+    assert list(stations) == ["left_hand", "right_hand", "left_ankle", "right_ankle", "head", "pelvis"]
+    assert stations["head"] == Station("head", along=0.5)
+    assert stations["left_hand"] == load_scenario("demo").stations["left_hand"]
+
+
+@pytest.mark.parametrize(
+    ("stations", "message"),
+    [
+        ('[stations]\nset = "liu201"\n', "Did you mean 'liu2011'"),
+        ('[stations]\nset = "liu2011"\npelvis = "none"\n', "no station of liu2011 called 'pelvis'"),
+        ('[stations]\nset = "liu2011"\nhead = { allong = 0.5 }\n', "along"),
+        ('[stations]\nset = "liu2011"\nhead = 3\n', "expected a table"),
+    ],
+)
+def test_what_is_wrong_with_a_set_of_stations_is_named(tmp_path: Path, stations: str, message: str) -> None:
+    with pytest.raises(HarnessError, match=message):
+        with_stations(tmp_path, stations)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [("[motion]", '[motion]\nprotocol = "block"', "split"), ("[motion]", "order = []\n[motion]", "expected_order")],
+)
+def test_an_old_key_is_refused_with_its_new_name(tmp_path: Path, old: str, new: str, key: str) -> None:
+    with pytest.raises(RenamedKey, match=f"now called {key!r}"):
+        load_scenario(written(tmp_path, MINIMAL.replace(old, new)))
+
+
+def test_patterns_in_clip_lists_stand_for_the_clips_that_match(tmp_path: Path) -> None:
+    text = MINIMAL.replace('["walking_p1_01"]', '["boxing_p2_02", "walking_p1_0[12]@0.20-0.40", "boxing_p2_*"]')
+    scenario = load_scenario(written(tmp_path, text))
+    motion = expand_clips(scenario, None).motion
+    boxing = [f"boxing_p2_{number:02}" for number in (1, 3, 4, 5, 6)]
+    assert list(motion.test[:3]) == ["boxing_p2_02", "walking_p1_01@0.20-0.40", "walking_p1_02@0.20-0.40"]
+    assert list(motion.test[3:]) == boxing
+    assert expand_clips(load_scenario("demo"), None) == load_scenario("demo")
+
+
+def test_a_pattern_that_matches_nothing_is_refused(tmp_path: Path) -> None:
+    scenario = load_scenario(written(tmp_path, MINIMAL.replace("walking_p1_01", "walking_p9_*")))
+    with pytest.raises(BadInput, match=r"motion\.test: no clip matches 'walking_p9_\*'"):
+        expand_clips(scenario, None)
+
+
+def test_behaviours_are_counted_when_patterns_are_expanded(tmp_path: Path) -> None:
+    text = MINIMAL.replace("walking_p1_01", "walking_p1_*").replace('["walking"]', '["walking", "boxing"]')
+    with pytest.raises(BadFile, match="2 behaviours for 6 test clips"):
+        expand_clips(load_scenario(written(tmp_path, text)), None)

@@ -26,29 +26,22 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def run(made: Path, tmp_path: Path) -> Path:
-    """As `harness run` writes it."""
+    """As `harness run` leaves it when it was stopped: four cells of eight."""
     out = tmp_path / "run"
     shutil.copytree(made, out)
-    manifest = json.loads((out / "manifest.json").read_text())
-    manifest["inputs"] |= {
-        "motion": {"test": ["walking_1", "walking_2"]},
-        "inputs": ["pos+ori"],
-        "vary": {"noise": {"x": [1, 2]}},
-    }
-    manifest["circumstances"]["methods"] = ["ik", "mean_pose"]
-    (out / "manifest.json").write_text(json.dumps(manifest))
+    with CellIndex(out) as found:
+        found.expect([f"to come {n}" for n in range(4)])
     return out
 
 
 def index(out: Path, rows: list[dict[str, Any]], planned: int, **facts: Any) -> None:
     out.mkdir(exist_ok=True)
-    (out / "study.json").write_text(json.dumps({"kind": "sweep"}))
     with CellIndex(out) as found:
         found.expect([f"cell {n}" for n in range(planned)])
         found.add(rows)
         found.record_outcomes((f"cell {n}", row["key"], "") for n, row in enumerate(rows))
         found.record_outcomes([(f"cell {planned - 1}", "", "Traceback\nValueError: on purpose")])
-        found.note(name="tiny", **facts)
+        found.note(kind="sweep", name="tiny", command="harness sweep tiny", **facts)
 
 
 def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path: Path) -> None:
@@ -68,12 +61,11 @@ def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path
 def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "sweep"
     index(out, summary_rows(read_cells(made))[:3], 4, started_s=1000.0, seen_s=1030.0, made=3)
-    (out / "failures.json").write_text("{}")
     assert main(["status", str(out)]) == 4
     assert capsys.readouterr().out.splitlines() == [
         "sweep tiny: finished, 3 of 4 cells finished, 1 failed",
         "FAILED cell 3: ValueError: on purpose",
-        f"with the commands that make them again: {out / 'failures.json'}",
+        "one of them again: harness sweep tiny --cell 'cell 3'",
         "incomplete",
     ]
     assert main(["status", str(out), "--json"]) == 4
@@ -82,24 +74,30 @@ def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixt
     assert (said["running"], said["left_s"], said["outcome"]) == (False, None, "incomplete")
 
 
-def test_a_run_is_counted_by_its_cells_until_it_ends(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = read_status(run)
+def test_a_run_is_counted_like_a_sweep(run: Path, made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = read_status(made)
     assert (found.kind, found.planned, found.finished, found.running) == ("run", 4, 4, False)
-    assert main(["status", str(run)]) == 0
-    (run / "summary.json").unlink()
+    assert main(["status", str(made)]) == 0
     found = read_status(run)
     assert (found.planned, found.finished, found.failures) == (8, 4, {})
-    with folder_lock(run, alone=False):
+    with folder_lock(run):
         assert read_status(run).running
+    capsys.readouterr()
     assert main(["status", str(run)]) == 4
     assert "run run: not running, 4 of 8 cells finished, 0 failed" in capsys.readouterr().out
 
 
-def test_a_paper_is_all_its_runs(run: Path) -> None:
-    shutil.copytree(run, run.parent / "another")
-    (run / "summary.json").unlink()
+def test_a_paper_is_all_its_runs(run: Path, made: Path) -> None:
+    shutil.copytree(made, run.parent / "another")
     found = read_status(run.parent)
     assert (found.kind, found.planned, found.finished) == ("paper", 12, 8)
+
+
+def test_a_run_without_an_index_is_refused_with_advice(run: Path) -> None:
+    for file in run.glob("index.sqlite*"):
+        file.unlink()
+    with pytest.raises(BadFile, match=r"index\.sqlite.*Give its command again"):
+        read_status(run)
 
 
 def test_what_is_no_work_of_ours_is_told(tmp_path: Path) -> None:

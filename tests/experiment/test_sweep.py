@@ -17,25 +17,24 @@ from harness.cli import main
 from harness.core.files import TEMPORARY
 from harness.errors import BadInput, Outcome
 from harness.experiment import cells
-from harness.experiment.cell_scheduler import cell_names, plan_tasks, run_cells
 from harness.experiment.cells import ClipTask
+from harness.experiment.engine import run_cells, run_sweep
 from harness.experiment.executors import R, TaskExecutor, run_in_process
+from harness.experiment.planning import cell_names, plan_tasks
 from harness.experiment.scenario import load_scenario
-from harness.experiment.sweep import run_sweep
 from harness.experiment.sweep_config import expand_sweep, load_sweep
 from harness.results.lock import folder_lock
-from harness.results.storage import read_cells
+from harness.results.storage import read_cell
 from harness.results.table import TIME_COLUMNS
 from tests.experiment.made_up import FAILING, judge, made_up, sweep_file
 
 __all__ = ["made_up"]
 
 
-def sweep(file: Path, out: Path, each: TaskExecutor = run_in_process, workers: int = 1, **more: Any) -> Outcome:
+def sweep(file: Path, out: Path, executor: TaskExecutor = run_in_process, workers: int = 1, **more: Any) -> Outcome:
     read, path = load_sweep(file)
-    return run_sweep(
-        read, expand_sweep(read, path), out, folder=None, each=each, workers=workers, command="harness sweep x", **more
-    )
+    more = {"folder": None, "command": "harness sweep x", **more}
+    return run_sweep(read, expand_sweep(read, path), out, executor=executor, workers=workers, **more)
 
 
 def untimed(table: Path) -> list[list[str]]:
@@ -59,7 +58,7 @@ def backwards(
 
 def test_every_cell_is_in_the_table_in_planned_order(made_up: Path) -> None:
     assert sweep(sweep_file(made_up), made_up / "out") is Outcome.PASS
-    table = untimed(made_up / "out" / "table.csv")
+    table = untimed(made_up / "out" / "summary.csv")
     found = [dict(zip(table[0], line, strict=True)) for line in table[1:]]
     assert [(row["vary.noise"], row["vary.tracker.rate_hz"], row["clip"], row["method"]) for row in found] == [
         (noise, rate, clip, method)
@@ -73,8 +72,7 @@ def test_every_cell_is_in_the_table_in_planned_order(made_up: Path) -> None:
     assert (summary["outcome"], summary["cells_finished"], summary["cells_planned"]) == ("pass", 16, 16)
     assert len(summary["groups"]) == 8
     assert summary["vary"] == {"noise": ["clean", "default"], "tracker.rate_hz": [20.0, 40.0]}
-    assert read(made_up / "out" / "failures.json") == {}
-    assert read(made_up / "out" / "study.json")["kind"] == "sweep"
+    assert (summary["kind"], summary["failures"]) == ("sweep", {})
 
 
 def test_any_number_of_workers_in_any_order_gives_the_same_bytes(made_up: Path) -> None:
@@ -82,10 +80,9 @@ def test_any_number_of_workers_in_any_order_gives_the_same_bytes(made_up: Path) 
     sweep(file, made_up / "1")
     for workers in (2, 16):
         out = made_up / str(workers)
-        sweep(file, out, each=backwards, workers=workers)
-        assert untimed(made_up / "1" / "table.csv") == untimed(out / "table.csv")
-        for name in ("summary.json", "failures.json"):
-            assert (made_up / "1" / name).read_bytes() == (out / name).read_bytes()
+        sweep(file, out, executor=backwards, workers=workers)
+        assert untimed(made_up / "1" / "summary.csv") == untimed(out / "summary.csv")
+        assert (made_up / "1" / "summary.json").read_bytes() == (out / "summary.json").read_bytes()
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5, 16, 1000])
@@ -95,7 +92,7 @@ def test_tasks_are_all_cells_once_and_enough_for_all_workers(workers: int) -> No
     for asked in (scenario, one, replace(one, vary={})):
         names = cell_names(asked)
         tasks = plan_tasks([asked], None, "", workers)
-        cut = [cell for task in tasks for cell in task.cells()]
+        cut = [str(cell) for task in tasks for cell in task.cells()]
         assert sorted(cut) == sorted(names)
         assert len(tasks) >= min(workers, len(names))
 
@@ -103,19 +100,19 @@ def test_tasks_are_all_cells_once_and_enough_for_all_workers(workers: int) -> No
 def test_a_sweep_goes_on_where_it_was(made_up: Path) -> None:
     out = made_up / "out"
     sweep(sweep_file(made_up), out)
-    table = (out / "table.csv").read_text()
+    table = (out / "summary.csv").read_text()
     made = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     gone = sorted(made)[:3]
     for name in gone:
         shutil.rmtree(out / "cells" / name)
-    for name in ("index.sqlite", "table.csv"):
+    for name in ("index.sqlite", "summary.csv"):
         (out / name).unlink()
     assert sweep(sweep_file(made_up), out) is Outcome.PASS
     again = {path.name: path.stat().st_mtime_ns for path in (out / "cells").iterdir()}
     assert set(again) == set(made)
     assert sorted(name for name in made if again[name] != made[name]) == gone
     (out / "again.csv").write_text(table)
-    assert untimed(out / "table.csv") == untimed(out / "again.csv")
+    assert untimed(out / "summary.csv") == untimed(out / "again.csv")
 
 
 def test_more_methods_are_added_and_other_sweeps_refused(made_up: Path) -> None:
@@ -141,23 +138,25 @@ def test_a_cell_that_fails_stops_no_other_and_its_command_makes_it_again(
     command = ["sweep", str(sweep_file(made_up)), "--out", "out", "--seed", "3"]
     assert main(command) == 4
     assert "FAILED 8, such as demo seed 3: ik:previous+ik on walking_p1_01" in capsys.readouterr().out
-    failures = read(made_up / "out" / "failures.json")
-    assert len(failures) == 8
-    assert read(made_up / "out" / "summary.json")["cells_finished"] == 8
+    summary = read(made_up / "out" / "summary.json")
+    failures = summary["failures"]
+    assert (len(failures), summary["cells_finished"]) == (8, 8)
     name, failed = next(iter(failures.items()))
     assert name == "demo seed 3: ik:previous+ik on walking_p1_01 (noise=clean tracker.rate_hz=20)"
-    assert failed["failure"].startswith("Traceback")
-    assert "ZeroDivisionError: on purpose" in failed["failure"]
-    pasted = shlex.split(failed["rerun"])
+    assert failed.startswith("Traceback")
+    assert "ZeroDivisionError: on purpose" in failed
+    assert main(["status", "out"]) == 4
+    (again,) = (line for line in capsys.readouterr().out.splitlines() if "--cell" in line)
+    pasted = shlex.split(again.partition(": ")[2])
     assert pasted[0] == "harness"
     assert main(pasted[1:]) == 4
     assert "ZeroDivisionError: on purpose" in capsys.readouterr().err
     (made_up / "broken").unlink()
     assert main(pasted[1:]) == 4, "seven others still lack"
-    assert name not in read(made_up / "out" / "failures.json")
+    assert name not in read(made_up / "out" / "summary.json")["failures"]
     assert read(made_up / "out" / "summary.json")["cells_finished"] == 9
     assert main(command) == 0
-    assert read(made_up / "out" / "failures.json") == {}
+    assert read(made_up / "out" / "summary.json")["failures"] == {}
 
 
 def test_a_cell_of_another_name_is_refused_with_the_nearest(made_up: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -169,13 +168,14 @@ def test_a_cell_of_another_name_is_refused_with_the_nearest(made_up: Path, capsy
 
 def test_a_worker_that_dies_takes_one_cell_with_it(made_up: Path) -> None:
     """Its task is made again cell by cell; the one that kills once more has failed."""
+    name = "demo seed 1: ik:previous+ik on boxing_p1_01 (noise=clean tracker.rate_hz=40)"
 
     def deadly(
         function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
     ) -> Generator[tuple[int, Future[R]], None, None]:
         for which, task in enumerate(tasks):
             (job,) = (part for part in task if isinstance(part, ClipTask))
-            if any(str(c) == "ik:previous+ik on boxing_p1_01 (noise=clean tracker.rate_hz=40)" for c in job.cells()):
+            if name in map(str, job.cells()):
                 future = Future[R]()
                 future.set_exception(BrokenExecutor("killed"))
                 yield which, future
@@ -183,9 +183,8 @@ def test_a_worker_that_dies_takes_one_cell_with_it(made_up: Path) -> None:
                 yield from ((which, future) for _, future in run_in_process(function, [task]))
 
     out = made_up / "out"
-    assert sweep(sweep_file(made_up), out, each=deadly) is Outcome.INCOMPLETE
+    assert sweep(sweep_file(made_up), out, executor=deadly) is Outcome.INCOMPLETE
     failures = read(out / "summary.json")["failures"]
-    name = "demo seed 1: ik:previous+ik on boxing_p1_01 (noise=clean tracker.rate_hz=40)"
     assert failures == {name: "a worker process died"}
     assert read(out / "summary.json")["cells_finished"] == 15
 
@@ -207,7 +206,7 @@ def test_the_first_ctrl_c_lets_cells_finish(
     assert "again stops it at once" in said.err
     assert "the same command goes on from there" in said.err
     assert read(made_up / "out" / "summary.json")["cells_finished"] == 1
-    assert len(untimed(made_up / "out" / "table.csv")) == 2
+    assert len(untimed(made_up / "out" / "summary.csv")) == 2
     assert not list((made_up / "out").glob(f"{TEMPORARY}*"))
     assert main(command) == 0
 
@@ -219,9 +218,10 @@ def test_the_second_ctrl_c_stops_at_once(made_up: Path, monkeypatch: pytest.Monk
         return judge(*asked)
 
     monkeypatch.setattr(cells, "evaluate_cell", struck)
+    before = signal.getsignal(signal.SIGINT)  # what a shell starts in the background ignores it
     assert main(["sweep", str(sweep_file(made_up)), "--out", "out"]) == 130
     assert list((made_up / "out" / "cells").iterdir()) == []
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_what_measured_nothing_is_not_comparable(made_up: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -240,21 +240,20 @@ def test_cells_are_asked_for_again_and_again_in_one_folder(made_up: Path) -> Non
     one = replace(scenario.motion, test=("walking_p1_01",), behaviours=("walking",))
     scenario = replace(scenario, motion=one, vary={"noise": ["clean", "default"]})
     (made_up / "broken").touch()
-    first = run_cells([scenario], made_up, folder=None, each=run_in_process, command="")
+    first = run_cells([scenario], made_up, folder=None, executor=run_in_process, command="")
     assert (first.planned, len(first.rows), len(first.failures)) == (4, 2, 2)
     made = {cell.key for cell in read_cells_of(made_up)}
     more = replace(scenario, methods=("ik:previous",), vary={"noise": ["noise", "clean"]})
-    second = run_cells([more], made_up, folder=None, each=run_in_process, command="")
+    second = run_cells([more], made_up, folder=None, executor=run_in_process, command="")
     assert [row["varied"]["noise"] for row in second.rows] == ["noise", "clean"]
     assert [row["seconds"] is not None for row in second.rows] == [True, True]
     assert len({cell.key for cell in read_cells_of(made_up)} - made) == 1
     with pytest.raises(BadInput, match="Two cells are called 'demo seed 1: ik:previous on walking_p1_01"):
-        run_cells([more, more], made_up, folder=None, each=run_in_process, command="")
+        run_cells([more, more], made_up, folder=None, executor=run_in_process, command="")
 
 
 def read_cells_of(out: Path) -> list[Any]:
-    (out / "manifest.json").write_text('{"inputs": {}, "metric_versions": {}, "circumstances": {}}')
-    return list(read_cells(out))
+    return [read_cell(folder) for folder in (out / "cells").iterdir()]
 
 
 @pytest.mark.parametrize(

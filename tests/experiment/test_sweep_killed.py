@@ -23,8 +23,8 @@ import pytest
 from harness.core.files import TEMPORARY
 from harness.core.split import ClipPart
 from harness.errors import BadInput
-from harness.experiment.cell_scheduler import CellResults, run_cells, run_task
-from harness.experiment.cells import ClipTask
+from harness.experiment.cells import ClipTask, run_task
+from harness.experiment.engine import CellResults, run_cells
 from harness.experiment.executors import TaskExecutor, dask_executor, process_executor, run_in_process
 from harness.experiment.scenario import Scenario
 from tests.study.papers.tiny import WALKS
@@ -58,9 +58,9 @@ def kept(out: Path) -> dict[str, str]:
     return digests
 
 
-def ran(out: Path, each: TaskExecutor, scenario: Scenario = NOISY, workers: int = 2) -> CellResults:
+def ran(out: Path, executor: TaskExecutor, scenario: Scenario = NOISY, workers: int = 2) -> CellResults:
     out.mkdir(exist_ok=True)
-    return run_cells([scenario], out, folder=None, each=each, command="harness sweep it", workers=workers)
+    return run_cells([scenario], out, folder=None, executor=executor, command="harness sweep it", workers=workers)
 
 
 def children(pid: int) -> list[int]:
@@ -105,7 +105,7 @@ def test_cells_cut_for_one_worker_or_sixteen_have_the_same_bytes(tmp_path: Path)
 def test_a_worker_that_does_not_see_the_folder_makes_none_of_its_own(tmp_path: Path) -> None:
     job = ClipTask(NOISY, ClipPart("walking_p1_01"), "walking", None, "")
     with pytest.raises(BadInput, match="does not see"):
-        run_task("session", job, tmp_path / "elsewhere", tmp_path / "stop")
+        list(run_task("session", job, tmp_path / "elsewhere", tmp_path / "stop"))
     assert not list(tmp_path.iterdir())
 
 
@@ -121,8 +121,11 @@ def backwards(
 @pytest.mark.parametrize("jobs", [2, 16])
 def test_workers_of_whom_some_are_killed_give_the_bytes_of_one(tmp_path: Path, jobs: int) -> None:
     one = ran(tmp_path / "one", run_in_process)
-    with killing(tmp_path / "many", lambda count: count >= 2, times=2) as killed:
-        many = ran(tmp_path / "many", process_executor(jobs), workers=jobs)
+    with (
+        process_executor(jobs) as executor,
+        killing(tmp_path / "many", lambda count: count >= 2, times=2) as killed,
+    ):
+        many = ran(tmp_path / "many", executor, workers=jobs)
     assert len(killed) == 2
     assert many.failures == {}
     assert told(one) == told(many)
@@ -165,7 +168,7 @@ def sweep(study: Path, out: Path) -> Iterator["subprocess.Popen[bytes]"]:
 
 
 def table(out: Path) -> list[dict[str, str]]:
-    with open(out / "table.csv", newline="") as file:
+    with open(out / "summary.csv", newline="") as file:
         return [{k: v for k, v in row.items() if not k.startswith(TIMED)} for row in csv.DictReader(file)]
 
 

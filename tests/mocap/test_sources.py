@@ -1,5 +1,6 @@
 """Sources of motion: their folders, and the skeletons that they know."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -49,3 +50,10 @@ def test_folders_are_those_of_the_option_or_of_the_variable(tmp_path: Path, monk
     monkeypatch.delenv(MOCAP_VARIABLE)
     with pytest.raises(BadInput, match="--mocap DIR"):
         find_library_folders(None)
+
+
+def test_the_variable_names_folders_as_path_does(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+    monkeypatch.setenv(MOCAP_VARIABLE, os.pathsep.join((str(tmp_path / "a"), "", str(tmp_path / "b"))))
+    assert find_library_folders(None) == (tmp_path / "a", tmp_path / "b")

@@ -15,6 +15,7 @@ from harness.core.seeds import generator
 from harness.mocap.synthetic import SOURCE, generate
 from harness.results import manifest, storage
 from harness.score.score import score_estimate
+from tests.results.finish import finish_run
 
 RATE_HZ = 40.0
 STATIONS = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
@@ -66,7 +67,7 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
             cell = make_cell(behaviour, take, method, (times + 1) * error_deg, inputs, plan, plan.varied[times])
             storage.write_cell(out, cell)
             keys.append(cell.key)
-    storage.write_summary(out, keys=keys, planned=planned, failures=failures)
+    finish_run(out, keys=keys, planned=planned, failures=failures)
     return out
 
 

@@ -58,7 +58,7 @@ def fabricate_sweep(out: Path, plan: Plan | None = None) -> Path:
         finished = [name for name in named if name not in {cell for cell, *_ in failed}]
         index.record_outcomes([(name, row["key"], "") for name, row in zip(finished, rows, strict=True)])
         index.record_outcomes(failed)
-        index.note(name="made_up", command=COMMAND)
+        index.note(kind="sweep", name="made_up", command=COMMAND)
     return out
 
 

@@ -1,6 +1,7 @@
 """The index of many cells: what goes in comes out, in planned order; it is worth nothing and made anew at any time."""
 
 import json
+import shutil
 import sqlite3
 from collections.abc import Mapping
 from pathlib import Path
@@ -69,7 +70,11 @@ def test_what_failed_is_counted_and_kept_until_it_is_made_again(tmp_path: Path) 
         assert list(index.failures()) == ["b"]
 
 
-def test_cells_that_the_index_lacks_are_gathered_from_their_folders(run: Path) -> None:
+def test_cells_that_the_index_lacks_are_gathered_from_their_folders(run: Path, tmp_path: Path) -> None:
+    rows = rows_of(run)
+    run = shutil.copytree(run, tmp_path / "run")
+    for file in run.glob(f"{INDEX_FILE}*"):
+        file.unlink()
     (run / "cells" / ".unfinished-1-abc").mkdir()
     (run / "cells" / "of_an_older_version").mkdir()
     (run / "cells" / "of_an_older_version" / "cell.json").write_text("{}")
@@ -77,7 +82,6 @@ def test_cells_that_the_index_lacks_are_gathered_from_their_folders(run: Path) -
         assert index.unwritten() == 9
         assert index.add_from_folders() == 8
         assert index.add_from_folders() == 0
-        rows = rows_of(run)
         assert list(index.rows_of([row["key"] for row in rows])) == [{**row, "seconds": None} for row in rows]
 
 
@@ -90,7 +94,7 @@ def test_a_damaged_or_older_index_is_made_anew(run: Path, tmp_path: Path, damage
         with sqlite3.connect(tmp_path / INDEX_FILE) as db:
             db.execute("PRAGMA user_version = 7")
         db.close()
-    with pytest.raises(BadFile, match=r"index\.sqlite.*Give the command"):
+    with pytest.raises(BadFile, match=r"index\.sqlite.*Give its command"):
         CellIndex(tmp_path, read_only=True)
     with CellIndex(tmp_path) as index:
         assert index.counts() == CellCounts(0, 0, 0)
@@ -112,11 +116,11 @@ def test_the_table_is_the_same_in_whatever_order_cells_ended(run: Path, tmp_path
             index.expect([named(row) for row in rows])
             index.add(order)
             index.record_outcomes((named(row), row["key"], "") for row in order)
-            write_table(index, tmp_path / name / "table.csv")
+            write_table(index, tmp_path / name / "summary.csv")
             (tmp_path / name / "groups.json").write_text(json.dumps(compute_group_statistics(index)))
-    for file in ("table.csv", "groups.json"):
+    for file in ("summary.csv", "groups.json"):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
-    header, first, *_ = (tmp_path / "one" / "table.csv").read_text().splitlines()
+    header, first, *_ = (tmp_path / "one" / "summary.csv").read_text().splitlines()
     found = dict(zip(header.split(","), first.split(","), strict=True))
     assert found["scenario"] == "fabricated"
     assert (found["vary.noise"], found["noise"]) == ("clean", "default")
@@ -143,8 +147,6 @@ def test_a_folder_has_one_coordinator(tmp_path: Path) -> None:
     assert not is_running(tmp_path)
     with folder_lock(tmp_path):
         assert is_running(tmp_path)
-        with pytest.raises(BadInput, match="at work"), folder_lock(tmp_path, alone=False):
+        with pytest.raises(BadInput, match="at work"), folder_lock(tmp_path):
             pass
     assert not is_running(tmp_path)
-    with folder_lock(tmp_path, alone=False), folder_lock(tmp_path, alone=False):
-        assert is_running(tmp_path)

@@ -16,6 +16,7 @@ from harness.core.files import TEMPORARY, to_json_types
 from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
+from tests.results.finish import finish_run
 
 MakeCell = Callable[..., storage.Cell]
 ISSUE_COLUMNS = (
@@ -23,10 +24,6 @@ ISSUE_COLUMNS = (
     "frames_matched,frames_expected,joint_angle_mean_deg,joint_angle_rms_deg,mpjre_deg,mpjpe_mm,mpjpe_root_mm,"
     "jitter_m_s3,step_p50_ms,step_p99_ms,fps"
 )
-
-
-NOBODY = 2**22 + 1
-"""A number that Linux gives to no process."""
 
 
 def manifest(**changes: object) -> manifests.Manifest:
@@ -75,7 +72,7 @@ def test_the_table_has_the_issues_columns_first(run_folder: Path, make_cell: Mak
     cells = [make_cell(0.01), make_cell(0.03, clip="walk_02", stations=("head", "torso"))]
     for cell in cells:
         storage.write_cell(run_folder, cell)
-    storage.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
+    finish_run(run_folder, keys=[c.key for c in cells], planned=2)
     text = (run_folder / "summary.csv").read_text()
     assert text.startswith(ISSUE_COLUMNS + ",")
     rows = list(csv.reader(text.splitlines()))
@@ -90,7 +87,7 @@ def test_means_over_sequences_and_over_frames_differ_when_takes_do(run_folder: P
     cells = [make_cell(0.01, frames=300), make_cell(0.05, frames=100, clip="walk_02")]
     for cell in cells:
         storage.write_cell(run_folder, cell)
-    content = storage.write_summary(run_folder, keys=[c.key for c in cells], planned=2)
+    content = finish_run(run_folder, keys=[c.key for c in cells], planned=2)
     (method,) = content["methods"]
     mpjpe = method["metrics"]["mpjpe_mm"]
     assert mpjpe["mean"] == pytest.approx(30.0)
@@ -106,7 +103,7 @@ def test_a_root_mean_square_over_frames_is_no_mean_of_means(run_folder: Path, ma
     uneven = {**cell.scores.per_frame, "joint_angle_rms_deg": np.where(np.arange(400) < 100, 2.0, 0.0)}
     scores = type(cell.scores)(cell.metrics, uneven, cell.scores.per_joint, cell.scores.scored)
     storage.write_cell(run_folder, make_cell(scores=scores))
-    content = storage.write_summary(run_folder, keys=[cell.key], planned=1)
+    content = finish_run(run_folder, keys=[cell.key], planned=1)
     assert content["methods"][0]["metrics"]["joint_angle_rms_deg"]["frame_weighted"] == pytest.approx(1.0)
 
 
@@ -115,7 +112,7 @@ def test_protocols_and_inputs_are_never_pooled(run_folder: Path, make_cell: Make
              enumerate([("pos", "block"), ("pos", "subject"), ("pos+ori", "block")])]  # fmt: skip
     for cell in cells:
         storage.write_cell(run_folder, cell)
-    content = storage.write_summary(run_folder, keys=[c.key for c in cells], planned=4, failures={"ik on d": "boom"})
+    content = finish_run(run_folder, keys=[c.key for c in cells], planned=4, failures={"ik on d": "boom"})
     assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
     assert content["outcome"] == "incomplete"
     assert (content["cells_finished"], content["cells_planned"]) == (3, 4)
@@ -126,11 +123,12 @@ def test_a_run_goes_on_where_it_was_and_clears_what_a_kill_left(run_folder: Path
     storage.open_run(run_folder, manifest())
     cell = make_cell()
     storage.write_cell(run_folder, cell)
-    half = run_folder / "cells" / f"{TEMPORARY}{NOBODY}-abc"
+    half = run_folder / "cells" / f"{TEMPORARY}12345-abc"
     half.mkdir()
     (half / "cell.json").write_text("{")
-    (run_folder / f"{TEMPORARY}{NOBODY}-summary.json").write_text("{")
+    (run_folder / f"{TEMPORARY}12345-summary.json").write_text("{")
     storage.open_run(run_folder, manifest(methods=["ik", "local_pca"]))
+    storage.remove_leftovers(run_folder)
     assert sorted(os.listdir(run_folder)) == ["cells", "manifest.json"]
     assert os.listdir(run_folder / "cells") == [cell.key]
     assert storage.has_cell(run_folder, cell.key)
@@ -204,11 +202,11 @@ def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
 
 WRITE_FOR_EVER = """
 import dataclasses, itertools, pathlib, sys
-from harness.score import results
+from harness.results import storage
 run, key = pathlib.Path(sys.argv[1]), sys.argv[2]
-cell = results.read_cell(run / "cells" / key)
+cell = storage.read_cell(run / "cells" / key)
 for n in itertools.count():
-    results.write_cell(run, dataclasses.replace(cell, key=f"{sys.argv[3]}-{n}"))
+    storage.write_cell(run, dataclasses.replace(cell, key=f"{sys.argv[3]}-{n}"))
 """
 
 
@@ -225,9 +223,9 @@ def test_a_kill_at_any_moment_leaves_whole_cells_only(run_folder: Path, make_cel
         finally:
             child.kill()
             child.wait()
-    storage.open_run(run_folder, manifest())
-    cells = list(storage.read_cells(run_folder))
-    assert len(cells) == len(os.listdir(run_folder / "cells")) >= 4
+    storage.remove_leftovers(run_folder)
+    cells = [storage.read_cell(folder) for folder in (run_folder / "cells").iterdir()]
+    assert len(cells) >= 4
 
 
 def test_pickles_are_refused(run_folder: Path, make_cell: MakeCell) -> None:
@@ -245,20 +243,18 @@ def test_a_summary_that_is_none_or_leads_elsewhere_is_refused(
 ) -> None:
     key = make_cell().key
     storage.write_cell(run_folder, make_cell())
-    content = storage.write_summary(run_folder, keys=[key], planned=1) | change
+    content = finish_run(run_folder, keys=[key], planned=1) | change
     text = json.dumps({name: value for name, value in content.items() if value is not None})
     (run_folder / "summary.json").write_text(text)
     with pytest.raises(BadFile, match=message):
+        storage.read_summary(run_folder)
+
+
+def test_a_run_without_an_index_is_refused_with_advice(run_folder: Path, make_cell: MakeCell) -> None:
+    storage.open_run(run_folder, manifest())
+    storage.write_cell(run_folder, make_cell())
+    with pytest.raises(BadFile, match=r"index\.sqlite.*Give its command again"):
         storage.read_cells(run_folder)
-
-
-def test_what_another_run_is_writing_is_left_alone(run_folder: Path) -> None:
-    storage.open_run(run_folder, manifest())
-    theirs, left_behind = f"{TEMPORARY}{os.getppid()}-cell", f"{TEMPORARY}{NOBODY}-cell"
-    for name in (theirs, left_behind):
-        (run_folder / "cells" / name).mkdir()
-    storage.open_run(run_folder, manifest())
-    assert os.listdir(run_folder / "cells") == [theirs]
 
 
 def test_no_run_in_a_folder_is_said_at_once(tmp_path: Path) -> None:
@@ -301,7 +297,7 @@ def test_known_and_new_performers_and_varied_values_are_never_pooled(run_folder:
     ]
     for cell in cells:
         storage.write_cell(run_folder, cell)
-    content = storage.write_summary(run_folder, keys=[c.key for c in cells], planned=3)
+    content = finish_run(run_folder, keys=[c.key for c in cells], planned=3)
     assert [row["sequences"] for row in content["methods"]] == [1, 1, 1]
     assert [row["varied"]["components.echo.share"] for row in content["behaviours"]] == shares
     assert [row["performer"] for row in content["cells"]] == ["known", "known", "new"]

@@ -1,10 +1,10 @@
 """Export of truth and estimates of a run to other programs: BVH players, OpenSim, tables, evo."""
 
-import os
 import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from harness.core.files import move_into_place, temporary_path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.bvh import bvh_files
 from harness.mocap.write.csv_table import csv_files
@@ -18,7 +18,6 @@ FORMATS: dict[str, Callable[[PosedMotion], dict[str, str]]] = {
     "csv": csv_files,
     "tum": tum_files,
 }
-_UNFINISHED = ".unfinished-"
 
 
 def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bool = False) -> list[Path]:
@@ -41,11 +40,11 @@ def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bo
                         path = folder / f"{stem}.{kind}{ending}"
                         ready[path] = _write_unfinished(path, text, force)
         for path, unfinished in ready.items():
-            os.replace(unfinished, path)
+            move_into_place(unfinished, path)
     except OSError as error:
         raise BadInput(f"{folder} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
     finally:
-        for unfinished in folder.glob(f"{_UNFINISHED}{os.getpid()}-*"):
+        for unfinished in folder.glob(temporary_path(folder / "*").name):
             unfinished.unlink()
     if not ready:
         raise BadInput("No cell of this run has an estimate to export.", "Run the scenario first.")
@@ -61,6 +60,6 @@ def _write_unfinished(path: Path, text: str, force: bool) -> Path:
     """Write the text under a temporary name, so that all files can be renamed at once."""
     if path.exists() and not force:
         raise BadInput(f"{path} exists.", "Name another folder with --out, or replace it with --force.")
-    unfinished = path.with_name(f"{_UNFINISHED}{os.getpid()}-{path.name}")
+    unfinished = temporary_path(path)
     unfinished.write_text(text, encoding="utf-8", newline="")
     return unfinished

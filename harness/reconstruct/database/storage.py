@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from harness.core.arrays import Singles
+from harness.core.files import flush, move_into_place, temporary_path, write_text
 from harness.errors import BadFile, BadInput
 from harness.reconstruct.database.frames import MotionFrames, TakeSegment
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
@@ -87,13 +88,11 @@ class FolderWriter(MemoryWriter):
         for name, file in self._files.items():
             self._write_header(name, self.segments[-1].stop)
             file.flush()
-            os.fsync(file.fileno())
+            flush(self._temporary / f"{name}.npy")
         card = {"format": FORMAT, "version": VERSION, "rate_hz": self.rate_hz}
         card["runs"] = [asdict(segment) for segment in self.segments]
-        with open(self._temporary / _HEADER_FILE, "w", encoding="utf-8") as text:
-            json.dump(card, text, indent=0, allow_nan=False, ensure_ascii=False)
-            text.flush()
-            os.fsync(text.fileno())
+        text = json.dumps(card, indent=0, allow_nan=False, ensure_ascii=False)
+        write_text(self._temporary / _HEADER_FILE, text)
 
     def close(self) -> None:
         for file in self._files.values():
@@ -113,7 +112,7 @@ def open_writer(folder: Path) -> Iterator[FolderWriter]:
     if os.path.lexists(folder):
         raise taken
     folder.parent.mkdir(parents=True, exist_ok=True)
-    temporary = folder.with_name(f".unfinished-{os.getpid()}-{folder.name}")
+    temporary = temporary_path(folder)
     temporary.mkdir()
     try:
         writer = FolderWriter(folder, temporary)
@@ -123,7 +122,7 @@ def open_writer(folder: Path) -> Iterator[FolderWriter]:
         finally:
             writer.close()
         try:
-            temporary.rename(folder)  # fails on a folder that has anything in it
+            move_into_place(temporary, folder)  # fails on a folder that has anything in it
         except OSError as error:
             raise taken from error
     finally:

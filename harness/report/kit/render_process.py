@@ -14,6 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.files import TEMPORARY
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
@@ -86,7 +87,8 @@ class RenderProcess:
             self._process.kill()
             self._process.communicate()
         for job in self._jobs:
-            job.output.with_name(f".unfinished-{job.output.name}").unlink(missing_ok=True)
+            for temporary in job.output.parent.glob(f"{TEMPORARY}*-{job.output.name}"):
+                temporary.unlink(missing_ok=True)
         self._folder.cleanup()
 
     def _start(self) -> "subprocess.Popen[str]":

@@ -3,7 +3,6 @@
 Each job is a file of arrays (see `apart.Job`); every picture is there whole or not at all.
 """
 
-import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.files import atomic_path
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.scene import ESTIMATE, TRUTH, Scene
 from harness.report.kit.skeleton_player import heading_rad
@@ -29,12 +29,11 @@ def main(jobs: Sequence[str]) -> None:
                 compute_poses(believed, content["estimate_qpos"]),
             )
             output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
-        beside = output.with_name(f".unfinished-{output.name}")
-        if fps:
-            write_movie(truth, estimate, fps, title, beside)
-        else:
-            write_strip(truth, estimate, beside)
-        os.replace(beside, output)
+        with atomic_path(output) as temporary:
+            if fps:
+                write_movie(truth, estimate, fps, title, temporary)
+            else:
+                write_strip(truth, estimate, temporary)
 
 
 def write_strip(truth: PoseSequence, estimate: PoseSequence, path: Path) -> None:

@@ -4,7 +4,6 @@ Started by `harness.report.placement.body_map` in a process of its own, for VTK 
 stands in the T-pose; each point of the skin has the colour of the places on its own bone.
 """
 
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from harness.body.humanoid import tpose
 from harness.body.mounts import Mount, locate_mount
 from harness.core import rotations
 from harness.core.arrays import Floats
+from harness.core.files import write_npz
 from harness.core.humanoid24 import standard_skeleton, unpack
 from harness.core.skeleton import Skeleton, forward_kinematics
 from harness.report.placement.body_map import interpolate_colours
@@ -55,10 +55,7 @@ def main(job: str, output: str) -> None:
     bones = [mount.bone for mount in mounts]
     body = [_coloured_mesh(standing, shape, bones, at_m, colour, known) for shape in body_geoms(skeleton)]
     views = _views(body, at_m, outward, colour, known)
-    beside = Path(output).with_name(f".unfinished-{Path(output).name}")
-    with open(beside, "wb") as file:
-        np.savez(file, picture=np.array([p for p, _ in views]), at=np.array([a for _, a in views]))
-    os.replace(beside, output)
+    write_npz(Path(output), picture=np.array([p for p, _ in views]), at=np.array([a for _, a in views]))
 
 
 class _TPose:

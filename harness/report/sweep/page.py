@@ -128,7 +128,7 @@ def _files(sweep: SweepData) -> Markup:
         return tag("code", name)
 
     items: list[Any] = [
-        join(file("table.csv"), f": {len(sweep):,} rows in planned order, with every metric."),
+        join(file("summary.csv"), f": {len(sweep):,} rows in planned order, with every metric."),
         join(file(INDEX_FILE), ": the same for questions, and more, such as how long each cell took:"),
     ]
     query = tag("pre", tag("code", f'sqlite3 {INDEX_FILE} "{_EXAMPLE}"'))

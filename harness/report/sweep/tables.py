@@ -57,7 +57,7 @@ def failures(sweep: SweepData) -> Markup:
     if not found:
         return Markup()
     more = len(found) - _MOST_FAILURES
-    rest = tag("p", f"And {more:,} more kinds; failures.json has them all.") if more > 0 else None
+    rest = tag("p", f"And {more:,} more kinds; summary.json has them all.") if more > 0 else None
     text = "Finished cells are kept. This tries all failed ones again:"
     again = join(tag("p", text), tag("pre", tag("code", sweep.command))) if sweep.command else None
     items = (_failure_item(fault, sweep.command) for fault in found[:_MOST_FAILURES])

@@ -19,7 +19,7 @@ def text(sweep: SweepData) -> str:
     for fault in found[:_MOST_FAILURES]:
         lines.append(f"FAILED {len(fault.cells):,}, such as {fault.cells[0]}: {fault.message}")
     if (more := len(found) - _MOST_FAILURES) > 0:
-        lines.append(f"and {more:,} more kinds of failure, in failures.json")
+        lines.append(f"and {more:,} more kinds of failure, in summary.json")
     return "\n".join(lines)
 
 

@@ -9,11 +9,11 @@ from typing import Literal
 
 from harness.core.package_data import data_folder
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
-from harness.experiment.cells import ProgressCallback, open_scenario_motion
+from harness.experiment.cells import ProgressCallback, check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
-from harness.study.papers.paper_study import PaperStudy, check_run_names, count_cells, open_study, run_scenarios
+from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.provenance import provenance_tables
 
 PAPERS = ("liu2011", "kim2012")
@@ -67,7 +67,7 @@ def reproduce(
     runs = paper.plan(motion, seed)
     if not runs:
         raise BadInput(f"{paper.name} has no runs on {motion} motion.", "Choose the other motion.")
-    check_run_names(runs, library)
+    check_names(runs.values(), library)
     title = open_scenario_motion(next(iter(runs.values())).motion, library, seed).title
     open_study(out, {"paper": paper.name, "motion": title, "seed": seed})
     cells = count_cells(runs)

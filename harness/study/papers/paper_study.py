@@ -10,15 +10,14 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.core.files import TEMPORARY, read_json, to_json_types, write_json
-from harness.core.split import ClipPart
-from harness.errors import BadInput, HarnessError, was_interrupted
-from harness.experiment import cells, engine
+from harness.core.files import read_json, to_json_types, write_json
+from harness.errors import HarnessError, was_interrupted
+from harness.experiment import engine
 from harness.experiment.cells import ProgressCallback
 from harness.experiment.scenario import Scenario, variants
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
-from harness.results.storage import read_summary
+from harness.results.storage import open_folder, read_summary
 
 _IDENTITY_FILE = "study.json"
 
@@ -72,30 +71,13 @@ def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
 
 
 def open_study(out: Path, identity: Mapping[str, Any]) -> None:
-    """Make a study's folder, or go on with it; BadInput when it holds another study or other files."""
-    advice = "Name another folder with --out, or delete this one."
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"{out} is a file.", "Name a folder with --out.")
-    held = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
-    if _IDENTITY_FILE in held:
-        found, mine = read_json(out / _IDENTITY_FILE, "what a study is"), to_json_types(identity)
-        if differences := [f"{k}: {found.get(k)}, not {mine.get(k)}" for k in mine if found.get(k) != mine[k]]:
-            raise BadInput(f"{out} holds another study ({'; '.join(differences)}).", advice)
-    elif held:
-        raise BadInput(f"{out} holds files that are no study ({', '.join(sorted(held)[:3])}).", advice)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        write_json(out / _IDENTITY_FILE, identity)  # first: without it a folder is no study
-    except OSError as error:
-        raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
+    """Create a study's folder, or open it to resume; BadInput when it holds another study or other files."""
 
+    def differences(path: Path) -> list[str]:
+        stored, given = read_json(path, "the identity of a study"), to_json_types(identity)
+        return [f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k]]
 
-def check_run_names(runs: Mapping[str, Scenario], folder: Path | None) -> None:
-    """That everything exists which the runs name; BadInput, UnknownName. Hours of work are not begun in vain."""
-    for scenario in runs.values():
-        parts = [ClipPart.parse(text) for text in scenario.motion.test]
-        for _, made in variants(scenario):
-            cells.check_names(made, cells.open_scenario_motion(made.motion, folder, made.seed), parts)
+    open_folder(out, _IDENTITY_FILE, identity, "study", differences)
 
 
 def run_scenarios(

@@ -15,9 +15,10 @@ import numpy as np
 
 from harness.core.files import content_key, to_json_types
 from harness.errors import BadInput
-from harness.experiment.cell_scheduler import CellResults, cell_names, run_cells
 from harness.experiment.cells import ProgressCallback
+from harness.experiment.engine import CellResults, run_cells
 from harness.experiment.executors import TaskExecutor
+from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, variants
 from harness.study.placement.candidates import StationSet, station_name
 
@@ -96,7 +97,7 @@ class CellCache:
         def told(last: str, done: int, planned: int) -> None:
             self.progress(last, before + done, before + planned)
 
-        asked_for = {"folder": self.folder, "each": self.executor, "command": self.command, "progress": told}
+        asked_for = {"folder": self.folder, "executor": self.executor, "command": self.command, "progress": told}
         self._take(scenarios, self.run(scenarios, self.out, **asked_for))
 
     def errors(

@@ -1,6 +1,5 @@
 """A study of where trackers go, as its TOML file has it: candidates, what is tried, where else, and what papers say."""
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -8,10 +7,11 @@ from typing import Any, Literal
 
 from harness.compare.margins import MARGINS
 from harness.core.fields import build, replace_fields
+from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
-from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario, shipped_placements
+from harness.experiment.scenario import SCHEMA, Scenario, check_scenario, load_scenario
 from harness.score.metrics import DEFINITIONS
 from harness.study.placement.candidates import (
     Candidate,
@@ -23,6 +23,8 @@ from harness.study.placement.candidates import (
 
 MAX_STATIONS = 12
 """Of an IS-900 (docs/is900.md)."""
+_OLD_PREFIX = "placement_"
+"""What names of shipped studies began with."""
 
 
 @dataclass(frozen=True)
@@ -150,21 +152,27 @@ def find_placement_study(path: Path | str) -> Path:
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_placements()}
-    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in (Path(), Path("scenarios")):
+    folders = (Path(), Path("scenarios/placement"))
+    if given.suffix in ("", ".toml") and given.stem in shipped and given.parent in folders:
         return shipped[given.stem]
+    if given.stem.removeprefix(_OLD_PREFIX) in shipped:
+        new = given.stem.removeprefix(_OLD_PREFIX)
+        raise BadInput(f"The placement study {given.stem} is now called {new}.", f"Type: harness placement {new}")
     if given.parent == Path() and not given.suffix:
         raise UnknownName("placement study", str(path), shipped)
-    raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are scenarios/placement_*.toml.")
+    raise BadFile(given, "no such file", "a placement study in TOML", "Shipped ones are in scenarios/placement/.")
+
+
+def shipped_placements() -> list[Path]:
+    """The files of the shipped placement studies."""
+    return sorted(data_folder("scenarios").glob("placement/*.toml"))
 
 
 def load_placement_study(path: Path | str) -> PlacementStudy:
     """BadFile and UnknownName name the place."""
     path = find_placement_study(path)
-    expected, advice = "a placement study", "See scenarios/placement_walking.toml."
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadFile(path, f"not TOML: {error}", expected, advice) from error
+    expected, advice = "a placement study", "See scenarios/placement/walking.toml."
+    content = read_toml(path, expected, advice)
     if content.get("kind") != "placement":
         raise BadFile(path, f"kind = {content.get('kind', 'scenario')!r}", f'{expected}, kind = "placement"', advice)
     content.setdefault("name", path.stem)

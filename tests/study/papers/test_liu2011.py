@@ -11,7 +11,7 @@ import pytest
 
 from harness.core.seeds import generator
 from harness.core.split import ClipPart
-from harness.experiment.cells import open_scenario_motion
+from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import load_scenario, shipped_scenarios
 from harness.results.cell import Cell
 from harness.results.findings import Claim, PaperExperiment
@@ -19,7 +19,7 @@ from harness.study.papers.frame_by_frame import frame_by_frame
 from harness.study.papers.leave_one_out import BEHAVIOURS, leave_one_out, own_model
 from harness.study.papers.liu2011 import PAPER, PUBLISHED_DEG, boxing_inputs
 from harness.study.papers.paper import PAPERS, Motion, load_paper
-from harness.study.papers.paper_study import PaperStudy, check_run_names
+from harness.study.papers.paper_study import PaperStudy
 
 LOW, MIDDLE, HIGH = 1.0, 2.0, 3.0
 THEIRS = {"dynamic_map": LOW, "dynamic_map:window": LOW, "local_pca": MIDDLE, "ik": HIGH}
@@ -135,7 +135,7 @@ def test_figures_are_judged_on_real_motion_within_a_quarter() -> None:
 def test_built_in_runs_name_what_exists_and_judge_enough(name: str) -> None:
     runs = load_paper(name).plan("builtin", 3)
     assert runs
-    check_run_names(runs, None)
+    check_names(runs.values(), None)
     assert {scenario.seed for scenario in runs.values()} == {3}
     for run, scenario in runs.items():
         assert scenario.name == run
@@ -166,7 +166,7 @@ def test_five_behaviours_of_eight_takes_learn_from_about_as_many_frames_as_the_p
 def test_real_runs_name_clips_that_show_what_they_say_and_that_chose_no_constants(name: str, mocap: Path) -> None:
     runs = load_paper(name).plan("cmu", 1)
     assert runs
-    check_run_names(runs, mocap)
+    check_names(runs.values(), mocap)
     chosen_on = [p for p in shipped_scenarios() if p.stem.startswith(("tune_", "validate_"))]
     chose = [ClipPart.parse(text) for path in chosen_on for text in load_scenario(path).motion.test]
     for scenario in runs.values():

@@ -11,12 +11,12 @@ import pytest
 import harness
 from harness.cli import main
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
-from harness.experiment.scenario import load_scenario, shipped_placements
+from harness.experiment.scenario import load_scenario
 from harness.results.placement_findings import PlacementFindings, read_placement
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
 from harness.study.placement.cell_cache import link_rate_hz
-from harness.study.placement.config import load_placement_study
+from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import FINDINGS, run_placement
 from harness.study.placement.plan import plan_placement
 
@@ -299,7 +299,7 @@ def test_every_shipped_study_is_ready_to_be_done(path: Path) -> None:
     assert ready.held_out is not None
     assert len(ready.held_out.motion.test) >= 6
     with pytest.raises(BadFile, match="a placement study; expected a scenario"):
-        load_scenario(path.stem)
+        load_scenario(path)
 
 
 def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
@@ -313,8 +313,10 @@ def test_the_study_of_the_docs_is_ready_to_be_done(tmp_path: Path) -> None:
 
 
 def test_studies_that_do_not_exist_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(UnknownName, match="Did you mean 'placement_walking'"):
-        load_placement_study("placement_walkin")
+    with pytest.raises(UnknownName, match="Did you mean 'walking'"):
+        load_placement_study("walkin")
+    with pytest.raises(BadInput, match="harness placement walking"):
+        load_placement_study("placement_walking")
     with pytest.raises(BadFile, match="no such file"):
         load_placement_study(tmp_path / "none.toml")
     with pytest.raises(BadFile, match="kind = 'scenario'"):

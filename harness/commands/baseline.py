@@ -1,0 +1,23 @@
+"""The verb `baseline`: keep the results of a finished run, to compare with later."""
+
+import argparse
+from pathlib import Path
+
+from harness.commands.common import Verbs, add_verb, print_result
+from harness.errors import Outcome
+
+
+def add_baseline(verbs: Verbs) -> None:
+    text = "keep what a finished run measured, to compare with later"
+    verb = add_verb(verbs, "baseline", text, run_baseline)
+    verb.add_argument("what", choices=["save"], help="the one thing there is to do")
+    verb.add_argument("name", metavar="NAME", help="of the baseline; it becomes results/baselines/NAME")
+    verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
+    verb.add_argument("--force", action="store_true", help="replace a baseline of that name")
+
+
+def run_baseline(args: argparse.Namespace) -> Outcome:
+    from harness.compare.baseline import write_baseline
+
+    folder = write_baseline(args.run, args.name, force=args.force)
+    return print_result(args, {"baseline": str(folder)}, f"baseline: {folder}")

@@ -1,0 +1,10 @@
+"""The verb `demo`: run the main job on built-in motion."""
+
+from harness.commands.common import Verbs, add_verb
+from harness.commands.run import run_scenario
+
+
+def add_demo(verbs: Verbs) -> None:
+    text = "run the main job on built-in motion and write its report"
+    verb = add_verb(verbs, "demo", text, run_scenario, "seed", "out", "jobs")
+    verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True, jobs=2)

@@ -1,0 +1,19 @@
+"""The verb `doctor`: check this installation."""
+
+import argparse
+
+from harness.commands.common import Verbs, add_verb, print_result
+from harness.errors import Outcome
+
+
+def add_doctor(verbs: Verbs) -> None:
+    add_verb(verbs, "doctor", "check this installation: scores, methods, pictures, motion", run_doctor, "mocap")
+
+
+def run_doctor(args: argparse.Namespace) -> Outcome:
+    from harness.testing.doctor import check_installation
+
+    checks = check_installation(args.mocap)
+    lines = [f"{'ok  ' if check.ok else 'FAIL'}  {check.name}: {check.detail}" for check in checks]
+    outcome = Outcome.PASS if all(check.ok for check in checks) else Outcome.REGRESSED
+    return print_result(args, {"checks": [check.as_dict() for check in checks]}, *lines, outcome=outcome)

@@ -1,0 +1,23 @@
+"""The verb `inspect`: describe a motion file and what is wrong with it."""
+
+import argparse
+from pathlib import Path
+
+from harness.commands.common import Verbs, add_verb, print_result
+from harness.errors import Outcome
+
+
+def add_inspect(verbs: Verbs) -> None:
+    verb = add_verb(verbs, "inspect", "say what a motion file is, and what is wrong with it", run_inspect, "mocap")
+    verb.add_argument("file", type=Path)
+    verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second, for files that do not record it")
+    verb.add_argument("--unit", metavar="M", type=float, help="metres per unit of length, where files do not record it")
+
+
+def run_inspect(args: argparse.Namespace) -> Outcome:
+    from harness.mocap.file_inspection import inspect_file as inspect
+    from harness.mocap.sources import folders_of_environment
+
+    library = args.mocap or folders_of_environment() or None
+    found = inspect(args.file, rate_hz=args.rate, unit=args.unit, library=library)
+    return print_result(args, found.as_dict(), *found.lines())

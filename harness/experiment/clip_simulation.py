@@ -1,0 +1,23 @@
+"""Simulation of one clip without a run."""
+
+from pathlib import Path
+
+from harness.body.retargeting import retarget_to_own_body
+from harness.core.motion import Clip
+from harness.experiment.clip_evaluation import mounts_of, noise_of, tracker_of
+from harness.experiment.scenario import Scenario, load_scenario
+from harness.simulate.simulation import Simulation, simulate_tracker
+
+
+def simulate_clip(clip: Clip, scenario: Scenario | Path | str = "demo") -> Simulation:
+    """Simulate what a tracker reports while a clip is performed, on the performer's own body.
+
+    Stations, tracker, noise and seed are the scenario's (a file, or the name of a shipped one). Returns frames as a
+    driver would deliver them, and the truth beside them. Raises BadInput for a clip shorter than one frame, and for a
+    skeleton that is not the humanoid of `harness.body`.
+    """
+    scenario = scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+    body, motion = retarget_to_own_body(clip)
+    return simulate_tracker(
+        body, motion, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
+    )

@@ -1,0 +1,78 @@
+"""Atomic writers and the readers of JSON and TOML."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.core import files
+from harness.errors import BadFile
+
+
+def test_a_writer_replaces_a_file_and_leaves_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    files.write_text(path, "old\r\n")
+    files.write_bytes(path, b"new")
+    files.write_npz(tmp_path / "b", x=np.arange(3))
+    assert path.read_bytes() == b"new"
+    assert np.load(tmp_path / "b")["x"].tolist() == [0, 1, 2]
+    assert {entry.name for entry in tmp_path.iterdir()} == {"a.txt", "b"}
+
+
+def test_a_failed_write_keeps_the_old_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.txt"
+    files.write_text(path, "old")
+
+    def fail() -> str:
+        raise RuntimeError
+
+    parts: list[Callable[[], str]] = [lambda: "half", fail]
+    with pytest.raises(RuntimeError):
+        files.write_parts(path, (part() for part in parts))
+    assert path.read_text() == "old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.txt"]
+
+
+def test_a_file_and_its_folder_are_flushed_before_anybody_relies_on_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[tuple[str, bool]] = []
+    path = tmp_path / "a.txt"
+    monkeypatch.setattr(files, "flush", lambda flushed: seen.append((flushed.name, path.exists())))
+    files.write_text(path, "text")
+    assert seen == [(f"{files.TEMPORARY}{os.getpid()}-a.txt", False), (tmp_path.name, True)]
+
+
+def test_a_folder_moves_where_nothing_is(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "file").touch()
+    with pytest.raises(OSError, match="empty"):
+        files.move_into_place(tmp_path / "one", tmp_path / "two")
+    files.move_into_place(tmp_path / "one", tmp_path / "three")
+    assert (tmp_path / "three" / "file").exists()
+
+
+@pytest.mark.parametrize(
+    ("data", "complaint"),
+    [
+        (b"a = ", "not TOML: Invalid value"),
+        (b"a = \xff", "not TOML: 'utf-8' codec"),
+        (b"a = " + 10_000 * b"[", "not TOML: "),
+        (b"#" * (files.MAX_TOML_BYTES + 1), "more than 4000000 bytes"),
+    ],
+)
+def test_what_is_no_toml_is_refused_in_a_line(data: bytes, complaint: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(data)
+    with pytest.raises(BadFile) as refused:
+        files.read_toml(path, "a scenario", "Write one.")
+    assert complaint in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_no_file_is_refused_too(tmp_path: Path) -> None:
+    with pytest.raises(BadFile, match="No such file"):
+        files.read_toml(tmp_path / "a.toml", "a scenario", "Write one.")
