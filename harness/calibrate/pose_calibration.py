@@ -49,7 +49,7 @@ class PoseCalibration:
     """(N,) standard deviation of the lengths found: the Cramér-Rao bound with what is known of people's bones."""
     length_bound_m: Floats
     """(N,) the bound without it, for whoever is unbiased; infinite where trackers do not tell."""
-    known: Floats
+    variance_reduction: Floats
     """(N,) share of the variance among people that the trackers take away; nominal mounts do not count."""
     from_prior: Bools
     """(N,) lengths of which they take away too little."""
@@ -65,9 +65,9 @@ class PoseCalibration:
     """(S,) root mean square over the poses of what is left."""
     residual_rad: Floats
     """(S,)"""
-    miss_rad: float
+    hinge_error_rad: float
     """How far the performer missed the poses, standard deviation of a hinge."""
-    pose_miss_rad: Floats
+    pose_error_rad: Floats
     """(P,) likewise of each pose."""
     mount_spread: float
     """How far trackers sit from their nominal mounts, in units of `unknowns.ALONG_M` and `ACROSS_M`."""
@@ -79,10 +79,10 @@ class PoseCalibration:
 
     def __post_init__(self) -> None:
         bones, stations = self.skeleton.bone_count, len(self.calibration.stations)
-        freeze(self, mean_m=(bones,), length_sd_m=(bones,), length_bound_m=(bones,), known=(bones,))
+        freeze(self, mean_m=(bones,), length_sd_m=(bones,), length_bound_m=(bones,), variance_reduction=(bones,))
         freeze(self, np.bool_, from_prior=(bones,))
         freeze(self, mount_sd_m=(stations,), mount_sd_rad=(stations,), residual_m=(stations,), residual_rad=(stations,))
-        freeze(self, mount_bound_m=(stations,), mount_bound_rad=(stations,), pose_miss_rad=("P",))
+        freeze(self, mount_bound_m=(stations,), mount_bound_rad=(stations,), pose_error_rad=("P",))
 
 
 def calibrate_poses(
@@ -90,7 +90,7 @@ def calibrate_poses(
 ) -> PoseCalibration:
     """Skeleton, mounts and room from the frames of each of the eight holds, in the order of `poses.POSES`.
 
-    `mounts` are in the order of the stream's stations: about where trackers sit, in any orientation. NotStanding names
+    `mounts` are in the order of the stream's stations: about where trackers sit, in any orientation. UnusableHold names
     the pose and the station and says what to do; BadInput for a wrong number of poses or stations.
     """
     if len(held) != len(POSES):
@@ -101,10 +101,10 @@ def calibrate_poses(
     names = [mount.station for mount in mounts]
     still = [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
     like = humanoid24.standard_skeleton()
-    asked_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
+    nominal_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
     turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([one.tracker_from_station for one in still]))
     place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([one.position_m for one in still]))
-    bundle = BundleAdjustment(SharedUnknowns(like, space, mounts), asked_rad, place_m, rotations.to_matrix(turn))
+    bundle = BundleAdjustment(SharedUnknowns(like, space, mounts), nominal_rad, place_m, rotations.to_matrix(turn))
     pose_checks.require_no_boresight(bundle)
     found = fit_bundle(bundle, *_reading_sd(still))
     pose_checks.require_poses_held(bundle, found)
@@ -122,13 +122,13 @@ def _reading_sd(still: Sequence[HoldReadings]) -> tuple[float, float]:
 
 
 def _assemble(
-    bundle: BundleAdjustment, found: BundleFit, known: CalibrationUncertainty, seconds: float
+    bundle: BundleAdjustment, found: BundleFit, uncertainty: CalibrationUncertainty, seconds: float
 ) -> PoseCalibration:
     at, mounts = found.solution, bundle.shared.mounts
     skeleton = bundle.shared.template.with_bones(at.bone_m)
     bone_from_station = rotations.from_matrix(at.bone_from_station)
     world_from_level, shift_m = _world_from_level(skeleton, found)
-    off_m, off_rad = bundle.residuals(bundle.reach(at))
+    off_m, off_rad = bundle.residuals(bundle.forward_kinematics(at))
     return PoseCalibration(
         calibration=Calibration(
             kind="poses",
@@ -141,20 +141,20 @@ def _assemble(
         ),
         skeleton=skeleton,
         mean_m=bundle.shared.space.mean_m,
-        length_sd_m=known.length_sd_m,
-        length_bound_m=known.length_bound_m,
-        known=known.variance_reduction,
-        from_prior=known.variance_reduction < LEAST_VARIANCE_REDUCTION,
-        mount_sd_m=known.mount_sd_m,
-        mount_sd_rad=known.mount_sd_rad,
-        mount_bound_m=known.mount_bound_m,
-        mount_bound_rad=known.mount_bound_rad,
+        length_sd_m=uncertainty.length_sd_m,
+        length_bound_m=uncertainty.length_bound_m,
+        variance_reduction=uncertainty.variance_reduction,
+        from_prior=uncertainty.variance_reduction < LEAST_VARIANCE_REDUCTION,
+        mount_sd_m=uncertainty.mount_sd_m,
+        mount_sd_rad=uncertainty.mount_sd_rad,
+        mount_bound_m=uncertainty.mount_bound_m,
+        mount_bound_rad=uncertainty.mount_bound_rad,
         residual_m=np.sqrt(np.mean(np.sum(off_m**2, axis=2), axis=0)),
         residual_rad=np.sqrt(np.mean(np.sum(off_rad**2, axis=2), axis=0)),
-        miss_rad=found.scales.pose_error_rad,
-        pose_miss_rad=found.pose_miss_rad,
+        hinge_error_rad=found.scales.pose_error_rad,
+        pose_error_rad=found.pose_error_rad,
         mount_spread=found.scales.mount_spread,
-        condition=known.condition,
+        condition=uncertainty.condition,
         hints=station_orientation.strap_hints(skeleton, mounts, bone_from_station),
         seconds=seconds,
     )

@@ -27,10 +27,10 @@ _SCREENING_STEPS, _CANDIDATES, _FINAL_STEPS = 1, 4, 5
 
 
 def require_no_boresight(bundle: BundleAdjustment) -> None:
-    """NotStanding when a station's orientations look turned in the room."""
+    """UnusableHold when a station's orientations look turned in the room."""
     at = bundle.start()
     turn_rad = station_orientation.estimate_boresight_rad(
-        bundle.reach(at).world_from_bone[:, bundle.shared.carriers], bundle.turn
+        bundle.forward_kinematics(at).world_from_bone[:, bundle.shared.carriers], bundle.turn
     )
     turn_rad = rotations.rotate(rotations.inverse(LEVEL_FROM_TRACKER), turn_rad)
     found = np.flatnonzero(np.any(turn_rad != 0.0, axis=1))
@@ -49,22 +49,22 @@ def require_no_boresight(bundle: BundleAdjustment) -> None:
 
 
 def require_poses_held(bundle: BundleAdjustment, found: BundleFit) -> None:
-    """NotStanding when a pose was not held as shown: because stations are exchanged, or because it was another pose."""
+    """UnusableHold when a pose was not held as shown: because stations are exchanged, or because it was another pose."""
     if found.heading_sd_rad > HEADING_SD_RAD:
         names = ", ".join(mount.station for mount in bundle.shared.mounts)
         raise UnusableHold(
             f"Stations {names} do not tell which way the performer faces in the poses.",
             "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
         )
-    worst = int(np.argmax(found.pose_miss_rad))
-    usual = OUTLIER_RATIO * float(np.median(found.pose_miss_rad))
-    if found.pose_miss_rad[worst] <= min(MOST_POSE_ERROR_RAD, max(usual, OUTLIER_RAD)):
+    worst = int(np.argmax(found.pose_error_rad))
+    usual = OUTLIER_RATIO * float(np.median(found.pose_error_rad))
+    if found.pose_error_rad[worst] <= min(MOST_POSE_ERROR_RAD, max(usual, OUTLIER_RAD)):
         return
     _require_no_exchange(bundle, found)
     mounts = bundle.shared.mounts
     off_m = _distances_m(bundle, found)[worst]
     station = int(np.argmax(off_m))
-    off_deg, off_mm = np.rad2deg(found.pose_miss_rad[worst]), 1e3 * off_m[station]
+    off_deg, off_mm = np.rad2deg(found.pose_error_rad[worst]), 1e3 * off_m[station]
     raise UnusableHold(
         f"Pose {worst + 1} ({POSES[worst].name}) was not held as shown: hinges are {off_deg:.0f} deg off on the whole; "
         f"station {mounts[station].station!r} is the farthest from its place in it, {off_mm:.0f} mm.",
@@ -83,9 +83,9 @@ def _distances_m(bundle: BundleAdjustment, found: BundleFit) -> Floats:
         at.bone_from_station,
         at.root_m,
         start.world_from_root,
-        bundle.asked_rad,
+        bundle.nominal_rad,
     )
-    place_m = bundle.reach(asked).place_m
+    place_m = bundle.forward_kinematics(asked).place_m
     shift_m = np.median(bundle.place_m - place_m, axis=1, keepdims=True)
     return np.asarray(np.linalg.norm(bundle.place_m - place_m - shift_m, axis=2))
 
@@ -95,14 +95,14 @@ def _require_no_exchange(bundle: BundleAdjustment, found: BundleFit) -> None:
     everyone = list(range(len(mounts)))
     bones = [mount.bone for mount in mounts]
     sides = [(bones.index(b), bones.index(f"r{b[1:]}")) for b in bones if b[0] == "l" and f"r{b[1:]}" in bones]
-    given = ResidualScales(MOST_POSE_ERROR_RAD / 2.0, 1.0, found.scales.flesh_m, 0.005, np.deg2rad(1.0))
-    plain = _ExchangedFit(bundle, everyone, given)
+    scales = ResidualScales(MOST_POSE_ERROR_RAD / 2.0, 1.0, found.scales.skin_offset_m, 0.005, np.deg2rad(1.0))
+    plain = _ExchangedFit(bundle, everyone, scales)
     tried = []
     for exchange in [*([pair] for pair in combinations(everyone, 2)), sides]:
         rows = list(everyone)
         for a, b in exchange:
             rows[a], rows[b] = b, a
-        tried.append((_ExchangedFit(bundle, rows, given), exchange))
+        tried.append((_ExchangedFit(bundle, rows, scales), exchange))
     tried = sorted(tried, key=lambda each: each[0].cost(_SCREENING_STEPS))[:_CANDIDATES]
     best, which = min((each.cost(_FINAL_STEPS), exchange) for each, exchange in tried)
     if best > min(_COST_RATIO * plain.cost(_FINAL_STEPS), _COST_PER_READING * 6.0 * bundle.place_m[..., 0].size):
@@ -117,15 +117,17 @@ def _require_no_exchange(bundle: BundleAdjustment, found: BundleFit) -> None:
 class _ExchangedFit:
     """A fit with the readings of these stations in the places of the others'."""
 
-    def __init__(self, bundle: BundleAdjustment, rows: list[int], given: ResidualScales) -> None:
-        self._bundle = BundleAdjustment(bundle.shared, bundle.asked_rad, bundle.place_m[:, rows], bundle.turn[:, rows])
-        self._at, self._damping, self._given = self._bundle.start(), 1e-3, given
+    def __init__(self, bundle: BundleAdjustment, rows: list[int], scales: ResidualScales) -> None:
+        self._bundle = BundleAdjustment(
+            bundle.shared, bundle.nominal_rad, bundle.place_m[:, rows], bundle.turn[:, rows]
+        )
+        self._at, self._damping, self._given = self._bundle.start(), 1e-3, scales
         self._weight = np.ones((*bundle.place_m.shape[:2], 2))
 
     def cost(self, steps: int) -> float:
         """Squared residuals that are left after so many more steps."""
         for _ in range(steps):
-            normal = self._bundle.normal(self._at, self._given, self._weight)
+            normal = self._bundle.normal_equations(self._at, self._given, self._weight)
             self._at, self._damping, _ = levenberg_marquardt_step(
                 self._bundle, self._at, normal, self._given, self._weight, self._damping
             )

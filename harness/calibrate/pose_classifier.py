@@ -48,23 +48,23 @@ class PoseClassifier:
         self._turned = rotations.multiply(turned, rotations.inverse(turned[0]))
         """(N, S, 4) since the first pose, in the room."""
 
-    def off_m(self, now: HoldReadings, first: HoldReadings | None = None) -> Floats:
+    def distances_m(self, now: HoldReadings, first: HoldReadings | None = None) -> Floats:
         """(N,) how far stations are from each pose, root mean square [m], for a performer who stands anywhere, faces
         anywhere and is of any size; by their turns too, once it is known how they were in the first pose."""
-        return np.array([self._off_m(now, first, pose) for pose in range(len(self._place_m))])
+        return np.array([self._distance_m(now, first, pose) for pose in range(len(self._place_m))])
 
     def matches(self, pose: int, now: HoldReadings, first: HoldReadings | None = None) -> bool:
         """Whether it may be this pose."""
-        off_m = self.off_m(now, first)
+        off_m = self.distances_m(now, first)
         return bool(off_m[pose] <= min(float(off_m.min()) + AMBIGUITY_M, _distance_limit_m(first)))
 
     def nearest(self, now: HoldReadings, first: HoldReadings | None = None) -> int | None:
         """The pose that it looks like most; None when it looks like none."""
-        off_m = self.off_m(now, first)
+        off_m = self.distances_m(now, first)
         best = int(np.argmin(off_m))
         return best if off_m[best] <= _distance_limit_m(first) else None
 
-    def _off_m(self, now: HoldReadings, first: HoldReadings | None, pose: int) -> float:
+    def _distance_m(self, now: HoldReadings, first: HoldReadings | None, pose: int) -> float:
         heading, away_m = _align(now.position_m, self._place_m[pose])
         squares = np.sum(away_m**2, axis=1)
         if first is not None:

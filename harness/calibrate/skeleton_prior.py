@@ -27,9 +27,9 @@ class SkeletonPrior:
     """(N,) mean lengths."""
     modes: Floats
     """(B, N) orthonormal rows: the principal directions of lengths."""
-    spread_m: Floats
+    mode_sd_m: Floats
     """(B,) standard deviation of each mode's weight."""
-    rest_m: Floats
+    residual_sd_m: Floats
     """(N,) standard deviation of what the modes leave."""
     direction: Floats
     """(N, 3) mean direction of each bone in the rest pose, unit vectors."""
@@ -41,19 +41,19 @@ class SkeletonPrior:
     """Whose bones, for tables."""
 
     def __post_init__(self) -> None:
-        freeze(self, mean_m=("N",), modes=("B", "N"), spread_m=("B",), rest_m=("N",))
+        freeze(self, mean_m=("N",), modes=("B", "N"), mode_sd_m=("B",), residual_sd_m=("N",))
         freeze(self, direction=("N", 3), across=("N", 2, 3), across_m=("N", 2))
 
     @property
     def covariance_m2(self) -> Floats:
         """(N, N) of lengths."""
-        out: Floats = (self.modes.T * self.spread_m**2) @ self.modes + np.diag(self.rest_m**2)
+        out: Floats = (self.modes.T * self.mode_sd_m**2) @ self.modes + np.diag(self.residual_sd_m**2)
         return out
 
     def explained_variance(self) -> float:
         """Share of the variance of lengths that the modes keep."""
-        modes = float(np.sum(self.spread_m**2))
-        return modes / (modes + float(np.sum(self.rest_m**2)))
+        modes = float(np.sum(self.mode_sd_m**2))
+        return modes / (modes + float(np.sum(self.residual_sd_m**2)))
 
     def mean_skeleton(self, like: Skeleton) -> Skeleton:
         """Bones of mean length and direction, on the hinges of another skeleton."""
@@ -84,8 +84,8 @@ def fit_skeleton_prior(skeletons: Sequence[Skeleton], modes: int = 5, source: st
     return SkeletonPrior(
         mean_m=mean_m,
         modes=rows[:modes],
-        spread_m=np.sqrt(variance[:modes]),
-        rest_m=np.sqrt(np.maximum(rest, LEAST_RESIDUAL_SD_M**2)),
+        mode_sd_m=np.sqrt(variance[:modes]),
+        residual_sd_m=np.sqrt(np.maximum(rest, LEAST_RESIDUAL_SD_M**2)),
         direction=direction,
         across=across,
         across_m=across_m,

@@ -44,15 +44,15 @@ class StationKinematics:
                 above[bone] = above[parent]
                 above[bone, parent] = True
         self._hinge_bone: Ints = np.repeat(np.arange(count), [len(h) for h in skeleton.hinges])
-        self.passes: Bools = above[self.bones]
+        self.bone_moves_station: Bools = above[self.bones]
         """(S, B) whether the whole of a bone lies between the root and the station."""
-        self.turns: Bools = (above | np.eye(count, dtype=bool))[self.bones][:, self._hinge_bone]
+        self.hinge_turns_station: Bools = (above | np.eye(count, dtype=bool))[self.bones][:, self._hinge_bone]
         """(S, D) whether a hinge turns the station."""
         self._cross: Floats = np.cross(np.eye(3), skeleton.axes[:, None])
         """(D, 3, 3) matrices of the cross product with each axis."""
         self._square: Floats = self._cross @ self._cross
 
-    def reach(
+    def forward_kinematics(
         self,
         bone_m: Floats,
         root_m: Floats,
@@ -83,7 +83,7 @@ class StationKinematics:
         """(P, S, 3, G) how places change with what is added to these bones (G,) along these vectors (G, 3); turns of
         stations do not."""
         along = (at.world_from_bone[:, bones] @ vectors[:, :, None])[:, None, :, :, 0]
-        return np.swapaxes(along * self.passes[:, bones, None], -1, -2)
+        return np.swapaxes(along * self.bone_moves_station[:, bones, None], -1, -2)
 
     def mount_jacobian(self, at: StationPoses) -> Floats:
         """(P, S, 3, 3) how places change with the station's own mount."""
@@ -101,6 +101,6 @@ class StationKinematics:
     def hinge_jacobian(self, at: StationPoses) -> tuple[Floats, Floats]:
         """(P, S, 3, D) how places and turns change with hinge angles."""
         reach_m = at.place_m[:, :, None] - at.joint_m[:, None, self._hinge_bone]
-        turn = at.hinge_axis[:, None] * self.turns[:, :, None]
+        turn = at.hinge_axis[:, None] * self.hinge_turns_station[:, :, None]
         place = np.cross(turn, reach_m)
         return np.swapaxes(place, -1, -2), np.swapaxes(turn, -1, -2)

@@ -60,7 +60,7 @@ def calibrate_tpose(
     """Calibration from frames of a performer in T-pose; trackers sit near their nominal mounts, in any orientation.
 
     `mounts` are in the order of the stream's stations. `pose` (55,) is what the performer holds, where and facing
-    which way, if not T-pose at the world's origin. NotStanding names what is wrong with the readings and what to do;
+    which way, if not T-pose at the world's origin. UnusableHold names what is wrong with the readings and what to do;
     BadInput for stations that are not the stream's.
     """
     names = [mount.station for mount in mounts]
@@ -108,7 +108,7 @@ class TPoseCollector:
 
 
 def _require_no_exchange(stance: HeldPoseModel, level_m: Floats, fit: HeldPoseFit, mounts: Sequence[Mount]) -> None:
-    """NotStanding when two stations, or all left and right ones, exchanged make a far likelier T-pose."""
+    """UnusableHold when two stations, or all left and right ones, exchanged make a far likelier T-pose."""
     everyone = list(range(len(mounts)))
     exchanges = [[pair] for pair in combinations(everyone, 2)] + [_left_right_pairs(mounts)]
     best, which = fit.chi_square, exchanges[-1]
@@ -138,7 +138,7 @@ def _left_right_pairs(mounts: Sequence[Mount]) -> list[tuple[int, int]]:
 
 
 def _require_pose(fit: HeldPoseFit, names: Sequence[str], body: Body) -> None:
-    """NotStanding when nobody who tries to stand in T-pose with this body would have stations there."""
+    """UnusableHold when nobody who tries to stand in T-pose with this body would have stations there."""
     if fit.chi_square <= _chi_square_limit(len(names)):
         return
     residual_m = np.linalg.norm(fit.residual_m, axis=1)

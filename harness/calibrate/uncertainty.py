@@ -32,12 +32,12 @@ class CalibrationUncertainty:
 
 def estimate_uncertainty(bundle: BundleAdjustment, found: BundleFit) -> CalibrationUncertainty:
     """By the normal equations at the solution: misses of the poses are unknown and marginalised."""
-    shared, at, given = bundle.shared, found.solution, found.scales
-    _, slope = shared.prior_residuals(at, given.mount_spread, given.flesh_m)
+    shared, at, scales = bundle.shared, found.solution, found.scales
+    _, slope = shared.prior_residuals(at, scales.mount_spread, scales.skin_offset_m)
     whole = found.normal.information()
     readings = whole - slope.T @ slope
-    _, wide = shared.prior_residuals(at, _UNKNOWN_MOUNT_SPREAD, given.flesh_m)
-    lengths = shared.length_slope(at)
+    _, wide = shared.prior_residuals(at, _UNKNOWN_MOUNT_SPREAD, scales.skin_offset_m)
+    lengths = shared.length_jacobian(at)
     prior_m2 = np.diag(shared.space.covariance_m2)
     scale = _prior_sd(slope)
     sd, alone = found.covariance, _inverse(readings, scale)

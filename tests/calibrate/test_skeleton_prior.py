@@ -28,9 +28,9 @@ def test_modes_and_rest_make_up_the_spread(modes: int) -> None:
     lengths = np.array([skeleton.length_m for skeleton in PEOPLE])
     pooled = np.concatenate([lengths, lengths])  # built-in performers are mirror images of themselves
     whole = np.sum((pooled - pooled.mean(axis=0)) ** 2, axis=0) / (2 * (len(PEOPLE) - 1))
-    kept = np.diag((found.modes.T * found.spread_m**2) @ found.modes)
+    kept = np.diag((found.modes.T * found.mode_sd_m**2) @ found.modes)
     expected = np.maximum((whole - kept) * len(PEOPLE) / (len(PEOPLE) - modes), LEAST_RESIDUAL_SD_M**2)
-    np.testing.assert_allclose(found.rest_m**2, expected, atol=1e-12)
+    np.testing.assert_allclose(found.residual_sd_m**2, expected, atol=1e-12)
     np.testing.assert_allclose(found.modes @ found.modes.T, np.eye(modes), atol=1e-12)
     assert 0.0 <= found.explained_variance() <= 1.0
 

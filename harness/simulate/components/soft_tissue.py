@@ -36,7 +36,7 @@ class SoftTissueArtefact:
     """The thickness that `frequency_hz` is of [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), of_flesh_m=(1e-3, 0.5))
+        require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), reference_tissue_m=(1e-3, 0.5))
 
     def apply(self, sensed: SimulatedReadings) -> None:
         frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / sensed.flesh_m)
