@@ -22,7 +22,7 @@ class ResidualScales:
     pose_error_rad: float
     """Error of each hinge, and of the lean of the body, against the nominal pose [rad]."""
     mount_spread: float
-    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_ALONG_SD_M` and `MOUNT_ACROSS_SD_M`."""
+    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_*_SD_M`."""
     skin_offset_m: Floats
     """(S, 3) offset of the nominal mounts from the bones, an argument of `SharedUnknowns.nominal_m` [m]."""
     position_sd_m: float

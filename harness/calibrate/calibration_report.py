@@ -80,8 +80,9 @@ def _fit_lines(result: PoseCalibration, miss_deg: Mapping[str, float]) -> list[s
     worst = max(miss_deg, key=lambda name: miss_deg[name])
     return [
         "bound alone: the Cramér-Rao bound without a prior of people's bones and of the mounts",
-        f"hinges are off the poses by {np.rad2deg(result.hinge_error_rad):.1f} deg, {worst!r} by {miss_deg[worst]:.1f} deg",
-        f"trackers sit {result.mount_spread:.1f} times as far from their nominal mounts as expected",
+        f"hinges are off the poses by {np.rad2deg(result.hinge_error_rad):.1f} deg, "
+        f"{worst!r} by {miss_deg[worst]:.1f} deg",
+        f"trackers sit {result.mount_spread:.1f} times as far from their mounts as is usual",
         f"condition number {result.condition:.3g}; poses held for {result.seconds:.1f} s in all",
         *(f"hint: {hint}" for hint in result.hints),
     ]

@@ -102,7 +102,7 @@ class HeldPoseModel:
         )
 
     def decompose_residual(self, residual_m: Floats) -> tuple[Floats, Floats]:
-        """Expected mount offsets (S, 3) [m] and bone rotation errors (S, 3) [rad], given residuals (S, 3); world axes."""
+        """Expected mount offsets (S, 3) [m] and bone rotations (S, 3) [rad] given residuals (S, 3); world axes."""
         white = self._precision @ residual_m.ravel()
         return (self._mount_covariance @ white).reshape(-1, 3), self._rotation_covariance @ white
 

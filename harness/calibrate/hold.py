@@ -135,7 +135,7 @@ def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: S
     elif suspect > 1.0 - LEAST_SHARE:
         why, advice = "sent suspect records", "Check the line, the output lists and which stations are on."
     raise UnusableHold(
-        f"Station {stations[worst]!r} {why}: {share[worst]:.0%} of its readings are usable; {LEAST_SHARE:.0%} are needed.",
+        f"Station {stations[worst]!r} {why}: {share[worst]:.0%} of its readings are usable, not {LEAST_SHARE:.0%}.",
         f"{advice} Then hold the pose again ({pose}).",
     )
 

@@ -164,7 +164,7 @@ def test_a_strap_put_on_the_other_way_round_is_told_of() -> None:
     ]
     found = calibrate_poses(held, space(), model.mounts)
     assert len(found.hints) == 1
-    assert "station 3 (left_ankle) looks turned 90 deg about z on its strap" in found.hints[0]
+    assert "station 3 (left_ankle) is rotated by 90 deg about z on its strap" in found.hints[0]
     assert turned_deg(found, model)[[0, 1, 3, 4, 5]].max() < 0.1
 
 
@@ -230,13 +230,13 @@ def test_stations_that_do_not_tell_the_heading_are_refused() -> None:
     bundle = BundleAdjustment(shared, nominal_rad, place_m, rotations.to_matrix(turn))
     found = fit_bundle(bundle, 0.001, 0.005)
     pose_checks.require_poses_held(bundle, found)
-    with pytest.raises(UnusableHold, match="torso, head do not tell which way the performer faces"):
+    with pytest.raises(UnusableHold, match="torso, head do not determine which way the performer faces"):
         pose_checks.require_poses_held(bundle, replace(found, heading_sd_rad=0.4))
 
 
 def test_other_numbers_of_poses_or_stations_are_refused() -> None:
     model = Model(somebody(12))
-    with pytest.raises(BadInput, match="7 poses were held, and 8 are asked for"):
+    with pytest.raises(BadInput, match="7 poses were held; 8 are needed"):
         calibrate_poses(model.held()[:7], space(), model.mounts)
     with pytest.raises(BadInput, match="Frames of 6 stations, but 4 are worn"):
         calibrate_poses(model.held(), space(), model.mounts[:4])

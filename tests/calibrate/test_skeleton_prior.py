@@ -76,7 +76,7 @@ def test_modes_help_to_guess_an_arm_of_somebody_else() -> None:
 
 
 def test_too_few_people_are_refused() -> None:
-    with pytest.raises(BadInput, match="6 skeletons do not give 5 modes"):
+    with pytest.raises(BadInput, match="6 skeletons are too few for 5 modes"):
         fit_skeleton_prior(PEOPLE[:6])
     with pytest.raises(BadInput, match="different bones"):
         fit_skeleton_prior([*PEOPLE[:8], PEOPLE[0].subset(PEOPLE[0].names[:6])[0]])
