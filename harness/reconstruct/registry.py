@@ -19,7 +19,7 @@ from typing import Any, cast
 
 from harness.core.fields import replace_fields
 from harness.core.options import parse_name, split_outside_brackets
-from harness.errors import BadInput, HarnessError, UnknownName
+from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods import dynamic_map, ik
 from harness.reconstruct.methods.best_match import BestMatch
@@ -97,7 +97,10 @@ def with_options(method: Method, options: Mapping[str, Any], name: str) -> Metho
         raise BadInput(f"{method.name} takes no options.", "Those of a method are the fields of its dataclass.")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
     known = [field for field in fields if field not in _REQUIRED_ATTRIBUTES]
+    renamed: Mapping[str, str] = getattr(method, "RENAMED_KEYS", {})
     for option in options:
+        if option in renamed:
+            raise RenamedKey(f"option of {method.name}", option, renamed[option])
         if option not in known:
             raise UnknownName(f"option of {method.name}", option, known)
     try:

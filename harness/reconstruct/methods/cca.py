@@ -30,7 +30,7 @@ def canonical_correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa
 
 @compiled
 def regression_weights(
-    inputs: Floats, query: Floats, outputs: Floats, width: float, bases: int, kappa: float, held: bool
+    inputs: Floats, query: Floats, outputs: Floats, width: float, bases: int, kappa: float, regularise_projection: bool
 ) -> Floats:
     """`weights_from_kernels` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d).
 
@@ -51,7 +51,7 @@ def regression_weights(
         _gaussian_kernel(between, sharpness),
         _gaussian_kernel(across, _kernel_precision(across, width)),
     )
-    return weights_from_kernels(kernel_x, kernel_y, near, bases, kappa, held)
+    return weights_from_kernels(kernel_x, kernel_y, near, bases, kappa, regularise_projection)
 
 
 @compiled
@@ -85,16 +85,18 @@ def _gaussian_kernel(squared: Floats, sharpness: float) -> Floats:
 
 @compiled
 def weights_from_kernels(
-    inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, held: bool
+    inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, regularise_projection: bool
 ) -> Floats:
     """(m,) what each of m >= 2 outputs counts, from Gram matrices (m, m) of both sides and the query's kernel (m,).
 
-    With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
+    With `regularise_projection` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
     """
     count = len(query)
     squared, y, root = _canonical_bases(_centre(inputs), _centre(outputs), bases, kappa)
     new = _helmert_contrasts((query - inputs.sum(axis=1) / count).reshape(-1, 1)).reshape(-1)
-    if held:  # H (H + kH I) and F y make the same diagonal of squares: eq. 4 and 5 project onto the F y
+    if (
+        regularise_projection
+    ):  # H (H + kH I) and F y make the same diagonal of squares: eq. 4 and 5 project onto the F y
         found = _project(root.T @ (root @ new), y)
     else:
         seen = y @ root.T

@@ -8,9 +8,9 @@ the regression (docs/methods.md G3), in terms of the postures that they lead to 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -42,24 +42,26 @@ _MIN_WEIGHT_VARIANCE = 1e-6
 
 @dataclass(frozen=True)
 class DynamicMap:
-    """A `Method`; defaults were chosen on validation clips, see scenarios/tune_dynamic_map.toml."""
+    """Options of the local dynamic model, a `Method`; scenarios/tune_dynamic_map.toml chose the defaults."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"terms": "regression", "like": "search", "kept": "variance_kept"}
 
     name: str = "dynamic_map"
     summary: str = (
         "the pose that is likely by the readings and by a local model of examples, learnt from answers and readings"
     )
     needs_examples: bool = True
-    like: Literal["evidence", "window"] = "evidence"
-    """What examples must be like: the last answers and the readings, or the last answers alone as in the paper."""
-    terms: ReducedRankOptions = field(default_factory=ReducedRankOptions)
-    """Of that evidence."""
+    search: Literal["features", "history"] = "features"
+    """What neighbours are compared by: the last estimates and the readings, or the last estimates alone (the paper)."""
+    regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)
+    """Options of the reduced-rank regression that makes the features; used when `search` is "features"."""
     poses: int = 3
     """m, answers that the next is predicted from."""
     neighbours: int = 800
     """K, examples of the local model."""
     width: float = 0.2
     """Variance of the weights in squared distances of the K/2-th neighbour; 0 for eq. 6 as printed, D_w = 1."""
-    kept: float = 1.0
+    variance_kept: float = 1.0
     """Share of the windows' variance that the regression uses: eq. 5 cuts off the rest, 1 leaves it to the ridge."""
     ridge: float = 1e-3
     """Added to that variance's eigenvalues, as a share of it."""
@@ -100,14 +102,14 @@ class DynamicMap:
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
         """From a database that may lie on disk."""
         windows = database.windows(self.poses, with_successor=True)
-        index = make_index(self.index, windows, self.neighbours) if self.like == "window" else None
+        index = make_index(self.index, windows, self.neighbours) if self.search == "history" else None
         return FittedDynamicMap(self, body, windows, index, mean_posture(body, database))
 
 
 WINDOW = DynamicMap(
     "dynamic_map:window",
     "the same with a local model of the last answers alone, as in Liu et al. 2011, its known traps mended",
-    like="window",
+    search="history",
     poses=2,
     neighbours=100,
     width=1.0,
@@ -122,11 +124,11 @@ WINDOW = DynamicMap(
 LITERAL = DynamicMap(
     "dynamic_map:literal",
     "Liu et al. 2011 to the letter: 99 % of the variance, weights and sigma as printed, start at the closest",
-    like="window",
+    search="history",
     poses=2,
     neighbours=40,
     width=0.0,
-    kept=0.99,
+    variance_kept=0.99,
     ridge=0.0,
     spread=1.0,
     least_sigma_rad=math.radians(0.01),
@@ -157,7 +159,7 @@ class FittedDynamicMap:
     def regression(self, worn: Calibration) -> ReducedRankRegression:
         """Of the database, for stations worn like this; made once."""
         return self._evidence.get(
-            worn, lambda: ReducedRankRegression(self.body, self.windows, worn, self.options.terms)
+            worn, lambda: ReducedRankRegression(self.body, self.windows, worn, self.options.regression)
         )
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
@@ -222,7 +224,7 @@ class DynamicMapSession(HistorySession):
         variance = 1.0 if options.width == 0.0 else options.width * float(squared[len(squared) // 2])
         weight = neighbour_weights(squared, max(variance, _MIN_WEIGHT_VARIANCE))
         after = windows.successors(rows)
-        next_mean, left = forecast(away, after, weight, options.kept, options.ridge)
+        next_mean, left = forecast(away, after, weight, options.variance_kept, options.ridge)
         self._closest = after[0].astype(float)
         mean = self._configuration(next_mean)
         mean[7:] = self.limits.clip(mean[7:])

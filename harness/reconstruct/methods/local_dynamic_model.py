@@ -36,13 +36,13 @@ def neighbour_weights(squared: Floats | Singles, variance: float) -> Floats:
     return out
 
 
-def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float) -> Forecast:
+def forecast(away: Real, after: Real, weight: Floats, variance_kept: float, ridge: float) -> Forecast:
     """What follows the query, from windows minus query (K, N), successors (K, D) and weights (K,) of sum 1.
 
-    Regresses in as many principal directions as hold the share `kept` of the weighted variance, in all of them for
+    Regresses in as many principal directions as hold the share `variance_kept` of the weighted variance, in all of them for
     1, with a `ridge` (a share of that variance, too) added to their eigenvalues.
     """
-    if kept >= 1.0 and away.shape[0] > away.shape[1]:
+    if variance_kept >= 1.0 and away.shape[0] > away.shape[1]:
         return _primal_ridge_regression(away, after, weight.astype(away.dtype), ridge)
     share: Real = weight.astype(away.dtype)
     root: Real = np.sqrt(share)[:, None]
@@ -52,19 +52,19 @@ def forecast(away: Real, after: Real, weight: Floats, kept: float, ridge: float)
     inner: Real = x @ x.T
     whole = float(inner.trace())
     asked: Real = x @ middle  # of minus (query - mean): the query is the origin of `away`
-    solve = _dual_ridge_regression if kept >= 1.0 else _principal_component_regression
-    shift, left = solve(inner, asked, y, kept, ridge * whole, whole)
+    solve = _dual_ridge_regression if variance_kept >= 1.0 else _principal_component_regression
+    shift, left = solve(inner, asked, y, variance_kept, ridge * whole, whole)
     variance = np.einsum("kd,kd->d", left, left)  # sigma_d^2 of eq. 8
     return Forecast((after_middle - shift).astype(float), variance.astype(float))
 
 
 def _principal_component_regression(
-    inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float
+    inner: Real, asked: Real, y: Real, variance_kept: float, ridge: float, whole: float
 ) -> tuple[Real, Real]:
     """Eq. 5 and 7: (D,) what to take off the mean, and (K, D) residuals."""
     eigenvalue, vector = np.linalg.eigh(inner)
     eigenvalue, vector = eigenvalue[::-1], vector[:, ::-1]
-    count = int(np.searchsorted(np.cumsum(eigenvalue), kept * whole)) + 1
+    count = int(np.searchsorted(np.cumsum(eigenvalue), variance_kept * whole)) + 1
     eigenvalue, vector = np.maximum(eigenvalue[:count], 1e-12 * whole + 1e-30), vector[:, :count]
     damped = eigenvalue + ridge
     along = vector.T @ y
@@ -73,7 +73,7 @@ def _principal_component_regression(
 
 
 def _dual_ridge_regression(
-    inner: Real, asked: Real, y: Real, kept: float, ridge: float, whole: float
+    inner: Real, asked: Real, y: Real, variance_kept: float, ridge: float, whole: float
 ) -> tuple[Real, Real]:
     """The same with all directions: Lambda^-1 becomes (Lambda + ridge)^-1, and no eigenvectors are needed."""
     single = inner.dtype == np.float32

@@ -100,7 +100,7 @@ def test_frames_that_are_missing_or_early(walk: Scene, method: Method) -> None:
 
 
 def test_the_literal_preset_is_literal() -> None:
-    assert (LITERAL.kept, LITERAL.ridge, LITERAL.width, LITERAL.spread) == (0.99, 0.0, 0.0, 1.0)
+    assert (LITERAL.variance_kept, LITERAL.ridge, LITERAL.width, LITERAL.spread) == (0.99, 0.0, 0.0, 1.0)
     assert LITERAL.loss.position_scale_m == LITERAL.loss.position_sigma_m
     assert LITERAL.start == "closest"
 
