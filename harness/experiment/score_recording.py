@@ -20,7 +20,7 @@ from harness.experiment.playback import Playback, prepare_playback, select_stati
 from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.report.run.text import COLUMNS
+from harness.results.reported_metrics import TABLE_COLUMNS
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pool_frames, score_estimate
 from harness.score.timing import step_times_ms
@@ -255,9 +255,9 @@ def _not_measured() -> dict[str, float | None]:
 
 def format_score_table(judged: Sequence[RecordingScore]) -> str:
     """A row for each method."""
-    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
+    lines = [["method", "matched", *(title for title, *_ in TABLE_COLUMNS)]]
     for one in judged:
-        figures = [_format_number(one.metrics[name], decimals) for _, name, decimals in COLUMNS]
+        figures = [_format_number(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
         lines.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(

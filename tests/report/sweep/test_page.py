@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from harness.cli import main
 from harness.compare.paired_statistics import bootstrap_interval
 from harness.errors import BadFile
-from harness.report.run.charts import draw_chart
+from harness.report.kit.chart import draw_chart
 from harness.report.sweep import page as sweep_page
 from harness.report.sweep.charts import (
     MAX_SERIES,
