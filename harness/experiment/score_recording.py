@@ -15,6 +15,8 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Estimate
+from harness.core.number_format import format_fixed
+from harness.core.text_table import Table
 from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.scenario import load_scenario
@@ -255,18 +257,8 @@ def _not_measured() -> dict[str, float | None]:
 
 def format_score_table(judged: Sequence[RecordingScore]) -> str:
     """A row for each method."""
-    lines = [["method", "matched", *(title for title, *_ in TABLE_COLUMNS)]]
+    rows = []
     for one in judged:
-        figures = [_format_number(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
-        lines.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for words in lines
-    )
-
-
-def _format_number(value: float | None, decimals: int) -> str:
-    return "not measured" if value is None else f"{value:.{decimals}f}"
+        figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
+        rows.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
+    return "\n".join(Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows).lines())

@@ -36,7 +36,7 @@ _HEIGHT_IN, _MOST_NAMED, _GAP = 4.9, 18, 0.048
 share of the picture's height."""
 _TOP, _ARMS, _TRUNK, _OUTER = 0.04, (0.145, 0.34), 0.12, 0.25
 _NECK = 0.17
-"""Shares of the picture: height of the first name; upper and lower limit of the arms; half of the trunk's width; distance of
+"""Shares of the picture: height of the first name; limits of the arms' height; half of the trunk's width; distance of
 hands and forearms from the edge; height of the neck."""
 CandidateValues = Mapping[str, float | None]
 """Candidate -> its contribution; None where it was not measured."""
