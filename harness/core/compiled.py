@@ -33,12 +33,12 @@ def compiled(function: F) -> F:
     It releases the interpreter lock, so a thread that reads a tracker does not wait for one that solves. Without a
     writable folder or a source file, every process compiles anew.
     """
-    dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
     with suppress(RuntimeError, OSError):  # no writable folder; no source file
         module = function.__module__
         if module not in _source_hashes:
             _source_hashes[module] = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).digest()
-        dispatcher._cache = _ModuleCache(function)
+        dispatcher._cache = cast(Any, _ModuleCache)(function)
     return cast(F, dispatcher)
 
 
@@ -51,16 +51,16 @@ def specialise(function: F, *arguments: Any) -> F:
     return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))
 
 
-class _ModuleCache(FunctionCache):  # type: ignore[misc]  # numba has no types
+class _ModuleCache(FunctionCache):
     """numba's cache on disk, with a stamp that also covers imported compiled modules and constants."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code from disk, or None; numba calls this before it compiles, and so before it saves."""
         self._cache_file._source_stamp = module_stamp(self._py_func.__globals__)
         try:
-            return super().load_overload(sig, target_context)
+            return cast(Any, super()).load_overload(sig, target_context)
         except (AttributeError, ImportError):  # the file names a class that has been renamed or moved
-            self.flush()
+            cast(Any, self).flush()
             return None
 
 

@@ -262,7 +262,7 @@ def _run_tasks(
     with graceful_stop(stop):
         broken = attempt(tasks)
         # One cell of a task may be to blame for the worker's death: the cells are tried one by one.
-        for task in attempt([single for task in broken for single in split_task(task)]):
+        for task in attempt([single for whole in broken for single in split_task(whole)]):
             record(CellOutcome(str(task.cells()[0]), failure="a worker process died"))
     return outcomes
 

@@ -15,12 +15,14 @@ import numpy as np
 
 from harness.core.arrays import Floats, Ints
 from harness.core.estimate import Estimate
+from harness.core.number_format import format_fixed
+from harness.core.text_table import Table
 from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.report.run.text import COLUMNS
+from harness.results.reported_metrics import TABLE_COLUMNS
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pool_frames, score_estimate
 from harness.score.timing import step_times_ms
@@ -255,18 +257,8 @@ def _not_measured() -> dict[str, float | None]:
 
 def format_score_table(judged: Sequence[RecordingScore]) -> str:
     """A row for each method."""
-    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
+    rows = []
     for one in judged:
-        figures = [_format_number(one.metrics[name], decimals) for _, name, decimals in COLUMNS]
-        lines.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for words in lines
-    )
-
-
-def _format_number(value: float | None, decimals: int) -> str:
-    return "not measured" if value is None else f"{value:.{decimals}f}"
+        figures = [format_fixed(one.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
+        rows.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
+    return "\n".join(Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows).lines())

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.number_format import format_fixed, format_share
+from harness.core.text_table import Table
 from harness.stream.frame import TrackerFrame
 
 
@@ -65,14 +67,11 @@ class StreamSummary:
     def __str__(self) -> str:
         rate = f", {(self._frames - 1) / self.duration_s:.2f} Hz" if self.duration_s > 0.0 else ""
         head = f"{self._frames} frames in {self.duration_s:.2f} s{rate}, longest gap {1e3 * self._longest_gap_s:.0f} ms"
-        width = max(map(len, (*self._stations, "station")))
-        lines = [head, "", f"{'station':<{width}}  with a record  position  orientation  suspect  mean quality"]
-        frames = max(self._frames, 1)
+        rows = []
         for i, station in enumerate(self._stations):
             counts = (self._records[i], self._positions[i], self._orientations[i])
-            records, positions, orientations = (f"{100.0 * count / frames:.1f} %" for count in counts)
-            suspect, quality = self._suspect[i], self._quality_sum[i] / frames
-            lines.append(
-                f"{station:<{width}}  {records:>13}  {positions:>8}  {orientations:>11}  {suspect:>7}  {quality:>12.2f}"
-            )
-        return "\n".join(lines)
+            records, positions, orientations = (format_share(count / max(self._frames, 1), 1) for count in counts)
+            quality = self._quality_sum[i] / max(self._frames, 1)
+            rows.append([station, records, positions, orientations, str(self._suspect[i]), format_fixed(quality, 2)])
+        table = Table(["station", "with a record", "position", "orientation", "suspect", "mean quality"], rows)
+        return "\n".join([head, "", *table.lines()])

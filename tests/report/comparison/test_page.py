@@ -9,6 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.compare.comparison import Comparison, Difference
+from harness.core.number_format import format_change_percent
 from harness.errors import Outcome
 from harness.report.comparison import writer as report
 from harness.report.comparison.interval_chart import _draw as draw_intervals
@@ -23,13 +24,12 @@ from harness.report.comparison.wording import (
     count_directions,
     count_verdicts,
     format_interval,
-    format_percent,
     format_signed,
     sentence,
 )
 from harness.report.comparison.writer import text, write_comparison_page
+from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import Chart
-from harness.report.run.charts import draw_chart
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_comparison import CIRCUMSTANCES, GROUP, METRICS, comparison, line, whole
 from tests.report.reading import read, text_of
@@ -56,7 +56,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_first_line_is_the_verdict() -> None:
     first, a, b = text(comparison()).splitlines()[:3]
     (worse,) = (found for found in comparison().differences if found.verdict == "worse")
-    share = format_percent(100.0 * worse.difference / worse.mean_a)
+    share = format_change_percent(100.0 * worse.difference / worse.mean_a)
     assert first == f"B is worse than A in 1 of 6 gated lines on 24 clips: local_pca mpjpe_mm {share}."
     assert (a, b) == ("A: baseline gate", "B: results/gate")
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from harness.cli import main
 from harness.compare.paired_statistics import bootstrap_interval
 from harness.errors import BadFile
-from harness.report.run.charts import draw_chart
+from harness.report.kit.chart import draw_chart
 from harness.report.sweep import page as sweep_page
 from harness.report.sweep.charts import (
     MAX_SERIES,
@@ -24,12 +24,13 @@ from harness.report.sweep.charts import (
     scenarios_varying,
     select_curves,
 )
-from harness.report.sweep.data import METRICS, PRIMARY_METRIC, Statistic, VariedKey
+from harness.report.sweep.data import METRICS, Statistic, VariedKey
 from harness.report.sweep.page import write_sweep_page
 from harness.report.sweep.reader import collect_cells, read_sweep
 from harness.report.sweep.text import text
 from harness.report.sweep.wording import describe_effect, group_failures, sentence
 from harness.results.index import CellIndex
+from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
 from tests.report.reading import read, text_of
@@ -74,7 +75,7 @@ def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
     rows = [row for row in cells if row[:2] == ("walking", "ik") and json.loads(row[2])[RATE] == 60]
     means = [np.mean([error for *_, name, error in rows if name == clip]) for clip in sorted({row[3] for row in rows})]
     series, value = sweep.series.index("ik"), next(k for k in sweep.keys if k.name == RATE).labels.index("60")
-    found = sweep.statistic(PRIMARY_METRIC, sweep.select(0, series, **{RATE: value}), ends=True)
+    found = sweep.statistic(PRIMARY_METRIC, sweep.select(0, series, **{RATE: value}), with_interval=True)
     assert (found.clips, len(rows)) == (7, 14)
     assert found.mean == pytest.approx(np.mean(means))
     assert found.sd == pytest.approx(np.std(means, ddof=1))
