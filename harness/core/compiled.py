@@ -18,10 +18,11 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache
+from numba.core import caching
 from numba.core.dispatcher import Dispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
+_FunctionCache: Any = caching.FunctionCache  # numba has no types
 
 _source_hashes: dict[str, bytes] = {}
 """SHA-256 of the file of each compiled module, by module name; read while the module is imported, for it may change."""
@@ -33,7 +34,7 @@ def compiled(function: F) -> F:
     It releases the interpreter lock, so a thread that reads a tracker does not wait for one that solves. Without a
     writable folder or a source file, every process compiles anew.
     """
-    dispatcher = numba.njit(error_model="numpy", nogil=True)(function)
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
     with suppress(RuntimeError, OSError):  # no writable folder; no source file
         module = function.__module__
         if module not in _source_hashes:
@@ -51,7 +52,7 @@ def specialise(function: F, *arguments: Any) -> F:
     return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))
 
 
-class _ModuleCache(FunctionCache):  # type: ignore[misc]  # numba has no types
+class _ModuleCache(_FunctionCache):  # type: ignore[misc]
     """numba's cache on disk, with a stamp that also covers imported compiled modules and constants."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

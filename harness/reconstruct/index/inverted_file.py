@@ -1,15 +1,15 @@
 """Approximate search for large sets: an inverted file over the leading principal axes, in 16 bits.
 
 Vectors are assigned to cells around centroids, which faiss computes; a query scans only the cells nearest to it. The
-cost of a query is the memory that it reads, and human poses hardly vary along most axes. So vectors are rotated
-onto their principal axes, truncated to the leading ones, and stored as 16-bit multiples of one small step: a third of the
+cost of a query is the memory that it reads, and human poses hardly vary along most axes. So vectors are rotated onto
+their principal axes, truncated to the leading ones, and stored as 16-bit multiples of one small step: a third of the
 memory. Unlike a neighbour graph, an inverted file does not depend on the order in which frames were added
-(docs/methods.md E, traps). Cells are scanned by a compiled loop of this module: faiss keeps a heap of the best, which
-for hundreds of neighbours takes longer than all distances (`harness bench index` measures both).
+(docs/methods.md E, traps). Cells are scanned by a compiled loop of this module. The heap in which faiss keeps the best
+takes longer than all distances when hundreds of neighbours are wanted (`harness bench index` measures both).
 
-Memory layout. `_rows` lists the vectors cell after cell; cell c occupies places `_starts[c]` to `_starts[c + 1]`. Within
-a cell of n vectors the codes are stored by axis, n numbers for the first axis, then n for the second, and so on. So the
-scan adds up one axis for all vectors of a cell in a contiguous loop that the compiler vectorises.
+Memory layout. `_rows` lists the vectors cell after cell; cell c occupies places `_starts[c]` to `_starts[c + 1]`.
+Within a cell of n vectors the codes are stored by axis: n numbers for the first axis, then n for the second, and so
+on. So the scan adds up one axis for all vectors of a cell in a contiguous loop, which the compiler vectorises.
 """
 
 import math
@@ -132,7 +132,7 @@ def cells_for(count: int) -> int:
 def probes_for(wanted: int, count: int) -> int:
     """Number of cells to scan for `wanted` neighbours among `count` vectors.
 
-    The recall is 0.96 or more at 66,000 and at 1,000,000 frames (`harness bench index`, `harness bench methods --large`).
+    Recall is 0.96 or more at 66,000 and at 1,000,000 frames: `harness bench index`, `harness bench methods --large`.
     """
     enough = _MIN_CANDIDATES_PER_NEIGHBOUR * wanted * cells_for(count) / max(count, 1)
     return math.ceil(max(PROBES + PROBES_PER_ROOT * math.sqrt(wanted), enough))
