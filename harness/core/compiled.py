@@ -18,10 +18,11 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache
+from numba.core import caching
 from numba.core.dispatcher import Dispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
+_FunctionCache: Any = caching.FunctionCache  # numba has no types
 
 _source_hashes: dict[str, bytes] = {}
 """SHA-256 of the file of each compiled module, by module name; read while the module is imported, for it may change."""
@@ -38,7 +39,7 @@ def compiled(function: F) -> F:
         module = function.__module__
         if module not in _source_hashes:
             _source_hashes[module] = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).digest()
-        dispatcher._cache = cast(Any, _ModuleCache)(function)
+        dispatcher._cache = _ModuleCache(function)
     return cast(F, dispatcher)
 
 
@@ -51,16 +52,16 @@ def specialise(function: F, *arguments: Any) -> F:
     return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))
 
 
-class _ModuleCache(FunctionCache):
+class _ModuleCache(_FunctionCache):  # type: ignore[misc]
     """numba's cache on disk, with a stamp that also covers imported compiled modules and constants."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The machine code from disk, or None; numba calls this before it compiles, and so before it saves."""
         self._cache_file._source_stamp = module_stamp(self._py_func.__globals__)
         try:
-            return cast(Any, super()).load_overload(sig, target_context)
+            return super().load_overload(sig, target_context)
         except (AttributeError, ImportError):  # the file names a class that has been renamed or moved
-            cast(Any, self).flush()
+            self.flush()
             return None
 
 
