@@ -136,7 +136,7 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--vmc", "nowhere"], "is not an address"),
         (["--view", "frames"], "needs a folder"),
         (["--bvh", "/no/such/folder/x.bvh"], "cannot be written"),
-        (["--lsl", ""], "without a name"),
+        (["--lsl", ""], "needs a name"),
         (["--out", "there"], "--out without --view frames"),
         (["--lsl-network"], "--lsl-network without --lsl"),
         (["--seconds", "soon"], "no positive number"),
