@@ -4,7 +4,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,6 +26,7 @@ from harness.commands.common import (
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
+    from harness.experiment.score_recording import RecordingScore
     from harness.stream.recording.replay import RecordingStream
 
 
@@ -212,6 +213,25 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     content |= {"lost": stream.recording.damage, "methods": [one.as_dict() for one in judged]}
     measured = any(one.metrics["joint_angle_mean_deg"] is not None for one in judged)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
-    return print_result(
-        args, content, f"played from {played}", "", score_recording.format_score_table(judged), outcome=outcome
+    return print_result(args, content, f"played from {played}", "", format_score_table(judged), outcome=outcome)
+
+
+def format_score_table(scores: "Sequence[RecordingScore]") -> str:
+    """Table with one row per method."""
+    from harness.report.run.text import COLUMNS
+
+    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
+    for score in scores:
+        figures = [_format_number(score.metrics[name], decimals) for _, name, decimals in COLUMNS]
+        lines.append([score.method, f"{score.frames_matched}/{score.frames_expected}", *figures])
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(
+        "  ".join(
+            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
+        ).rstrip()
+        for words in lines
     )
+
+
+def _format_number(value: float | None, decimals: int) -> str:
+    return "not measured" if value is None else f"{value:.{decimals}f}"
