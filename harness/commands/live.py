@@ -104,7 +104,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         device = opened.enter_context(_open_device(args, rehearsal, events))
         rate_hz = rehearsal.tracker.rate_hz
         print_status(
-            f"learning {args.method} from {len(rehearsal.clip_evaluation.example_names)} clips of {rehearsal.scenario.name}"
+            f"learning {args.method} from {len(rehearsal.clip_evaluation.subject.example_names)} clips of {rehearsal.scenario.name}"
         )
         with redirect_stdout(sys.stderr):  # what a method prints is talk
             reconstructor = rehearsal.clip_evaluation.fit_method(method, args.method)
