@@ -204,7 +204,7 @@ def test_the_first_ctrl_c_lets_cells_finish(
     said = capfd.readouterr()
     assert said.out.splitlines()[-1] == "interrupted"
     assert "again stops it at once" in said.err
-    assert "the same command goes on from there" in said.err
+    assert "the same command resumes" in said.err
     assert read(made_up / "out" / "summary.json")["cells_finished"] == 1
     assert len(untimed(made_up / "out" / "summary.csv")) == 2
     assert not list((made_up / "out").glob(f"{TEMPORARY}*"))
