@@ -264,7 +264,7 @@ def read_cells_of(out: Path) -> list[Any]:
         ({"methods": '["ik:previos"]'}, "Did you mean 'ik:previous'"),
         ({"noise": '["cleen"]'}, "Did you mean 'clean'"),
         ({"tracker.rate_hz": '["fast"]'}, "expected float"),
-        ({"tracker.rate_hz": "[20.0, 20.0]"}, "no list of different values"),
+        ({"tracker.rate_hz": "[20.0, 20.0]"}, "not a list of different values"),
         ({"seeds": "[1, 1]"}, "seeds names something twice"),
         ({"metods": '["ik"]'}, "Did you mean 'methods'"),
         ({"inputs": '["position"]'}, "input combination"),
