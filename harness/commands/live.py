@@ -107,7 +107,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         outputs = _open_outputs(args, playback, opened)
         device = opened.enter_context(_open_device(args, playback, events))
         rate_hz = playback.tracker.rate_hz
-        examples = len(playback.clip_evaluation.example_names)
+        examples = len(playback.clip_evaluation.subject.example_names)
         print_status(f"learning {args.method} from {examples} clips of {playback.scenario.name}")
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
             reconstructor = playback.clip_evaluation.fit_method(method, args.method)

@@ -193,7 +193,7 @@ def evaluate_cell(
         calibration=known.calibration.kind,
         noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,
-        performer=setting.performer,
+        performer=setting.subject.performer,
         varied=planned.varied,
         scenario=scenario.name,
         defined_by=setting.conditions_of(method, planned.inputs),

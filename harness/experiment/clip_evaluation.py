@@ -1,9 +1,13 @@
-"""What the cells of one clip share: the body, the true motion on it, its simulation, and what may be learnt from."""
+"""The evaluation of one test clip, in three records by lifetime: the subject, the training and the observation.
 
-import copy
+Cells of one clip share them by construction: variants of a scenario hold the same subject, and methods and inputs the
+same observation.
+"""
+
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
+from typing import Self
 
 import numpy as np
 
@@ -17,7 +21,7 @@ from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, allowed_frames, refuse_leak, select_examples
 from harness.errors import BadInput
-from harness.experiment.scenario import Scenario
+from harness.experiment.scenario import Scenario, ScenarioMotion
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,
@@ -39,7 +43,7 @@ from harness.simulate.trajectory import Trajectory
 
 
 def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
-    """Where the stations are said to be worn."""
+    """Nominal mounts of the stations that are worn."""
     return tuple(
         Mount(name, s.bone, s.along, float(np.deg2rad(s.around_deg)), s.stand_off_m)
         for name, s in scenario.worn_stations.items()
@@ -47,134 +51,99 @@ def mounts_of(scenario: Scenario) -> tuple[Mount, ...]:
 
 
 def tracker_of(scenario: Scenario) -> TrackerConfig:
-    """The device; sampling in turn belongs to the clock's errors, so that at level `clean` all stations are sampled
-    at one moment unless the scenario's `tracker.slot_s` says otherwise (docs/is900.md 13.5)."""
-    together = scenario.noise == "clean" and scenario.tracker.slot_s is None
-    return replace(scenario.tracker, slot_s=0.0) if together else scenario.tracker
+    """The device of a scenario.
+
+    Sampling in turn is an error of the clock. With the preset `clean` all stations are therefore sampled at one moment,
+    unless the scenario sets `tracker.slot_s` (docs/is900.md 13.5).
+    """
+    simultaneous = scenario.noise == "clean" and scenario.tracker.slot_s is None
+    return replace(scenario.tracker, slot_s=0.0) if simultaneous else scenario.tracker
 
 
 def noise_of(scenario: Scenario) -> Noise:
-    """The level, with the scenario's changes to single components; UnknownName, BadInput."""
+    """The noise preset with the scenario's changes to single components; UnknownName, BadInput."""
     try:
         return replace_fields(noises.noise_preset(scenario.noise), scenario.components, "components")
     except TypeError as error:
         raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
 
-class ClipEvaluation:
-    """One test clip of a scenario; each part is made when it is first asked for."""
+@dataclass(frozen=True, eq=False)
+class Subject:
+    """The test clip, its performer and body, the true motion on that body, and the clips that may be learnt from.
 
-    def __init__(self, scenario: Scenario, source: MotionSource, part: ClipPart, behaviour: str) -> None:
-        self.scenario, self.source, self.part, self.behaviour = scenario, source, part, behaviour
-        self.clip = source.load(part.clip)
-        self._retargeted: dict[str, retargeting.RetargetReport] = {}
-        """What each clip that is not on its own body lost on the way."""
-        self._fitted: dict[str, Reconstructor] = {}
-        self._sources: dict[str, str] = {}
+    All variants of a scenario that differ only in what trackers observe share one subject.
+    """
 
-    def with_conditions(self, scenario: Scenario) -> "ClipEvaluation | None":
-        """The same under other errors of the tracker, with other stations, calibrated otherwise or for other methods,
-        sharing motion and, on the same body, what was learnt, which knows of none of these; None if more differs."""
-        world = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
-        free = (*world, "methods", "inputs", "vary")
-        if replace(self.scenario, **{name: getattr(scenario, name) for name in free}) != scenario:
-            return None
-        other = copy.copy(self)
-        other.scenario = scenario
-        if "poses" in (self.scenario.calibration, scenario.calibration):  # another skeleton, and all that stood on it
-            other._fitted = {}
-            other._retargeted = {name: r for name, r in self._retargeted.items() if name == self.clip.name}
-            other.__dict__.pop("examples", None)
-        for own in ("session", "calibrated", "simulation", "_worn", "_same_for_all"):
-            other.__dict__.pop(own, None)
-        return other
-
-    def with_calibration(self, calibrated: PerformerCalibration) -> "ClipEvaluation":
-        """The same with methods told this of trackers, room and body; what was learnt on another body is not shared."""
-        other = copy.copy(self)
-        other.__dict__.pop("examples", None)
-        other.__dict__["calibrated"] = calibrated
-        other._fitted, other._retargeted = {}, {}
-        return other
-
-    def fit_method(self, method: Method, name: str) -> Reconstructor:
-        """The method of that name, trained once on what the split lets it see."""
-        if name not in self._fitted:
-            rng = generator(self.scenario.seed, "method", registry.without_options(name))
-            examples = self.examples if method.needs_examples else []
-            self._fitted[name] = method.fit(self.performer_calibration.body, examples, rng)
-        return self._fitted[name]
+    motion: ScenarioMotion
+    seed: int
+    rate_hz: float
+    """Rate of the tracker, to which examples are resampled [Hz]."""
+    source: MotionSource
+    part: ClipPart
+    behaviour: str
 
     @cached_property
-    def session(self) -> TrackerSession:
-        """What is true while the trackers are worn."""
-        scenario, how, nominal = self.scenario, self.scenario.calibrating, mounts_of(self.scenario)
-        turned_rad, name = float(np.deg2rad(how.turned_deg)), str(self.part)
-        worn = perturb_mounts(nominal, beside_m=how.beside_m, turned_rad=turned_rad, seed=scenario.seed, session=name)
-        tracker, noise = tracker_of(scenario), noise_of(scenario)
-        return TrackerSession(name, scenario.seed, self.body, nominal, worn, tracker, noise)
-
-    @cached_property
-    def performer_calibration(self) -> PerformerCalibration:
-        """What methods go by; NotStanding when the performer's model cannot be calibrated from."""
-        how = self.scenario.calibrating
-        model = {"miss_rad": float(np.deg2rad(how.miss_deg)), "hold_s": how.hold_s}
-        match self.scenario.calibration:
-            case "exact":
-                return use_exact_calibration(self.session)
-            case "tpose":
-                return simulate_tpose_calibration(self.session, **model)
-            case "poses":
-                known = f"{len(self.people)} others ({self.source.title})"
-                return simulate_poses_calibration(
-                    self.session, fit_skeleton_prior(list(self.people.values()), source=known), **model
-                )
+    def clip(self) -> Clip:
+        """The test clip as recorded."""
+        return self.source.load(self.part.clip)
 
     @cached_property
     def people(self) -> dict[str, Skeleton]:
-        """Of whose bones something is known before eight poses are held: never the performer's own."""
+        """Skeletons of the other performers, from which the calibration with eight poses takes its prior."""
         return self.source.other_skeletons(without=self.source.subject(self.part.clip))
 
     @cached_property
     def body(self) -> humanoid.Body:
-        """The performer's, in truth."""
-        if self.scenario.motion.body == "own":
+        """The performer's true body."""
+        if self.motion.body == "own":
             return humanoid.build_body(self.clip.skeleton.subset(BONES)[0])
         return humanoid.build_body(standard_skeleton())
 
     @cached_property
     def full_take(self) -> BodyMotion:
-        """The test clip on the performer's body."""
-        return self._on_body(self.clip, self.body)
+        """The whole test clip on the performer's body."""
+        return self._retargeted[0]
+
+    @property
+    def retarget_report(self) -> retargeting.RetargetReport | None:
+        """Errors of retargeting the test clip; None on the performer's own proportions."""
+        return self._retargeted[1]
+
+    @cached_property
+    def _retargeted(self) -> tuple[BodyMotion, retargeting.RetargetReport | None]:
+        return self.on_body(self.clip, self.body)
+
+    def on_body(self, clip: Clip, body: humanoid.Body) -> tuple[BodyMotion, retargeting.RetargetReport | None]:
+        """A clip on a body, and the errors of retargeting; None for the test clip on its performer's proportions."""
+        kind = self.motion.body
+        if clip.name == self.clip.name and kind == "own" and body is self.body:
+            return retargeting.retarget_to_own_body(clip)[1], None
+        if kind == "own" or body is not self.body:
+            return _retarget(clip, kind, body.skeleton)
+        return _retarget_to_standard(clip, kind)
 
     @cached_property
     def take(self) -> BodyMotion:
-        """The part of it that is judged, and before a part the second of warm-up, which is nobody's example either."""
+        """The scored part of the test clip, and up to one second of warm-up before it.
+
+        No method has learnt from that second, because the split guards it.
+        """
         frames, rate_hz = self.part.frames(len(self.full_take)), self.full_take.rate_hz
         start = max(frames.start - round(WARM_UP_S * rate_hz), 0)
-        longest_s = self.scenario.motion.longest_s
+        longest_s = self.motion.longest_s
         stop = min(frames.stop, start + round(longest_s * rate_hz) + 1) if longest_s else frames.stop
         return _cut_take(self.full_take, range(start, stop), str(self.part))
 
     @cached_property
-    def simulation(self) -> Simulation:
-        scenario, tracker = self.scenario, self.session.tracker
-        noise = scenario.disturbance.add_to(self.session.noise, tuple(scenario.worn_stations))
-        seen = simulate_tracker(self.body, self.take, self.session.true_mounts, tracker, noise, seed=scenario.seed)
-        if len(seen.truth_s) <= WARM_UP_S * tracker.rate_hz:
-            found = f"{self.part} is judged for {len(seen.truth_s) / tracker.rate_hz:.2f} s"
-            raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
-        return seen
-
-    @cached_property
     def held_out_parts(self) -> tuple[ClipPart, ...]:
-        """What nothing is learnt from: the part that is judged, and what the scenario withholds."""
-        return (self.part, *map(ClipPart.parse, self.scenario.motion.withheld))
+        """Parts of clips that nothing is learnt from: the scored part, and what the scenario withholds."""
+        return (self.part, *map(ClipPart.parse, self.motion.withheld))
 
     @cached_property
     def example_names(self) -> list[str]:
-        """The clips that the split and the scenario let a method learn from, wholly or in part."""
-        motion, test = self.scenario.motion, self.part
+        """Names of the clips that the split and the scenario let a method learn from, wholly or in part."""
+        motion, test = self.motion, self.part
         subjects = {name: self.source.subject(name) for name in {*motion.examples, test.clip}}
         names = select_examples(test, motion.examples, motion.split, subjects)
         if motion.database == "behaviour":
@@ -183,124 +152,263 @@ class ClipEvaluation:
 
     @cached_property
     def performer(self) -> str:
-        """`known` if other motion of whoever is judged is among the examples, `new` if not, "" without examples."""
+        """`known` if the examples include other motion of the performer, `new` if not, "" without examples."""
         if not self.example_names:
             return ""
-        judged = self.source.subject(self.part.clip)
-        return "known" if judged in {self.source.subject(name) for name in self.example_names} else "new"
+        performer = self.source.subject(self.part.clip)
+        return "known" if performer in {self.source.subject(name) for name in self.example_names} else "new"
 
     @cached_property
     def example_clips(self) -> list[Clip]:
-        test = self.part
-        clips, judged = [self.source.load(name) for name in self.example_names], _motion_digest(self.clip)
+        """The example clips; BadInput when one is a copy of the test clip under another name."""
+        clips, digest = [self.source.load(name) for name in self.example_names], _motion_digest(self.clip)
         for clip in clips:
-            if clip.name != test.clip and _motion_digest(clip) == judged:
-                raise BadInput(f"{clip.name} is {test.clip} under another name.", "Remove it from motion.examples.")
+            if clip.name != self.part.clip and _motion_digest(clip) == digest:
+                message = f"{clip.name} is {self.part.clip} under another name."
+                raise BadInput(message, "Remove it from motion.examples.")
         return clips
 
     @cached_property
-    def examples(self) -> list[BodyMotion]:
-        """What the split lets a method learn from, on the body that it goes by and at the tracker's rate."""
-        takes, body = [], self.performer_calibration.body
-        for clip in self.example_clips:
-            runs = allowed_frames(self.held_out_parts, clip.name, len(clip), clip.rate_hz)
-            refuse_leak(self.held_out_parts, clip.name, runs, len(clip), clip.rate_hz)
-            whole = self._on_body(clip, body)
-            takes += [_resample(body, _cut_take(whole, r, clip.name), self.scenario.tracker.rate_hz) for r in runs]
-        return thin_takes(takes, self.scenario.motion.thin_to)
+    def training(self) -> "Training":
+        """Training on the performer's true body."""
+        return Training(self, self.body)
 
-    def conditions_of(self, method: Method, inputs: str) -> dict[str, object]:
-        """Everything that defines a cell; two results with other inputs are not comparable.
 
-        Device and noise stand as numbers, motion, body and mounts as digests of theirs: names and defaults mean
-        what the code of their day made of them.
-        """
-        learnt = {c.name: _motion_digest(c) for c in (self.example_clips if method.needs_examples else [])}
-        return {
-            **self._same_for_all,
-            "examples": learnt,
-            "withheld": sorted(str(part) for part in self.held_out_parts[1:] if part.clip in learnt),
-            "inputs": inputs,
-        }
+@dataclass(frozen=True, eq=False)
+class Training:
+    """The examples of a subject on one body, and the methods that were fitted to them."""
+
+    subject: Subject
+    body: humanoid.Body
+    """The body that methods are given: the performer's, or the one that a calibration estimated."""
+    _fits: dict[str, Reconstructor] = field(default_factory=dict)
 
     @cached_property
-    def _same_for_all(self) -> dict[str, object]:
-        """Of the inputs, what all methods share."""
-        scenario = self.scenario
+    def _retargeted(self) -> list[tuple[BodyMotion, retargeting.RetargetReport | None]]:
+        return [self.subject.on_body(clip, self.body) for clip in self.subject.example_clips]
+
+    @property
+    def retarget_reports(self) -> list[retargeting.RetargetReport | None]:
+        """Errors of retargeting each example clip."""
+        return [report for _, report in self._retargeted]
+
+    @cached_property
+    def examples(self) -> list[BodyMotion]:
+        """The motion that the split lets a method learn from, on the body and at the tracker's rate."""
+        takes, held_out = [], self.subject.held_out_parts
+        for clip, (whole_take, _) in zip(self.subject.example_clips, self._retargeted, strict=True):
+            runs = allowed_frames(held_out, clip.name, len(clip), clip.rate_hz)
+            refuse_leak(held_out, clip.name, runs, len(clip), clip.rate_hz)
+            parts = (_cut_take(whole_take, run, clip.name) for run in runs)
+            takes += [_resample(self.body, part, self.subject.rate_hz) for part in parts]
+        return thin_takes(takes, self.subject.motion.thin_to)
+
+    def fit(self, method: Method, name: str) -> Reconstructor:
+        """The method of that name, fitted once to the examples."""
+        if name not in self._fits:
+            rng = generator(self.subject.seed, "method", registry.without_options(name))
+            self._fits[name] = method.fit(self.body, self.examples if method.needs_examples else [], rng)
+        return self._fits[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """What the trackers of a scenario observe of a subject: the session, its calibration and the simulated stream."""
+
+    scenario: Scenario
+    subject: Subject
+
+    @cached_property
+    def session(self) -> TrackerSession:
+        """The truth about one wearing of the trackers."""
+        scenario, settings, nominal = self.scenario, self.scenario.calibrating, mounts_of(self.scenario)
+        turned_rad, name = float(np.deg2rad(settings.turned_deg)), str(self.subject.part)
+        true_mounts = perturb_mounts(
+            nominal, beside_m=settings.beside_m, turned_rad=turned_rad, seed=scenario.seed, session=name
+        )
+        tracker, noise = tracker_of(scenario), noise_of(scenario)
+        return TrackerSession(name, scenario.seed, self.subject.body, nominal, true_mounts, tracker, noise)
+
+    @cached_property
+    def calibration(self) -> PerformerCalibration:
+        """The calibration that methods receive; NotStanding when the held poses do not suffice for one."""
+        settings = self.scenario.calibrating
+        model = {"miss_rad": float(np.deg2rad(settings.miss_deg)), "hold_s": settings.hold_s}
+        match self.scenario.calibration:
+            case "exact":
+                return use_exact_calibration(self.session)
+            case "tpose":
+                return simulate_tpose_calibration(self.session, **model)
+            case "poses":
+                people = self.subject.people
+                origin = f"{len(people)} others ({self.subject.source.title})"
+                prior = fit_skeleton_prior(list(people.values()), source=origin)
+                return simulate_poses_calibration(self.session, prior, **model)
+
+    @cached_property
+    def simulation(self) -> Simulation:
+        """The stream of the take, and the truth; BadInput when the take is no longer than the warm-up."""
+        scenario, tracker, take = self.scenario, self.session.tracker, self.subject.take
+        noise = scenario.disturbance.add_to(self.session.noise, tuple(scenario.worn_stations))
+        mounts = self.session.true_mounts
+        simulation = simulate_tracker(self.subject.body, take, mounts, tracker, noise, seed=scenario.seed)
+        if len(simulation.truth_s) <= WARM_UP_S * tracker.rate_hz:
+            found = f"{self.subject.part} is judged for {len(simulation.truth_s) / tracker.rate_hz:.2f} s"
+            raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
+        return simulation
+
+    @cached_property
+    def conditions(self) -> dict[str, object]:
+        """The conditions that all methods and inputs share, as JSON content."""
+        scenario, subject = self.scenario, self.subject
         content = asdict(scenario)
-        for many in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
-            del content[many]
+        for key in ("methods", "inputs", "name", "components", "vary", "expected_order", "left_out", "fault", "worn"):
+            del content[key]
         content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
-        del content["motion"]["test"], content["motion"]["behaviours"], content["motion"]["examples"]
-        del content["motion"]["withheld"]
+        for key in ("test", "behaviours", "examples", "withheld"):
+            del content["motion"][key]
         if scenario.calibration == "exact":
-            del content["calibrating"]  # nobody stands model, and where trackers sit is in the digest of the mounts
+            del content["calibrating"]  # no pose is held, and the digest of the mounts covers where trackers sit
+        skeleton = subject.body.skeleton
+        mounts = [array for mount in self.session.true_mounts for array in locate_mount(skeleton, mount)]
+        people = subject.people.values() if scenario.calibration == "poses" else ()
         return {
             **content,
             "tracker": asdict(tracker_of(scenario)),
             "components": asdict(noise_of(scenario)),
             "disturbance": scenario.disturbance.as_dict(),
-            "clip": str(self.part),
-            "motion_digest": _motion_digest(self.clip),
-            **self._worn,
-            **({"people_digest": self._people_digest} if scenario.calibration == "poses" else {}),
+            "clip": str(subject.part),
+            "motion_digest": _motion_digest(subject.clip),
+            "body_digest": storage.digest(skeleton.bone_m, skeleton.axes, subject.body.limits_rad),
+            "mounts_digest": storage.digest(*mounts),
+            **({"people_digest": storage.digest(*(person.bone_m for person in people))} if people else {}),
             "metric_versions": VERSIONS,
         }
 
-    @cached_property
-    def _worn(self) -> dict[str, str]:
-        """Digests of the body and of where the stations really sit on it."""
-        skeleton = self.body.skeleton
-        worn = [array for mount in self.session.true_mounts for array in locate_mount(skeleton, mount)]
-        body = storage.digest(skeleton.bone_m, skeleton.axes, self.body.limits_rad)
-        return {"body_digest": body, "mounts_digest": storage.digest(*worn)}
+
+_OBSERVATION_KEYS = ("noise", "profile", "components", "disturbance", "stations", "worn", "calibration", "calibrating")
+"""Scenario keys that only the observation depends on."""
+_METHOD_KEYS = ("methods", "inputs", "vary")
+"""Scenario keys that neither subject nor observation depends on."""
+
+
+class ClipEvaluation:
+    """One test clip of a scenario: its subject, its observation and the training of methods, each made when needed."""
+
+    def __init__(self, scenario: Scenario, source: MotionSource, part: ClipPart, behaviour: str) -> None:
+        subject = Subject(scenario.motion, scenario.seed, scenario.tracker.rate_hz, source, part, behaviour)
+        self._set(scenario, subject, Observation(scenario, subject))
+
+    def _set(
+        self,
+        scenario: Scenario,
+        subject: Subject,
+        observation: Observation,
+        calibration: PerformerCalibration | None = None,
+    ) -> Self:
+        self.scenario, self.subject, self.observation = scenario, subject, observation
+        self.source, self.part, self.behaviour = subject.source, subject.part, subject.behaviour
+        self._calibration = calibration
+        self._method_hashes: dict[str, str] = {}
+        return self
+
+    def with_conditions(self, scenario: Scenario) -> "ClipEvaluation | None":
+        """An evaluation of the same clip under another scenario, which shares what the two have in common.
+
+        The subject, with training on its body, is shared when scenarios differ in the tracker's errors, stations,
+        calibration, methods and inputs. The observation is shared when they differ in methods and inputs alone.
+        None if anything else differs.
+        """
+        if _replace_keys(self.scenario, scenario, _METHOD_KEYS) == scenario:
+            observation = self.observation
+        elif _replace_keys(self.scenario, scenario, _METHOD_KEYS + _OBSERVATION_KEYS) == scenario:
+            observation = Observation(scenario, self.subject)
+        else:
+            return None
+        return object.__new__(ClipEvaluation)._set(scenario, self.subject, observation)
+
+    def with_calibration(self, calibration: PerformerCalibration) -> "ClipEvaluation":
+        """The same evaluation with another calibration given to methods."""
+        return object.__new__(ClipEvaluation)._set(self.scenario, self.subject, self.observation, calibration)
+
+    @property
+    def body(self) -> humanoid.Body:
+        """The performer's true body."""
+        return self.subject.body
+
+    @property
+    def session(self) -> TrackerSession:
+        """The truth about one wearing of the trackers."""
+        return self.observation.session
+
+    @property
+    def simulation(self) -> Simulation:
+        """The simulated stream and the truth."""
+        return self.observation.simulation
+
+    @property
+    def performer_calibration(self) -> PerformerCalibration:
+        """The calibration that methods receive."""
+        return self._calibration or self.observation.calibration
 
     @cached_property
-    def _people_digest(self) -> str:
-        return storage.digest(*(skeleton.bone_m for skeleton in self.people.values()))
+    def training(self) -> Training:
+        """The examples on the body that methods receive; shared with other evaluations of the true body."""
+        body = self.performer_calibration.body
+        return self.subject.training if body is self.subject.body else Training(self.subject, body)
+
+    def fit_method(self, method: Method, name: str) -> Reconstructor:
+        """The method of that name, trained once on what the split allows."""
+        return self.training.fit(method, name)
+
+    def conditions_of(self, method: Method, inputs: str) -> dict[str, object]:
+        """Everything that defines a cell; two results with other conditions are not comparable.
+
+        Device and noise stand as numbers, motion, body and mounts as digests, because names and defaults depend on
+        the version of the code.
+        """
+        learnt = {c.name: _motion_digest(c) for c in (self.subject.example_clips if method.needs_examples else [])}
+        return {
+            **self.observation.conditions,
+            "examples": learnt,
+            "withheld": sorted(str(part) for part in self.subject.held_out_parts[1:] if part.clip in learnt),
+            "inputs": inputs,
+        }
 
     def notes(self, method: Method) -> tuple[str, ...]:
-        """What a reader should know: notes of the clip, what was calibrated, what retargeting to another body cost."""
-        used = [self.clip, *(self.example_clips if method.needs_examples else [])]
-        reports = [self._retargeted[clip.name] for clip in used if clip.name in self._retargeted]
-        told = (*self.clip.notes, *self.performer_calibration.notes)
-        if not reports:
-            return told
-        deviation_mm = np.mean([report.deviation_mm for report in reports])
-        worst = max(reports, key=lambda report: report.deviation_mm)
-        soles_mm = [x for report in reports for x in (report.float_mm, report.sink_mm) if np.isfinite(x)]
-        how = ", every angle kept" if self.scenario.motion.body == "common" else ""
+        """Notes for readers: on the clip, on the calibration, and on the errors of retargeting to another body."""
+        reports = [self.subject.retarget_report, *(self.training.retarget_reports if method.needs_examples else [])]
+        known = [report for report in reports if report is not None]
+        notes = (*self.subject.clip.notes, *self.performer_calibration.notes)
+        if not known:
+            return notes
+        deviation_mm = np.mean([report.deviation_mm for report in known])
+        worst = max(known, key=lambda report: report.deviation_mm)
+        soles_mm = [x for report in known for x in (report.float_mm, report.sink_mm) if np.isfinite(x)]
+        angles = ", every angle kept" if self.scenario.motion.body == "common" else ""
         note = (
-            f"{len(reports)} of {len(used)} clips (test and examples) retargeted to the body under test{how}: joint "
-            f"centres {deviation_mm:.0f} mm off on average, {worst.deviation_mm:.0f} mm in {worst.clip}"
+            f"{len(known)} of {len(reports)} clips (test and examples) retargeted to the body under test{angles}: "
+            f"joint centres {deviation_mm:.0f} mm off on average, {worst.deviation_mm:.0f} mm in {worst.clip}"
         )
         soles = f"; soles in stance off by up to {max(soles_mm):.0f} mm (95th percentile)" if soles_mm else ""
-        return (*told, note + soles)
+        return (*notes, note + soles)
 
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
-        """Of a cell; the varied values count even where they change nothing for the method, as does what the scenario
-        is called, for a cell says both."""
-        if name not in self._sources:
-            self._sources[name] = registry.source_hash(method)
-        described = {"name": name, "options": repr(method), "source": self._sources[name]}
+        """Key of a cell. It includes the varied values and the scenario's name, because the cell states both."""
+        if name not in self._method_hashes:
+            self._method_hashes[name] = registry.source_hash(method)
+        described = {"name": name, "options": repr(method), "source": self._method_hashes[name]}
         content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
         return storage.cell_key(content, described, manifest.source_hash())
 
-    def _on_body(self, clip: Clip, body: humanoid.Body) -> BodyMotion:
-        kind = self.scenario.motion.body
-        if clip.name == self.clip.name and kind == "own" and body is self.body:
-            return retargeting.retarget_to_own_body(clip)[1]
-        if kind == "own" or body is not self.body:
-            take, report = _retarget(clip, kind, body.skeleton)
-        else:
-            take, report = _retarget_to_standard(clip, kind)
-        self._retargeted[clip.name] = report
-        return take
+
+def _replace_keys(scenario: Scenario, other: Scenario, keys: Sequence[str]) -> Scenario:
+    return replace(scenario, **{key: getattr(other, key) for key in keys})
 
 
 @lru_cache(maxsize=256)
 def _retarget_to_standard(clip: Clip, kind: str) -> tuple[BodyMotion, retargeting.RetargetReport]:
-    """The same for every test clip: once in a process."""
+    """Retargeting to the standard skeleton. It is the same for every test clip, hence done once per process."""
     return _retarget(clip, kind, standard_skeleton())
 
 
@@ -323,9 +431,9 @@ def _cut_take(take: BodyMotion, frames: range, name: str) -> BodyMotion:
 
 
 def thin_takes(takes: Sequence[BodyMotion], count: int) -> list[BodyMotion]:
-    """So many frames of takes at one rate, evenly spaced over all of them, at the lower rate that they then have.
+    """Keep `count` frames of takes at one rate, evenly spaced over all of them, and state their lower rate.
 
-    0 keeps all; BadInput when there are not as many.
+    A count of 0 keeps all frames. BadInput when there are fewer than `count`.
     """
     total = sum(map(len, takes))
     if not count:

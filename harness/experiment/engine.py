@@ -262,8 +262,8 @@ def _run_tasks(
     with graceful_stop(stop):
         broken = attempt(tasks)
         # One cell of a task may be to blame for the worker's death: the cells are tried one by one.
-        for task in attempt([single for task in broken for single in split_task(task)]):
-            record(CellOutcome(str(task.cells()[0]), failure="a worker process died"))
+        for single in attempt([single for task in broken for single in split_task(task)]):
+            record(CellOutcome(str(single.cells()[0]), failure="a worker process died"))
     return outcomes
 
 

@@ -30,7 +30,7 @@ SCHEDULER_TIMEOUT_S = 5.0
 POLL_INTERVAL_S = 1.0
 """How often it is asked whether it is there and how many workers it has."""
 LOCAL_CLUSTER_CONFIG = {
-    "distributed.scheduler.allowed-failures": 1,  # of workers that die with a task; then `schedule_tasks` has it tried alone
+    "distributed.scheduler.allowed-failures": 1,  # dead workers per task; `schedule_tasks` tries it alone
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
     "distributed.worker.profile.enabled": False,  # it would slow the steps that are timed

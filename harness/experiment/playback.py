@@ -76,7 +76,7 @@ class Playback:
     def take(self) -> BodyMotion:
         """What the performer does."""
         if not self.posing:
-            return self.clip_evaluation.take
+            return self.clip_evaluation.subject.take
         how = self.scenario.calibrating
         poses = [configuration(pose, self.body.skeleton) for pose in POSES]
         return self.clip_evaluation.session.make_pose_take(

@@ -20,7 +20,6 @@ from harness.experiment.playback import Playback, prepare_playback, select_stati
 from harness.experiment.scenario import load_scenario
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
-from harness.report.run.text import COLUMNS
 from harness.score.metrics import DEFINITIONS, FRAME_METRICS
 from harness.score.score import COVERAGE_FLOOR, WARM_UP_S, Scores, pool_frames, score_estimate
 from harness.score.timing import step_times_ms
@@ -251,22 +250,3 @@ def _pool_metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float 
 
 def _not_measured() -> dict[str, float | None]:
     return dict.fromkeys([*FRAME_METRICS, *step_times_ms(np.zeros(0))])
-
-
-def format_score_table(judged: Sequence[RecordingScore]) -> str:
-    """A row for each method."""
-    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
-    for one in judged:
-        figures = [_format_number(one.metrics[name], decimals) for _, name, decimals in COLUMNS]
-        lines.append([one.method, f"{one.frames_matched}/{one.frames_expected}", *figures])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for words in lines
-    )
-
-
-def _format_number(value: float | None, decimals: int) -> str:
-    return "not measured" if value is None else f"{value:.{decimals}f}"

@@ -47,20 +47,20 @@ def cell_key(inputs: Mapping[str, Any], method: Mapping[str, Any], source_hash: 
 
 
 def open_folder(
-    out: Path, identity_file: str, identity: Mapping[str, Any], kind: str, differences: Callable[[Path], Sequence[str]]
+    out: Path, identity_file: str, identity: Mapping[str, Any], kind: str, difference: Callable[[Path], str]
 ) -> None:
     """Create a results folder and its `identity_file`, or open it to resume.
 
-    `differences` names in what the identity file that is there differs. BadInput when it differs, when the folder
-    holds other files, and when it cannot be written.
+    `difference` says in what an existing identity file differs, "" if it does not. BadInput when it differs, when the
+    folder holds other files, and when it cannot be written.
     """
     advice = "Name another folder with --out, or delete this one."
     if out.exists() and not out.is_dir():
         raise BadInput(f"{out} is a file.", "Name a folder with --out.")
     names = {path.name for path in out.iterdir() if not path.name.startswith(TEMPORARY)} if out.is_dir() else set()
     if identity_file in names:
-        if different := differences(out / identity_file):
-            raise BadInput(f"{out} holds another {kind} (differs in {', '.join(different)}).", advice)
+        if text := difference(out / identity_file):
+            raise BadInput(f"{out} holds another {kind} ({text}).", advice)
     elif names:
         raise BadInput(f"{out} holds files that are no {kind} ({', '.join(sorted(names)[:3])}).", advice)
     try:
@@ -72,7 +72,12 @@ def open_folder(
 
 def open_run(out: Path, manifest: Manifest) -> None:
     """Create the folder of a run or sweep, or open it to resume; BadInput when it holds another run or other files."""
-    open_folder(out, "manifest.json", manifest.as_dict(), "run", lambda path: manifest.differences(Manifest.read(path)))
+
+    def difference(path: Path) -> str:
+        keys = manifest.differences(Manifest.read(path))
+        return f"differs in {', '.join(keys)}" if keys else ""
+
+    open_folder(out, "manifest.json", manifest.as_dict(), "run", difference)
     (out / "cells").mkdir(exist_ok=True)
 
 

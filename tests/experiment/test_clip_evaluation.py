@@ -44,10 +44,10 @@ def test_what_retargeting_cost_is_told() -> None:
         ClipEvaluation(replace(SCENARIO, motion=m), source, ClipPart("walking_p1_01"), "walking")
         for m in (SCENARIO.motion, motion)
     )
-    assert len(own.take) == len(common.take)
+    assert len(own.subject.take) == len(common.subject.take)
     assert own.notes(PREVIOUS) == ()
     assert "1 of 1 clips" in common.notes(PREVIOUS)[0]
-    assert len(common.examples) == 2
+    assert len(common.training.examples) == 2
     assert "3 of 3 clips" in common.notes(MeanPose())[0]
 
 
@@ -56,8 +56,8 @@ def test_the_common_body_keeps_the_angles_of_test_clip_and_examples() -> None:
     source = open_motion_source("builtin", None, seed=1, rate_hz=None)
     setting = ClipEvaluation(replace(SCENARIO, motion=motion), source, ClipPart("walking_p1_01"), "walking")
     np.testing.assert_array_equal(setting.body.skeleton.bone_m, standard_skeleton().bone_m)
-    np.testing.assert_array_equal(unpack(setting.full_take.qpos)[2], _angles(setting.clip))
-    for clip, take in zip(setting.example_clips, setting.examples, strict=True):
+    np.testing.assert_array_equal(unpack(setting.subject.full_take.qpos)[2], _angles(setting.subject.clip))
+    for clip, take in zip(setting.subject.example_clips, setting.training.examples, strict=True):
         np.testing.assert_allclose(unpack(take.qpos)[2][0], _angles(clip)[0], atol=1e-12)
     assert "every angle kept" in setting.notes(MeanPose())[0]
     assert "3 of 3 clips" in setting.notes(MeanPose())[0]
@@ -72,15 +72,15 @@ def test_what_is_withheld_is_in_no_example() -> None:
         ClipEvaluation(replace(SCENARIO, motion=m), source, ClipPart("walking_p1_01"), "walking")
         for m in (motion, held)
     )
-    assert [c.name for c in closed.example_clips] == ["walking_p1_02", "walking_p1_03"]
-    assert [t.name for t in closed.examples] == ["walking_p1_02", "walking_p1_02", "walking_p1_03"]
-    whole, (before, after, other) = free.examples[0], closed.examples
-    clip = closed.example_clips[0]
+    assert [c.name for c in closed.subject.example_clips] == ["walking_p1_02", "walking_p1_03"]
+    assert [t.name for t in closed.training.examples] == ["walking_p1_02", "walking_p1_02", "walking_p1_03"]
+    whole, (before, after, other) = free.training.examples[0], closed.training.examples
+    clip = closed.subject.example_clips[0]
     block, guard = ClipPart("walking_p1_02", 0.4, 0.6).frames(len(clip)), round(clip.rate_hz)
     assert before.qpos[-1, :3] == pytest.approx(whole.qpos[len(before) - 1, :3], abs=1e-9)
     assert (len(before) - 1) / 40.0 == pytest.approx((block.start - guard - 1) / clip.rate_hz, abs=1 / 40.0)
     assert (len(after) - 1) / 40.0 == pytest.approx((len(clip) - block.stop - guard - 1) / clip.rate_hz, abs=1 / 40.0)
-    np.testing.assert_array_equal(other.qpos, free.examples[1].qpos)
+    np.testing.assert_array_equal(other.qpos, free.training.examples[1].qpos)
     assert closed.conditions_of(MeanPose(), "pos+ori")["withheld"] == ["walking_p1_02@0.40-0.60"]
     assert closed.conditions_of(PREVIOUS, "pos+ori") == free.conditions_of(PREVIOUS, "pos+ori")
 
@@ -103,7 +103,7 @@ def test_a_copy_of_the_test_clip_is_no_example() -> None:
         replace(SCENARIO, motion=motion), cast(Any, Copying()), ClipPart("walking_p1_01"), "walking"
     )
     with pytest.raises(BadInput, match="under another name"):
-        _ = setting.examples
+        _ = setting.training.examples
 
 
 def test_equal_scenarios_have_equal_inputs() -> None:
@@ -145,10 +145,10 @@ def test_a_part_is_warmed_up_on_what_comes_before_it() -> None:
     scenario = replace(SCENARIO, motion=replace(SCENARIO.motion, longest_s=0.0, split="block"))
     part = ClipPart("walking_p1_01", 0.4, 0.6)
     setting = ClipEvaluation(scenario, source, part, "walking")
-    block = part.frames(len(setting.full_take))
-    rate_hz = setting.full_take.rate_hz
-    assert len(setting.take) == len(block) + round(rate_hz)
-    assert (setting.take.qpos[-1] == setting.full_take.qpos[block.stop - 1]).all()
+    block = part.frames(len(setting.subject.full_take))
+    rate_hz = setting.subject.full_take.rate_hz
+    assert len(setting.subject.take) == len(block) + round(rate_hz)
+    assert (setting.subject.take.qpos[-1] == setting.subject.full_take.qpos[block.stop - 1]).all()
 
 
 def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
@@ -161,7 +161,7 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
     results = [_estimated(first, method)]
     shared = first.with_conditions(elsewhere)
     assert shared is not None
-    assert shared.full_take is first.full_take
+    assert shared.subject.full_take is first.subject.full_take
     assert shared.fit_method(method, "dynamic_map") is first.fit_method(method, "dynamic_map")
     results.append(_estimated(shared, method))
     anew = ClipEvaluation(elsewhere, source, ClipPart("walking_p1_01"), "walking")

@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.commands.replay import format_score_table
 from harness.core.estimate import Status
 from harness.errors import BadInput, UnknownName
 from harness.experiment.cells import run_method
 from harness.experiment.playback import Playback, prepare_playback
 from harness.experiment.scenario import find_scenario
-from harness.experiment.score_recording import RecordingScore, find_playback, format_score_table, score_methods
+from harness.experiment.score_recording import RecordingScore, find_playback, score_methods
 from harness.reconstruct import registry
 from harness.score.score import score_estimate
 from harness.stream.codec import commands

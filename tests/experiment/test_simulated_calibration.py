@@ -67,7 +67,7 @@ def plainly(scenario: Scenario) -> Simulation:
     """The take worn as if nobody had ever calibrated."""
     made = setting(scenario)
     return simulate_tracker(
-        made.body, made.take, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
+        made.body, made.subject.take, mounts_of(scenario), tracker_of(scenario), noise_of(scenario), seed=scenario.seed
     )
 
 
@@ -239,7 +239,7 @@ def found() -> tuple[TrackerSession, PerformerCalibration, SkeletonPrior]:
     """What eight poses of p2 told."""
     scenario = replace(SMALL, calibration="poses", calibrating=BESIDE)
     made = setting(scenario, "walking_p2_01")
-    return made.session, made.performer_calibration, fit_skeleton_prior(list(made.people.values()))
+    return made.session, made.performer_calibration, fit_skeleton_prior(list(made.subject.people.values()))
 
 
 def test_eight_poses_find_bones_mounts_and_room(
@@ -264,7 +264,7 @@ def test_nothing_of_the_performer_but_the_stream_is_told(
     heard = worn.observe_poses(poses, miss_rad=np.deg2rad(BESIDE.miss_deg), hold_s=BESIDE.hold_s)
     other = session(replace(SMALL, calibrating=CalibrationSettings(beside_m=0.3)))
     assert other.body is not worn.body
-    monkeypatch.setattr(TrackerSession, "standing_model", lambda *_, **__: heard)
+    monkeypatch.setattr(TrackerSession, "observe_poses", lambda *_, **__: heard)
     again = simulate_poses_calibration(other, space, miss_rad=0.0, hold_s=3.0)
     for name in ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m"):
         one, two = (getattr(c.calibration, name) for c in (calibrated, again))
@@ -284,9 +284,7 @@ def test_methods_and_their_examples_stand_on_the_body_that_was_found(
             return super().fit(body, examples, rng)
 
     made.fit_method(Watching(), "watching")
-    other = made.with_conditions(replace(SMALL, calibration="poses"))
-    assert other is not None
-    other.__dict__["calibrated"] = found[1]
+    other = made.with_calibration(found[1])
     other.fit_method(Watching(), "watching")
     assert [body for body, _ in bodies] == [made.body, found[1].body]
     (own,), (calibrated,) = (examples for _, examples in bodies)
@@ -316,7 +314,7 @@ def test_nobody_s_own_skeleton_is_learnt_from_a_library(mocap: Path) -> None:
     for clip in scenario.motion.test:
         made = ClipEvaluation(scenario, source, ClipPart(clip), "walking")
         own = made.body.skeleton.length_m
-        assert source.subject(clip) not in made.people
-        assert len(made.people) == len(source.other_skeletons("")) - 1 >= 19
-        assert min(np.abs(skeleton.length_m - own).max() for skeleton in made.people.values()) > 0.002
+        assert source.subject(clip) not in made.subject.people
+        assert len(made.subject.people) == len(source.other_skeletons("")) - 1 >= 19
+        assert min(np.abs(skeleton.length_m - own).max() for skeleton in made.subject.people.values()) > 0.002
         assert source.subject(clip) not in {source.subject(name) for name in scenario.motion.examples}

@@ -73,11 +73,11 @@ def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
 def open_study(out: Path, identity: Mapping[str, Any]) -> None:
     """Create a study's folder, or open it to resume; BadInput when it holds another study or other files."""
 
-    def differences(path: Path) -> list[str]:
+    def difference(path: Path) -> str:
         stored, given = read_json(path, "the identity of a study"), to_json_types(identity)
-        return [f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k]]
+        return "; ".join(f"{k}: {stored.get(k)}, not {given[k]}" for k in given if stored.get(k) != given[k])
 
-    open_folder(out, _IDENTITY_FILE, identity, "study", differences)
+    open_folder(out, _IDENTITY_FILE, identity, "study", difference)
 
 
 def run_scenarios(

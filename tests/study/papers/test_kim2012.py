@@ -73,7 +73,7 @@ def test_every_clip_of_real_motion_is_there(path: Path, mocap: Path) -> None:
     parts = [ClipPart.parse(text) for text in scenario.motion.test]
     check_names([scenario], mocap)
     settings = [ClipEvaluation(scenario, source, part, scenario.motion.behaviours[0]) for part in parts]
-    assert [setting.performer for setting in settings] == ["known"] * 8 + ["new"] * (len(parts) - 8)
+    assert [setting.subject.performer for setting in settings] == ["known"] * 8 + ["new"] * (len(parts) - 8)
 
 
 def test_joint_groups_are_of_different_bones_and_all_of_them() -> None:
