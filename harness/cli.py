@@ -121,7 +121,7 @@ def build_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"harness {VERSION}")
-    subparsers = parser.add_subparsers(metavar="VERB", required=True, help=argparse.SUPPRESS)
+    subparsers = parser.add_subparsers(prog="harness", metavar="VERB", required=True, help=argparse.SUPPRESS)
     paragraphs = []
     for title, adders in _VERB_GROUPS.items():
         group = _VerbGroup(subparsers)

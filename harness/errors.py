@@ -1,7 +1,7 @@
-"""Everything this package raises on purpose, and the words and exit codes a command ends with.
+"""Errors that the package raises on purpose, and the outcomes of a command with their words and exit codes.
 
-A type per thing the reader can do about it; the message names the culprit, where it stands and the choices.
-Fields, not text, go to `super().__init__`, so that an error survives the way out of a worker process.
+There is a type for each thing that the reader can do about it. A message names the cause, its place and the choices.
+`super().__init__` gets the fields instead of the text, so that an error can be pickled out of a worker process.
 """
 
 import difflib
@@ -22,22 +22,24 @@ class Outcome(Enum):
 
     @property
     def word(self) -> str:
+        """The word in JSON and on the last printed line."""
         return str(self.value[0])
 
     @property
     def exit_code(self) -> int:
+        """The exit code of the process."""
         return int(self.value[1])
 
 
 def was_interrupted(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: what it strikes may raise another one on the way out."""
+    """Whether Ctrl-C caused an error: interrupted code may raise another error while it cleans up."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
 
 
 class HarnessError(Exception):
-    """Anything this package raises on purpose; the command line prints it without a traceback."""
+    """Base class of the errors that the package raises on purpose; the command line prints them without a traceback."""
 
     outcome = Outcome.REFUSED
 
@@ -56,7 +58,7 @@ class UnknownName(HarnessError):
 
 
 class RenamedKey(HarnessError):
-    """A key of a scenario or study that has another name today."""
+    """A key of a scenario or study that was renamed."""
 
     def __init__(self, where: str, old: str, new: str) -> None:
         super().__init__(where, old, new)
@@ -67,7 +69,7 @@ class RenamedKey(HarnessError):
 
 
 class ShapeError(HarnessError):
-    """Arrays of one record that disagree about their sizes."""
+    """Arrays of one record whose sizes do not agree."""
 
     def __init__(self, record: str, field: str, found: tuple[int, ...], expected: str) -> None:
         super().__init__(record, field, found, expected)
@@ -78,7 +80,7 @@ class ShapeError(HarnessError):
 
 
 class BadFile(HarnessError):
-    """A file that cannot be used: what was found, what was expected, and what to try."""
+    """A file that cannot be used. The message tells what was found, what was expected, and what to try."""
 
     def __init__(self, path: Path | str, found: str, expected: str, advice: str, line: int | None = None) -> None:
         super().__init__(str(path), found, expected, advice, line)
@@ -90,7 +92,7 @@ class BadFile(HarnessError):
 
 
 class BadInput(HarnessError):
-    """An option, scenario value or combination that cannot be used, and what to do instead."""
+    """An option, scenario value or combination that cannot be used. The message tells what to do instead."""
 
     def __init__(self, what: str, advice: str) -> None:
         super().__init__(what, advice)
@@ -101,7 +103,7 @@ class BadInput(HarnessError):
 
 
 class MissingExtra(HarnessError):
-    """A part that needs a package of an optional extra."""
+    """A part that needs a package of an optional extra, which is not installed."""
 
     def __init__(self, what: str, package: str, extra: str) -> None:
         super().__init__(what, package, extra)

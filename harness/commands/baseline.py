@@ -8,12 +8,12 @@ from harness.errors import Outcome
 
 
 def add_baseline(verbs: Verbs) -> None:
-    text = "keep what a finished run measured, to compare with later"
+    text = "save the results of a finished run as a baseline"
     verb = add_verb(verbs, "baseline", text, run_baseline)
-    verb.add_argument("what", choices=["save"], help="the one thing there is to do")
-    verb.add_argument("name", metavar="NAME", help="of the baseline; it becomes results/baselines/NAME")
+    verb.add_argument("what", choices=["save"], help="the only action")
+    verb.add_argument("name", metavar="NAME", help="name of the baseline, written to results/baselines/NAME")
     verb.add_argument("run", metavar="RUN", type=Path, help="folder written by `harness run` or `harness sweep`")
-    verb.add_argument("--force", action="store_true", help="replace a baseline of that name")
+    verb.add_argument("--force", action="store_true", help="replace an existing baseline")
 
 
 def run_baseline(args: argparse.Namespace) -> Outcome:

@@ -1,4 +1,4 @@
-"""The verb that finds where trackers are worn, and on whose bones."""
+"""The verb `calibrate`: find mounts and bone lengths of a performer."""
 
 import argparse
 import math
@@ -34,53 +34,53 @@ _FLAGS_BY_SOURCE = {
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }
-"""Flags that are of use to each source only."""
+"""Source -> flags that apply to it."""
 
 
 def add_calibrate(verbs: Verbs) -> None:
-    text = "find mounts and bone lengths from a performer who holds eight poses, or mounts from a T-pose"
+    text = "estimate mounts and bone lengths from eight held poses, or mounts from a T-pose"
     verb = add_verb(verbs, "calibrate", text, run_calibrate, "seed", "mocap")
-    text = "recording (see `harness record`) of somebody who holds the poses"
+    text = "recording of a performer who holds the poses (see `harness record`)"
     verb.add_argument("recording", nargs="?", type=Path, metavar="RECORDING", help=text)
     verb.add_argument(
-        "--live", action="store_true", help="from the tracker at --port; the performer is shown the poses"
+        "--live", action="store_true", help="use the tracker at --port, and show the poses to the performer"
     )
     verb.add_argument(
-        "--simulate", type=positive_int, metavar="N", help="N simulated performers, and how far off each was"
+        "--simulate", type=positive_int, metavar="N", help="calibrate N simulated performers and print the errors"
     )
-    verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files")
-    verb.add_argument("--port", help="/dev/ttyUSB0, COM3, the link of an emulator's pty, tcp://HOST:PORT")
-    text = "names the stations and where they are worn (see `harness list`)"
+    verb.add_argument("--sheet", type=Path, metavar="DIR", help="only draw the poses, as PNG files in DIR")
+    verb.add_argument("--port", help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT")
+    text = "scenario with the stations and their nominal mounts (see `harness list`)"
     verb.add_argument("--scenario", metavar="NAME", help=text)
-    text = "how many of the scenario's stations, or their names (default: the first 4; of a recording: its own)"
+    text = "number of the scenario's stations, or their names (default: the first 4; a recording's own)"
     verb.add_argument("--stations", metavar="N|A,B", help=text)
-    text = "poses: eight, for bones and mounts; tpose: the first alone, for mounts on a known body (default poses)"
+    text = "poses: eight poses, for bone lengths and mounts; tpose: one, for mounts on a known body (default poses)"
     verb.add_argument("--kind", choices=["poses", "tpose"], help=text)
-    verb.add_argument("--clip", help="of tpose: whose body that is (default: of the scenario's first clip)")
-    verb.add_argument("--out", type=Path, metavar="FILE", help="the calibration to write, in TOML")
-    verb.add_argument("--force", action="store_true", help="write over files that exist")
-    text = "frames per second, where the device does not tell"
+    verb.add_argument("--clip", help="with tpose: clip of the performer (default: the scenario's first)")
+    verb.add_argument("--out", type=Path, metavar="FILE", help="calibration file to write, in TOML")
+    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
+    text = "frames per second, for a device that does not report its rate"
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
-    text = "show the poses: in a window, or as PNG files in the folder --pictures"
+    text = "show the poses in a window, or as PNG files in the folder --pictures"
     verb.add_argument("--view", choices=["window", "frames"], help=text)
     verb.add_argument("--pictures", type=Path, metavar="DIR", help="folder of --view frames")
-    text = "of --simulate: how far each hinge misses each pose, standard deviation (default 2.5)"
+    text = "with --simulate: standard deviation of each hinge from each pose [deg] (default 2.5)"
     verb.add_argument("--miss", type=float, metavar="DEG", help=text)
-    verb.add_argument("--noise", metavar="LEVEL", help="of --simulate: clean, noise or default (default default)")
+    verb.add_argument("--noise", metavar="PRESET", help="with --simulate: clean, noise or default (default: default)")
 
 
 def run_calibrate(args: argparse.Namespace) -> Outcome:
     given = [name for name in _SOURCES if getattr(args, name)]
     if len(given) != 1:
-        found = "Nothing to calibrate from" if not given else f"{len(given)} sources: {', '.join(given)}"
-        raise BadInput(f"{found}.", "Name a RECORDING, or say one of --live, --simulate N, --sheet DIR.")
+        problem = "No source of poses" if not given else f"{len(given)} sources: {', '.join(given)}"
+        raise BadInput(f"{problem}.", "Give one: RECORDING, --live, --simulate N or --sheet DIR.")
     for name in sorted(
         {name for names in _FLAGS_BY_SOURCE.values() for name in names} - set(_FLAGS_BY_SOURCE[given[0]])
     ):
         if getattr(args, name) is not None:
             users = " or ".join(source for source, names in _FLAGS_BY_SOURCE.items() if name in names)
-            raise BadInput(f"--{name} with {given[0]}.", f"It is for {users}: leave it out.")
+            raise BadInput(f"--{name} with {given[0]}.", f"It applies to {users}: leave it out.")
     action = {"sheet": _draw_sheet, "simulate": _measure_accuracy}.get(given[0], _calibrate_performer)
     with sigterm_as_interrupt():
         try:
@@ -88,7 +88,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
         except (KeyboardInterrupt, Exception) as error:
             if not was_interrupted(error):
                 raise
-            return print_result(args, {}, "stopped; nothing is calibrated", outcome=Outcome.INTERRUPTED)
+            return print_result(args, {}, "stopped; nothing was calibrated", outcome=Outcome.INTERRUPTED)
 
 
 def _draw_sheet(args: argparse.Namespace) -> Outcome:
@@ -111,9 +111,9 @@ def _measure_accuracy(args: argparse.Namespace) -> Outcome:
     given = {"noise": args.noise, "seed": args.seed}
     if args.miss is not None:
         if not 0.0 <= args.miss <= 45.0:
-            raise BadInput(f"--miss {args.miss:g}.", "Hinges miss poses by 0 to 45 deg.")
+            raise BadInput(f"--miss {args.miss:g}.", "Give 0 to 45 deg.")
         given["miss_rad"] = math.radians(args.miss)
-    noise_preset(args.noise or "default")  # refuses what is none before anybody holds a pose
+    noise_preset(args.noise or "default")  # refuses an unknown preset before the calibration starts
     found = measure_calibration_accuracy(
         args.simulate, **{key: value for key, value in given.items() if value is not None}, folder=args.mocap
     )
@@ -125,9 +125,9 @@ def _calibrate_performer(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import require_writable, write_calibration
 
     if args.out is None:
-        raise BadInput("--out is missing.", "Name the file to write: --out me.toml.")
+        raise BadInput("--out is missing.", "Name the file to write, such as --out me.toml.")
     if args.pictures is not None and args.view != "frames":
-        raise BadInput("--pictures without --view frames.", "Say both, or neither.")
+        raise BadInput("--pictures without --view frames.", "Give both, or neither.")
     require_writable(args.out, force=args.force)
     found = _calibrate_from_device(args) if args.live else _calibrate_from_recording(args)
     write_calibration(args.out, found.file, force=args.force)
@@ -144,25 +144,25 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
 
     for name in ("port", "scenario"):
         if getattr(args, name) is None:
-            raise BadInput(f"--live without --{name}.", "It takes both.")
+            raise BadInput(f"--live without --{name}.", "Give --port and --scenario.")
     stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args)))
-    posing = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
+    session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
         show: PoseDisplay | None = None
         if args.view is not None:
-            view = ViewerOutput(args.view, posing.body.skeleton, args.pictures, force=args.force)
+            view = ViewerOutput(args.view, session.body.skeleton, args.pictures, force=args.force)
             opened.callback(view.close)
             print_status(view.description)
             show = view.show
-        wanted = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
+        config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
         device = opened.enter_context(
-            Is900(args.port, wanted, on_event=lambda event: print_status(f"line: {event.text}"))
+            Is900(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
-        worn = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
-        print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {worn}; Ctrl-C ends it")
-        collector = posing.collect_poses(device, print_status, show, show_progress)
+        names = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
+        print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {names}; Ctrl-C ends it")
+        collector = session.collect_poses(device, print_status, show, show_progress)
     print_status("solving")
-    return posing.solve(collector.holds, f"the tracker at {args.port}")
+    return session.solve(collector.holds, f"the tracker at {args.port}")
 
 
 def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
@@ -176,19 +176,17 @@ def _calibrate_from_recording(args: argparse.Namespace) -> "CalibrationOutcome":
     note = stream.recording.note
     scenario, clip = args.scenario or note.get("scenario"), args.clip or note.get("clip")
     if scenario is None:
-        raise BadInput(
-            f"Nothing says how trackers are worn in {args.recording}.", "Name the scenario: --scenario NAME."
-        )
+        raise BadInput(f"{args.recording} does not name its scenario.", "Name it with --scenario NAME.")
     names = None if args.stations is None else parse_names(args.stations)
-    posing = CalibrationSession(
+    session = CalibrationSession(
         scenario, name_recorded_stations(stream, scenario, names), args.kind or "poses", clip, args.mocap
     )
     frames = iter(stream)
-    collector = posing.collect_poses(frames, print_status)
-    if args.kind != "tpose":  # one more is one too many, or one before it was none
+    collector = session.collect_poses(frames, print_status)
+    if args.kind != "tpose":  # further held poses show that one was taken wrongly
         before = len(collector.rejected)
         for frame in frames:
             collector.add(frame)
         for passed in collector.rejected[before:]:
             print_status(str(passed))
-    return posing.solve(collector.holds, str(args.recording))
+    return session.solve(collector.holds, str(args.recording))

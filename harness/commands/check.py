@@ -14,8 +14,10 @@ if TYPE_CHECKING:
 
 
 def add_check(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "check", "try methods for the contract: causality, lost stations, recovery", run_check)
-    text = "names as in scenarios, or my_module:MyMethod (default: all that are registered)"
+    verb = add_verb(
+        verbs, "check", "test methods against the contract: causality, determinism, lost stations, recovery", run_check
+    )
+    text = "a name as in scenarios, or my_module:MyMethod (default: all registered methods)"
     verb.add_argument("methods", nargs="*", metavar="METHOD", help=text)
 
 
@@ -25,7 +27,7 @@ def run_check(args: argparse.Namespace) -> Outcome:
     from harness.testing.rules import RULES
 
     found: dict[str, list[RuleResult]] = {}
-    with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+    with ProgressBar("rules") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         methods = {name: registry.resolve(name) for name in args.methods or sorted(registry.methods())}
         for name, method in methods.items():
             found[name] = []

@@ -1,4 +1,4 @@
-"""What the verbs of the command line share: their flags, and how they answer."""
+"""What the verbs of the command line share: common flags, their parsers, and the printing of results."""
 
 import argparse
 import json
@@ -15,24 +15,24 @@ from harness.errors import BadInput, Outcome
 
 Verbs = Any  # argparse's subparsers object has no public type
 DEFAULT_STATION_COUNT = 4
-"""Stations of a device where nothing is said: VRPN takes no more (docs/is900.md 11.1)."""
+"""Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
 Action = Callable[[argparse.Namespace], Outcome]
 
 
 def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) -> argparse.ArgumentParser:
-    """A verb with the flags it shares with others; they mean the same everywhere.
+    """Add a verb with flags that other verbs share: any of "seed", "out", "jobs" and "mocap".
 
-    `endless` is no flag: it goes on until Ctrl-C, which is then no interruption.
+    "endless" is no flag: it marks a verb that runs until Ctrl-C, which is then the normal end.
     """
     verb: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
     verb.set_defaults(action=action, endless="endless" in flags)
     verb.add_argument("--json", action="store_true", help="print JSON instead of text")
     if "seed" in flags:
-        verb.add_argument("--seed", type=int, help="replaces the scenario's seed")
+        verb.add_argument("--seed", type=int, help="seed instead of the scenario's")
     if "out" in flags:
         verb.add_argument("--out", type=Path, metavar="DIR", help="folder to write")
     if "jobs" in flags:
-        text = "clips at the same time (default 1; the demo's is 2)"
+        text = "clips computed at the same time (default 1, of the demo 2)"
         verb.add_argument("--jobs", type=positive_int, default=1, metavar="N", help=text)
     if "mocap" in flags:
         add_mocap_flag(verb, "folder of real motion; may be repeated (default: those that HARNESS_MOCAP names)")
@@ -60,53 +60,55 @@ def mocap_words(folders: Path | Sequence[Path] | None) -> list[str]:
 
 
 def add_line_flags(verb: argparse.ArgumentParser) -> None:
-    """The flags of a verb that opens a device's line; `line_options` reads them."""
+    """Add the flags of a verb that opens a device's line; `line_options` reads them."""
     verb.add_argument(
         "--items", type=parse_items, metavar="A,B", help="output list of the device (default 40,2,11,21,1)"
     )
-    verb.add_argument("--baud", type=positive_int, help="of a serial port (default: found out)")
-    text = "where lost stations show: in the records (item 40), or in answers to MP, for firmware before 4.13"
+    verb.add_argument("--baud", type=positive_int, help="baud rate of a serial port (default: detected)")
+    text = "how lost stations are reported: in records (item 40), or in replies to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
 
 
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
-    """What those flags ask of the driver, the rest left out; BadInput."""
+    """The driver options that those flags give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
-        raise BadInput(f"--baud with {args.port}.", "It is for a serial port; leave it out.")
+        raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
     return {name: getattr(args, name) for name in ("items", "baud", "quality") if getattr(args, name) is not None}
 
 
 def is_whole_number(text: str) -> bool:
-    """Whether these are digits 0 to 9 and nothing else; `isdigit` alone takes `²` too."""
+    """Whether a text consists of digits 0 to 9; `str.isdigit` alone accepts `²` too."""
     return text.isascii() and text.isdecimal()
 
 
 def positive_int(text: str) -> int:
+    """A whole number above 0, for argparse."""
     if not is_whole_number(text) or int(text) < 1:
-        raise argparse.ArgumentTypeError(f"{text!r} is no positive whole number")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive whole number")
     return int(text)
 
 
 def positive_float(text: str) -> float:
+    """A finite number above 0, for argparse."""
     try:
         value = float(text)
     except ValueError:
         value = 0.0
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is no positive number")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
     return value
 
 
 def parse_items(text: str) -> tuple[int, ...]:
-    """An output list."""
+    """An output list such as 40,2,11,21,1."""
     codes = text.split(",")
     if not all(is_whole_number(code.strip()) for code in codes):
-        raise argparse.ArgumentTypeError(f"{text!r} is no list such as 40,2,11,21,1")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a list such as 40,2,11,21,1")
     return tuple(map(int, codes))
 
 
 def parse_stations(args: argparse.Namespace) -> int | list[str]:
-    """What `--stations` asks for: how many of the scenario's, or their names; `DEFAULT_STATION_COUNT` without. BadInput."""
+    """The number of the scenario's stations, or their names, from `--stations`; BadInput for an empty name."""
     from harness.experiment.scenario import load_scenario
 
     if args.stations is None:
@@ -115,27 +117,27 @@ def parse_stations(args: argparse.Namespace) -> int | list[str]:
 
 
 def parse_names(text: str) -> list[str]:
-    """Stations by name, as `--stations` has them; BadInput for an empty one."""
+    """Station names separated by commas; BadInput for an empty name."""
     names = [name.strip() for name in text.split(",")]
     if not all(names):
-        raise BadInput(f"--stations {text!r} names no station.", "Write names with commas between them: head,torso.")
+        raise BadInput(f"--stations {text!r} names no station.", "Separate names by commas: head,torso.")
     return names
 
 
 def print_status(line: str) -> None:
-    """To whoever sits there, over what `show_progress` left; stdout is data."""
+    """Print a line to stderr, over the line of `show_progress`; stdout is for data."""
     print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
 
 
 def show_progress(line: str) -> None:
-    """One line that changes, for whoever watches a terminal."""
+    """Replace the last line of stderr, if stderr is a terminal."""
     if sys.stderr.isatty():
         print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
 @contextmanager
 def sigterm_as_interrupt() -> Iterator[None]:
-    """Whoever stops the program by SIGTERM means what Ctrl-C says."""
+    """Treat SIGTERM as Ctrl-C in the block."""
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
@@ -156,5 +158,5 @@ def print_result(
 
 
 def this_command() -> str:
-    """The command as typed, to print where it can be copied."""
+    """The command line as it was typed."""
     return shlex.join(["harness", *sys.argv[1:]])

@@ -6,20 +6,21 @@ from pathlib import Path
 from harness.commands.common import Verbs, add_verb, print_result
 from harness.errors import BadInput, Outcome
 
-_SIDE_HELP = "folder of a run or sweep, or of a baseline, or a baseline's name"
+_SIDE_HELP = "the folder of a run, sweep or baseline, or the name of a baseline"
 _EVERYTHING = "everything"
 
 
 def add_compare(verbs: Verbs) -> None:
-    text = "tell whether B is worse than A, or one method than another"
+    text = "tell whether result B is worse than A, or one method worse than another"
     verb = add_verb(verbs, "compare", text, run_compare)
-    verb.add_argument("a", metavar="A", help=f"the reference: {_SIDE_HELP}")
-    verb.add_argument("b", metavar="B", nargs="?", help="what is compared with it (default: A, with --methods)")
-    verb.add_argument("--methods", metavar="A,B", help="compare method A of A with method B of B, or one of both")
-    verb.add_argument("--metrics", metavar="M,N", help="what the outcome rests on (see `harness list`)")
-    text = "let these inputs differ, or coverage, or cells without a partner; without names, everything"
+    verb.add_argument("a", metavar="A", help=f"reference: {_SIDE_HELP}")
+    verb.add_argument("b", metavar="B", nargs="?", help="result to compare with A (default: A itself, with --methods)")
+    text = "compare method A of result A with method B of result B; one name: the same method of both"
+    verb.add_argument("--methods", metavar="A,B", help=text)
+    verb.add_argument("--metrics", metavar="M,N", help="metrics that decide the outcome (see `harness list`)")
+    text = "let these conditions, `coverage` or `cells` (without a partner) differ; without names, everything"
     verb.add_argument("--allow", metavar="NAME,NAME", nargs="?", const=_EVERYTHING, help=text)
-    verb.add_argument("--html", metavar="FILE", type=Path, help="also write a page that shows it clip by clip")
+    verb.add_argument("--html", metavar="FILE", type=Path, help="also write a page that shows every clip")
 
 
 def run_compare(args: argparse.Namespace) -> Outcome:

@@ -1,10 +1,10 @@
-"""The verb `demo`: run the main job on built-in motion."""
+"""The verb `demo`: run the main job on synthetic motion."""
 
 from harness.commands.common import Verbs, add_verb
 from harness.commands.run import run_scenario
 
 
 def add_demo(verbs: Verbs) -> None:
-    text = "run the main job on built-in motion and write its report"
+    text = "run the main job on synthetic motion and write its report: nothing to download, a minute"
     verb = add_verb(verbs, "demo", text, run_scenario, "seed", "out", "jobs")
     verb.set_defaults(scenario="demo", mocap=None, methods=None, movie=False, report=True, jobs=2)

@@ -7,7 +7,13 @@ from harness.errors import Outcome
 
 
 def add_doctor(verbs: Verbs) -> None:
-    add_verb(verbs, "doctor", "check this installation: scores, methods, pictures, motion", run_doctor, "mocap")
+    add_verb(
+        verbs,
+        "doctor",
+        "check this installation: scores, optional parts, the library of real motion",
+        run_doctor,
+        "mocap",
+    )
 
 
 def run_doctor(args: argparse.Namespace) -> Outcome:

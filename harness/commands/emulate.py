@@ -1,4 +1,4 @@
-"""The verb that plays a tracker."""
+"""The verb `emulate`: play a scenario as an IS-900."""
 
 import argparse
 from contextlib import closing
@@ -25,36 +25,38 @@ if TYPE_CHECKING:
 
 
 def add_emulate(verbs: Verbs) -> None:
-    text = "play a scenario as an IS-900 in real time, on a pty or a TCP port; Ctrl-C ends it"
+    text = "play a scenario as an IS-900 in real time, at a pseudo terminal or a TCP port, until Ctrl-C"
     verb = add_verb(verbs, "emulate", text, run_emulate, "seed", "mocap", "endless")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     where = verb.add_mutually_exclusive_group(required=True)
-    where.add_argument("--pty", type=Path, metavar="LINK", help="pseudo terminal, reached through a link of this name")
-    where.add_argument("--tcp", metavar="HOST:PORT", help="TCP port; 0 takes a free one")
-    verb.add_argument("--anywhere", action="store_true", help="let a TCP port be reached from other computers")
-    verb.add_argument("--clip", help="a clip to play (default: the scenario's first)")
-    text = (
-        "the performer holds the poses of `harness calibrate` instead, one after another, in the session of that clip"
-    )
+    text = "open a pseudo terminal, and link to it under this name"
+    where.add_argument("--pty", type=Path, metavar="LINK", help=text)
+    where.add_argument("--tcp", metavar="HOST:PORT", help="listen at a TCP port; port 0 takes a free one")
+    verb.add_argument("--anywhere", action="store_true", help="accept connections from other computers")
+    verb.add_argument("--clip", help="clip to play (default: the scenario's first)")
+    text = "play the calibration poses of `harness calibrate`, held one after another, instead of the clip"
     verb.add_argument("--poses", action="store_true", help=text)
-    text = f"how many of the scenario's stations, or their names (default: the first {DEFAULT_STATION_COUNT})"
+    text = f"number of the scenario's stations, or their names (default: the first {DEFAULT_STATION_COUNT})"
     verb.add_argument("--stations", metavar="N|A,B", help=text)
-    verb.add_argument("--rate", type=positive_float, metavar="HZ", help="records per second of each station")
-    verb.add_argument("--noise", help="clean, noise or default, instead of the scenario's")
+    text = "records per second of each station (default: the scenario's)"
+    verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
+    verb.add_argument("--noise", metavar="PRESET", help="clean, noise or default (default: the scenario's)")
     verb.add_argument(
         "--items",
         type=parse_items,
         metavar="A,B",
-        help="list that clients will ask for, to see whether the line carries it",
+        help="output list that clients will request, to check whether the line carries it",
     )
-    verb.add_argument("--baud", type=positive_int, help="rate of the line, which paces what is sent (default 115200)")
-    verb.add_argument("--unpaced", action="store_true", help="send at once, as over Ethernet")
-    verb.add_argument("--overload", action="store_true", help="play more than the line carries; records are dropped")
-    text = "pty: garble everything while the client has set another rate"
+    text = "bits per second of the line, which pace the data (default 115200)"
+    verb.add_argument("--baud", type=positive_int, help=text)
+    verb.add_argument("--unpaced", action="store_true", help="send without pacing, as over Ethernet")
+    text = "allow more data than the line carries; records are dropped"
+    verb.add_argument("--overload", action="store_true", help=text)
+    text = "pty: garble the data while the client has set another rate"
     verb.add_argument("--check-baud", action="store_true", help=text)
-    verb.add_argument("--firmware", metavar="VERSION", help="such as 4.1105, which has no item 40 (default 4.2301)")
-    verb.add_argument("--restart", type=float, metavar="S", help="silence after a restart [s] (default 0.25)")
-    verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave out the scenario's faults")
+    verb.add_argument("--firmware", metavar="VERSION", help="firmware version (default 4.2301; 4.1105 has no item 40)")
+    verb.add_argument("--restart", type=float, metavar="S", help="seconds of silence after a restart (default 0.25)")
+    verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave the scenario's faults out")
 
 
 def run_emulate(args: argparse.Namespace) -> Outcome:
@@ -63,10 +65,10 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     from harness.stream.emulator.server import open_port, play_samples
 
     if args.pty and args.anywhere:
-        raise BadInput("--anywhere with --pty.", "It is for --tcp: leave it out.")
+        raise BadInput("--anywhere with --pty.", "--anywhere is for --tcp: leave it out.")
     if args.tcp and args.check_baud:
-        raise BadInput("--check-baud with --tcp.", "A connection has no rate, it is for --pty: leave it out.")
-    rehearsal = prepare_playback(
+        raise BadInput("--check-baud with --tcp.", "A TCP connection has no baud rate; --check-baud is for --pty.")
+    playback = prepare_playback(
         args.scenario,
         clip=args.clip,
         stations=parse_stations(args),
@@ -76,21 +78,19 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
         folder=args.mocap,
         posing=args.poses,
     )
-    scenario, tracker = rehearsal.scenario, rehearsal.tracker
+    scenario, tracker = playback.scenario, playback.tracker
     config = _config(args, scenario)
     if not (args.unpaced or args.overload):
         check_capacity(len(scenario.stations), tracker.rate_hz, args.items or tracker.items, config.baud)
-    samples = rehearsal.samples  # before the port, which clients take for a device that answers
+    samples = playback.samples  # before the port opens: clients expect an open port to answer
     port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
     with closing(port), sigterm_as_interrupt():
-        worn = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
+        names = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
         played = (
-            f"the poses of {rehearsal.clip_evaluation.part}'s performer"
-            if args.poses
-            else rehearsal.clip_evaluation.part
+            f"the poses of {playback.clip_evaluation.part}'s performer" if args.poses else playback.clip_evaluation.part
         )
-        print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {worn}")
+        print_status(f"{played} at {samples.rate_hz:g} Hz, {pace}; stations {names}")
         print_status(f"an IS-900 at {port.name}{_access_note(args)}; Ctrl-C ends it")
         counts = play_samples(samples, config, port)
     return print_result(args, counts, *(f"{name:20} {value:.6g}" for name, value in counts.items()))
@@ -99,9 +99,9 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
 def _config(args: argparse.Namespace, scenario: "Scenario") -> "EmulatorConfig":
     from harness.stream.emulator.config import EmulatorConfig
 
-    given = {"firmware": args.firmware, "restart_s": args.restart}
+    options = {"firmware": args.firmware, "restart_s": args.restart}
     return EmulatorConfig(
-        **{name: value for name, value in given.items() if value is not None},
+        **{name: value for name, value in options.items() if value is not None},
         baud=args.baud or scenario.tracker.baud,
         paced=not args.unpaced,
         queue_records=scenario.tracker.queue_records,
@@ -114,4 +114,4 @@ def _config(args: argparse.Namespace, scenario: "Scenario") -> "EmulatorConfig":
 def _access_note(args: argparse.Namespace) -> str:
     if args.pty:
         return ""
-    return ", reached from anywhere: nothing asks who commands it" if args.anywhere else ", from this computer alone"
+    return ", open to other computers: it obeys every client" if args.anywhere else ", open to this computer only"

@@ -8,10 +8,12 @@ from harness.errors import Outcome
 
 
 def add_export(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "export", "write truth and estimates of a run for other programs", run_export, "out")
+    verb = add_verb(
+        verbs, "export", "write the true and estimated motion of a run for other programs", run_export, "out"
+    )
     verb.add_argument("run", type=Path, help="folder written by `harness run`")
-    verb.add_argument("--format", required=True, choices=["bvh", "trc", "csv", "tum"])
-    verb.add_argument("--force", action="store_true", help="write over files that exist")
+    verb.add_argument("--format", required=True, choices=["bvh", "trc", "csv", "tum"], help="format of the files")
+    verb.add_argument("--force", action="store_true", help="overwrite files that exist")
 
 
 def run_export(args: argparse.Namespace) -> Outcome:

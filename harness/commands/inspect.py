@@ -8,10 +8,17 @@ from harness.errors import Outcome
 
 
 def add_inspect(verbs: Verbs) -> None:
-    verb = add_verb(verbs, "inspect", "say what a motion file is, and what is wrong with it", run_inspect, "mocap")
-    verb.add_argument("file", type=Path)
-    verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second, for files that do not record it")
-    verb.add_argument("--unit", metavar="M", type=float, help="metres per unit of length, where files do not record it")
+    verb = add_verb(
+        verbs,
+        "inspect",
+        "describe a motion file: skeleton, rate, unit, and what is wrong with it",
+        run_inspect,
+        "mocap",
+    )
+    verb.add_argument("file", type=Path, help="an AMC, BVH, C3D or AMASS npz file")
+    verb.add_argument("--rate", type=float, metavar="HZ", help="frames per second of a file that records no rate")
+    text = "metres per unit of length of a file that records no unit"
+    verb.add_argument("--unit", metavar="M", type=float, help=text)
 
 
 def run_inspect(args: argparse.Namespace) -> Outcome:

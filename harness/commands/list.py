@@ -7,7 +7,9 @@ from harness.errors import Outcome
 
 
 def add_list(verbs: Verbs) -> None:
-    add_verb(verbs, "list", "name the methods, scenarios, built-in takes and metrics", run_list)
+    add_verb(
+        verbs, "list", "list the methods, scenarios, studies, synthetic takes, noise presets and metrics", run_list
+    )
 
 
 def run_list(args: argparse.Namespace) -> Outcome:

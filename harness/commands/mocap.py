@@ -10,14 +10,14 @@ from harness.errors import BadInput, Outcome
 
 
 def add_mocap(verbs: Verbs) -> None:
-    verb = verbs.add_parser("mocap", help="list or download real motion", description="Libraries of real motion.")
-    inner = verb.add_subparsers(title="what to do", metavar="WHAT", required=True)
-    add_verb(inner, "list", "name the clips of a library", run_mocap_list, "mocap")
+    verb = verbs.add_parser("mocap", help="list or download real motion", description="List or download real motion.")
+    inner = verb.add_subparsers(title="actions", metavar="ACTION", required=True)
+    add_verb(inner, "list", "list the clips of a library", run_mocap_list, "mocap")
     fetch = add_verb(inner, "fetch", "download clips of CMU's motion capture database", run_mocap_fetch)
-    fetch.add_argument("database", choices=["cmu"])
+    fetch.add_argument("database", choices=["cmu"], help="the database")
     fetch.add_argument("--subjects", required=True, metavar="13,14", help="CMU's subject numbers")
-    fetch.add_argument("--out", type=Path, default=Path("mocap"), metavar="DIR", help="where to (default mocap/)")
-    fetch.add_argument("--url", help="another address of the same layout (a mirror)")
+    fetch.add_argument("--out", type=Path, default=Path("mocap"), metavar="DIR", help="folder to write (default mocap)")
+    fetch.add_argument("--url", help="address of a mirror with the same layout")
 
 
 def run_mocap_list(args: argparse.Namespace) -> Outcome:
@@ -29,7 +29,9 @@ def run_mocap_list(args: argparse.Namespace) -> Outcome:
     for note in ignored_links_note(library.ignored_links):
         print(note, file=sys.stderr)
     if not entries:
-        raise BadInput("There are no clips in it.", "Looked for .amc with .asf, .bvh, .npz and .c3d files.")
+        raise BadInput(
+            "The library holds no clips.", "It may hold .amc files with their .asf, .bvh, .npz and .c3d files."
+        )
     return print_result(args, {"clips": [entry.as_dict() for entry in entries]}, *(entry.line() for entry in entries))
 
 

@@ -1,4 +1,4 @@
-"""The verb that reruns a paper's experiments."""
+"""The verb `paper`: rerun the experiments of a paper."""
 
 import argparse
 import sys
@@ -11,13 +11,14 @@ from harness.errors import Outcome
 
 
 def add_paper(verbs: Verbs) -> None:
-    text = "rerun every experiment of a paper beside its published figures; resumes what was interrupted"
+    text = "rerun every experiment of a paper and compare it with the published figures; resumes"
     verb = add_verb(verbs, "paper", text, run_paper, "out")
-    verb.add_argument("paper", choices=["liu2011", "kim2012"], help="Liu et al. 2011, or Kim, Seol and Lee 2012")
+    verb.add_argument("paper", choices=["liu2011", "kim2012"], help="Liu et al. 2011; Kim, Seol and Lee 2012")
     text = "use the real motion in this folder; may be repeated (default: synthetic motion)"
     add_mocap_flag(verb, text)
-    verb.add_argument("--seed", type=int, default=1, help="of all runs (default 1)")
-    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
+    verb.add_argument("--seed", type=int, default=1, help="seed of all runs (default 1)")
+    text = "clips computed at the same time (default 2)"
+    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
 
 
 def run_paper(args: argparse.Namespace) -> Outcome:
@@ -29,7 +30,7 @@ def run_paper(args: argparse.Namespace) -> Outcome:
     from harness.study.papers.paper import load_paper, reproduce
 
     out = args.out or Path("results") / (args.paper + ("_cmu" if args.mocap else ""))
-    with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+    with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         findings, outcome = reproduce(
             load_paper(args.paper),
             out,

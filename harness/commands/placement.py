@@ -1,4 +1,4 @@
-"""The verb that finds out where trackers go."""
+"""The verb `placement`: find out how many stations to wear, and where."""
 
 import argparse
 import sys
@@ -11,10 +11,11 @@ from harness.errors import Outcome
 
 
 def add_placement(verbs: Verbs) -> None:
-    text = "find out which trackers to wear and where: sets of candidates, ranked; resumes what was interrupted"
+    text = "rank sets of stations: how many to wear, and where; the same command resumes"
     verb = add_verb(verbs, "placement", text, run_placement, "out", "mocap")
     verb.add_argument("study", help="a TOML file, or the name of a shipped one, such as walking")
-    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help="clips at the same time (default 2)")
+    text = "clips computed at the same time (default 2)"
+    verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
 
 
 def run_placement(args: argparse.Namespace) -> Outcome:
@@ -29,7 +30,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     out = args.out or Path("results") / f"placement_{Path(args.study).stem.removeprefix('placement_')}"
     with (
         ProgressBar("cells") as bar,
-        redirect_stdout(sys.stderr),  # what a method prints is talk
+        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
         process_executor(args.jobs) as each,
     ):
         findings, outcome = run_placement(

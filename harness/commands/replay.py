@@ -11,23 +11,29 @@ from harness.commands.common import Verbs, add_verb, print_result
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from harness.experiment.score_recording import RecordingScore
     from harness.stream.recording.replay import RecordingStream
 
 
 def add_replay(verbs: Verbs) -> None:
-    text = "play a recording to the same decoder; with --methods, to methods, scored where its motion is known"
+    text = "play a recording into the decoder; with --methods, into methods, scored against the known motion"
     verb = add_verb(verbs, "replay", text, run_replay, "seed", "mocap")
-    verb.add_argument("file", type=Path, help="written by `harness record`")
-    text = "step (a frame for each Enter), max (default), or so many times as fast as it was: 1, 0.5, 4"
+    verb.add_argument("file", type=Path, help="recording written by `harness record`")
+    text = "max (default), step (one frame per Enter), or a factor of the recorded speed, such as 1 or 0.5"
     verb.add_argument("--speed", default="max", metavar="SPEED", help=text)
-    verb.add_argument("--frames", action="store_true", help="print every station of every frame, as CSV or JSON lines")
-    verb.add_argument("--methods", metavar="A,B", help="names as in scenarios, such as ik,dynamic_map")
-    text = "what it was played from, where the recording does not say so itself"
+    text = "print every station of every frame, as CSV or as JSON lines"
+    verb.add_argument("--frames", action="store_true", help=text)
+    text = "methods to score, named as in scenarios, such as ik,dynamic_map"
+    verb.add_argument("--methods", metavar="A,B", help=text)
+    text = "scenario that was played, if the recording does not name it"
     verb.add_argument("--scenario", metavar="NAME", help=text)
-    verb.add_argument("--clip", metavar="CLIP", help="which of its clips (default: the first)")
-    verb.add_argument("--noise", metavar="LEVEL", help="replaces the scenario's noise")
-    verb.add_argument("--rate", type=float, metavar="HZ", help="replaces the scenario's rate")
-    text = "what methods are told of trackers, room and body (see `harness calibrate`; default: the truth)"
+    verb.add_argument("--clip", metavar="CLIP", help="clip that was played (default: the scenario's first)")
+    verb.add_argument("--noise", metavar="PRESET", help="noise preset that was played (default: the scenario's)")
+    text = "frames per second that were played (default: the scenario's)"
+    verb.add_argument("--rate", type=float, metavar="HZ", help=text)
+    text = "calibration of mounts, room and body for the methods, written by `harness calibrate` (default: the truth)"
     verb.add_argument("--calibration", type=Path, metavar="FILE", help=text)
 
 
@@ -37,8 +43,8 @@ def run_replay(args: argparse.Namespace) -> Outcome:
     stream = RecordingStream(args.file, parse_speed(args.speed))
     for lost in stream.recording.damage:
         print(f"lost: {lost}", file=sys.stderr)
-    told = (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed, args.calibration)
-    if any(value is not None for value in told):
+    scoring = (args.methods, args.scenario, args.clip, args.noise, args.rate, args.seed, args.calibration)
+    if any(value is not None for value in scoring):
         return _score_methods(args, stream)
     return _print_frames(args, stream)
 
@@ -73,8 +79,8 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
 def _format_counts(stream: "RecordingStream") -> str:
     counts = stream.counts
     return (
-        f"set up {counts['sessions']} times; {counts['records']} records, {counts['garbage_bytes']} bytes that belong "
-        f"to nothing; the device's clock was set anew {counts['clock_resets']} times besides"
+        f"set up {counts['sessions']} times; {counts['records']} records, {counts['garbage_bytes']} bytes outside "
+        f"records; the device's clock was also reset {counts['clock_resets']} times"
     )
 
 
@@ -83,22 +89,47 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     from harness.core.options import expand_alternatives, split_outside_brackets
     from harness.experiment import score_recording
 
-    told = {"scenario": args.scenario, "clip": args.clip, "rate_hz": args.rate, "noise": args.noise, "seed": args.seed}
-    rehearsal = score_recording.find_playback(stream, **told, folder=args.mocap)
+    options = {
+        "scenario": args.scenario,
+        "clip": args.clip,
+        "rate_hz": args.rate,
+        "noise": args.noise,
+        "seed": args.seed,
+    }
+    playback = score_recording.find_playback(stream, **options, folder=args.mocap)
     if args.calibration is not None:
-        rehearsal = rehearsal.with_calibration(read_calibration(args.calibration))
-    methods = rehearsal.scenario.methods
+        playback = playback.with_calibration(read_calibration(args.calibration))
+    methods = playback.scenario.methods
     if args.methods is not None:
         methods = tuple(
             name for text in split_outside_brackets(args.methods, ",") for name in expand_alternatives(text)
         )
-    with redirect_stdout(sys.stderr):  # what a method prints is talk
-        judged = score_recording.score_methods(stream, rehearsal, methods)
-    played = f"{rehearsal.scenario.name}, {rehearsal.clip_evaluation.part}"
-    content = {"scenario": rehearsal.scenario.name, "clip": str(rehearsal.clip_evaluation.part), **stream.counts}
-    content |= {"lost": stream.recording.damage, "methods": [one.as_dict() for one in judged]}
-    measured = any(one.metrics["joint_angle_mean_deg"] is not None for one in judged)
+    with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
+        scores = score_recording.score_methods(stream, playback, methods)
+    played = f"{playback.scenario.name}, {playback.clip_evaluation.part}"
+    content = {"scenario": playback.scenario.name, "clip": str(playback.clip_evaluation.part), **stream.counts}
+    content |= {"lost": stream.recording.damage, "methods": [score.as_dict() for score in scores]}
+    measured = any(score.metrics["joint_angle_mean_deg"] is not None for score in scores)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
-    return print_result(
-        args, content, f"played from {played}", "", score_recording.format_score_table(judged), outcome=outcome
+    return print_result(args, content, f"played from {played}", "", format_score_table(scores), outcome=outcome)
+
+
+def format_score_table(scores: "Sequence[RecordingScore]") -> str:
+    """Table with one row per method."""
+    from harness.report.run.text import COLUMNS
+
+    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
+    for score in scores:
+        figures = [_format_number(score.metrics[name], decimals) for _, name, decimals in COLUMNS]
+        lines.append([score.method, f"{score.frames_matched}/{score.frames_expected}", *figures])
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    return "\n".join(
+        "  ".join(
+            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
+        ).rstrip()
+        for words in lines
     )
+
+
+def _format_number(value: float | None, decimals: int) -> str:
+    return "not measured" if value is None else f"{value:.{decimals}f}"

@@ -10,13 +10,13 @@ from harness.errors import BadInput, Outcome
 
 def add_report(verbs: Verbs) -> None:
     verb = add_verb(
-        verbs, "report", "write the page and plots of a finished run, sweep, study or paper again", run_report
+        verbs, "report", "write the report page of a finished run, sweep, placement study or paper again", run_report
     )
     verb.add_argument("run", type=Path, help="folder written by `harness run`, `sweep`, `placement` or `paper`")
     verb.add_argument(
         "--movie", action="store_true", help="also write an mp4 of the worst cell of each method of a run"
     )
-    text = "also put the tables of a paper into this page, such as results/README.md, for those that stand there"
+    text = "also replace the tables of a paper that this page shows, such as results/README.md"
     verb.add_argument("--readme", type=Path, metavar="FILE", help=text)
 
 
@@ -43,7 +43,9 @@ def _report_sweep(args: argparse.Namespace) -> Outcome:
     from harness.report.sweep.page import write_sweep_page
 
     if args.movie:
-        raise BadInput(f"--movie with {args.run}, a sweep.", "Movies are made of the runs of `harness run`.")
+        raise BadInput(
+            f"--movie with {args.run}, a sweep.", "Movies show cells of a run: name the folder of `harness run`."
+        )
     page = write_sweep_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}")
 
@@ -56,7 +58,10 @@ def _report_findings(args: argparse.Namespace) -> Outcome:
     if not is_placement_findings(args.run / FINDINGS):
         return _report_paper(args)
     if args.movie or args.readme:
-        raise BadInput(f"--movie or --readme with {args.run}, a placement study.", "They are of runs and of papers.")
+        raise BadInput(
+            f"--movie or --readme with {args.run}, a placement study.",
+            "--movie is for runs, --readme for papers: leave it out.",
+        )
     page = write_placement_page(args.run)
     return print_result(args, {"report": str(page)}, f"report: {page}")
 
@@ -67,7 +72,9 @@ def _report_paper(args: argparse.Namespace) -> Outcome:
     from harness.results.findings import read_findings
 
     if args.movie:
-        raise BadInput("--movie with a paper's folder.", "Movies are made of its runs: name the folder of one.")
+        raise BadInput(
+            "--movie with a paper's folder.", "Movies show cells of a run: name the folder of one of its runs."
+        )
     page = write_paper_page(args.run)
     if args.readme:
         update_readme(args.readme, read_findings(args.run / FINDINGS))

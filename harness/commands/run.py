@@ -12,13 +12,13 @@ from harness.errors import Outcome
 
 
 def add_run(verbs: Verbs) -> None:
-    text = "run a scenario: every test clip, every method; resumes what was interrupted"
+    text = "run a scenario: every test clip with every method; the same command resumes an interrupted run"
     verb = add_verb(verbs, "run", text, run_scenario, "seed", "out", "jobs", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
-    text = "replaces the scenario's methods, such as ik,best_match+ik,my_module:MyMethod[option=3]"
+    text = "methods instead of the scenario's, such as ik,best_match+ik,my_module:MyMethod[option=3]"
     verb.add_argument("--methods", metavar="A,B", help=text)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
-    verb.add_argument("--no-report", dest="report", action="store_false", help="leave out report.html and plots")
+    verb.add_argument("--no-report", dest="report", action="store_false", help="write no report.html and no plots")
 
 
 def run_scenario(args: argparse.Namespace) -> Outcome:
@@ -37,7 +37,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         scenario = replace(scenario, methods=tuple(named))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
-    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
+    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         outcome = engine.run(scenario, out, folder=args.mocap, jobs=args.jobs, command=this_command(), progress=bar)
     page = None
     if args.report:

@@ -16,9 +16,9 @@ _MAX_FAILURES = 10
 
 
 def add_status(verbs: Verbs) -> None:
-    text = "say how far a sweep, a placement or a run is, also while it goes on"
+    text = "tell how much of a run, sweep or placement study is finished, also while it runs"
     verb = add_verb(verbs, "status", text, run_status)
-    verb.add_argument("folder", type=Path, metavar="DIR", help="folder that it writes")
+    verb.add_argument("folder", type=Path, metavar="DIR", help="the folder that it writes")
 
 
 def run_status(args: argparse.Namespace) -> Outcome:

@@ -12,18 +12,18 @@ from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
 
 _DEFAULT_CLUSTER_WORKERS = 64
-"""Workers for whom the cells are shared out when those of a scheduler may come and go."""
+"""Number of workers that cells are planned for when a scheduler's workers may come and go."""
 
 
 def add_sweep(verbs: Verbs) -> None:
-    text = "run scenario x clip x method x seed x any value; resumes what was interrupted"
+    text = "run scenarios x clips x methods x seeds x values; the same command resumes an interrupted sweep"
     verb = add_verb(verbs, "sweep", text, run_sweep, "out", "mocap")
     verb.add_argument("sweep", help="a TOML file, or the name of a shipped one (see `harness list`)")
-    verb.add_argument("--seed", type=int, help="replaces all seeds of the sweep")
+    verb.add_argument("--seed", type=int, help="one seed instead of the sweep's")
     verb.add_argument("--jobs", type=positive_int, metavar="N", help="worker processes (default 1)")
-    text = "workers of the Dask scheduler at this address, or `local` for some of its own, instead of --jobs"
+    text = "run on the workers of the Dask scheduler at ADDRESS, or on a local cluster: `local`"
     verb.add_argument("--dask", metavar="ADDRESS", help=text)
-    text = "make only the cell of this name, as `harness status` prints it, and print why it fails"
+    text = "run only this cell, named as `harness status` prints it, and print why it fails"
     verb.add_argument("--cell", metavar="NAME", default="", help=text)
 
 
@@ -37,14 +37,14 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     from harness.report.sweep.text import text
 
     if args.dask and args.jobs and args.dask != "local":
-        raise BadInput("--jobs with --dask.", "A scheduler's workers are started by whoever starts it: leave it out.")
+        raise BadInput("--jobs with --dask.", "The scheduler has workers of its own: leave --jobs out.")
     sweep, path = load_sweep(args.sweep)
     scenarios = expand_sweep(sweep, path, args.seed, args.mocap)
     out = args.out or Path("results") / sweep.name
     with ExitStack() as stack:
         stack.enter_context(sigterm_as_interrupt())
         bar = stack.enter_context(ProgressBar("cells"))
-        stack.enter_context(redirect_stdout(sys.stderr))  # what a method prints is talk
+        stack.enter_context(redirect_stdout(sys.stderr))  # a method may print; stdout is for data
         workers = args.jobs or {None: 1, "local": os.cpu_count() or 1}.get(args.dask, _DEFAULT_CLUSTER_WORKERS)
         executor = dask_executor(args.dask, args.jobs) if args.dask else process_executor(workers)
         outcome = run(
@@ -68,6 +68,6 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
 
 
 def _resume_command(args: argparse.Namespace, out: Path) -> str:
-    """The command that goes on with the sweep, wherever else its cells were made."""
+    """The command that resumes the sweep, also in a folder whose cells were computed elsewhere."""
     parts = ["harness", "sweep", args.sweep, "--out", str(out), *mocap_words(args.mocap)]
     return shlex.join(parts if args.seed is None else [*parts, "--seed", str(args.seed)])

@@ -1,4 +1,4 @@
-"""What is known about trackers before a session starts: where each sits on the body, and the room's frame."""
+"""Calibration of a tracker for one performer: the mount of each station, and the tracker's frame in the world."""
 
 from dataclasses import dataclass
 
@@ -7,14 +7,14 @@ from harness.core.arrays import Floats, freeze
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """S stations on their bones, and the tracker's frame in the world."""
+    """Mounts of S stations on their bones, and the pose of the tracker's frame in the world."""
 
     kind: str
-    """`exact` (the truth of the simulation), `tpose` or `poses`."""
+    """Source of the values: `exact` (the truth of the simulation), `tpose` or `poses`."""
     stations: tuple[str, ...]
-    """Names, in the order of the stream's rows."""
+    """(S,) station names in the order of the stream's rows."""
     bones: tuple[str, ...]
-    """(S,) the bone that carries each."""
+    """(S,) the bone that carries each station."""
     mount_m: Floats
     """(S, 3) station origin in its bone's frame [m]."""
     bone_from_station: Floats

@@ -1,4 +1,4 @@
-"""What a reconstructor answers for one frame."""
+"""The estimate that a reconstructor returns for one frame."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -7,20 +7,20 @@ from harness.core.arrays import Floats, freeze
 
 
 class Status(IntEnum):
-    """How far an estimate rests on readings."""
+    """How much an estimate depends on present readings."""
 
     SOLVED = 0
     HELD = 1
-    """Too little came in; the pose is carried on from before."""
+    """There were too few readings; the pose is extrapolated from earlier ones."""
     LOST = 2
-    """Fewer than half of the configured stations for more than 0.5 s."""
+    """For more than 0.5 s fewer than half of the configured stations had readings."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """One pose of the body: every output can be posed, rendered, exported and scored in one way.
+    """One pose of the body and its status, in the form that is posed, rendered, exported and scored.
 
-    ShapeError for a pose that is no vector, ValueError for a status that there is not.
+    Raises ShapeError for a pose that is no vector, and ValueError for an unknown status.
     """
 
     qpos: Floats

@@ -1,4 +1,4 @@
-"""Frozen dataclasses from mappings, such as TOML's, checked against their annotations."""
+"""Frozen dataclasses built from mappings, such as TOML tables, and checked against their annotations."""
 
 import dataclasses
 import math
@@ -14,11 +14,14 @@ if TYPE_CHECKING:
 T = TypeVar("T", bound="DataclassInstance")
 
 NONE = "none"
-"""Where a value may be None, this word stands for it: TOML has no other."""
+"""The word for None where a value may be None: TOML has no null."""
 
 
 def build(kind: type[T], content: Any, where: str) -> T:
-    """A dataclass from a mapping, by its annotations; UnknownName for keys, TypeError for values."""
+    """Build a dataclass from a mapping by its annotations.
+
+    `where` names the place in messages. Raises UnknownName and RenamedKey for keys, TypeError for values.
+    """
     if not isinstance(content, Mapping):
         raise TypeError(f"{where}: expected a table, found {content!r}")
     hints = get_type_hints(kind)
@@ -35,7 +38,10 @@ def build(kind: type[T], content: Any, where: str) -> T:
 
 
 def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite: bool = False) -> T:
-    """A copy of a dataclass with the given fields replaced, checked as `build` does; `infinite` allows such numbers."""
+    """A copy of a dataclass with some fields replaced, checked as by `build`.
+
+    Mappings change nested records and tables field by field. `infinite` allows infinite numbers.
+    """
     hints = get_type_hints(type(instance))
     fields = [f.name for f in dataclasses.fields(instance) if f.init]
     _refuse_unknown_keys(type(instance), content, fields, where)
@@ -66,7 +72,7 @@ def _refuse_unknown_keys(kind: type, content: Mapping[str, Any], fields: Iterabl
 def _replace_entries(
     now: Mapping[str, Any], content: Mapping[str, Any], hint: Any, where: str, infinite: bool
 ) -> Iterator[tuple[str, Any]]:
-    """Those of a table that `content` changes or adds: records and tables inside it keep what is not named."""
+    """The entries that `content` changes or adds; nested records and tables keep the fields it does not name."""
     kind = (get_args(hint) or (Any, Any))[1]
     for key, value in content.items():
         old = now.get(key)
@@ -79,7 +85,7 @@ def _replace_entries(
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:
-    """`value` as the annotation wants it; TypeError says where and what was expected."""
+    """Convert a value to the type of an annotation; TypeError names the place and what was expected."""
     origin, args = get_origin(hint), get_args(hint)
     if hint is Any:
         return value
@@ -115,11 +121,11 @@ def convert(hint: Any, value: Any, where: str) -> Any:
 def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
     if type(None) in kinds and value in (None, NONE):
         return None
-    complaints: list[Exception] = []
+    errors: list[Exception] = []
     for kind in kinds:
         if kind is not type(None):
             try:
                 return convert(kind, value, where)
-            except (TypeError, HarnessError) as complaint:
-                complaints.append(complaint)
-    raise complaints[0]
+            except (TypeError, HarnessError) as error:
+                errors.append(error)
+    raise errors[0]

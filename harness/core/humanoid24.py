@@ -8,7 +8,7 @@ funding from NSF EIA-0196217.
 
 A configuration `qpos` is MuJoCo's: root position, root quaternion, then the hinges of each bone outermost first,
 because MuJoCo composes the joints of a body in the order listed; the skeleton (and an AMC row) names them innermost
-first. `pack` and `unpack` are the one place that knows.
+first. Only `pack` and `unpack` convert between the two orders.
 """
 
 from functools import cache

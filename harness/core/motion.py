@@ -1,4 +1,4 @@
-"""Recorded or generated motion: on its own skeleton (`Clip`), and on the body (`BodyMotion`)."""
+"""Motion as recorded or generated, on the actor's skeleton (`Clip`), and on the MuJoCo body (`BodyMotion`)."""
 
 from dataclasses import dataclass, field
 
@@ -8,15 +8,15 @@ from harness.core.skeleton import Skeleton
 
 @dataclass(frozen=True, eq=False)
 class Clip:
-    """Motion of T frames on the skeleton it was captured with; world axes x forward, y left, z up."""
+    """T frames of motion on the skeleton of its recording; world axes x forward, y left, z up."""
 
     name: str
-    """Subject and trial, such as "13_17"; a clip and its copies in other formats share it."""
+    """Subject and trial, such as "13_17"; copies of a clip in other formats have the same name."""
     subject: str
     source: str
-    """Where it comes from: "cmu", "built-in performer", a folder's name."""
+    """Origin, such as "cmu", "built-in performer" or the name of a folder."""
     behaviour: str
-    """walking, boxing, jumping, golf, table_tennis, ... or "" when unknown."""
+    """What the performer does, such as walking or table_tennis; "" if unknown."""
     skeleton: Skeleton
     rate_hz: float
     root_m: Floats
@@ -24,9 +24,9 @@ class Clip:
     world_from_root: Floats
     """(T, 4) unit quaternion (w, x, y, z)."""
     angles_rad: Floats
-    """(T, D) hinge angles in the skeleton's order [rad]."""
+    """(T, D) hinge angles in the order of the skeleton [rad]."""
     notes: tuple[str, ...] = field(default=())
-    """What a user of the clip should know (glitches, inferred facts)."""
+    """Remarks for users of the clip, such as glitches and inferred facts."""
 
     def __post_init__(self) -> None:
         freeze(self, root_m=("T", 3), world_from_root=("T", 4))
@@ -42,7 +42,7 @@ class Clip:
 
 @dataclass(frozen=True, eq=False)
 class BodyMotion:
-    """Motion on the body: T MuJoCo configurations at an even rate. What methods learn from."""
+    """T MuJoCo configurations of the body at an even rate. Methods learn from such motions."""
 
     name: str
     subject: str

@@ -1,6 +1,6 @@
-"""Options written after a name: `best_match[matching=tree,gate.reach_m=0.5]`; `3|5` stands for one after the other.
+"""Options in brackets after a name: `best_match[matching=tree,gate.reach_m=0.5]`; `3|5` gives two names.
 
-Values are TOML's (numbers, true, "text", [lists]) and plain words; dots lead into records inside records.
+Values are those of TOML (numbers, true, "text", [lists]), or plain words. Dots name fields of nested records.
 """
 
 import itertools
@@ -13,7 +13,7 @@ _ADVICE = "Write it as NAME[OPTION=VALUE,OPTION=VALUE]."
 
 
 def split_outside_brackets(text: str, at: str) -> list[str]:
-    """The pieces of a text between the signs `at` that stand outside brackets and quotes; BadInput if those are odd."""
+    """Split a text at the character `at` outside brackets and quotes; BadInput if these do not match."""
     pieces = [""]
     for sign, level in zip(text, _bracket_depths(text), strict=True):
         if sign == at and level == 0:
@@ -24,7 +24,7 @@ def split_outside_brackets(text: str, at: str) -> list[str]:
 
 
 def expand_alternatives(text: str) -> list[str]:
-    """Every name that a text with `|` between values stands for, the last option changing fastest."""
+    """Every name that a text with `|` between values stands for; the last option changes fastest."""
     names = [""]
     for part in _split_brackets(text):
         ways = [part]
@@ -36,53 +36,53 @@ def expand_alternatives(text: str) -> list[str]:
 
 
 def parse_name(text: str) -> tuple[str, dict[str, Any]]:
-    """`name[a=1,b.c=2]` as the name and {"a": 1, "b": {"c": 2}}; BadInput when it is not written so."""
+    """Split `name[a=1,b.c=2]` into the name and {"a": 1, "b": {"c": 2}}; BadInput for another form."""
     name, *brackets = _split_brackets(text)
     if len(brackets) > 1 or name.startswith("["):
-        raise BadInput(f"{text!r} is no name with options.", _ADVICE)
-    found: dict[str, Any] = {}
+        raise BadInput(f"{text!r} is not a name with options.", _ADVICE)
+    options: dict[str, Any] = {}
     for option in split_outside_brackets(brackets[0][1:-1], ",") if brackets else ():
-        _add(found, option, text)
-    return name, found
+        _add(options, option, text)
+    return name, options
 
 
-def _add(found: dict[str, Any], option: str, text: str) -> None:
+def _add(options: dict[str, Any], option: str, text: str) -> None:
     key, equals, value = (piece.strip() for piece in option.partition("="))
-    *into, last = key.split(".")
-    if not equals or not value or not all((*into, last)):
-        raise BadInput(f"{text!r}: {option!r} is no option with a value.", _ADVICE)
-    for step in into:
-        found = found.setdefault(step, {})
-        if not isinstance(found, dict):
-            raise BadInput(f"{text!r} gives {step} twice.", _ADVICE)
-    if last in found:
+    *parents, last = key.split(".")
+    if not equals or not value or not all((*parents, last)):
+        raise BadInput(f"{text!r}: {option!r} is not an option with a value.", _ADVICE)
+    for parent in parents:
+        options = options.setdefault(parent, {})
+        if not isinstance(options, dict):
+            raise BadInput(f"{text!r} gives {parent} twice.", _ADVICE)
+    if last in options:
         raise BadInput(f"{text!r} gives {key} twice.", _ADVICE)
-    found[last] = _value(value)
+    options[last] = _parse_value(value)
 
 
-def _value(text: str) -> Any:
+def _parse_value(text: str) -> Any:
     try:
-        found = tomllib.loads(f"value = {text}")
+        table = tomllib.loads(f"value = {text}")
     except tomllib.TOMLDecodeError:
         return text
-    return found["value"] if set(found) == {"value"} else text
+    return table["value"] if set(table) == {"value"} else text
 
 
 def _expand_option(option: str) -> list[str]:
-    """`a=1|2` as `a=1` and `a=2`."""
+    """Expand `a=1|2` to `a=1` and `a=2`."""
     key, equals, value = option.partition("=")
-    return [key + equals + one for one in split_outside_brackets(value, "|")]
+    return [key + equals + choice for choice in split_outside_brackets(value, "|")]
 
 
 def _split_brackets(text: str) -> list[str]:
-    """A text cut before and after its outermost brackets; never empty."""
+    """Cut a text before and after its outermost brackets; the list is never empty."""
     pairs = zip(text, _bracket_depths(text), strict=True)
     groups = ["".join(sign for sign, _ in group) for _, group in itertools.groupby(pairs, key=lambda p: p[1] > 0)]
     return groups or [""]
 
 
 def _bracket_depths(text: str) -> list[int]:
-    """How deep in brackets or quotes each sign stands, those themselves included; BadInput if they do not match."""
+    """Depth of each character in brackets or quotes, which count themselves; BadInput if they do not match."""
     levels, depth, quote = [], 0, ""
     for sign in text:
         opens = not quote and sign == "["

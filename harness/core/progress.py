@@ -1,11 +1,14 @@
-"""How far long work has come, for whoever watches a terminal."""
+"""Progress of long work on a terminal."""
 
 import sys
 from typing import Any
 
 
 class ProgressBar:
-    """A bar on stderr when that is a terminal; nothing otherwise. Calling it says what was done last."""
+    """A progress bar on stderr if stderr is a terminal, else nothing; a context manager.
+
+    A call with the name of the last step, the number of finished steps and the number of planned ones updates it.
+    """
 
     def __init__(self, unit: str) -> None:
         self.unit = unit

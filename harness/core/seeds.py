@@ -9,7 +9,7 @@ import numpy as np
 
 
 def generator(seed: int, *names: str | int) -> np.random.Generator:
-    """The generator of the part called `names` under `seed`; the same key gives the same draws on any machine."""
+    """The random generator of the part with these names; the same seed and names give the same draws on any machine."""
     key = "\x1f".join([str(int(seed)), *(str(name) for name in names)])
     digest = hashlib.blake2b(key.encode(), digest_size=16).digest()
     return np.random.Generator(np.random.Philox(int.from_bytes(digest, "little")))

@@ -40,12 +40,12 @@ class Skeleton:
 
     @cached_property
     def dof_names(self) -> tuple[str, ...]:
-        """(D,) such as "lfemur.rx"."""
+        """(D,) hinge names, such as "lfemur.rx"."""
         return tuple(f"{n}.{c}" for n, channels in zip(self.names, self.hinges, strict=True) for c in channels)
 
     @cached_property
     def dof_of_bone(self) -> tuple[slice, ...]:
-        """(B,) where each bone's hinges lie among the D."""
+        """(B,) slice of each bone's hinges among the D."""
         ends = np.cumsum([len(channels) for channels in self.hinges])
         return tuple(slice(int(e) - len(c), int(e)) for e, c in zip(ends, self.hinges, strict=True))
 
@@ -56,6 +56,7 @@ class Skeleton:
         return out
 
     def index(self, bone: str) -> int:
+        """Index of a bone; UnknownName if there is none of that name."""
         if bone not in self.names:
             raise UnknownName("bone", bone, self.names)
         return self.names.index(bone)
@@ -77,18 +78,18 @@ class Skeleton:
         return small, dofs
 
     def with_bones(self, bone_m: Floats) -> "Skeleton":
-        """The same joints with other bone vectors (B, 3) [m]."""
+        """A copy with other bone vectors (B, 3) [m] and the same joints."""
         return Skeleton(self.names, self.parents, bone_m, self.hinges, self.axes)
 
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Where the B bones of T frames are."""
+    """Positions and rotations of B bones in T frames, in the world."""
 
     start_m: Floats
-    """(T, B, 3) joint that each bone turns about [m]."""
+    """(T, B, 3) position of the joint that each bone turns about [m]."""
     end_m: Floats
-    """(T, B, 3) its far end [m]."""
+    """(T, B, 3) position of each bone's far end [m]."""
     world_from_bone: Floats
     """(T, B, 3, 3) rotation matrices."""
 
@@ -99,7 +100,10 @@ def forward_kinematics(skeleton: Skeleton, root_m: Floats, world_from_root: Floa
 
 
 def world_rotations(skeleton: Skeleton, world_from_root: Floats, angles_rad: Floats) -> Floats:
-    """(T, B, 3, 3) `world_from_bone`: the greater part of the work, and the same wherever the root is."""
+    """(T, B, 3, 3) rotations `world_from_bone`, which do not depend on the root's position.
+
+    They are the most expensive part of the forward kinematics.
+    """
     root = rotations.to_matrix(world_from_root)
     out = np.empty((len(angles_rad), skeleton.bone_count, 3, 3))
     for b, parent in enumerate(skeleton.parents):
@@ -109,7 +113,7 @@ def world_rotations(skeleton: Skeleton, world_from_root: Floats, angles_rad: Flo
 
 
 def pose_from_rotations(skeleton: Skeleton, root_m: Floats, world_from_bone: Floats) -> Pose:
-    """Bones turned so (T, B, 3, 3), hung on the root's path (T, 3)."""
+    """The pose of bones with rotations (T, B, 3, 3) on a root at positions (T, 3) [m]."""
     start = np.empty(world_from_bone.shape[:3])
     end = np.empty_like(start)
     for b, parent in enumerate(skeleton.parents):
@@ -128,11 +132,12 @@ def local_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
 
 
 def unwrap_angles(skeleton: Skeleton, angles_rad: Floats) -> Floats:
-    """The same rotations (T, D) with each bone's angles as near as possible to the frame before.
+    """Angles (T, D) of the same rotations, with each bone's angles as near as possible to those of the frame before.
 
-    Files wrap at 180 deg, and three hinges also know the twin (a + pi, pi - b, c + pi) (docs/methods.md F9). What that
-    leaves open is settled for the clip as a whole: each column's median lies in (-pi, pi], and of a bone's two twin
-    courses the one whose medians are nearer to zero is taken. A single frame takes what is nearest to zero.
+    Files wrap at 180 deg, and three hinges reach a rotation by two sets of angles: (a, b, c) and the twin
+    (a + pi, pi - b, c + pi) (docs/methods.md F9). The remaining freedom is settled for the whole clip. Each column's
+    median lies in (-pi, pi], and of a bone's two twin courses the one with medians nearer to zero is taken. A single
+    frame takes the angles nearest to zero.
     """
     out = np.array(angles_rad, dtype=float)
     for where in skeleton.dof_of_bone:

@@ -1,4 +1,4 @@
-"""Which motion may be learnt from: a test clip is never among its own examples (docs/methods.md F1)."""
+"""Splits: which motion a method may learn from. A test clip is never among its own examples (docs/methods.md F1)."""
 
 import re
 from collections.abc import Iterable
@@ -17,7 +17,7 @@ GUARD_S = 1.0
 
 @dataclass(frozen=True)
 class ClipPart:
-    """A clip, or the share of it from `start` to `end`."""
+    """A clip, or the part of it from `start` to `end`, as shares of its length."""
 
     clip: str
     start: float = 0.0
@@ -25,37 +25,37 @@ class ClipPart:
 
     @classmethod
     def parse(cls, text: str) -> "ClipPart":
-        """From "13_17" or "13_17@0.20-0.40"."""
+        """Parse "13_17" or "13_17@0.20-0.40"; BadInput for another form."""
         clip, at, share = text.partition("@")
         if not at:
             return cls(text)
-        found = re.fullmatch(r"([01]?\.?\d*)-([01]?\.?\d*)", share)
+        match = re.fullmatch(r"([01]?\.?\d*)-([01]?\.?\d*)", share)
         try:
-            start, end = (float(x) for x in found.groups()) if found else (1.0, 0.0)
+            start, end = (float(x) for x in match.groups()) if match else (1.0, 0.0)
         except ValueError:
             start, end = 1.0, 0.0
         if not 0.0 <= start < end <= 1.0:
-            raise BadInput(f"{text!r} is no part of a clip.", "Write it as CLIP@0.20-0.40, shares of the take.")
+            raise BadInput(f"{text!r} is not a part of a clip.", "Write it as CLIP@0.20-0.40, in shares of the take.")
         return cls(clip, start, end)
 
     def __str__(self) -> str:
-        """As `parse` reads it; parts that differ at all print differently."""
-        whole = (self.start, self.end) == (0.0, 1.0)
-        return self.clip if whole else f"{self.clip}@{_text(self.start)}-{_text(self.end)}"
+        """The text that `parse` reads; different parts have different texts."""
+        complete = (self.start, self.end) == (0.0, 1.0)
+        return self.clip if complete else f"{self.clip}@{_format_share(self.start)}-{_format_share(self.end)}"
 
     def frames(self, count: int) -> range:
-        """The frames of a take of `count` frames that lie in it."""
+        """The frames of the part, in a take of `count` frames."""
         return range(round(self.start * count), round(self.end * count))
 
 
-def _text(share: float) -> str:
-    """At least two decimals, and as many as it takes."""
+def _format_share(share: float) -> str:
+    """A share with two decimals, or more if it needs more."""
     short = f"{share:.2f}"
     return short if float(short) == share else np.format_float_positional(share)
 
 
 def select_examples(test: ClipPart, candidates: Iterable[str], split: Split, subjects: dict[str, str]) -> list[str]:
-    """The candidate clips that the split lets a method see; for `block` the test clip itself is among them."""
+    """The candidate clips that the split allows as examples, sorted; for `block` with the test clip itself."""
     match split:
         case "block":
             return sorted({*candidates, test.clip})
@@ -65,26 +65,29 @@ def select_examples(test: ClipPart, candidates: Iterable[str], split: Split, sub
             return sorted({name for name in candidates if subjects[name] != subjects[test.clip]})
 
 
-def allowed_frames(closed: Iterable[ClipPart], example: str, count: int, rate_hz: float) -> list[range]:
-    """The runs of frames of an example that may be learnt from: all, but for the closed parts and their guard time.
+def allowed_frames(held_out: Iterable[ClipPart], example: str, count: int, rate_hz: float) -> list[range]:
+    """The runs of frames of an example that a method may learn from: all but held-out parts and their guard time.
 
-    A clip that is closed whole gives nothing, whatever the split.
+    `count` and `rate_hz` are the example's number of frames and frame rate. A clip that is held out completely gives no
+    frames, whatever the split.
     """
     guard, first, runs = round(GUARD_S * rate_hz), 0, []
-    for shut in sorted((p.frames(count) for p in closed if p.clip == example), key=lambda shut: shut.start):
-        runs.append(range(first, shut.start - guard))
-        first = max(first, shut.stop + guard)
+    for frames_out in sorted(
+        (p.frames(count) for p in held_out if p.clip == example), key=lambda frames_out: frames_out.start
+    ):
+        runs.append(range(first, frames_out.start - guard))
+        first = max(first, frames_out.stop + guard)
     return [run for run in (*runs, range(first, count)) if len(run) > 1]
 
 
-def refuse_leak(closed: Iterable[ClipPart], example: str, runs: Iterable[range], count: int, rate_hz: float) -> None:
-    """BadInput when any frame that is learnt from lies in a closed part of the example or in the guard time of it."""
+def refuse_leak(held_out: Iterable[ClipPart], example: str, runs: Iterable[range], count: int, rate_hz: float) -> None:
+    """Raise BadInput if a run of example frames reaches into a held-out part of the example or its guard time."""
     guard, used = GUARD_S * rate_hz, list(runs)
-    for part in closed:
-        shut = part.frames(count)
+    for part in held_out:
+        frames_out = part.frames(count)
         for run in used if part.clip == example else ():
-            if run.start < shut.stop + guard - 0.5 and run.stop > shut.start - guard + 0.5:
+            if run.start < frames_out.stop + guard - 0.5 and run.stop > frames_out.start - guard + 0.5:
                 raise BadInput(
-                    f"{part} is judged or withheld, but frames {run.start} to {run.stop} of that take are examples.",
+                    f"{part} is tested or withheld, but frames {run.start} to {run.stop} of that take are examples.",
                     "A test clip can never be among its own examples: remove it, or use split block with a part.",
                 )

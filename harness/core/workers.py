@@ -1,4 +1,4 @@
-"""Worker processes that end with the one that started them, however it ended; Ctrl-C reaches that one alone."""
+"""Worker processes that end with the process that started them, and never see Ctrl-C themselves."""
 
 import os
 import signal
@@ -18,7 +18,7 @@ R = TypeVar("R")
 def run_in_workers(
     function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], workers: int
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    """`function(*task)` of every task, in fresh processes: which, and what came of it, as each ends; see `Pool`."""
+    """Call `function(*task)` for every task in new processes; yields (index, future) as each task ends (see `Pool`)."""
     pool = Pool(workers)
     try:
         yield from pool(function, tasks)
@@ -27,10 +27,10 @@ def run_in_workers(
 
 
 class Pool:
-    """So many worker processes, which are started when first needed and then stay for the next call.
+    """A pool of worker processes, started when first needed and kept for later calls.
 
-    They end with this pool, or with this process. A worker that dies takes nothing with it but its task, see
-    `schedule_tasks`. What workers print goes to stderr.
+    They end with the pool, or with this process. A worker that dies loses only its task (see `schedule_tasks`). Workers
+    print to stderr.
     """
 
     def __init__(self, workers: int) -> None:
@@ -40,17 +40,17 @@ class Pool:
     def __call__(
         self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]]
     ) -> Generator[tuple[int, Future[R]], None, None]:
-        """As `run_in_workers`. A caller that stops early, as Ctrl-C makes it, stops what runs at once."""
+        """Like `run_in_workers`. If the caller stops early, as after Ctrl-C, running tasks are stopped at once."""
 
-        def submit(which: int) -> Future[R]:
-            return next(process for process in self._processes if process.idle).submit(function, *tasks[which])
+        def submit(index: int) -> Future[R]:
+            return next(process for process in self._processes if process.idle).submit(function, *tasks[index])
 
-        whole = False
+        complete = False
         try:
             yield from schedule_tasks(submit, len(tasks), lambda: self._workers)
-            whole = True
+            complete = True
         finally:
-            if not whole:
+            if not complete:
                 self._stop()
                 self._begin()
 
@@ -62,24 +62,23 @@ class Pool:
         self._stop()
 
     def _begin(self) -> None:
-        self._theirs, self._ours = get_context("spawn").Pipe(duplex=False)
-        self._processes = [_WorkerProcess(self._theirs) for _ in range(self._workers)]
+        self._worker_end, self._own_end = get_context("spawn").Pipe(duplex=False)
+        self._processes = [_WorkerProcess(self._worker_end) for _ in range(self._workers)]
 
     def _stop(self) -> None:
-        self._ours.close()
+        self._own_end.close()
         for process in self._processes:
             process.pool.shutdown(cancel_futures=True)
-        self._theirs.close()
+        self._worker_end.close()
 
 
 def schedule_tasks(
     submit: Callable[[int], Future[R]], count: int, room: Callable[[], int], *, look_s: float | None = None
 ) -> Generator[tuple[int, Future[R]], None, None]:
-    """Tasks 0 to `count` - 1, as many under way as there is room for: which, and what came of it, as each ends.
+    """Submit tasks 0 to `count` - 1, at most `room()` at a time; yields (index, future) as each task ends.
 
-    One that ends in BrokenExecutor, because its worker died, is begun once more when all others are done and with
-    nothing beside it: what a worker dies of may be too much at a time. What comes then is what came of it.
-    `room` is asked whenever a task ends, and every `look_s`.
+    A task whose worker died (BrokenExecutor) is submitted once more, alone, after all others: the worker may have died
+    for lack of memory. The second result counts. `room` is called whenever a task ends, and every `look_s` seconds.
     """
     first, again, alone = deque(range(count)), deque[int](), set[int]()
     running: dict[Future[R], int] = {}
@@ -87,24 +86,24 @@ def schedule_tasks(
     while first or again or running or ended:
         places = room()
         while first and len(running) < places:
-            which = first.popleft()
-            running[submit(which)] = which
+            index = first.popleft()
+            running[submit(index)] = index
         if again and not (first or running):
-            which = again.popleft()
-            alone.add(which)
-            running[submit(which)] = which
-        while ended:  # when its worker has something to do; kept no longer than the caller keeps it
+            index = again.popleft()
+            alone.add(index)
+            running[submit(index)] = index
+        while ended:  # after the workers have new tasks; no reference to a result is kept
             yield ended.popleft()
         for future in wait(running, look_s, FIRST_COMPLETED).done:
-            which = running.pop(future)
-            if which not in alone and isinstance(future.exception(), BrokenExecutor):
-                again.append(which)
+            index = running.pop(future)
+            if index not in alone and isinstance(future.exception(), BrokenExecutor):
+                again.append(index)
             else:
-                ended.append((which, future))
+                ended.append((index, future))
 
 
 class _WorkerProcess:
-    """A worker process, started when it is needed and anew when it died; a pool of one, which breaks alone."""
+    """A worker process, started when needed and again after it died: a pool of one, so that no other breaks with it."""
 
     def __init__(self, alive: Connection) -> None:
         self._alive = alive
@@ -118,7 +117,7 @@ class _WorkerProcess:
     def submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         try:
             future = self._submit(function, *task)
-        except BrokenExecutor:  # of its last task, or while it had none
+        except BrokenExecutor:  # the worker died in its last task or while idle
             self.pool.shutdown()
             self.pool, self._last = self._fresh(), None
             future = self._submit(function, *task)
@@ -128,7 +127,7 @@ class _WorkerProcess:
     def _submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         if self._last is not None:
             return self.pool.submit(function, *task)
-        with ignore_sigint():  # which the process inherits, so that it never sees it, not even while it imports
+        with ignore_sigint():  # inherited by the process, so that it ignores Ctrl-C even while it imports
             return self.pool.submit(function, *task)
 
     def _fresh(self) -> ProcessPoolExecutor:
@@ -141,14 +140,14 @@ def _initialise_worker(alive: Connection) -> None:
 
 
 def _exit_with_parent(alive: Connection) -> None:
-    alive.poll(None)  # nothing is ever sent: this returns when the other end closes
+    alive.poll(None)  # nothing is ever sent; this returns when the other end closes
     os._exit(1)
 
 
 @contextmanager
 def ignore_sigint() -> Iterator[None]:
-    """Processes that are started meanwhile never see Ctrl-C."""
-    if current_thread() is not main_thread():  # Ctrl-C is the main thread's affair, and signals may be set there alone
+    """Processes started in the block ignore Ctrl-C."""
+    if current_thread() is not main_thread():  # only the main thread may set signal handlers
         yield
         return
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,4 +1,4 @@
-"""Scenarios: TOML files read into frozen dataclasses, with units in the keys and unknown keys refused."""
+"""Scenarios: TOML files read into frozen dataclasses. Keys name their units, and unknown keys are refused."""
 
 import fnmatch
 import itertools
@@ -28,61 +28,68 @@ _NOT_VARIABLE = ("schema", "name", "methods", "inputs", "vary", "expected_order"
 
 @dataclass(frozen=True)
 class ScenarioMotion:
-    """Which clips are judged, and which may be learnt from."""
+    """The test clips of a scenario, and the clips that methods may learn from.
+
+    Clip lists take patterns: "13_*" stands for every clip that matches (see `expand_clips`).
+    """
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"protocol": "split"}
 
     source: Literal["builtin", "cmu"]
-    """`cmu` is looked up below --mocap or HARNESS_MOCAP and refused without it."""
+    """`builtin` is the motion generator; `cmu` is the library that --mocap or HARNESS_MOCAP names."""
     test: tuple[str, ...]
-    """Clip names; "13_17@0.20-0.40" is that share of the take (split block)."""
+    """Test clips by name; "13_17@0.20-0.40" is that part of the take (for split `block`)."""
     behaviours: tuple[str, ...]
-    """What the clips show: one word for all of them, or one for each."""
+    """Behaviour of the test clips: one word for all of them, or one word for each."""
     examples: tuple[str, ...] = ()
-    """Clips that methods may learn from; what the split forbids is left out clip by clip."""
+    """Clips that methods may learn from, except those that the split forbids for a test clip."""
     withheld: tuple[str, ...] = ()
-    """Clips and parts of clips that nothing is learnt from under any split, nor within 1 s of them: the test clips,
-    while constants are chosen on others."""
+    """Clips and parts of clips that are no examples under any split, with 1 s around them: for example the test clips
+    of the tables, while constants are chosen on other clips."""
     thin_to: int = 0
-    """Keep so many frames of all examples together, evenly spaced: a sparse database (Kim et al. 2012); 0 keeps all."""
+    """Number of frames that all examples together keep, evenly spaced, for a sparse database (Kim et al. 2012); 0 keeps
+    all."""
     database: Literal["all", "behaviour"] = "all"
-    """Learn from every example, or from those of the test clip's behaviour only (Liu et al. 2011)."""
+    """Learn from all examples, or only from those of the test clip's behaviour (Liu et al. 2011)."""
     split: Literal["block", "sequence", "subject"] = "sequence"
+    """Frames that are no examples: those of the test block, of the test take, or of the test subject."""
     body: Literal["own", "standard", "common"] = "own"
-    """Judge on the performer's own proportions; or on the mean skeleton, `standard` with bones that point as the
-    performer's do, `common` with the recorded angles kept and the root's path scaled by the legs."""
+    """Body of the test: `own` has the performer's proportions, the others are the mean skeleton. On `standard` the
+    bones point as the performer's do; on `common` the recorded angles are kept and the root's path is scaled by the
+    legs."""
     longest_s: float = 0.0
-    """Only the first so many seconds of each test clip [s]; 0 is all of it."""
+    """Length of each test clip that is used, from its start [s]; 0 is all of it."""
     rate_hz: float = 0.0
-    """Rate of files that record none and that no index names [Hz]; 0 refuses them."""
+    """Frame rate of files that record none and that no index lists [Hz]; 0 refuses such files."""
 
 
 @dataclass(frozen=True)
 class Station:
-    """One tracker and where it is worn (see `harness.body.mounts.Mount`)."""
+    """One station and its nominal mount (see `harness.body.mounts.Mount`)."""
 
     bone: str
+    """Name of the bone that carries the station."""
     along: float = 0.5
     """Position along the bone, 0 at its joint to 1 at its far end."""
     around_deg: float = 0.0
     """Angle around the bone [deg]."""
     stand_off_m: float = 0.01
-    """Distance of the tracker's origin from the skin [m]."""
+    """Distance of the station's origin from the skin [m]."""
 
 
 @dataclass(frozen=True)
 class CalibrationSettings:
-    """How a performer stands model for a calibration, and how the trackers then really sit."""
+    """Errors of a simulated performer who holds calibration poses, and of the true mounts."""
 
     miss_deg: float = 2.5
-    """How far each hinge, and the lean of the body, misses each pose, standard deviation [deg]."""
+    """Standard deviation of each hinge, and of the body's lean, from each pose [deg]."""
     hold_s: float = 3.0
-    """How long each pose is held [s]."""
+    """Time that each pose is held [s]."""
     beside_m: float = 0.0
-    """How far trackers sit from their nominal mounts, standard deviation along each of their axes [m]. Part of the
-    simulated world, for every kind of calibration: `exact` knows it, the others have to find it."""
+    """Standard deviation of the stations' positions from their nominal mounts, along each axis [m]. It is part of the
+    simulated world: the calibration `exact` knows it, the others estimate it."""
     turned_deg: float = 0.0
-    """How far they are turned there, standard deviation about each of their axes [deg]; 180 is practically anyhow."""
+    """Standard deviation of the stations' orientations about each axis [deg]; 180 is nearly random."""
 
     def __post_init__(self) -> None:
         require_ranges(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
@@ -90,46 +97,50 @@ class CalibrationSettings:
 
 @dataclass(frozen=True)
 class Scenario:
-    """One experiment: every test clip, with every method and every choice of inputs."""
+    """One experiment: every test clip with every method and every choice of inputs."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"order": "expected_order"}
 
     name: str
     motion: ScenarioMotion
     stations: dict[str, Station]
+    """The stations by name; in a file also the name of a set, such as "liu2011" (see `expand_station_set`)."""
     methods: tuple[str, ...]
-    """By name, with options and alternatives in brackets (see `harness.core.options`)."""
+    """Methods by name, with options and alternatives in brackets (see `harness.core.options`)."""
     schema: int = SCHEMA
     seed: int = 1
     inputs: tuple[str, ...] = ("pos+ori",)
+    """Which of position and orientation each station delivers; every method runs with each choice."""
     worn: tuple[str, ...] = ()
-    """Which of the stations are worn, all of them if none is named: vary "worn" to compare sets of trackers. The stream
-    has no others, so that one that is not worn is not a lost one."""
+    """Names of the stations that are worn; all of them if empty. Vary "worn" to compare sets of stations. The stream
+    has no other stations, so that a station that is not worn is not a lost one."""
     calibration: Literal["exact", "tpose", "poses"] = "exact"
-    """What methods are told of trackers, room and body: the truth; what a T-pose tells of trackers and room (bone
-    lengths are known); or what eight poses tell of all three. Vary it to see what calibrating costs."""
+    """Source of the mounts, room and body that methods get: `exact` is the truth, `tpose` estimates mounts and room
+    from a T-pose (bone lengths are known), `poses` estimates all three from eight poses. Vary it to measure the cost of
+    calibration."""
     calibrating: CalibrationSettings = field(default_factory=CalibrationSettings)
-    """How that is done."""
+    """Errors of the simulated calibration."""
     mount: str = "tibia"
-    """Name of the mounting in tables, such as tibia or foot (where the ankle trackers sit)."""
+    """Name of the mounting in tables, such as tibia or foot: the place of the ankle stations."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     """The device and its line."""
     noise: Literal["clean", "noise", "default"] = "default"
+    """Noise preset."""
     profile: str = ""
-    """What tables call the noise when components are changed; "default*" and so on without a name."""
+    """Name of changed noise in tables; without it the preset's name and an asterisk."""
     components: dict[str, Any] = field(default_factory=dict)
-    """Changes to the noise level (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
+    """Changes to the noise preset (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
     disturbance: Disturbance = field(default_factory=Disturbance)
-    """A fault that ends; vary "disturbance.kind" to see how methods get over it (see `harness.results.recovery`)."""
+    """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.results.recovery`)."""
     vary: dict[str, Any] = field(default_factory=dict)
-    """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]: everything runs with each value,
-    or with each combination of them when there are several keys."""
+    """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]. Everything runs with each value,
+    or with each combination of values when there are several keys."""
     expected_order: tuple[ExpectedOrder, ...] = ()
-    """What a paper expects of the errors (see `harness.results.expected_orders`)."""
+    """Rankings that papers state (see `harness.results.expected_orders`)."""
     left_out: dict[str, str] = field(default_factory=dict)
-    """Clips, behaviours or experiments that are not here though one would expect them, and why: for the record."""
+    """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
-    """What goes wrong where an emulator plays the scenario (see `harness.stream.emulator`); runs know nothing of it."""
+    """Faults of the line when an emulator plays the scenario (see `harness.stream.emulator`); runs ignore them."""
 
     @property
     def worn_stations(self) -> dict[str, Station]:
@@ -138,11 +149,14 @@ class Scenario:
 
 
 def load_scenario(path: Path | str) -> Scenario:
-    """The scenario in a TOML file, or the shipped one of that name. BadFile and UnknownName name the place."""
+    """Load the scenario in a TOML file, or the shipped scenario of that name.
+
+    Raises BadFile, UnknownName and RenamedKey, which name the place. Patterns in clip lists stay (see `expand_clips`).
+    """
     path = find_scenario(path)
     content = read_toml(path, "a scenario", "`harness list` names the shipped ones.")
     if content.get("kind") == "placement":
-        raise BadFile(path, "a placement study", "a scenario", "`harness placement` does it.")
+        raise BadFile(path, "a placement study", "a scenario", "Run it with `harness placement`.")
     content.setdefault("name", path.stem)
     try:
         if "stations" in content:
@@ -225,37 +239,39 @@ def _match_clips(key: str, texts: Sequence[str], names: Collection[str]) -> tupl
 
 
 def variants(scenario: Scenario, chosen: Collection[int] = ()) -> list[tuple[dict[str, Any], Scenario]]:
-    """Every combination of the varied values and the scenario that it makes; one and nothing varied without any.
-    Only those at the places in `chosen`, if any are.
+    """Every combination of varied values with the scenario that it gives; one empty combination if nothing varies.
 
-    UnknownName for a key that does not exist, BadInput for one that cannot be varied or a value that does not fit.
+    `chosen` selects combinations by index. UnknownName for a key that does not exist, BadInput for a key that cannot be
+    varied and for a value that does not fit.
     """
     choices = dict(dotted_keys(scenario.vary))
     for key, values in choices.items():
         if key.split(".")[0] in _NOT_VARIABLE or key in ("motion.test", "motion.behaviours"):
-            raise BadInput(f"vary: {key} cannot be varied.", "Lists of methods, inputs and clips say it themselves.")
+            raise BadInput(
+                f"vary: {key} cannot be varied.", "Name several methods, inputs or clips in their own lists."
+            )
         if not isinstance(values, list) or not values or any(values.count(value) > 1 for value in values):
-            raise BadInput(f"vary: {key} = {values!r} is no list of different values.", "For example: [0.0, 0.05].")
+            raise BadInput(f"vary: {key} = {values!r} is not a list of different values.", "Write it as [0.0, 0.05].")
     found = []
     for place, combination in enumerate(itertools.product(*choices.values())):
         if chosen and place not in chosen:
             continue
         varied = dict(zip(choices, combination, strict=True))
-        made = replace(scenario, vary={})
+        variant = replace(scenario, vary={})
         try:
             for key, value in varied.items():
                 content: Any = value
                 for name in reversed(key.split(".")):
                     content = {name: content}
-                made = replace_fields(made, content, "scenario")
+                variant = replace_fields(variant, content, "scenario")
         except (TypeError, ValueError) as error:
-            raise BadInput(f"vary: {error}.", "Values are those that the scenario's own key may have.") from error
-        found.append((varied, made))
+            raise BadInput(f"vary: {error}.", "A value must be one that the scenario's own key may have.") from error
+        found.append((varied, variant))
     return found
 
 
 def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys, whether TOML read them as one text or as tables inside tables."""
+    """Entries of a table under dotted keys, whether TOML read these as one text or as nested tables."""
     for key, value in table.items():
         if isinstance(value, Mapping):
             yield from dotted_keys(value, f"{before}{key}.")
@@ -264,7 +280,7 @@ def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
 
 
 def find_scenario(path: Path | str) -> Path:
-    """A file as named, or a shipped scenario by its bare name."""
+    """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile."""
     given = Path(path)
     if given.is_file():
         return given
@@ -282,13 +298,13 @@ def shipped_scenarios() -> list[Path]:
 
 
 def check_scenario(path: Path, scenario: Scenario) -> None:
-    """What types cannot say."""
+    """Check the rules that types cannot express; BadFile names `path`."""
 
     def refuse(found: str, expected: str, advice: str) -> None:
         raise BadFile(path, found, expected, advice)
 
     if scenario.schema != SCHEMA:
-        refuse(f"schema {scenario.schema}", f"schema {SCHEMA}", "This version of the harness reads no other.")
+        refuse(f"schema {scenario.schema}", f"schema {SCHEMA}", "This version of the harness reads no other schema.")
     if not scenario.motion.test:
         refuse("no test clips", "names in motion.test", "`harness mocap list` names what a library holds.")
     if not scenario.stations:
@@ -303,12 +319,12 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
     if counted and len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
         refuse(
             f"{len(scenario.motion.behaviours)} behaviours for {len(scenario.motion.test)} test clips",
-            "one for all of them, or one for each",
+            "one word for all, or one for each",
             "Give motion.behaviours one word.",
         )
-    for varied, made in variants(scenario) if scenario.vary else ():
+    for varied, variant in variants(scenario) if scenario.vary else ():
         try:
-            check_scenario(path, made)
+            check_scenario(path, variant)
         except BadFile as error:
             refuse(f"{error.found} with {varied_text(varied)}", error.expected, error.advice)
     for what, repeated in (
@@ -326,16 +342,19 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
     for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):
         if value < 0.0:
-            refuse(f"motion.{key} = {value}", "0 or more", "0 stands for all of it, or for none recorded.")
+            refuse(f"motion.{key} = {value}", "0 or more", "0 uses the whole clip, or the rate in the file.")
     for name, station in scenario.stations.items():
         if not 0.0 <= station.along <= 1.0:
             refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
         if station.stand_off_m < 0.0:
-            refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Trackers sit on the skin.")
+            refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Stations sit on the skin.")
 
 
 def check_expected_orders(path: Path, scenario: Scenario) -> None:
-    """That the orders a file states are of what it runs; BadFile. Whoever replaces its methods need not mind them."""
+    """Check that expected orders name the scenario's methods or inputs; BadFile.
+
+    The command line skips the check where it replaces the methods.
+    """
     for order in scenario.expected_order:
         where, what, known = f"the order of {order.source!r}", "methods", scenario.methods
         if order.inputs:
@@ -350,7 +369,7 @@ def check_expected_orders(path: Path, scenario: Scenario) -> None:
             "names fewer than two": len(order.names) < 2,
             "names something twice": len(set(order.names)) < len(order.names),
             f"names {', '.join(map(repr, strange))}, none of the scenario's {what}": bool(strange),
-            "gives a reason for what is no step of it": not set(order.why_not) <= set(order.steps),
+            "gives a reason for a step that it does not have": not set(order.why_not) <= set(order.steps),
         }
         for fault in (text for text, found in faults.items() if found):
             advice = f"Known {what}: {', '.join(known)}. Reasons belong to {', '.join(map(repr, order.steps))}."

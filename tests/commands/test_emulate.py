@@ -102,7 +102,7 @@ def test_a_place_that_is_taken_or_open_to_all_is_refused(tmp_path: Path, capsys:
 def test_no_rate(rate: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["emulate", "builtin_walking", "--tcp", "127.0.0.1:0", "--rate", rate])
-    assert f"{rate!r} is no positive number" in capsys.readouterr().err
+    assert f"{rate!r} is not a positive number" in capsys.readouterr().err
 
 
 def test_the_shipped_scenario_shows_every_fault() -> None:

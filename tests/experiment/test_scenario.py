@@ -132,7 +132,7 @@ def test_orders_are_of_what_is_run(tmp_path: Path) -> None:
         ('"ik[loss.robust=false]", "ik"]', '"kernel_cca", "ik"]', "'kernel_cca', none of the scenario's methods"),
         ('"ik[loss.robust=false]", "ik"]', '"ik", "mean_pose"]', "twice"),
         ('["pos+ori", "pos"]\n[motion]', '["pos+ori", "mixed"]\n[motion]', "'mixed', none of the scenario's inputs"),
-        ('"mean_pose > ik[', '"ik > ik[', "no step"),
+        ('"mean_pose > ik[', '"ik > ik[', "does not have"),
         ("why_not =", "why =", "Did you mean 'why_not'"),
     ],
 )
@@ -223,9 +223,9 @@ def test_a_component_can_be_varied_away(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("seed = 3", "no list"),
-        ("seed = []", "no list"),
-        ("seed = [1, 1]", "no list"),
+        ("seed = 3", "not a list"),
+        ("seed = []", "not a list"),
+        ("seed = [1, 1]", "not a list"),
         ("seed = [1, 1.5]", "expected int"),
         ("sed = [1, 2]", "Did you mean 'seed'"),
         ("tracker.rate = [1.0, 2.0]", "Did you mean 'rate_hz'"),

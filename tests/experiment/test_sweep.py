@@ -204,7 +204,7 @@ def test_the_first_ctrl_c_lets_cells_finish(
     said = capfd.readouterr()
     assert said.out.splitlines()[-1] == "interrupted"
     assert "again stops it at once" in said.err
-    assert "the same command goes on from there" in said.err
+    assert "the same command resumes" in said.err
     assert read(made_up / "out" / "summary.json")["cells_finished"] == 1
     assert len(untimed(made_up / "out" / "summary.csv")) == 2
     assert not list((made_up / "out").glob(f"{TEMPORARY}*"))
@@ -264,7 +264,7 @@ def read_cells_of(out: Path) -> list[Any]:
         ({"methods": '["ik:previos"]'}, "Did you mean 'ik:previous'"),
         ({"noise": '["cleen"]'}, "Did you mean 'clean'"),
         ({"tracker.rate_hz": '["fast"]'}, "expected float"),
-        ({"tracker.rate_hz": "[20.0, 20.0]"}, "no list of different values"),
+        ({"tracker.rate_hz": "[20.0, 20.0]"}, "not a list of different values"),
         ({"seeds": "[1, 1]"}, "seeds names something twice"),
         ({"metods": '["ik"]'}, "Did you mean 'methods'"),
         ({"inputs": '["position"]'}, "input combination"),

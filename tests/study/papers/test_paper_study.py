@@ -111,7 +111,7 @@ def test_a_killed_study_keeps_its_cells_and_goes_on(tmp_path: Path) -> None:
 def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path) -> None:
     code, said = stopped(tmp_path / "tiny", signal.SIGINT)
     assert code == 130
-    assert "the same command goes on from there" in said
+    assert "the same command resumes" in said
     assert said.splitlines()[-1] == "interrupted"
     assert "Traceback" not in said
 
