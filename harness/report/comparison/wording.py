@@ -110,12 +110,12 @@ def percent_of_a(line: Difference, value: float | None) -> float:
 
 def format_mean(line: Difference, value: float) -> str:
     """A mean with the decimals of the line."""
-    return format_fixed(value, _decimals(line))
+    return format_fixed(value, _decimals(line), grouped=True)
 
 
 def format_signed(line: Difference, value: float | None) -> str:
     """A difference with its sign and the decimals of the line; a dash for None."""
-    return "–" if value is None else format_fixed(value, _decimals(line), signed=True)
+    return "–" if value is None else format_fixed(value, _decimals(line), signed=True, grouped=True)
 
 
 def format_interval(line: Difference) -> str:
