@@ -156,7 +156,7 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, f
     content, said = page.read_text(encoding="utf-8"), text_of(page)
     assert f"<h1>{ANSWER}</h1>" in content
     assert content.index("<h1>") < content.index('aria-label="best sets"') < content.index("<nav")
-    assert f"The body in colours: {NO_PICTURE}" in said
+    assert f"The body map: {NO_PICTURE}" in said
     assert hostile not in content
     assert hostile in said
     for place in PLACES:
