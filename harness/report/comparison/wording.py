@@ -45,7 +45,7 @@ def sentence(comparison: Comparison) -> str:
             ]
             return f"B is worse than A in {counts['worse']} of {lines}: {list_first(worse)}."
         case Outcome.PASS:
-            return f"B is not worse than A: of {lines}, {counts['same']} are the same and {counts['better']} better."
+            return f"B is no worse than A in {lines}: {counts['same']} same, {counts['better']} better."
         case _:
             return f"It cannot be decided whether B is worse than A: {comparison.why.rstrip('.')}."
 

@@ -1,4 +1,4 @@
-"""A comparison shown: every verdict in text and on the page, nothing left out, nothing that a name could break."""
+"""Text and page of a comparison: every verdict is shown, nothing is left out, and hostile names break nothing."""
 
 import re
 from collections.abc import Sequence
@@ -49,7 +49,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where matplotlib is not: for tests that look at no picture."""
+    """Hide matplotlib, for tests that need no charts."""
     monkeypatch.setattr(report, "find_spec", lambda name: None)
 
 
@@ -65,10 +65,13 @@ def test_the_first_line_is_the_verdict() -> None:
 @pytest.mark.parametrize(
     ("shown", "said"),
     [
-        (comparison(methods=("ik", "dynamic_map")), "B is not worse than A: of 4 gated lines on 24 clips"),
+        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A in 4 gated lines on 24 clips"),
         (comparison(3), "It cannot be decided whether B is worse than A: 7 lines were judged."),
         (told([], outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik"), "missing: A: ik."),
-        (told([], why="no cell of A has a partner in B"), "It cannot be decided whether B is worse than A: no cell of A has a partner in B."),
+        (
+            told([], why="no cell of A has a partner in B"),
+            "It cannot be decided whether B is worse than A: no cell of A has a partner in B.",
+        ),
     ],
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
@@ -135,7 +138,7 @@ def test_a_slope_goes_from_a_to_b_beside_the_margin() -> None:
 
 
 def test_a_slope_is_coloured_by_what_it_means() -> None:
-    """All clips rise: errors are worse then, frames per second better."""
+    """If all clips rise, errors are worse and frames per second are better."""
     rising = line("local_pca", "mpjpe_mm", 8, 0.3)
     error, speed = slope_chart(rising, 1).svg, slope_chart(replace(rising, metric="fps", unit="frames/s"), 1).svg
     assert count_directions(rising) == (8, 0, 0)

@@ -1,4 +1,4 @@
-"""The page of a paper: what it opens on, what each claim shows, and what it must never do."""
+"""The page of a paper: its first sentence, the content of each claim, and its safety."""
 
 import json
 import re
@@ -45,7 +45,7 @@ def test_the_page_opens_on_the_verdict(study: Path) -> None:
 
 
 def test_every_claim_stands_in_the_table_with_both_figures_and_its_verdict(study: Path) -> None:
-    """As a word and a mark: never by colour alone."""
+    """A verdict is shown as a word and a mark, not only by colour."""
     rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', (study / "report.html").read_text(encoding="utf-8"))
     claims = [claim for experiment in liu().experiments for claim in experiment.claims]
     assert len(rows) == len(claims)
@@ -182,7 +182,7 @@ def test_what_has_nothing_to_draw_is_said_and_not_drawn(tmp_path: Path) -> None:
 
 
 def test_words_stand_on_the_left_of_their_column_and_numbers_on_the_right(tmp_path: Path) -> None:
-    """Whatever begins with a number and goes on is words."""
+    """A cell that begins with a number and continues with words is text."""
     rows = (("a", "1.2 ± 0.4 (8)", "8: one, two, three, four, five, six, seven"), ("b", "not measured", "none"))
     page = alone(tmp_path, replace(EMPTY, tables=(FindingsTable("Errors", ("a", "b", "c"), rows),)))
     words = re.findall(r'<span class="words"[^>]*>([^<]*)<', page.read_text(encoding="utf-8"))

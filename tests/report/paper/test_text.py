@@ -1,4 +1,4 @@
-"""A paper's claims as text: whole, aligned, narrow enough; and the page that keeps the last of them."""
+"""The claims of a paper as text: complete, aligned and narrow enough; and their update in a README."""
 
 import re
 from dataclasses import replace
@@ -165,7 +165,7 @@ def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_the_results_page_has_its_markers() -> None:
-    """What `harness report --readme results/README.md` would replace is whole."""
+    """The markers in results/README.md come in pairs, so that `harness report --readme` can replace the tables."""
     begun = re.findall(r"^<!-- paper (.*) -->$", RESULTS, re.MULTILINE)
     ended = re.findall(r"^<!-- end of paper (.*) -->$", RESULTS, re.MULTILINE)
     assert begun == ended

@@ -1,4 +1,4 @@
-"""A placement study shown: the answer first, every figure beside its interval, and nothing told apart that is a tie."""
+"""Text and page of a placement study: the answer comes first, numbers have intervals, and ties are called ties."""
 
 import json
 import re
@@ -41,12 +41,12 @@ def findings() -> PlacementFindings:
 
 @pytest.fixture
 def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As on a machine that cannot render: quick, and the page has to say so."""
+    """Simulate a machine that cannot render; the page must say so."""
     monkeypatch.setattr(writer, "draw_body_map", lambda *args, **options: (None, NO_PICTURE))
 
 
 def study_of(errors: dict[StationNames, list[float | None]], better: str = "lower") -> PlacementFindings:
-    """Of these sets, in the order of their size, each the best of its own."""
+    """Findings with these sets in order of size, each the best of its size."""
     tried = [
         StationSetResult(stations, 40.0, dict(zip(CLIPS, values, strict=False)), _mean(values))
         for stations, values in errors.items()
@@ -220,7 +220,7 @@ def test_skin_has_the_colours_of_its_places_nearer_ones_more(rng: np.random.Gene
 
 
 def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator) -> None:
-    """Drawn around a picture that nobody rendered: every place has its name and value, none upon another."""
+    """Every place has its name and value, and no label overlaps another; the picture itself is a stand-in."""
     height, width = 74, 76
     at = np.stack([rng.uniform(0.05, 0.95, len(PLACES)) * width, rng.uniform(0.1, 0.95, len(PLACES)) * height], axis=1)
     facing = rng.choice([-1.0, 1.0], len(PLACES))
@@ -265,7 +265,7 @@ def test_without_pyvista_or_values_the_reason_is_said(monkeypatch: pytest.Monkey
 @pytest.mark.slow
 @pytest.mark.usefixtures("renders")
 def test_the_rendered_body_has_the_colours_of_the_scale(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Yellow where worth is largest, purple where none is, grey where nothing was tried; places where they are."""
+    """Skin is yellow at the largest contribution, purple at zero and grey where nothing was tried."""
     kept: dict[str, np.ndarray] = {}
 
     def keep(places: object, shown: BodyMapValues, views: dict[str, np.ndarray], *rest: object) -> None:

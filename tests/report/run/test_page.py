@@ -1,4 +1,4 @@
-"""The page of a run: what it says, what it must never do, and what is left when pictures cannot be made."""
+"""The page of a run: its content, its safety, and what remains when pictures cannot be rendered."""
 
 import json
 import re
@@ -23,14 +23,14 @@ HOSTILE = "<script>alert(1)</script>&\"'$x^2$"
 
 @pytest.fixture(scope="module")
 def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two behaviours and four methods, reported on without rendering."""
+    """A run of two behaviours and four methods with its page, without rendering."""
     out = fabricate(tmp_path_factory.mktemp("report") / "run")
     write_run_page(out, rendered=False)
     return out
 
 
 def text_of(page: Path) -> str:
-    """What a reader reads: no scripts, no tags, blanks folded."""
+    """The text of the page without scripts and tags, with single blanks."""
     content = re.sub(r"<(script|style)\b.*?</\1>", " ", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     return re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", content))
 
@@ -154,7 +154,7 @@ def test_inputs_and_several_takes_are_told_apart(tmp_path: Path) -> None:
 
 
 def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
-    """All values are in the table; everything else is about the last one."""
+    """The table has all values; all other sections show the last one."""
     varied = tuple({"components.echo.share": share} for share in (0.0, 0.02, 0.1))
     plan = Plan(behaviours=("boxing",), methods={"ik": 1.0, "mean_pose": 9.0}, duration_s=3.0, varied=varied)
     out = fabricate(tmp_path / "run", plan)

@@ -1,4 +1,4 @@
-"""The page and the text of a sweep: what they open on, that they add up, and that they stay small."""
+"""Page and text of a sweep: their first sentence, their numbers and their size."""
 
 import json
 import re
@@ -42,7 +42,7 @@ VARIED = Plan(vary={RATE: (120, 20, 60), NOISE: ("clean", "default")}, failing=(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """With its page."""
+    """A sweep folder with its page."""
     out = fabricate_sweep(tmp_path_factory.mktemp("sweep") / "out", VARIED)
     write_sweep_page(out)
     return out
@@ -50,7 +50,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where matplotlib is not: for tests that look at no picture."""
+    """Hide matplotlib, for tests that need no charts."""
     monkeypatch.setattr(sweep_page, "find_spec", lambda name: None)
 
 
@@ -58,7 +58,10 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map has the lowest error: ")
-    assert re.search(r"error over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$", said)
+    assert re.search(
+        r"error over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$",
+        said,
+    )
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -67,7 +70,7 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
 
 
 def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
-    """Whatever is averaged, by hand."""
+    """The statistic equals means that are computed by hand."""
     sweep = read_sweep(folder)
     with CellIndex(folder, read_only=True) as index:
         cells = list(index.columns("scenario", "method", "varied", "clip", PRIMARY_METRIC))
@@ -88,7 +91,7 @@ def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> N
 
 
 def test_what_a_key_does_is_told(folder: Path) -> None:
-    """Errors rise by tenths in the order 120, 20, 60 of the plan."""
+    """Errors rise by tenths in the plan's order 120, 20, 60."""
     sweep = read_sweep(folder)
     assert re.fullmatch(r"[\d.]+ deg at 120, [\d.]+ deg at 60 \(\+\d+ %\)", describe_effect(sweep, sweep.keys[0]))
     for shown in (text_of(folder / "report.html"), text(sweep)):
