@@ -8,25 +8,28 @@ _DECIMALS = {"deg": 2, "mm": 1, "mm/s": 1, "m/s³": 1, "ms": 2, "frames/s": 0, "
 """Decimals that suit a unit; 2 for others."""
 
 
-def format_fixed(value: float | None, decimals: int, *, signed: bool = False) -> str:
-    """A number with fixed decimals and thousands separators; `NOT_MEASURED` for None. `signed` writes "+" too."""
+def format_fixed(value: float | None, decimals: int, *, signed: bool = False, grouped: bool = False) -> str:
+    """A number with fixed decimals; `NOT_MEASURED` for None.
+
+    `signed` also writes "+"; `grouped` separates thousands by commas.
+    """
     if value is None:
         return NOT_MEASURED
-    text = f"{value:{'+' if signed else ''},.{decimals}f}"
+    text = f"{value:{'+' if signed else ''}{',' if grouped else ''}.{decimals}f}"
     is_zero = not text.strip("+-0.,")
     return (text.lstrip("+-") if is_zero else text).replace("-", MINUS)
 
 
 def format_number(value: float | None, unit: str, *, decimals: int = 0, signed: bool = False) -> str:
-    """A number with the decimals that suit its unit, and at least `decimals` of them; `NOT_MEASURED` for None."""
-    return format_fixed(value, max(decimals, _DECIMALS.get(unit, 2)), signed=signed)
+    """A number with the decimals of its unit, or `decimals` if that is more; thousands are separated by commas."""
+    return format_fixed(value, max(decimals, _DECIMALS.get(unit, 2)), signed=signed, grouped=True)
 
 
 def format_interval(low: float | None, high: float | None, decimals: int, *, signed: bool = False) -> str:
-    """ "1.78 to 2.02"; empty where the interval was not computed."""
+    """ "1.78 to 2.02", with separated thousands; empty where the interval was not computed."""
     if low is None or high is None:
         return ""
-    return f"{format_fixed(low, decimals, signed=signed)} to {format_fixed(high, decimals, signed=signed)}"
+    return " to ".join(format_fixed(end, decimals, signed=signed, grouped=True) for end in (low, high))
 
 
 def format_mean_sd(mean: float | None, sd: float | None, decimals: int) -> str:
@@ -45,7 +48,8 @@ def format_change_percent(percent: float) -> str:
     if math.isnan(percent):
         return "–"
     size = abs(percent)
-    text = format_fixed(percent, 0 if size >= 9.95 else 1 if size >= 0.0995 else 2, signed=True)
+    decimals = 0 if size >= 9.95 else 1 if size >= 0.0995 else 2
+    text = format_fixed(percent, decimals, signed=True, grouped=True)
     return f"{text if text.strip('0.') else '0'} %"
 
 

@@ -1,4 +1,4 @@
-"""What tests of pages share: a browser, and whether this machine can render, found out in a process that may crash."""
+"""Fixtures for tests of pages: a browser, and a check in a separate process whether this machine can render."""
 
 import os
 import shutil
@@ -22,7 +22,7 @@ FLAGS = [
 
 @pytest.fixture(scope="session")
 def renders() -> None:
-    """Skips where nothing can be rendered off-screen."""
+    """Skip the test if off-screen rendering does not work."""
     environment = dict(os.environ)
     if not environment.get("DISPLAY"):
         environment["VTK_DEFAULT_OPENGL_WINDOW"] = "vtkEGLRenderWindow"

@@ -1,4 +1,4 @@
-"""What every small chart is held to."""
+"""Checks that every small chart must pass."""
 
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
@@ -6,7 +6,7 @@ from matplotlib.text import Text
 
 
 def texts_apart(figure: Figure) -> None:
-    """No tick, note or legend entry meets another, and all are on the picture."""
+    """Assert that no tick label, note or legend entry overlaps another, and that all lie inside the figure."""
     figure.draw_without_rendering()  # sizes were those of the file that it was written to
     texts = [text for axes in figure.axes for text in (*_ticks(axes.xaxis), *_ticks(axes.yaxis), *axes.texts)]
     texts += [text for legend in figure.legends for text in legend.get_texts()]
@@ -19,6 +19,6 @@ def texts_apart(figure: Figure) -> None:
 
 
 def _ticks(axis: Axis) -> list[Text]:
-    """Labels that are drawn: those within the limits."""
+    """The tick labels that are drawn, which are those within the limits."""
     low, high = sorted(axis.get_view_interval())
     return [tick.label1 for tick in axis.get_major_ticks() if low <= float(tick.get_loc()) <= high]

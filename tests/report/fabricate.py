@@ -1,4 +1,4 @@
-"""A run folder made up from the built-in performer and from errors of known kind, through the real results API."""
+"""Fabricates a run folder from built-in motion and errors of known size, through the real results API."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -25,7 +25,7 @@ METHODS = {"ik": 1.5, "best_match": 3.0, "best_match+ik": 1.0, "mean_pose": 14.0
 
 @dataclass(frozen=True)
 class Plan:
-    """What to make up."""
+    """What the fabricated run contains."""
 
     behaviours: tuple[str, ...] = ("walking", "boxing")
     methods: Mapping[str, float] | None = None
@@ -33,17 +33,17 @@ class Plan:
     duration_s: float = 5.0
     inputs: Sequence[str] = ("pos+ori",)
     clip_name: str = ""
-    """Replaces the name of every clip."""
+    """Name given to every clip instead of its own."""
     failing: tuple[str, ...] = ()
     """Methods whose cells are planned and fail."""
     covered: float = 1.0
-    """Share of the frames that find an estimate."""
+    """Share of the frames that have an estimate."""
     silent: tuple[str, ...] = ()
     """Methods that never answer."""
     performers: tuple[str, ...] = ("known",)
-    """Of the takes, in turn."""
+    """Behaviours of the takes, in turn."""
     varied: tuple[Mapping[str, Any], ...] = ({},)
-    """The n-th has errors n times as large."""
+    """The n-th entry has errors n times as large."""
 
 
 def fabricate(out: Path, plan: Plan | None = None) -> Path:
@@ -74,7 +74,7 @@ def fabricate(out: Path, plan: Plan | None = None) -> Path:
 def make_cell(
     behaviour: str, take: int, method: str, error_deg: float, inputs: str, plan: Plan, varied: Mapping[str, Any]
 ) -> storage.Cell:
-    """One method on one take of the performer."""
+    """The cell of one method on one take."""
     made = generate(behaviour, "p1", take, seed=1, duration_s=plan.duration_s, rate_hz=RATE_HZ)
     skeleton, dofs = made.skeleton.subset(BONES)
     truth = pack(made.root_m, made.world_from_root, made.angles_rad[:, dofs])
@@ -123,7 +123,7 @@ def make_cell(
 
 
 def _readings(clip: str, frames: int) -> tuple[Bools, Floats]:
-    """Validity and quality (F, S): each station is lost once for up to a second."""
+    """(F, S) validity and quality; each station is lost once for up to a second."""
     valid, quality = np.ones((frames, 6), dtype=bool), np.ones((frames, 6))
     for s, station in enumerate(STATIONS):
         rng = generator(1, clip, station)

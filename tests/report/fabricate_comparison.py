@@ -1,4 +1,4 @@
-"""Comparisons made up as the gate writes them; no figure in here was ever measured."""
+"""Fabricated comparisons in the form that the regression gate writes; none of their numbers was measured."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ from harness.errors import Outcome
 METRICS = {"joint_angle_mean_deg": ("deg", 2.0, 0.03), "mpjpe_mm": ("mm", 12.0, 0.03), "step_relative": ("x", 6.0, 0.1)}
 """Metric -> unit, size, margin as a share of A's mean."""
 METHODS = {"ik": 0.0, "local_pca": 0.05, "dynamic_map": -0.06}
-"""Method -> how much worse B is, as a share."""
+"""Method -> relative increase of the error in B."""
 GROUP = "pos+ori, sequence, known"
 CIRCUMSTANCES = (
     ("commit", "0123456789abcdef0123456789abcdef01234567", "89abcdef0123456789abcdef0123456789abcdef"),
@@ -25,7 +25,7 @@ CIRCUMSTANCES = (
 
 
 def line(method: str, metric: str, clips: int, change: float, group: str = GROUP, scatter: float = 0.02) -> Difference:
-    """Errors of so many clips that differ much among themselves, B's being worse by a share `change`, about."""
+    """A line of `clips` clips whose errors vary much, with errors in B larger by about the share `change`."""
     unit, size, share = METRICS[metric]
     rng = generator(1, "made-up comparison", method, metric, group)
     a = size * np.exp(rng.normal(0.0, 0.35, clips))
@@ -34,7 +34,7 @@ def line(method: str, metric: str, clips: int, change: float, group: str = GROUP
 
 
 def judged(method: str, group: str, metric: str, unit: str, a: Floats, b: Floats, margin: float) -> Difference:
-    """With an interval of the normal kind and the verdict that follows."""
+    """A line with a normal-theory interval and the verdict that follows from it."""
     step, clips = b - a, len(a)
     mean = float(step.mean()) if clips else 0.0
     half = 2.1 * float(step.std(ddof=1)) / clips**0.5 if clips >= 6 else 0.0
@@ -66,7 +66,7 @@ def judged(method: str, group: str, metric: str, unit: str, a: Floats, b: Floats
 def comparison(
     clips: int = 24, methods: Sequence[str] = tuple(METHODS), metrics: Sequence[str] = ("mpjpe_mm", "step_relative")
 ) -> Comparison:
-    """Every verdict: one method is the same, one worse, one better; the last metric of the last cannot tell."""
+    """A comparison with every verdict: same, worse and better, and cannot tell for the last metric."""
     lines = [line(method, metric, clips, METHODS[method]) for method in methods for metric in metrics]
     if len(methods) == len(METHODS):
         lines[-1] = line(methods[-1], metrics[-1], clips, 0.1, scatter=0.5)
@@ -75,7 +75,7 @@ def comparison(
 
 
 def whole(lines: Sequence[Difference], why: str = "") -> Comparison:
-    """With the outcome that follows from the lines."""
+    """A comparison of these lines, with the outcome that follows from them."""
     verdicts = {line.verdict for line in lines if line.gated}
     outcome = Outcome.NOT_COMPARABLE if "cannot tell" in verdicts or not verdicts else Outcome.PASS
     if "worse" in verdicts:

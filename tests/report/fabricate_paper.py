@@ -1,4 +1,4 @@
-"""Findings made up as studies of both papers write them; no figure in here was ever measured."""
+"""Fabricated findings in the form that the paper studies write; none of their numbers was measured."""
 
 import math
 from collections.abc import Mapping
@@ -33,14 +33,14 @@ CIRCUMSTANCES = {
 
 
 def write_study(folder: Path, findings: PaperFindings) -> Path:
-    """The folder of a study that has no runs."""
+    """Write the folder of a study without runs."""
     folder.mkdir(parents=True, exist_ok=True)
     write_findings(folder / "findings.json", findings)
     return folder
 
 
 def liu() -> PaperFindings:
-    """Every kind of figure and every verdict."""
+    """Findings with every kind of figure and every verdict."""
     errors = {name: _errors(name, size) for name, size in METHODS.items()}
     orders = [_order(n, *pair, errors) for n in range(len(BEHAVIOURS)) for pair in pairwise(METHODS)]
     figures = [
@@ -79,7 +79,7 @@ def liu() -> PaperFindings:
 
 
 def kim() -> PaperFindings:
-    """31 lying bars and a sparse database."""
+    """Findings with 31 horizontal bars and a sparse database."""
     differences = ("All 31 sets of the five trackers were run.",)
     best = Claim("boxing: RH+LH+PEL errs least", "called suitable", "1st of 10", "cannot tell", "5 clips, of 6", 5)
     figures = tuple(sets(behaviour) for behaviour in ("walking", "boxing"))
@@ -98,7 +98,7 @@ def kim() -> PaperFindings:
 
 
 def sets(behaviour: str) -> BarChart:
-    """All 31 sets of five trackers."""
+    """Errors of all 31 sets of five stations."""
     rng = generator(1, "made-up findings", behaviour)
     masks = sorted(range(1, 2 ** len(STATIONS)), key=lambda mask: mask.bit_count())
     names = tuple("+".join(name for bit, name in enumerate(STATIONS) if mask >> bit & 1) for mask in masks)
@@ -134,7 +134,7 @@ def _errors(name: str, size: float) -> tuple[float, ...]:
 
 
 def _order(n: int, less: str, more: str, errors: Mapping[str, tuple[float, ...]]) -> Claim:
-    """Golf has too few clips."""
+    """A claim about an order; golf has too few clips."""
     ours, theirs = errors[less][n], errors[more][n]
     few = BEHAVIOURS[n] == "golf"
     return Claim(
@@ -165,7 +165,7 @@ def _grouped(errors: Mapping[str, tuple[float, ...]]) -> BarChart:
 
 
 def _inputs() -> BarChart:
-    """One bar is missing, one interval too."""
+    """A bar chart in which one bar and one interval are missing."""
     return BarChart(
         "Four combinations of inputs, boxing",
         "deg",

@@ -53,7 +53,7 @@ Errors = Mapping[StationNames, Mapping[str, float]]
 
 
 def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementFindings:
-    """Every kind of figure, claim and failure."""
+    """Findings with every kind of figure, claim and failure."""
     names = tuple(place.name for place in PLACES)
     sets = [stations for size in range(1, at_most + 1) for stations in itertools.combinations(names, size)]
     errors, elsewhere = _errors(sets, "walking", clips), _errors(sets, "boxing", clips)
@@ -120,14 +120,14 @@ def made_up(clips: Sequence[str] = CLIPS, at_most: int = _AT_MOST) -> PlacementF
 
 
 def write_made_up(folder: Path, findings: PlacementFindings | None = None) -> Path:
-    """The folder of a study that has findings alone."""
+    """Write the folder of a study that has only findings."""
     folder.mkdir(parents=True, exist_ok=True)
     write_placement(folder / "findings.json", findings or made_up())
     return folder
 
 
 def _errors(sets: Sequence[StationNames], behaviour: str, clips: Sequence[str]) -> dict[StationNames, dict[str, float]]:
-    """Set -> clip -> error [deg]; what is worn beside much else is worth less."""
+    """Set -> clip -> error [deg]; the contribution of a station shrinks with the number of others."""
     worth = dict(zip((place.name for place in PLACES), WORTH[behaviour], strict=True))
     found = {}
     for stations in sets:
@@ -161,7 +161,7 @@ def _ties(best: StationNames, sets: Sequence[StationNames], errors: Errors) -> t
 
 
 def _best(stations: StationNames, ties: tuple[StationNames, ...], errors: Errors) -> BestSet:
-    """Judged on clips that were held out, a little worse there."""
+    """The best set of a size, with a slightly larger error on held-out clips."""
     of, there = sum(len(other) == len(stations) for other in errors), 1.05 * _mean(errors[stations])
     return BestSet(
         stations, ties, True, of, 0.83, there, held_out=there, held_out_low=there - 0.4, held_out_high=there + 0.4,
@@ -202,7 +202,7 @@ def _without(names: StationNames, name: str) -> StationNames:
 
 
 def _paired(a: Mapping[str, float], b: Mapping[str, float] | None = None) -> PairedDifference:
-    """Quicker than the bootstrap: these intervals need to look right only."""
+    """A paired difference with a normal-theory interval, which is faster than the bootstrap."""
     values = np.array([a[clip] - (b[clip] if b else 0.0) for clip in a])
     mean, half = float(values.mean()), 2.3 * float(values.std(ddof=1)) / len(values) ** 0.5
     enough = len(values) >= MIN_CLIPS

@@ -1,4 +1,4 @@
-"""Folders of sweeps made up through the real index; no figure in here was ever measured."""
+"""Fabricated folders of sweeps, written through the real index; none of their numbers was measured."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,7 @@ FAILURE = "Traceback (most recent call last):\n  somewhere\nValueError: <b>no</b
 
 @dataclass(frozen=True)
 class Plan:
-    """What to make up."""
+    """What the fabricated sweep contains."""
 
     scenarios: Sequence[str] = ("walking", "boxing")
     clips: int = 7
@@ -36,7 +36,7 @@ class Plan:
 
 
 def fabricate_sweep(out: Path, plan: Plan | None = None) -> Path:
-    """The folder with its index; the same plan gives the same rows."""
+    """Write the folder with its index; the same plan gives the same rows."""
     plan = plan or Plan()
     out.mkdir(parents=True, exist_ok=True)
     named, rows, failed = [], [], []
@@ -90,5 +90,5 @@ def _row(
 
 
 def hash_free(varied: Mapping[str, Any]) -> str:
-    """A name that is the same in every process."""
+    """A cell key that is the same in every process."""
     return "".join(character for character in str(varied) if character.isalnum())

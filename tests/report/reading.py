@@ -1,4 +1,4 @@
-"""A page read as a reader does: its text, its elements, and whether each is closed."""
+"""Parses a page: its text, its elements, and whether each element is closed."""
 
 import re
 from html.parser import HTMLParser
@@ -6,7 +6,7 @@ from pathlib import Path
 
 
 class Reader(HTMLParser):
-    """Complains of elements that are not closed in order; gathers text and attributes."""
+    """Collects text and attributes; fails if elements are not closed in order."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -35,5 +35,5 @@ def read(page: Path) -> Reader:
 
 
 def text_of(page: Path) -> str:
-    """With one blank wherever there is any."""
+    """The text of a page with every run of white space replaced by one blank."""
     return re.sub(r"\s+", " ", " ".join(read(page).text))

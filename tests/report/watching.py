@@ -1,4 +1,4 @@
-"""A page opened in a browser and watched."""
+"""Opens a page in a browser and records what it does."""
 
 from pathlib import Path
 from typing import Any

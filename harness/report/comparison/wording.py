@@ -45,7 +45,7 @@ def sentence(comparison: Comparison) -> str:
             ]
             return f"B is worse than A in {counts['worse']} of {lines}: {list_first(worse)}."
         case Outcome.PASS:
-            return f"B is not worse than A: of {lines}, {counts['same']} are the same and {counts['better']} better."
+            return f"B is no worse than A in {lines}: {counts['same']} same, {counts['better']} better."
         case _:
             return f"It cannot be decided whether B is worse than A: {comparison.why.rstrip('.')}."
 
@@ -110,12 +110,12 @@ def percent_of_a(line: Difference, value: float | None) -> float:
 
 def format_mean(line: Difference, value: float) -> str:
     """A mean with the decimals of the line."""
-    return format_fixed(value, _decimals(line))
+    return format_fixed(value, _decimals(line), grouped=True)
 
 
 def format_signed(line: Difference, value: float | None) -> str:
     """A difference with its sign and the decimals of the line; a dash for None."""
-    return "–" if value is None else format_fixed(value, _decimals(line), signed=True)
+    return "–" if value is None else format_fixed(value, _decimals(line), signed=True, grouped=True)
 
 
 def format_interval(line: Difference) -> str:

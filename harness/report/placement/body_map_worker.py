@@ -124,12 +124,12 @@ def _views(
 ) -> list[tuple[np.ndarray, Floats]]:
     """The views from the front and from behind, each as a picture and the places on it (see `main`)."""
     plotter: Any = pv.Plotter(off_screen=True, window_size=[_SUPERSAMPLING * side for side in SIZE], lighting="none")
-    whole = body[0].append_polydata(*body[1:])
-    low, high = whole.bounds[4:6]
+    merged = body[0].append_polydata(*body[1:])
+    low, high = merged.bounds[4:6]
     middle = np.array([0.0, 0.0, 0.5 * (low + high)])
     try:
         shading = {"ambient": 0.62, "diffuse": 0.45, "specular": 0.0, "smooth_shading": True}
-        plotter.add_mesh(whole, scalars="colour", rgb=True, **shading)
+        plotter.add_mesh(merged, scalars="colour", rgb=True, **shading)
         for at, normal, shade, has_value in zip(at_m, outward, colour, known, strict=True):
             centre = at + 0.5 * _BALL_M * normal
             for radius, rim in _RIMS:

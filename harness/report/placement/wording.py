@@ -91,7 +91,7 @@ def _recommendation(findings: PlacementFindings, best: BestSet) -> str:
     if clips < MIN_CLIPS:
         return f"The lowest error was measured with {noun}, but {count_noun(clips, 'clip')} are too few to compare sets"
     if count == most:
-        return f"Of 1 to {most} stations, {count} are best" if count > 1 else "One station"
+        return f"Of 1 to {most} stations, {count} have the lowest error" if count > 1 else "One station"
     return f"{noun} {'is' if count == 1 else 'are'} as good as up to {most}"
 
 
@@ -169,7 +169,7 @@ def format_value(value: float | None) -> str:
     if value is None:
         return NOT_MEASURED
     decimals = 0 if abs(value) >= 1000.0 else 1 if abs(value) >= 100.0 else max(2, decimals_for(value))
-    return format_fixed(value, decimals)
+    return format_fixed(value, decimals, grouped=True)
 
 
 def format_value_interval(low: float | None, high: float | None) -> str:

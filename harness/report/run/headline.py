@@ -22,7 +22,7 @@ _MOST_UNMEASURED = 8
 
 @dataclass(frozen=True)
 class Headline:
-    """What a run found, as plain text; whoever prints it escapes it."""
+    """What a run found, as plain text; the page escapes it."""
 
     sentence: str
     best: str | None

@@ -59,7 +59,7 @@ def _best_of(by_clip: Mapping[str, Floats]) -> str:
         return f"{list_first(list(by_clip))} share no measured clip, so they are not ranked."
     errors = {name: float(means[shared].mean()) for name, means in by_clip.items()}
     best, *others = sorted(errors, key=lambda name: errors[name])
-    start = f"{best}{' is best' if others else ''}: {_format_error(errors[best])} mean joint-angle error"
+    start = f"{best}{' has the lowest error' if others else ''}: {_format_error(errors[best])} mean joint-angle error"
     start += f" over {count_noun(clips, 'clip')}"
     if not others:
         return f"{start}."

@@ -1,4 +1,4 @@
-"""A comparison's page in a browser: whole at the width of a desktop and of a phone, and quiet."""
+"""The page of a comparison in a browser, at the widths of a desktop and of a phone: it fits, and it loads nothing."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""A comparison shown: every verdict in text and on the page, nothing left out, nothing that a name could break."""
+"""Text and page of a comparison: every verdict is shown, nothing is left out, and hostile names break nothing."""
 
 import re
 from collections.abc import Sequence
@@ -49,7 +49,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where matplotlib is not: for tests that look at no picture."""
+    """Hide matplotlib, for tests that need no charts."""
     monkeypatch.setattr(report, "find_spec", lambda name: None)
 
 
@@ -65,10 +65,13 @@ def test_the_first_line_is_the_verdict() -> None:
 @pytest.mark.parametrize(
     ("shown", "said"),
     [
-        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A: of 4 gated lines on 24 clips"),
-        (comparison(3), "Whether B is worse than A cannot be told: 7 lines were judged."),
+        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A in 4 gated lines on 24 clips"),
+        (comparison(3), "It cannot be decided whether B is worse than A: 7 lines were judged."),
         (told([], outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik"), "missing: A: ik."),
-        (told([], why="no cell of A has a partner in B"), "cannot be told: no cell of A has a partner in B."),
+        (
+            told([], why="no cell of A has a partner in B"),
+            "It cannot be decided whether B is worse than A: no cell of A has a partner in B.",
+        ),
     ],
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
@@ -135,7 +138,7 @@ def test_a_slope_goes_from_a_to_b_beside_the_margin() -> None:
 
 
 def test_a_slope_is_coloured_by_what_it_means() -> None:
-    """All clips rise: errors are worse then, frames per second better."""
+    """If all clips rise, errors are worse and frames per second are better."""
     rising = line("local_pca", "mpjpe_mm", 8, 0.3)
     error, speed = slope_chart(rising, 1).svg, slope_chart(replace(rising, metric="fps", unit="frames/s"), 1).svg
     assert count_directions(rising) == (8, 0, 0)
@@ -194,7 +197,7 @@ def test_what_differs_is_named_and_long_lists_are_counted(tmp_path: Path) -> Non
         assert "tracker.rate_hz: 40 against 60" in found
         assert "ik on walking_0, ik on walking_1" in found
         assert all(name in found for name, _, _ in CIRCUMSTANCES)
-    assert "cells in a alone: 500 (ik on walking_0, ik on walking_1, ik on walking_2 and 497 more)" in printed
+    assert "cells only in a: 500 (ik on walking_0, ik on walking_1, ik on walking_2 and 497 more)" in printed
     assert "and 300 more" in said
     assert max(map(len, printed.splitlines())) < 200
 
@@ -232,7 +235,7 @@ def test_equal_sides_are_the_same_and_nothing_differs(tmp_path: Path) -> None:
     assert shown.outcome is Outcome.PASS
     assert "6 clips: 6 unchanged." in slope_chart(shown.differences[0], 1).alt
     said = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-    assert "Nothing: same inputs, same circumstances, the same cells." in said
+    assert "Nothing: inputs, circumstances and cells are the same." in said
 
 
 @pytest.mark.usefixtures("undrawn")

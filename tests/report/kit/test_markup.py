@@ -1,4 +1,4 @@
-"""Text stays text."""
+"""Text in HTML is escaped."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A paper's page in a browser: whole at the width of a desktop and of a phone, and quiet."""
+"""The page of a paper in a browser, at the widths of a desktop and of a phone: it fits, and it loads nothing."""
 
 from collections.abc import Iterator
 from pathlib import Path

@@ -26,7 +26,7 @@ PLACES = {name: n for n, name in enumerate(("kernel_cca", "dynamic_map", "local_
 
 
 def figure_of(shown: BarChart | LineChart, places: Mapping[str, int] = PLACES) -> Figure:
-    """As it is drawn, laid out."""
+    """The figure after layout."""
     made: list[Figure] = []
 
     def draw(canvas: Figure) -> None:

@@ -1,4 +1,4 @@
-"""The page of a paper: what it opens on, what each claim shows, and what it must never do."""
+"""The page of a paper: its first sentence, the content of each claim, and its safety."""
 
 import json
 import re
@@ -45,7 +45,7 @@ def test_the_page_opens_on_the_verdict(study: Path) -> None:
 
 
 def test_every_claim_stands_in_the_table_with_both_figures_and_its_verdict(study: Path) -> None:
-    """As a word and a mark: never by colour alone."""
+    """A verdict is shown as a word and a mark, not only by colour."""
     rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', (study / "report.html").read_text(encoding="utf-8"))
     claims = [claim for experiment in liu().experiments for claim in experiment.claims]
     assert len(rows) == len(claims)
@@ -72,7 +72,7 @@ def test_what_several_experiments_differ_in_is_told_once(study: Path) -> None:
     said = text_of(study / "report.html")
     assert said.count("The motion comes from a generator") == 1
     assert said.count("Golf has 2 clips only.") == 1
-    assert said.count("what several experiments differ in") == 2
+    assert said.count("differences of several experiments") == 2
 
 
 def test_figures_are_told_in_words_and_kept_as_files(study: Path) -> None:
@@ -154,7 +154,7 @@ def test_an_experiment_may_be_empty(tmp_path: Path) -> None:
         tmp_path / "one", EMPTY, replace(EMPTY, name="table", tables=(FindingsTable("Errors", ("a", "b"), ()),))
     )
     said = text_of(page)
-    assert "No published statement was held against a figure of ours." in said
+    assert "No published statement was compared with a measured result." in said
     assert "Errors : nothing was measured." in said
     assert "Circumstances" in text_of(alone(tmp_path / "none"))
 
@@ -182,7 +182,7 @@ def test_what_has_nothing_to_draw_is_said_and_not_drawn(tmp_path: Path) -> None:
 
 
 def test_words_stand_on_the_left_of_their_column_and_numbers_on_the_right(tmp_path: Path) -> None:
-    """Whatever begins with a number and goes on is words."""
+    """A cell that begins with a number and continues with words is text."""
     rows = (("a", "1.2 ± 0.4 (8)", "8: one, two, three, four, five, six, seven"), ("b", "not measured", "none"))
     page = alone(tmp_path, replace(EMPTY, tables=(FindingsTable("Errors", ("a", "b", "c"), rows),)))
     words = re.findall(r'<span class="words"[^>]*>([^<]*)<', page.read_text(encoding="utf-8"))
@@ -206,7 +206,7 @@ def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
 def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writer, "find_spec", lambda name: None)
     said = text_of(write_paper_page(write_study(tmp_path, kim())))
-    assert "Missing here Figures: matplotlib is not installed; their numbers are tables" in said
+    assert "Missing Figures: matplotlib is not installed; tables show their numbers" in said
     assert "RH+LH+RA+LA+PEL" in said
     assert "walking_p1_01: mean joint-angle error [deg]" in said
     assert not list((tmp_path / "plots").iterdir())

@@ -1,4 +1,4 @@
-"""A paper's claims as text: whole, aligned, narrow enough; and the page that keeps the last of them."""
+"""The claims of a paper as text: complete, aligned and narrow enough; and their update in a README."""
 
 import re
 from dataclasses import replace
@@ -75,7 +75,7 @@ def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
         ((0.004, -0.001, 0.01), "deg", ("0.004 deg", "−0.001 to 0.010")),
         ((0.5, None, None), "deg", ("0.50 deg", "")),
         ((0.0, 0.0, 0.0), "mm", ("0.0 mm", "0.0 to 0.0")),
-        ((1e-12, -1e-12, 1.0), "", ("0.0000", "−0.0000 to 1.0000")),
+        ((1e-12, -1e-12, 1.0), "", ("0.0000", "0.0000 to 1.0000")),
         ((None, None, None), "deg", ("", "")),
         ((12.0, None, None), "frames/s", ("12 frames/s", "")),
     ],
@@ -165,7 +165,7 @@ def test_the_verb_puts_the_tables_into_a_page(tmp_path: Path, capsys: pytest.Cap
 
 
 def test_the_results_page_has_its_markers() -> None:
-    """What `harness report --readme results/README.md` would replace is whole."""
+    """The markers in results/README.md come in pairs, so that `harness report --readme` can replace the tables."""
     begun = re.findall(r"^<!-- paper (.*) -->$", RESULTS, re.MULTILINE)
     ended = re.findall(r"^<!-- end of paper (.*) -->$", RESULTS, re.MULTILINE)
     assert begun == ended

@@ -1,4 +1,4 @@
-"""What a reader is told of calibration."""
+"""Tests of the calibration tables."""
 
 from typing import Any
 

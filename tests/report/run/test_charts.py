@@ -1,4 +1,4 @@
-"""Legends: every name whole, and no row more than it takes."""
+"""Legends show every name in full and have no more rows than needed."""
 
 from collections.abc import Sequence
 

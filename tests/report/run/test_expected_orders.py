@@ -1,4 +1,4 @@
-"""What a reader is told of expected orders."""
+"""Tests of the text and tables of expected orders."""
 
 from harness.report.run.expected_orders import section, text
 

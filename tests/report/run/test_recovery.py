@@ -1,4 +1,4 @@
-"""What a reader is told of recovery."""
+"""Tests of the recovery table."""
 
 from harness.report.run.recovery import section, text
 

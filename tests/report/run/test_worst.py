@@ -1,4 +1,4 @@
-"""The worst two seconds, on errors that are written down here."""
+"""The worst two seconds of given errors."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ RATE_HZ = 50.0
 
 
 def bump(start_s: float, end_s: float, height: float = 10.0, length_s: float = 20.0) -> tuple[np.ndarray, np.ndarray]:
-    """Times and errors: 1 everywhere, `height` between two times."""
+    """Times and errors: the error is 1 everywhere, and `height` between two times."""
     time_s = np.arange(round(length_s * RATE_HZ)) / RATE_HZ
     return time_s, np.where((time_s >= start_s - 1e-9) & (time_s < end_s - 1e-9), height, 1.0)
 

@@ -1,4 +1,4 @@
-"""The page and the text of a sweep: what they open on, that they add up, and that they stay small."""
+"""Page and text of a sweep: their first sentence, their numbers and their size."""
 
 import json
 import re
@@ -43,7 +43,7 @@ VARIED = Plan(vary={RATE: (120, 20, 60), NOISE: ("clean", "default")}, failing=(
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """With its page."""
+    """A sweep folder with its page."""
     out = fabricate_sweep(tmp_path_factory.mktemp("sweep") / "out", VARIED)
     write_sweep_page(out)
     return out
@@ -51,15 +51,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As where matplotlib is not: for tests that look at no picture."""
+    """Hide matplotlib, for tests that need no charts."""
     monkeypatch.setattr(sweep_page, "find_spec", lambda name: None)
 
 
 def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
-    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to come. dynamic_map errs least: ")
-    assert re.search(r"error over 14 clips; next ik with [\d.]+ deg, worse by [\d.]+ to [\d.]+ deg \(95 %\)\.$", said)
+    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map has the lowest error: ")
+    assert re.search(
+        r"error over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$",
+        said,
+    )
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -68,7 +71,7 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
 
 
 def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
-    """Whatever is averaged, by hand."""
+    """The statistic equals means that are computed by hand."""
     sweep = read_sweep(folder)
     with CellIndex(folder, read_only=True) as index:
         cells = list(index.columns("scenario", "method", "varied", "clip", PRIMARY_METRIC))
@@ -89,7 +92,7 @@ def test_numbers_stand_in_rising_order_and_words_as_they_came(folder: Path) -> N
 
 
 def test_what_a_key_does_is_told(folder: Path) -> None:
-    """Errors rise by tenths in the order 120, 20, 60 of the plan."""
+    """Errors rise by tenths in the plan's order 120, 20, 60."""
     sweep = read_sweep(folder)
     assert re.fullmatch(r"[\d.]+ deg at 120, [\d.]+ deg at 60 \(\+\d+ %\)", describe_effect(sweep, sweep.keys[0]))
     for shown in (text_of(folder / "report.html"), text(sweep)):
@@ -139,10 +142,10 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
     [
         (Plan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
         (Plan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")), "6 of 6 cells finished. Nothing was measured."),
-        (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to come."),
+        (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to run."),
         (Plan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
-        (Plan(performers=("known", "new")), "dynamic_map (known) errs least: "),
-        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map errs least: "),
+        (Plan(performers=("known", "new")), "dynamic_map (known) has the lowest error: "),
+        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest error: "),
     ],
 )
 def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path) -> None:
@@ -156,7 +159,7 @@ def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path)
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
-    assert sentence(sweep).count("errs least") == 2
+    assert sentence(sweep).count("has the lowest error") == 2
 
 
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
@@ -168,8 +171,8 @@ def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
     alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
-    assert sentence(read_sweep(few)).endswith("which so few clips cannot tell apart.")
-    assert sentence(read_sweep(alike)).endswith("which these clips cannot tell apart.")
+    assert sentence(read_sweep(few)).endswith("there are too few clips to establish a difference.")
+    assert sentence(read_sweep(alike)).endswith("the 95 % interval of the difference contains zero.")
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:
