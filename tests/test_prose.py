@@ -19,8 +19,8 @@ DOCUMENTS = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 TABLES = {ROOT / "results" / "README.md"}
 """Pages that `harness report --readme` writes: they hold tables, not prose."""
 ELLIPTICAL = re.compile(
-    r"^(The same|The other|The rest|Of (so|all|each|every|one|what|the|a)\b|As (above|before|it|they)|Likewise|Whoever|Whatever|"
-    r"What (is|was|has|they|it)\b.*said|So many|How it is said)"
+    r"^(The same|The other|The rest|Of (so|all|each|every|one|what|the|a)\b|As (above|before|it|they)|Likewise|Whoever|"
+    r"Whatever|What (is|was|has|they|it)\b.*said|So many|How it is said)"
 )
 """Beginnings of docstrings that cannot be read alone."""
 
@@ -50,7 +50,9 @@ def words(sentence: str) -> int:
 
 
 def test_the_counter_counts() -> None:
-    page = "# A title\n\nOne two; three four. Five `a b c` six.\n\n- An item\n- Another. Item\n\n    code here\n\n| a | b |\n"
+    page = (
+        "# A title\n\nOne two; three four. Five `a b c` six.\n\n- An item\n- Another. Item\n\n    code here\n\n| a |\n"
+    )
     assert [words(s) for s in sentences(page)] == [2, 4, 3, 2, 1, 1]
 
 

@@ -11,9 +11,6 @@ from harness.commands.common import Verbs, add_verb, print_result
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from harness.experiment.score_recording import RecordingScore
     from harness.stream.recording.replay import RecordingStream
 
 
@@ -111,25 +108,6 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
     content |= {"lost": stream.recording.damage, "methods": [score.as_dict() for score in scores]}
     measured = any(score.metrics["joint_angle_mean_deg"] is not None for score in scores)
     outcome = Outcome.PASS if measured else Outcome.NOT_COMPARABLE
-    return print_result(args, content, f"played from {played}", "", format_score_table(scores), outcome=outcome)
-
-
-def format_score_table(scores: "Sequence[RecordingScore]") -> str:
-    """Table with one row per method."""
-    from harness.report.run.text import COLUMNS
-
-    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
-    for score in scores:
-        figures = [_format_number(score.metrics[name], decimals) for _, name, decimals in COLUMNS]
-        lines.append([score.method, f"{score.frames_matched}/{score.frames_expected}", *figures])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for words in lines
+    return print_result(
+        args, content, f"played from {played}", "", score_recording.format_score_table(scores), outcome=outcome
     )
-
-
-def _format_number(value: float | None, decimals: int) -> str:
-    return "not measured" if value is None else f"{value:.{decimals}f}"
