@@ -3,13 +3,17 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-slow gate lint docs compiled clean
+.PHONY: demo test test-long test-slow gate lint docs compiled clean
 
 demo: compiled
 	$(BIN)/harness demo
 
+# The fast tests; `make test-long` runs the others but for the slow ones.
 test: compiled
-	$(BIN)/python -m pytest -n 2 --dist worksteal --durations 15
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not slow and not long"
+
+test-long: compiled
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "long and not slow" --durations 15
 
 test-slow: compiled
 	$(BIN)/python -m pytest -m slow --hypothesis-profile=default
