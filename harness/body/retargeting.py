@@ -45,8 +45,10 @@ class RetargetReport:
 
 def retarget_to_own_body(clip: Clip) -> tuple[Body, BodyMotion]:
     """The clip on the body scaled to its own skeleton, unchanged; fingers and toes are left out."""
-    own, angles_rad = _humanoid_part(clip)
-    return humanoid.build_body(own), _body_motion(clip, humanoid24.pack(clip.root_m, clip.world_from_root, angles_rad))
+    source, angles_rad = _humanoid_part(clip)
+    return humanoid.build_body(source), _body_motion(
+        clip, humanoid24.pack(clip.root_m, clip.world_from_root, angles_rad)
+    )
 
 
 def retarget_to_common_body(clip: Clip, target: Skeleton) -> tuple[BodyMotion, RetargetReport]:
@@ -56,11 +58,11 @@ def retarget_to_common_body(clip: Clip, target: Skeleton) -> tuple[BodyMotion, R
     moves by a constant offset in its own frame, of least squared joint deviation, and by a slowly varying height that
     puts soles in stance at the performer's heights over a floor at z = 0.
     """
-    own, own_angles_rad = _humanoid_part(clip)
+    source, source_angles_rad = _humanoid_part(clip)
     world_from_root = clip.world_from_root
-    goal = _RetargetGoal.create(target, own, own_angles_rad, clip)
-    qpos = humanoid24.pack(clip.root_m, world_from_root, own_angles_rad)
-    angles_rad = bone_directions.match_bone_directions(own, qpos, target)
+    goal = _RetargetGoal.create(target, source, source_angles_rad, clip)
+    qpos = humanoid24.pack(clip.root_m, world_from_root, source_angles_rad)
+    angles_rad = bone_directions.match_bone_directions(source, qpos, target)
     world_from_bone = skeleton.world_rotations(target, world_from_root, angles_rad)
     pose = skeleton.pose_from_rotations(target, goal.root_m, world_from_bone)
     root_m = goal.root_m + _best_offset_m(goal.joints_m - pose.end_m, world_from_root)
@@ -77,8 +79,8 @@ def retarget_with_same_angles(clip: Clip, target: Skeleton) -> tuple[BodyMotion,
     The root's path scales with the legs and is shifted once in height, so that the median height of soles in stance is
     the performer's over a floor at z = 0. Hands and feet are not at the performer's positions.
     """
-    own, angles_rad = _humanoid_part(clip)
-    goal = _RetargetGoal.create(target, own, angles_rad, clip)
+    source, angles_rad = _humanoid_part(clip)
+    goal = _RetargetGoal.create(target, source, angles_rad, clip)
     pose = skeleton.forward_kinematics(target, goal.root_m, clip.world_from_root, angles_rad)
     soles_m = (ground.sole_heights_m(target, pose) - goal.soles_m)[goal.stance]
     root_m = goal.root_m - np.array([0.0, 0.0, np.median(soles_m) if soles_m.size else 0.0])
@@ -91,7 +93,7 @@ class _RetargetGoal:
     """Targets on a common body: the performer's joints and soles, scaled by the legs, over a floor at z = 0."""
 
     clip: Clip
-    own: Skeleton
+    source: Skeleton
     angles_rad: Floats
     """(T, 48) the clip's angles [rad]."""
     target: Skeleton
@@ -109,14 +111,15 @@ class _RetargetGoal:
     """(T, 2) targets of the sole heights [m]."""
 
     @classmethod
-    def create(cls, target: Skeleton, own: Skeleton, angles_rad: Floats, clip: Clip) -> "_RetargetGoal":
-        pose = skeleton.forward_kinematics(own, clip.root_m, clip.world_from_root, angles_rad)
-        soles_m, stance = ground.sole_heights_m(own, pose), ground.detect_stance(own, pose, clip.rate_hz)
-        floor_m, scale = ground.floor_m(soles_m, stance), _leg_m(target) / _leg_m(own)
+    def create(cls, target: Skeleton, source: Skeleton, angles_rad: Floats, clip: Clip) -> "_RetargetGoal":
+        """Targets for a clip with the angles `angles_rad` (T, 48) on the performer's skeleton."""
+        pose = skeleton.forward_kinematics(source, clip.root_m, clip.world_from_root, angles_rad)
+        soles_m, stance = ground.sole_heights_m(source, pose), ground.detect_stance(source, pose, clip.rate_hz)
+        floor_m, scale = ground.floor_m(soles_m, stance), _leg_m(target) / _leg_m(source)
         level_m = np.array([0.0, 0.0, floor_m])
         root_m, joints_m = scale * (clip.root_m - level_m), scale * (pose.end_m - level_m)
         soles_m = scale * (soles_m - floor_m)
-        return cls(clip, own, angles_rad, target, pose, stance, floor_m, scale, root_m, joints_m, soles_m)
+        return cls(clip, source, angles_rad, target, pose, stance, floor_m, scale, root_m, joints_m, soles_m)
 
     def report(self, result: Pose) -> RetargetReport:
         """Errors of a motion of the common body against the targets."""
@@ -134,7 +137,7 @@ class _RetargetGoal:
             deviation_plain_mm=float(1e3 * np.mean(np.linalg.norm(plain.end_m - scale * self.pose.end_m, axis=2))),
             deviation_mm=float(np.mean(deviation_mm)),
             deviation_p95_mm=float(np.percentile(deviation_mm, 95)),
-            proportions_mm=_proportions_mm(self.own, self.pose, target, scale, clip),
+            proportions_mm=_proportions_mm(self.source, self.pose, target, scale, clip),
             float_plain_mm=_percentile95(plain_feet_mm),
             sink_plain_mm=_percentile95(-plain_feet_mm),
             float_mm=_percentile95(feet_mm),
@@ -144,9 +147,9 @@ class _RetargetGoal:
 
 def _humanoid_part(clip: Clip) -> tuple[Skeleton, Floats]:
     """The 24 bones of the clip's skeleton and their angles (T, 48) [rad]; UnknownName or BadInput if it lacks them."""
-    own, dofs = clip.skeleton.subset(humanoid24.BONES)
-    humanoid.require_humanoid(own)
-    return own, clip.angles_rad[:, dofs]
+    source, dofs = clip.skeleton.subset(humanoid24.BONES)
+    humanoid.require_humanoid(source)
+    return source, clip.angles_rad[:, dofs]
 
 
 def _best_offset_m(residual_m: Floats, world_from_root: Floats) -> Floats:
@@ -155,12 +158,12 @@ def _best_offset_m(residual_m: Floats, world_from_root: Floats) -> Floats:
     return rotations.rotate(world_from_root, np.mean(in_root, axis=0))
 
 
-def _proportions_mm(own: Skeleton, pose: Pose, target: Skeleton, scale: float, clip: Clip) -> float:
+def _proportions_mm(source: Skeleton, pose: Pose, target: Skeleton, scale: float, clip: Clip) -> float:
     """Mean deviation from bone lengths alone, if every bone pointed exactly as the performer's [mm]."""
     ends_m = np.empty_like(pose.end_m)
     for bone, parent in enumerate(target.parents):
         at = scale * clip.root_m if parent < 0 else ends_m[:, parent]
-        stretch = target.length_m[bone] / own.length_m[bone] if own.length_m[bone] > 0.0 else 0.0
+        stretch = target.length_m[bone] / source.length_m[bone] if source.length_m[bone] > 0.0 else 0.0
         ends_m[:, bone] = at + stretch * (pose.end_m[:, bone] - pose.start_m[:, bone])
     residual_m = scale * pose.end_m - ends_m
     residual_m -= _best_offset_m(residual_m, clip.world_from_root)[:, None]
@@ -172,8 +175,8 @@ def _percentile95(error_mm: Floats) -> float:
     return max(0.0, float(np.percentile(error_mm, 95))) if error_mm.size else float("nan")
 
 
-def _leg_m(own: Skeleton) -> float:
-    return float(sum(own.length_m[own.index(bone)] for bone in _LEGS) / 2)
+def _leg_m(skeleton: Skeleton) -> float:
+    return float(sum(skeleton.length_m[skeleton.index(bone)] for bone in _LEGS) / 2)
 
 
 def _body_motion(clip: Clip, qpos: Floats) -> BodyMotion:

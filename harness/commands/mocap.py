@@ -21,12 +21,12 @@ def add_mocap(verbs: Verbs) -> None:
 
 
 def run_mocap_list(args: argparse.Namespace) -> Outcome:
-    from harness.mocap.library import MotionLibrary, ignored_links_note
+    from harness.mocap.library import MotionLibrary, ignored_paths_note
     from harness.mocap.sources import find_library_folders
 
     library = MotionLibrary(find_library_folders(args.mocap))
     entries = library.entries()
-    for note in ignored_links_note(library.ignored_links):
+    for note in ignored_paths_note(library.ignored_paths):
         print(note, file=sys.stderr)
     if not entries:
         raise BadInput(

@@ -132,10 +132,10 @@ def _fetch_file(name: str, top: Path, base_url: str) -> Path:
     return path
 
 
-def _check_file(new: Path, url: str, listed: str | None, beside: Path) -> None:
+def _check_file(new: Path, url: str, listed: str | None, folder: Path) -> None:
     """Raise BadFile with the address unless the file parses and has the listed SHA-256."""
     try:
-        _parse_file(new, beside)
+        _parse_file(new, folder)
     except BadFile as error:
         raise BadFile(url, error.found, error.expected, "It was not kept; try again.", error.line) from error
     sha256 = sha256_of(new)
@@ -144,10 +144,10 @@ def _check_file(new: Path, url: str, listed: str | None, beside: Path) -> None:
         raise BadFile(url, f"a file with SHA-256 {sha256[:12]}...", f"{listed[:12]}... as shipped", advice)
 
 
-def _parse_file(path: Path, beside: Path) -> AsfFile | Clip:
+def _parse_file(path: Path, folder: Path) -> AsfFile | Clip:
     if path.suffix == ".asf":
         return read_asf_file(path)
-    asf = read_asf_file(beside / f"{path.stem.split('_')[0]}.asf")
+    asf = read_asf_file(folder / f"{path.stem.split('_')[0]}.asf")
     return read_amc(path, asf.skeleton, rate_hz=SHIPPED_RATE_HZ)
 
 

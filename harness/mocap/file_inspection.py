@@ -81,11 +81,11 @@ def inspect_clip(clip: Clip) -> Inspection:
     skeleton = clip.skeleton
     pose = forward_kinematics(skeleton, clip.root_m, clip.world_from_root, clip.angles_rad)
     humanoid = set(BONES) <= set(skeleton.names)
-    kept = [skeleton.index(bone) for bone in (BONES if humanoid else skeleton.names)]
-    rest_m = _rest_positions_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in kept)]]
+    bones = [skeleton.index(bone) for bone in (BONES if humanoid else skeleton.names)]
+    rest_m = _rest_positions_m(skeleton.parents, skeleton.bone_m)[[0, *(b + 1 for b in bones)]]
     points = PointTrajectories(
-        names=("root", *(skeleton.names[b] for b in kept)),
-        position_m=np.concatenate([clip.root_m[:, None], pose.end_m[:, kept]], axis=1),
+        names=("root", *(skeleton.names[b] for b in bones)),
+        position_m=np.concatenate([clip.root_m[:, None], pose.end_m[:, bones]], axis=1),
         rest_m=rest_m,
     )
     facts = replace(
@@ -153,8 +153,8 @@ def _inspect_c3d(path: Path, unit_m: float | None, library: LibraryFolders | Non
     from harness.mocap.read.c3d import read_c3d
 
     markers = read_c3d(path, unit_m=unit_m)
-    seen: Bools = np.isfinite(markers.position_m[..., 0])
-    if not seen.any():
+    visible: Bools = np.isfinite(markers.position_m[..., 0])
+    if not visible.any():
         raise BadFile(path, "no marker in any frame", "positions of markers", "Export it again.")
     facts = _inspect_points(path.stem, PointTrajectories(markers.labels, markers.position_m, None), markers.rate_hz)
     return replace(
@@ -164,8 +164,8 @@ def _inspect_c3d(path: Path, unit_m: float | None, library: LibraryFolders | Non
         unit_m=markers.unit_m,
         unit_evidence=markers.unit_evidence,
         up=markers.up_evidence,
-        missing_share=float(1.0 - seen.mean()),
-        missing_markers=tuple(label for m, label in enumerate(markers.labels) if not seen[:, m].all()),
+        missing_share=float(1.0 - visible.mean()),
+        missing_markers=tuple(label for m, label in enumerate(markers.labels) if not visible[:, m].all()),
         notes=() if library is None else _marker_spread_notes(markers, MotionLibrary(library)),
     )
 

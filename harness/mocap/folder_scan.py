@@ -11,8 +11,8 @@ class FolderScan:
 
     files: tuple[Path, ...]
     """Files with one of the suffixes, sorted; links to files inside the folder are among them."""
-    ignored_links: tuple[Path, ...]
-    """Links that lead outside the folder or to nothing, sorted."""
+    ignored_paths: tuple[Path, ...]
+    """Links that lead outside the folder or to nothing, and folders that cannot be read, sorted."""
 
 
 def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
@@ -23,7 +23,13 @@ def scan_folder(folder: Path, suffixes: Collection[str]) -> FolderScan:
     top = folder.resolve()
     files, ignored, waiting = [], [], [top]
     while waiting:
-        for path in waiting.pop().iterdir():
+        parent = waiting.pop()
+        try:
+            paths = list(parent.iterdir())
+        except PermissionError:
+            ignored.append(parent)
+            continue
+        for path in paths:
             link = path.is_symlink()
             if link and not (path.exists() and path.resolve().is_relative_to(top)):
                 ignored.append(path)

@@ -51,23 +51,23 @@ class LibraryEntry:
 
 
 class UnknownClip(UnknownName):
-    """A clip that a library does not hold. The message names the links that were ignored while it was searched."""
+    """A clip that a library does not hold. The message names the links and folders that were ignored."""
 
-    def __init__(self, name: str, known: Sequence[str], ignored_links: Sequence[str] = ()) -> None:
+    def __init__(self, name: str, known: Sequence[str], ignored_paths: Sequence[str] = ()) -> None:
         super().__init__("clip", name, known)
-        self.args = name, tuple(known), tuple(ignored_links)
-        self.ignored_links = tuple(ignored_links)
+        self.args = name, tuple(known), tuple(ignored_paths)
+        self.ignored_paths = tuple(ignored_paths)
 
     def __str__(self) -> str:
-        return " ".join([super().__str__(), *ignored_links_note(self.ignored_links)])
+        return " ".join([super().__str__(), *ignored_paths_note(self.ignored_paths)])
 
 
-def ignored_links_note(links: Sequence[Path | str]) -> list[str]:
-    """A sentence that names the ignored links of a library; [] if there are none."""
-    if not links:
+def ignored_paths_note(paths: Sequence[Path | str]) -> list[str]:
+    """A sentence that names the ignored links and folders of a library; [] if there are none."""
+    if not paths:
         return []
-    names = ", ".join(map(str, links))
-    return [f"Ignored, because they lead outside the library's folder or to nothing: {names}."]
+    names = ", ".join(map(str, paths))
+    return [f"Ignored links that lead outside the library's folder or to nothing, and unreadable folders: {names}."]
 
 
 class MotionLibrary:
@@ -88,13 +88,13 @@ class MotionLibrary:
         self._folder_of: dict[str, Path] = {}
         ignored: list[Path] = []
         for folder in self.folders:
-            entries, links = _scan_entries(folder.resolve())
-            ignored += links
+            entries, paths = _scan_entries(folder.resolve())
+            ignored += paths
             for entry in entries.values():
                 self._add(entry, folder)
         self._entries = dict(sorted(self._entries.items()))
-        self.ignored_links = tuple(ignored)
-        """Symbolic links that lead outside their library folder, or to nothing."""
+        self.ignored_paths = tuple(ignored)
+        """Symbolic links that lead outside their library folder or to nothing, and folders that cannot be read."""
 
     def _add(self, entry: LibraryEntry, folder: Path) -> None:
         other = self._entries.get(entry.name)
@@ -122,7 +122,7 @@ class MotionLibrary:
     def entry(self, name: str) -> LibraryEntry:
         """The entry of a clip; UnknownName if the library has no such clip."""
         if name not in self._entries:
-            raise UnknownClip(name, tuple(self._entries), tuple(map(str, self.ignored_links)))
+            raise UnknownClip(name, tuple(self._entries), tuple(map(str, self.ignored_paths)))
         return self._entries[name]
 
     def load(self, name: str) -> Clip:
@@ -154,7 +154,7 @@ def as_folders(folders: LibraryFolders) -> tuple[Path, ...]:
 
 
 def _scan_entries(top: Path) -> tuple[dict[str, LibraryEntry], tuple[Path, ...]]:
-    """Entries by clip name, and the ignored links, of a resolved folder."""
+    """Entries by clip name, and the ignored paths, of a resolved folder."""
     index = read_index(top / INDEX_NAME)
     rows = {(top / path).resolve(): row for path, row in index.items()}
     scan = scan_folder(top, {f".{kind}" for kind in FORMATS})
@@ -166,7 +166,7 @@ def _scan_entries(top: Path) -> tuple[dict[str, LibraryEntry], tuple[Path, ...]]
         best, *others = sorted(files[name], key=lambda path: (FORMATS.index(path.suffix.lower().lstrip(".")), path))
         row = index.get(best.relative_to(top).as_posix()) or rows.get(best.resolve(), {})
         entries[name] = _make_entry(name, best, tuple(others), row)
-    return entries, scan.ignored_links
+    return entries, scan.ignored_paths
 
 
 def _make_entry(name: str, path: Path, copies: tuple[Path, ...], row: Mapping[str, str]) -> LibraryEntry:

@@ -1,4 +1,4 @@
-"""Bodies and motion for these tests: other proportions than the standard ones, and clips without a library."""
+"""Bodies with other proportions than the standard ones, and clips that need no library."""
 
 import numpy as np
 import pytest
@@ -11,14 +11,14 @@ from harness.core.skeleton import Skeleton
 
 @pytest.fixture
 def lanky(rng: np.random.Generator) -> Skeleton:
-    """A skeleton whose every bone differs from the standard one in length (within 15 %) and direction."""
+    """A skeleton whose bones all differ from the standard ones in length (within 15 %) and direction."""
     standard = humanoid24.standard_skeleton()
     turns = rotations.exp(rng.normal(scale=0.1, size=(24, 3)))
     return standard.with_bones(rng.uniform(0.87, 1.15, size=(24, 1)) * rotations.rotate(turns, standard.bone_m))
 
 
 def random_qpos(rng: np.random.Generator, frames: int) -> Floats:
-    """(frames, 55) configurations anywhere within the joint limits."""
+    """(frames, 55) random configurations within the joint limits."""
     low, high = humanoid24.limits_rad().T
     turns = rng.normal(size=(frames, 4))
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Bones made to point alike, and feet on the floor."""
+"""Matching of bone directions, and contact of the feet with the floor."""
 
 import numpy as np
 import pytest

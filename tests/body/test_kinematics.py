@@ -16,7 +16,7 @@ STATIONS = tuple(mounts.DEFAULT_MOUNTS)
 
 @pytest.fixture
 def worn(lanky: Skeleton) -> tuple[Kinematics, list[int], Floats, Floats]:
-    """A body with all trackers: kinematics, bones, mounts."""
+    """Kinematics of a body with all stations, and the bones and mounts of these."""
     places = [mounts.locate_mount(lanky, mounts.DEFAULT_MOUNTS[s]) for s in STATIONS]
     bones = [lanky.index(mounts.DEFAULT_MOUNTS[s].bone) for s in STATIONS]
     body = humanoid.build_body(lanky, mounts.DEFAULT_MOUNTS.values())

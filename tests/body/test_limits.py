@@ -1,4 +1,4 @@
-"""How often real motion that the limits were not made from lies outside of them (they never clip it)."""
+"""Share of real motion outside the joint limits, for clips that the limits were not derived from."""
 
 from pathlib import Path
 
@@ -14,14 +14,14 @@ CLIPS = (
     *("13_17", "14_02", "16_16", "16_22", "16_31", "02_01", "07_05", "29_01", "49_01"),
     *("16_02", "16_05", "14_08", "127_25", "01_01", "02_04", "64_01", "02_07"),
 )
-"""The test clips."""
+"""Names of the test clips."""
 KINDS = ("own skeleton", "standard body", "without the margin")
 MARGIN_RAD = np.deg2rad(10.0)
-"""What the limits add to the envelope of other clips."""
+"""Margin of the limits around the envelope of other clips."""
 
 
 def excess_rad(angles_rad: Floats, margin_rad: float = 0.0) -> Floats:
-    """(T, 48) how far each angle, in its principal form, lies beyond its limits made narrower, turns left out [rad]."""
+    """(T, 48) excess of each principal angle over its limits, which are narrowed by a margin [rad]."""
     skeleton = humanoid24.standard_skeleton()
     angles = np.array(angles_rad)
     for where in skeleton.dof_of_bone:

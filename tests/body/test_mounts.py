@@ -1,4 +1,4 @@
-"""Where trackers sit."""
+"""Mounts of trackers on the surface of the body."""
 
 import math
 
@@ -17,7 +17,7 @@ STANDARD = humanoid24.standard_skeleton()
 
 
 def depth(shape: anatomy.BodyGeom, point_m: Floats) -> float:
-    """Below 0 inside a shape, 0 on its skin; metres for a capsule, relative for an ellipsoid."""
+    """Negative inside a geom, 0 on its surface; in metres for a capsule, relative for an ellipsoid."""
     local = rotations.rotate(rotations.inverse(shape.bone_from_shape), point_m - shape.centre_m)
     if shape.kind == "capsule":
         core = np.array([0.0, 0.0, np.clip(local[2], -shape.size_m[1], shape.size_m[1])])
@@ -117,7 +117,7 @@ def test_two_trackers_of_one_name_are_refused() -> None:
 
 
 def test_rays_see_the_flesh() -> None:
-    """What ultrasound will be shaded by: the chest lies between the spine and a point in front of it."""
+    """Occlusion of ultrasound: the chest lies between the spine and a point in front of it."""
     model = humanoid.build_body().model
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)

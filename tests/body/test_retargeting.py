@@ -1,4 +1,4 @@
-"""Captured motion onto the performer's own body and onto a common one."""
+"""Retargeting of clips to the performer's own body and to a common one."""
 
 from collections.abc import Iterator
 from dataclasses import fields, replace
@@ -54,7 +54,7 @@ def own_body_errors(clip: Clip, frames: range) -> tuple[float, float]:
 
 
 def test_staged_clips_are_exact_on_their_own_bodies(mocap: Path) -> None:
-    """Every third; of all of them, `make test-slow` looks at every frame."""
+    """Every third clip; `make test-slow` checks every frame of all clips."""
     for path in amcs(mocap)[::3]:
         clip = as_recorded(path, mocap)
         metres, radians = own_body_errors(clip, range(0, len(clip), max(1, len(clip) // 8)))
@@ -98,7 +98,7 @@ def test_clips_without_the_humanoids_bones_or_hinges_are_refused(rng: np.random.
 
 
 def walking_in_place(own: Skeleton, rate_hz: float = 60.0) -> Clip:
-    """Four seconds of bending the knees in turn, the other foot planted; the hips follow the planted foot."""
+    """Four seconds of alternate knee bends; the hips follow the foot in stance."""
     time_s = np.arange(0.0, 4.0, 1.0 / rate_hz)
     qpos = np.tile(humanoid.tpose(own), (len(time_s), 1))
     root_m, turns, angles = humanoid24.unpack(qpos)
@@ -172,7 +172,7 @@ def test_the_root_s_path_grows_with_the_legs_and_soles_stand_on_the_floor(lanky:
 
 
 def test_angles_of_files_are_kept_on_the_common_body(mocap: Path) -> None:
-    """To the bit; what `unwrapped` does on the way in changes no rotation of a bone."""
+    """Angles are equal to the bit; unwrapping them before does not change the rotation of any bone."""
     for path in amcs(mocap)[::20]:
         clip = as_recorded(path, mocap)
         own, dofs = clip.skeleton.subset(humanoid24.BONES)
@@ -200,7 +200,7 @@ def onto_standard(paths: list[Path], mocap: Path) -> Iterator[RetargetReport]:
 
 
 def hold(reports: list[RetargetReport]) -> None:
-    """What the README of the model states."""
+    """Check the statements in the README of the model."""
     for report in reports:
         assert report.deviation_mm < 35.0, report
         assert report.deviation_mm < report.deviation_plain_mm + 5.0, report

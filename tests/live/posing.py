@@ -1,4 +1,4 @@
-"""Poses to send, without a tracker."""
+"""Poses for tests of outputs, made without a tracker."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ from harness.stream.frame import TrackerFrame
 
 
 def frame(at_s: float, measured_s: float | None = None, stations: int = 2) -> TrackerFrame:
-    """Both clocks start together unless told."""
+    """A pose with these times; both clocks start together by default."""
     stamp_s = at_s if measured_s is None else measured_s
     return TrackerFrame(
         received_s=at_s,
@@ -26,7 +26,7 @@ def frame(at_s: float, measured_s: float | None = None, stations: int = 2) -> Tr
 
 
 def configuration(rng: np.random.Generator, spread_rad: float = 0.3) -> Floats:
-    """(55,) somewhere about the T-pose."""
+    """(55,) random configuration near the T-pose."""
     qpos = np.array(humanoid.tpose(humanoid.build_body().skeleton))
     qpos[:3] += rng.normal(scale=0.5, size=3)
     qpos[3:7] = rng.normal(size=4)

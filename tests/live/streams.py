@@ -1,4 +1,4 @@
-"""Trackers for tests."""
+"""Tracker streams for tests."""
 
 import threading
 import time
@@ -9,7 +9,7 @@ from harness.stream.frame import TrackerFrame
 
 
 class Paced:
-    """A `TrackerStream` of these frames, by default stamped as they come; then it waits to be closed, or ends."""
+    """A `TrackerStream` of given frames, stamped on delivery by default; it then waits for `close`, or ends."""
 
     stations = ("a", "b")
 
@@ -32,7 +32,7 @@ class Paced:
 
 
 class Broken(Paced):
-    """One that raises after its frames."""
+    """A stream that raises an error after its frames."""
 
     def __iter__(self) -> Iterator[TrackerFrame]:
         yield from super().__iter__()

@@ -1,4 +1,4 @@
-"""The queue between the threads: bounded, newest first to stay, and never a wait for whoever puts."""
+"""The queue between the threads: bounded, drops the oldest items, and never blocks the producer."""
 
 import threading
 

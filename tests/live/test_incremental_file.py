@@ -1,4 +1,4 @@
-"""Files of a live session: the same as those of an export, and whole at any moment."""
+"""Files of a live session: equal to those of an export, and complete at any moment."""
 
 import csv
 from pathlib import Path
@@ -25,7 +25,7 @@ BODY = humanoid.build_body()
 
 
 def walked(rng: np.random.Generator, frames: int) -> Floats:
-    """(F, 55) that turns over and over, so that angles wrap."""
+    """(F, 55) configurations with full rotations, so that angles wrap."""
     qpos = np.array([configuration(rng, 0.1) for _ in range(frames)])
     turns = np.cumsum(rng.normal(scale=0.4, size=(frames, 3)), axis=0)
     qpos[:, 3:7] = rotations.exp(turns)
@@ -33,7 +33,7 @@ def walked(rng: np.random.Generator, frames: int) -> Floats:
 
 
 def exported(qpos: Floats, frame_index: list[int]) -> str:
-    """The file that `harness export` writes of these frames."""
+    """Text of the file that `harness export` writes for these frames."""
     _, world_from_root, angles_rad = unpack(qpos)
     kinematics = Kinematics(BODY)
     posed = [live_pose(row, kinematics=kinematics) for row in qpos]
@@ -50,7 +50,7 @@ def exported(qpos: Floats, frame_index: list[int]) -> str:
 
 
 def written(path: Path, qpos: Floats, frame_index: list[int]) -> BvhOutput:
-    """A BVH output that was sent these frames, still open."""
+    """An open BVH output to which these frames were sent."""
     output, kinematics = BvhOutput(path, BODY.skeleton, RATE_HZ), Kinematics(BODY)
     for row, index in zip(qpos, frame_index, strict=True):
         at_s = index / RATE_HZ

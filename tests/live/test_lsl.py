@@ -1,4 +1,4 @@
-"""What a receiver of the Lab Streaming Layer gets."""
+"""The LSL output, as a receiver of its streams gets it."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""A live session over streams that a test holds in its hand."""
+"""A live session over streams that the test controls."""
 
 import gc
 import sys
@@ -36,7 +36,7 @@ PLAN = LiveOptions(rate_hz=100.0)
 
 
 class Counting:
-    """A reconstructor and its session: T-pose, after so long; remembers what it saw."""
+    """A reconstructor and its session: returns the T-pose after a given time and stores the frames."""
 
     def __init__(self, takes_s: float = 0.0, fails_at: int | None = None) -> None:
         self.takes_s, self.fails_at = takes_s, fails_at
@@ -56,7 +56,7 @@ class Counting:
 
 
 class Kept:
-    """An output that keeps poses and fails when told."""
+    """An output that stores poses, and fails at a given one."""
 
     name = description = "kept"
 
@@ -121,7 +121,7 @@ def test_it_ends_after_its_time() -> None:
 
 
 def test_ctrl_c_is_a_normal_end() -> None:
-    """It strikes whoever waits, which looks at the clock meanwhile; signals themselves are the verb's tests."""
+    """Ctrl-C interrupts the waiting thread, which reads the clock; tests of the command send real signals."""
     method, output, stream = Counting(), Kept(), Paced(frames(3), ends=False)
     waiting = threading.current_thread()
 
@@ -181,7 +181,7 @@ def test_any_error_of_an_output_leaves_it_out() -> None:
 
 
 class AfterTwo:
-    """A calibrator."""
+    """A calibrator that needs a given number of frames."""
 
     def __init__(self) -> None:
         self.frames = 0
@@ -235,7 +235,7 @@ def test_a_t_pose_is_calibrated_from(worn: Playback) -> None:
     output, said = Kept(), list[str]()
 
     def stands() -> Iterator[TrackerFrame]:
-        """Until there are poses: how long it takes to calibrate is the machine's affair."""
+        """Repeats the frames until there are poses, since the time for calibration depends on the computer."""
         yield from standing
         for n in range(1, 100_000):
             if len(output.poses) > 5:

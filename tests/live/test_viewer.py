@@ -1,4 +1,4 @@
-"""The view in its own process: pictures of the newest pose, and clear words where there can be none."""
+"""The viewer in its own process: pictures of the newest pose, and clear errors where it cannot draw."""
 
 import sys
 import time

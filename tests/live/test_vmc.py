@@ -1,4 +1,4 @@
-"""What a receiver of the VMC protocol rebuilds is the pose that was sent."""
+"""The VMC output: a receiver reconstructs the pose that was sent."""
 
 import socket
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ UNITY = (
     "Hips Spine Chest UpperChest Neck Head LeftShoulder LeftUpperArm LeftLowerArm LeftHand RightShoulder RightUpperArm "
     "RightLowerArm RightHand LeftUpperLeg LeftLowerLeg LeftFoot RightUpperLeg RightLowerLeg RightFoot"
 )
-"""Of Unity's documentation of HumanBodyBones, those that a body without fingers, toes, eyes and jaw has."""
+"""Unity's HumanBodyBones, by its documentation, without fingers, toes, eyes and jaw."""
 Message = tuple[str, list[object]]
 
 
@@ -35,7 +35,7 @@ def receiver() -> Iterator[socket.socket]:
 
 
 def received(ours: socket.socket, datagrams: int) -> list[Message]:
-    """As python-osc reads them."""
+    """The messages, read by python-osc."""
     found: list[Message] = []
     for _ in range(datagrams):
         data = ours.recv(65536)
@@ -45,7 +45,7 @@ def received(ours: socket.socket, datagrams: int) -> list[Message]:
 
 
 def rebuilt(messages: list[Message]) -> dict[str, tuple[Floats, Floats]]:
-    """Where each bone of Unity's is in our world, by forward kinematics in Unity's own axes."""
+    """Pose of each Unity bone in world axes, by forward kinematics in Unity's axes."""
     local: dict[str, tuple[Floats, Floats]] = {}
     for address, values in messages:
         if address in ("/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos"):

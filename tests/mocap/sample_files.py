@@ -1,4 +1,4 @@
-"""Small motion files made here, in the dialects that the parsers must read; no byte of them is CMU's."""
+"""Small synthetic motion files in the dialects that the parsers must read; none is copied from CMU."""
 
 import warnings
 from pathlib import Path
@@ -18,7 +18,7 @@ from harness.mocap.read.bvh import CMU_MAP
 
 UNIT_M = INCH_M / 0.45
 LEFT_OUT = ("thorax", "lwrist", "rwrist")
-"""Bones of which CMU's BVH conversion drops the length."""
+"""Bones whose length CMU's BVH conversion leaves out."""
 
 
 def clip(frames: int = 24, *, name: str = "91_01", rate_hz: float = 120.0, wild: bool = False) -> Clip:
@@ -82,7 +82,7 @@ def amc_text(motion: Clip, newline: str = "\n") -> str:
 
 
 def bvh_text(motion: Clip, *, t_pose: bool = True, unit_m: float = UNIT_M) -> str:
-    """The motion in the layout of CMU's BVH conversion, exact for bones that it keeps the length of."""
+    """The motion in the layout of CMU's BVH conversion, exact for bones whose length it keeps."""
     skeleton = motion.skeleton
     bone_of = {drive.joint: bone for bone, drive in CMU_MAP.items()}
     tip_of = {drive.tip: bone for bone, drive in CMU_MAP.items()}
@@ -134,7 +134,7 @@ def bvh_text(motion: Clip, *, t_pose: bool = True, unit_m: float = UNIT_M) -> st
 
 
 def amass_arrays(motion: Clip) -> dict[str, Floats]:
-    """The motion as AMASS would hold it; the joints that drive no bone do not move."""
+    """The motion as arrays of an AMASS file; joints without a bone do not move."""
     world = _world_from_bone(motion)
     joints = {drive.joint: bone for bone, drive in reversed(list(SMPL_MAP.items()))}
     joints |= {"left_elbow": "lwrist", "right_elbow": "rwrist", "neck": "upperneck"}
@@ -171,7 +171,7 @@ def _words(values: Floats) -> str:
 
 
 def _frame(channels: tuple[str, ...], axes: Floats) -> Floats:
-    """A rotation whose columns of these channels are the given axes."""
+    """A rotation matrix whose columns for these channels are the given axes."""
     frame = np.zeros((3, 3))
     known = ["xyz".index(channel[1]) for channel in channels]
     for column, axis in zip(known, axes, strict=True):
@@ -216,7 +216,7 @@ def _zyx_deg(quaternion: Floats) -> Floats:
 
 
 def _euler_deg(matrix: Floats, order: Literal["xyz", "ZYX"]) -> Floats:
-    """scipy's Euler angles [deg]; at gimbal lock any of the many will do."""
+    """scipy's Euler angles [deg]; at gimbal lock, one of the equivalent solutions."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         out: Floats = Rotation.from_matrix(matrix).as_euler(order, degrees=True)

@@ -1,4 +1,4 @@
-"""Fetching, against a server of our own: whole files are kept, others never stay, trouble is one clear line."""
+"""Download from a local server: complete files are kept, others are removed, and errors are one clear line."""
 
 import csv
 import hashlib
@@ -172,7 +172,7 @@ def test_no_network_is_one_clear_line(tmp_path: Path) -> None:
 
 
 def test_the_shipped_list_is_that_of_the_library(mocap: Path) -> None:
-    """Every staged file on the list has the listed digest, and its index the digest of its very bytes."""
+    """Every file of the library on the list has the listed digest, and the index has the digest of its exact bytes."""
     listed, found = shipped_sha256(), 0
     with (mocap / "manifest.csv").open(newline="") as file:
         for row in csv.DictReader(file):
@@ -186,7 +186,7 @@ def test_the_shipped_list_is_that_of_the_library(mocap: Path) -> None:
 
 
 def test_real_files_pass_as_cmus(mocap: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two real files through the checks that a download goes through."""
+    """Two real files pass the checks of a download."""
     for name in ("13.asf", "13_30.amc"):
         (tmp_path / name).write_bytes((mocap / "cmu" / "13" / name).read_bytes())
         fetch._check_file(tmp_path / name, name, shipped_sha256()[f"13/{name}"], tmp_path)

@@ -1,4 +1,4 @@
-"""Inspect: facts with their evidence, known glitches found, sound motion left in peace, nothing guessed."""
+"""Inspection: facts with evidence, known glitches found, no findings in sound motion, and no guesses."""
 
 import json
 from dataclasses import replace
@@ -15,13 +15,13 @@ from harness.mocap.library import MotionLibrary
 from tests.mocap.sample_files import amass_arrays, asf_text, bvh_text, clip, write_clip
 
 GLITCHES = {"05_13": 732, "16_01": 204, "16_15": 3, "16_23": 4, "16_28": 7}
-"""Clip and frame of the glitches that the staged library's index names."""
+"""Clip and frame of the glitches that the index of the library names."""
 ALSO_FLAGGED = {
     "13_17": "frame 716: the right shoulder jumps by 0.14 m and stays there",
     "16_17": "frame 475: the whole body is 0.09 m off for one frame",
     "49_04": "frames 245 to 251 are all the same",
 }
-"""Clips that the index does not mark, and what was found in them."""
+"""Clips with findings that the index does not mark."""
 
 
 def _changed(motion: Clip, root_m: Floats) -> Clip:

@@ -100,9 +100,9 @@ def test_links_out_of_the_folder_are_ignored_and_named(folder: Path, tmp_path_fa
     links[1].symlink_to(target)
     links[2].symlink_to(folder / "absent.amc")
     library = MotionLibrary(folder)
-    assert library.ignored_links == tuple(links)
+    assert library.ignored_paths == tuple(links)
     assert "92_01" not in library.names()
-    with pytest.raises(UnknownName, match=r"Ignored, because they lead outside .*/92, .*/92_01\.amc") as error:
+    with pytest.raises(UnknownName, match=r"Ignored links that lead outside .*/92, .*/92_01\.amc") as error:
         library.load("92_01")
     assert str(copy(error.value)) == str(error.value)  # as on the way out of a worker process
     with pytest.raises(UnknownName):
@@ -114,7 +114,7 @@ def test_links_inside_the_folder_are_followed_and_loops_end(folder: Path) -> Non
     (folder / "again").symlink_to("deep", target_is_directory=True)
     (folder / "deep" / "loop").symlink_to(folder, target_is_directory=True)
     library = MotionLibrary(folder)
-    assert library.ignored_links == ()
+    assert library.ignored_paths == ()
     assert library.names() == ("91_01", "91_02", "91_03", "walk")
     assert len(library.entry("91_01").copies) == 2
     walk = library.load("walk")

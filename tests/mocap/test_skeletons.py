@@ -1,4 +1,4 @@
-"""The skeletons of a library: one for each subject, however many copies there are, and nobody's taken for another's."""
+"""The skeletons of a library: one for each subject, whatever the number of copies, and never that of another."""
 
 from pathlib import Path
 

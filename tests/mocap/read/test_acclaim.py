@@ -1,4 +1,4 @@
-"""ASF and AMC: what is written comes back; what is wrong is named with its line."""
+"""ASF and AMC: a written motion is read back, and errors name their line."""
 
 import time
 import tracemalloc
@@ -46,7 +46,7 @@ def test_a_motion_comes_back(tmp_path: Path, newline: str) -> None:
 
 
 def test_axis_order_and_bones_without_hinges(tmp_path: Path) -> None:
-    """Bone axes turn the hinges, first angle first: ZYX of (0, 0, 90) turns about x, which takes y into z."""
+    """A bone's axis angles rotate its hinges in order: ZYX of (0, 0, 90) rotates about x, which takes y to z."""
     text = """:version 1.10
 :units
   length 0.45
@@ -233,7 +233,7 @@ def test_five_thousand_frames_load_within_a_second(tmp_path: Path) -> None:
 
 
 def test_every_staged_motion_parses(mocap: Path) -> None:
-    """All of them whole; kinematics of every 40th frame: a person's height above a floor near z = 0."""
+    """All clips are complete; in every 40th frame the body has a person's height above a floor near z = 0."""
     library = MotionLibrary(mocap)
     motions = [entry for entry in library.entries() if entry.format == "amc"]
     assert len(motions) >= 1
@@ -266,7 +266,7 @@ def _read(path: Path) -> Clip:
 
 
 def _refused(read: Callable[[Path], object], file: Path, content: bytes) -> str:
-    """The message of the BadFile that reading gives: one line, with an advice."""
+    """The message of the BadFile that reading raises: one line, with advice."""
     file.write_bytes(content)
     with pytest.raises(BadFile) as error:
         read(file)

@@ -1,4 +1,4 @@
-"""C3D: markers come back in world axes, sit on the bones of the same take, and damage never gets through."""
+"""C3D: markers are read in world axes, follow the bones of the same take, and damaged files are refused."""
 
 import contextlib
 import subprocess
@@ -20,7 +20,7 @@ LABELS = ["X:LFHD", "X:RFHD", "X:LTOE"]
 
 
 def _write(file: Path, position_mm: Floats, *, unit: str = "mm", up: str = "+Z") -> bytes:
-    """A file of three markers (T, 3, 3), the last of which is not seen in the first frame."""
+    """A file of three markers (T, 3, 3); the last one is missing in the first frame."""
     content = ezc3d.c3d()
     content["parameters"]["POINT"]["LABELS"]["value"] = LABELS
     content["parameters"]["POINT"]["UNITS"]["value"] = [unit]
@@ -92,7 +92,7 @@ def test_damage_is_refused(tmp_path: Path, position_mm: Floats, change: object, 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_damaged_file_is_read_or_refused(tmp_path: Path, seed: int) -> None:
-    """Bytes changed anywhere in the header and the parameters: nothing but BadFile may come of it."""
+    """Bytes changed anywhere in header and parameters: the file is read or refused with BadFile."""
     content = bytearray(_write(tmp_path / "x.c3d", np.ones((3, 3, 3))))
     rng = np.random.default_rng(seed)
     for at in rng.integers(0, 1536, size=seed % 4 + 1):
@@ -128,7 +128,7 @@ def test_the_child_says_when_ezc3d_is_missing(monkeypatch: pytest.MonkeyPatch) -
 
 
 SPREAD_M = {"02_01": (0.012, 0.030), "02_05": (0.020, 0.045), "05_13": (0.040, 0.110)}
-"""Median and largest spread of the 41 markers on the skin about their bones; printed by the test with -s."""
+"""Median and largest spread of the 41 skin markers about their bones; the test prints them with -s."""
 
 
 @pytest.mark.parametrize("name", sorted(SPREAD_M))

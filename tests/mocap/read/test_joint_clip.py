@@ -1,4 +1,4 @@
-"""BVH and AMASS: joint rotations come back as hinge angles, and what hinges cannot follow is reported."""
+"""BVH and AMASS: joint rotations are read as hinge angles, and the residual of the fit is reported."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -16,7 +16,7 @@ from harness.mocap.read.joint_clip import fit_hinges
 from tests.mocap.sample_files import LEFT_OUT, UNIT_M, amass_arrays, bvh_text, clip
 
 SHARED = ["02_01", "02_05", "05_13", "07_05", "14_08", "16_16", "29_01", "49_06"]
-"""Staged takes that are there as AMC and as BVH."""
+"""Takes of the library in AMC and in BVH."""
 LEGS = {"LeftLeg": "lfemur", "RightLeg": "rfemur", "LeftFoot": "ltibia", "RightFoot": "rtibia", "LeftToeBase": "lfoot"}
 ABOVE = {"Neck": "thorax", "Head_end": "head", "LeftForeArm": "lhumerus", "LeftHand": "lradius", "RightHand": "rradius"}
 
@@ -109,7 +109,7 @@ def _swap(line: str, a: int, b: int) -> str:
 
 @pytest.mark.parametrize("name", SHARED)
 def test_bvh_agrees_with_the_amc_of_the_same_take(mocap: Path, name: str) -> None:
-    """Legs to the hundredth of a millimetre; above the upper back nearer to the hips by the thorax's length."""
+    """Legs agree to 0.01 mm; joints above the upper back are closer to the hips by the thorax's length."""
     amc = MotionLibrary(mocap).load(name)
     joint_clip = bvh.read_bvh(mocap / "bvh" / f"{name}.bvh").cut(1)
     pose = forward_kinematics(amc.skeleton, amc.root_m, amc.world_from_root, amc.angles_rad)
@@ -185,7 +185,7 @@ def test_smpl_at_rest_is_a_t_with_straight_legs(tmp_path: Path) -> None:
 
 
 def test_a_bent_elbow_bends_the_elbow(tmp_path: Path) -> None:
-    """A left elbow bent by 80 deg about SMPL's y brings the forearm forward, and is nearly all hinge."""
+    """A left elbow bent by 80 deg about SMPL's y brings the forearm forward, almost entirely by its hinge."""
     poses = np.zeros((1, 156))
     poses[0, 18 * 3 + 1] = -np.deg2rad(80.0)
     file = tmp_path / "bent.npz"

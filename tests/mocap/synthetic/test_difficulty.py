@@ -1,4 +1,4 @@
-"""Errors on the built-in performer are neither trivial nor random: data helps, and does not help completely."""
+"""Errors on synthetic motion are neither trivial nor random: training data reduces them, but not to zero."""
 
 import numpy as np
 import pytest
@@ -10,12 +10,12 @@ from harness.core.skeleton import forward_kinematics
 from harness.mocap import synthetic
 
 STATIONS = {"head": 0.5, "thorax": 0.5, "lhand": 0.5, "rhand": 0.5, "ltibia": 0.9, "rtibia": 0.9}
-"""Bones that carry a tracker, and where along them."""
+"""Bones with a tracker, and its place along the bone."""
 JUDGED = [("p1", 1), ("p3", 3), ("p5", 2), ("p8", 4)]
 
 
 def features(clip: Clip, every: int) -> tuple[Floats, Floats]:
-    """What six trackers report, relative to the chest's heading (N, 54), and the hinge angles (N, 48) [rad]."""
+    """Readings of six trackers relative to the chest's heading (N, 54), and the hinge angles (N, 48) [rad]."""
     frames = slice(None, None, every)
     angles = clip.angles_rad[frames]
     pose = forward_kinematics(clip.skeleton, clip.root_m[frames], clip.world_from_root[frames], angles)
@@ -42,7 +42,7 @@ def mean_error_deg(estimate: Floats, truth: Floats) -> float:
 
 @pytest.mark.parametrize("behaviour", synthetic.BEHAVIOURS)
 def test_learning_from_other_takes_beats_the_mean_pose_threefold(behaviour: str) -> None:
-    """Kernel ridge regression from tracker readings to angles, trained on every take but the one it is judged on."""
+    """Kernel ridge regression from tracker readings to angles, trained on all takes but the test take."""
     takes = {
         (who, take): features(synthetic.generate(behaviour, who, take, seed=7, rate_hz=30.0), 10)
         for who in synthetic.performer_names()

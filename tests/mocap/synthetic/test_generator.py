@@ -1,4 +1,4 @@
-"""The built-in performer keeps what people keep: joint limits, planted feet, ballistic flight, smoothness."""
+"""The motion generator has properties of human motion: joint limits, fixed feet, ballistic flight, smoothness."""
 
 import time
 from functools import cache
@@ -31,13 +31,13 @@ def made(behaviour: str, who: str, take: int, seed: int = 7) -> tuple[Clip, Pose
 
 
 def speed_m_s(points: Floats, rate_hz: float) -> Floats:
-    """(T-1,) of points (T, 3)."""
+    """(T-1,) speed of points (T, 3) [m/s]."""
     out: Floats = np.linalg.norm(np.diff(points, axis=0), axis=-1) * rate_hz
     return out
 
 
 def sole(clip: Clip, pose: Pose, side: str) -> dict[str, Floats]:
-    """Heel and ball of a foot (T, 3), as heights over where each is when the foot stands flat."""
+    """Heel and ball of a foot (T, 3), with heights relative to those of a flat foot."""
     b = clip.skeleton.index(f"{side}foot")
     ankle, ball = pose.start_m[:, b], pose.end_m[:, b]
     line = (ball - ankle) / clip.skeleton.length_m[b]
@@ -57,7 +57,7 @@ def airborne(clip: Clip, pose: Pose) -> Bools:
 
 
 def runs(mask: Bools) -> list[tuple[int, int]]:
-    """First frames and ends of the stretches where `mask` (T,) holds, those at the borders left out."""
+    """First frame and end of each run of True in `mask` (T,), without runs at the borders."""
     edges = np.flatnonzero(np.diff(mask.astype(int)))
     starts, ends = edges[~mask[edges]] + 1, edges[mask[edges]] + 1
     return [(int(s), int(ends[ends > s][0])) for s in starts if np.any(ends > s)]
@@ -133,7 +133,7 @@ def test_a_population_depends_on_its_seed_and_not_on_its_size() -> None:
 
 
 def test_the_performers_are_the_ones_that_results_were_measured_on() -> None:
-    """Rounded: the last bit of a sine is the machine's."""
+    """Rounded, since the last bit of a sine depends on the computer."""
     bones_m = np.round([synthetic.performer_skeleton(who).bone_m for who in synthetic.performer_names()], 9) + 0.0
     assert blake2b(bones_m.tobytes(), digest_size=8).hexdigest() == "b81940f776d8d094"
 
@@ -217,7 +217,7 @@ def test_walkers_turn_both_ways() -> None:
 
 @pytest.mark.parametrize(("who", "take"), TAKES)
 def test_arms_swing_against_the_legs(who: str, take: int) -> None:
-    """Where a foot is furthest ahead, the hand of the same side is behind the other hand."""
+    """When a foot is farthest ahead, the hand of the same side is behind the other hand."""
     clip, pose = made("walking", who, take)
     s = clip.skeleton
     ahead = pose.world_from_bone[:, s.index("thorax"), :, 0] * [1.0, 1.0, 0.0]

@@ -1,4 +1,4 @@
-"""The parts the performer is made of: curves without jumps, limbs that reach, feet that stand."""
+"""Parts of the motion generator: smooth curves, limbs that reach their targets, feet that do not slide."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Contact sheets: a picture of the size the documentation can carry, and the committed ones are of every behaviour."""
+"""Contact sheets: pictures of moderate size, and one in the documentation for every behaviour."""
 
 import runpy
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Other programs read what is written, and read the same motion."""
+"""Exported files: other programs and this package read the same motion from them."""
 
 import csv
 from collections.abc import Mapping
@@ -26,13 +26,13 @@ from harness.testing.doctor import find_evo, run_evo_ape_m
 FRAMES, RATE_HZ = 50, 40.0
 SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)
 BELIEVED = standard_skeleton().with_bones(standard_skeleton().bone_m * 0.9)
-"""What the estimate stands on, as after a calibration that erred."""
+"""Skeleton of the estimate, as after an inaccurate calibration."""
 NAMES = ("root", *SKELETON.names)
 
 
 @dataclass(frozen=True)
 class Written:
-    """What a cell must have to be exported."""
+    """The fields of a cell that an export needs."""
 
     truth_qpos: Floats
     estimate_qpos: Floats
@@ -54,7 +54,7 @@ class Written:
 
 @pytest.fixture
 def cell(rng: np.random.Generator) -> Written:
-    """Arbitrary motion, upside down and beyond gimbal lock included."""
+    """Arbitrary motion, including upside-down poses and gimbal lock."""
 
     def motion() -> Floats:
         turns = np.cumsum(0.3 * rng.normal(size=(FRAMES, 3)), axis=0)
@@ -216,7 +216,7 @@ def test_evo_finds_our_root_position_error(cell: Written, tmp_path: Path) -> Non
 
 
 def test_gaps_and_broken_estimates(cell: Written, tmp_path: Path) -> None:
-    """BVH has no times, so it holds the frame before; the others skip what is not there."""
+    """BVH has no times, so it repeats the frame before a gap; the other formats leave the gap out."""
     estimate = cell.estimate_qpos.copy()
     estimate[10] = np.nan
     gappy = replace(cell, estimate_qpos=estimate, frame_index=np.r_[np.arange(20), np.arange(23, 23 + 30)])
