@@ -11,6 +11,7 @@ from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.anchor_frame import anchor_of
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
+from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.methods.kernel_cca import KernelCca
 from harness.reconstruct.methods.local_regression import LocalRegression
@@ -108,7 +109,7 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     assert examples.nearest(query, trust, 1).tolist() == [row]
     inputs, asked, poses = examples.regression_data(np.array([row]), np.array([row]), query, trust)
     np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
-    stood = ground_frame.qpos_from_postures(poses[0, :52], ground_frame.step_grounds(np.array(view), poses[0, 52:]))
+    stood = ground_frame.qpos_from_postures(poses[0, :52], step_ground(np.array(view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 
