@@ -114,7 +114,9 @@ def test_the_source_hash_follows_a_method_into_its_own_files(tmp_path: Path, mon
     """A lone file, and what it imports from beside itself, however deep; nothing else that lies there."""
     monkeypatch.syspath_prepend(tmp_path)
     for name, text in {
-        "split_method": "import split_options\nfrom harness.reconstruct.methods.ik import Ik\n\n\nclass Mine(Ik): ...\n",
+        "split_method": (
+            "import split_options\nfrom harness.reconstruct.methods.ik import Ik\n\n\nclass Mine(Ik): ...\n"
+        ),
         "split_options": "from split_numbers import *\n",
         "split_numbers": "SIGMA = 1.0\n",
         "split_stranger": "",

@@ -59,9 +59,7 @@ class DynamicMap:
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"terms": "regression", "like": "search", "kept": "variance_kept"}
 
     name: str = "dynamic_map"
-    summary: str = (
-        "the pose that is likely by the readings and by a local model of examples, learnt from answers and readings"
-    )
+    summary: str = "maximum a posteriori pose under a local dynamic model of examples, found by history and readings"
     needs_examples: bool = True
     search: Literal["features", "history"] = "features"
     """What neighbours are compared by: the last estimates and the readings, or the last estimates alone (the paper)."""
@@ -122,7 +120,7 @@ class DynamicMap:
 
 WINDOW = DynamicMap(
     "dynamic_map:window",
-    "the same with a local model of the last answers alone, as in Liu et al. 2011, its known traps mended",
+    "dynamic_map with examples found by history alone, as in Liu et al. 2011, and regularised",
     search="history",
     poses=2,
     neighbours=100,
@@ -137,7 +135,7 @@ WINDOW = DynamicMap(
 )
 LITERAL = DynamicMap(
     "dynamic_map:literal",
-    "Liu et al. 2011 to the letter: 99 % of the variance, weights and sigma as printed, start at the closest",
+    "dynamic_map as printed in Liu et al. 2011: 99 % of the variance, no ridge, start at the nearest example",
     search="history",
     poses=2,
     neighbours=40,

@@ -50,7 +50,7 @@ class LocalPca:
     """Options of local PCA, a `Method`; scenarios/tune_local_pca.toml chose the defaults on validation clips."""
 
     name: str = "local_pca"
-    summary: str = "the pose within a few principal directions of similar examples that fits the readings best"
+    summary: str = "best fit to the readings within the principal directions of similar examples"
     needs_examples: bool = True
     neighbours: int = 300
     """K, examples of the local model."""

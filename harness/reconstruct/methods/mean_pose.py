@@ -68,7 +68,7 @@ class MeanPose:
     """The mean pose, a `Method`; it has no options."""
 
     name: str = "mean_pose"
-    summary: str = "the examples' mean posture, stood where the trackers are: the null that learns"
+    summary: str = "the examples' mean posture, placed at the trackers: a baseline"
     needs_examples: bool = True
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedMeanPose":
