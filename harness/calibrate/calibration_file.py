@@ -50,20 +50,20 @@ class CalibrationFile:
 
     def select(self, stations: Sequence[str]) -> "CalibrationFile":
         """A copy with these stations only, in this order; BadInput names the first that is missing."""
-        known = self.calibration
+        calibration = self.calibration
         for name in stations:
-            if name not in known.stations:
+            if name not in calibration.stations:
                 raise BadInput(
-                    f"Station {name!r} is not in the calibration, which has {', '.join(known.stations)}.",
+                    f"Station {name!r} is not in the calibration, which has {', '.join(calibration.stations)}.",
                     "Wear the calibrated stations, use the names they had then, or calibrate again.",
                 )
-        rows = [known.stations.index(name) for name in stations]
+        rows = [calibration.stations.index(name) for name in stations]
         chosen = replace(
-            known,
+            calibration,
             stations=tuple(stations),
-            bones=tuple(known.bones[row] for row in rows),
-            mount_m=known.mount_m[rows],
-            bone_from_station=known.bone_from_station[rows],
+            bones=tuple(calibration.bones[row] for row in rows),
+            mount_m=calibration.mount_m[rows],
+            bone_from_station=calibration.bone_from_station[rows],
         )
         return replace(self, calibration=chosen)
 
@@ -111,15 +111,15 @@ def write_calibration(path: Path, content: CalibrationFile, *, force: bool = Fal
     """Write a calibration file atomically; BadFile as `require_writable`, BadInput for a skeleton of other joints."""
     require_writable(path, force=force)
     target = path.resolve()  # a symbolic link stays; its target is replaced
-    beside = target.with_name(f".unfinished-{target.name}")
+    temporary = target.with_name(f".unfinished-{target.name}")
     text = "\n".join(_lines(content)) + "\n"
     try:
-        beside.write_text(text, encoding="utf-8", errors="replace", newline="\n")
-        os.replace(beside, target)
+        temporary.write_text(text, encoding="utf-8", errors="replace", newline="\n")
+        os.replace(temporary, target)
     except OSError as error:
         raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Choose another.") from error
     finally:
-        beside.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
 
 
 def read_calibration(path: Path | str) -> CalibrationFile:

@@ -106,7 +106,7 @@ class SharedUnknowns:
         return out
 
     def _lengths(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
-        """What the modes leave of the lengths."""
+        """Residual of the lengths about the modes, in standard deviations, and its Jacobian."""
         slope = self.length_jacobian(at)
         slope[:, self.weights] = -self.space.modes.T
         left_m = at.length_m - self.space.mean_m - at.weights_m @ self.space.modes
@@ -137,8 +137,8 @@ class SharedUnknowns:
         ) / mount_spread
         slope = np.zeros((len(self.mounts), 3, self.count))
         for j, bone in enumerate(self.carriers):
-            own = np.flatnonzero(self.bone_of == bone)
-            slope[j][:, own] = -self._along[j] * self.vector[own].T
+            coordinates = np.flatnonzero(self.bone_of == bone)
+            slope[j][:, coordinates] = -self._along[j] * self.vector[coordinates].T
             slope[j][:, self.mount][:, 3 * j : 3 * j + 3] = np.eye(3)
         off_m = at.mount_m - self.nominal_m(at.bone_m, skin_offset_m)
         return (root @ off_m[..., None]).ravel(), (root @ slope).reshape(-1, self.count)

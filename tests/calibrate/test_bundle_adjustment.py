@@ -80,13 +80,13 @@ def test_expectations_against_differences(rng: np.random.Generator) -> None:
 
 def whole(normal: NormalEquations) -> tuple[Floats, Floats]:
     """The normal matrix of everything at once, and its right side."""
-    poses, own, shared = normal.across.shape
+    poses, own, shared = normal.coupling.shape
     matrix = np.zeros((shared + poses * own,) * 2)
     matrix[:shared, :shared] = normal.shared
     for p in range(poses):
         rows = slice(shared + p * own, shared + (p + 1) * own)
-        matrix[rows, rows], matrix[rows, :shared] = normal.own[p], normal.across[p]
-        matrix[:shared, rows] = normal.across[p].T
+        matrix[rows, rows], matrix[rows, :shared] = normal.pose_blocks[p], normal.coupling[p]
+        matrix[:shared, rows] = normal.coupling[p].T
     return matrix, np.concatenate([normal.shared_gradient, normal.pose_gradient.ravel()])
 
 

@@ -62,7 +62,7 @@ class DynamicMap:
     summary: str = "maximum a posteriori pose under a local dynamic model of examples, found by history and readings"
     needs_examples: bool = True
     search: Literal["features", "history"] = "features"
-    """What neighbours are compared by: the last estimates and the readings, or the last estimates alone (the paper)."""
+    """Search of the neighbours: by the last estimates and the readings, or by the last estimates alone (the paper)."""
     regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)
     """Options of the reduced-rank regression that makes the features; used when `search` is "features"."""
     poses: int = 3
