@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.station_kinematics import StationKinematics, StationPoses
 from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns, apply_step
 from harness.core import rotations
@@ -22,7 +23,7 @@ class ResidualScales:
     pose_error_rad: float
     """Error of each hinge, and of the lean of the body, against the nominal pose [rad]."""
     mount_spread: float
-    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_*_SD_M`."""
+    """Spread of trackers about their nominal mounts, in units of `held_pose_model.MOUNT_*_SD_M`."""
     skin_offset_m: Floats
     """(S, 3) offset of the nominal mounts from the bones, an argument of `SharedUnknowns.nominal_m` [m]."""
     position_sd_m: float
@@ -184,12 +185,6 @@ class BundleAdjustment:
         slope[:, :2, 3:6] = _tilt(at)[1]
         slope[:, 2:, 6:] = np.eye(count)
         return slope
-
-
-def heading_between_rad(from_m: Floats, to_m: Floats) -> float:
-    """Rotation about the vertical that fits points (S, 3) to others best, each about its mean [rad]."""
-    a, b = ((points - points.mean(axis=0))[:, :2] @ [1.0, 1.0j] for points in (from_m, to_m))
-    return float(np.angle(np.vdot(a, b)))
 
 
 def mean_rotations(turns: Floats) -> Floats:

@@ -74,7 +74,7 @@ class PoseCalibration:
     pose_error_rad: Floats
     """(P,) error of each pose, standard deviation of a hinge [rad]."""
     mount_spread: float
-    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_*_SD_M`."""
+    """Spread of trackers about their nominal mounts, in units of `held_pose_model.MOUNT_*_SD_M`."""
     condition: float
     """Condition number of the whitened normal matrix."""
     hints: tuple[str, ...]

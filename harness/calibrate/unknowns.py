@@ -9,15 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.body.mounts import Mount, locate_mount
+from harness.calibrate.held_pose_model import MOUNT_ACROSS_SD_M, MOUNT_ALONG_SD_M
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
 
-MOUNT_ALONG_SD_M, MOUNT_ACROSS_SD_M = 0.03, 0.015
-"""Distance of trackers from their nominal mounts, standard deviation along the bone and on the two axes across it [m].
-
-The values are those of `held_pose_model`; the fit estimates the actual spread in units of them (`mount_spread`)."""
 _LEAST_ACROSS_M = 1e-6
 """Directions with a smaller standard deviation than this are taken as fixed [m]."""
 

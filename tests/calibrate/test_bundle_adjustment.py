@@ -8,9 +8,9 @@ from harness.calibrate.bundle_adjustment import (
     BundleAdjustment,
     NormalEquations,
     ResidualScales,
-    heading_between_rad,
     mean_rotations,
 )
+from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.poses import POSES, pose_angles_rad
 from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns
 from harness.core import rotations

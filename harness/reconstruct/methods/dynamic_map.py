@@ -35,10 +35,10 @@ from harness.reconstruct.descent import qpos_from_posture
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.neighbour_search import FeatureSearch, NeighbourSearch, PoseHistorySearch
+from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.index import Index, make_index
 from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
-from harness.reconstruct.methods.mean_pose import mean_posture
 from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE_SIZE, TILT
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions

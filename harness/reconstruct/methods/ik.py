@@ -28,7 +28,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.methods.mean_pose import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M
