@@ -1,4 +1,4 @@
-"""The mean posture and the best match: what they are for is to be beaten, but rightly."""
+"""The baselines: mean pose and best match."""
 
 from dataclasses import replace
 

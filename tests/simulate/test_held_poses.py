@@ -1,4 +1,4 @@
-"""Poses that are held one after another, and trackers that are strapped on beside their places."""
+"""Motions of held poses, and random mounts."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def body() -> Body:
 
 
 def poses(body: Body) -> list[Floats]:
-    """The T-pose, then arms and legs elsewhere."""
+    """The T-pose and other configurations."""
     out, rng = [tpose(body.skeleton)], generator(1, "poses")
     for _ in range(COUNT - 1):
         pose = np.array(out[0])

@@ -1,4 +1,4 @@
-"""The set-ups of the papers, and configurations that cannot be."""
+"""The set-ups of the papers, and impossible configurations."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,7 +34,7 @@ FIVE = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "pelvis")
 
 
 def error_m(body: Body, simulation: Simulation) -> float:
-    """Farthest that a decoded station, put into the world by the calibration, is from MuJoCo's at the frame's time."""
+    """Largest distance of a decoded station, in world axes, from MuJoCo's at the frame's time."""
     known, kinematics, worst = simulation.calibration, Kinematics(body), 0.0
     bones = [body.skeleton.index(bone) for bone in known.bones]
     for frame, index in zip(simulation.frames, simulation.frame_index, strict=True):
