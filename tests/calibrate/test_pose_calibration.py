@@ -129,7 +129,7 @@ def test_what_few_stations_do_not_tell_is_named(stations: tuple[str, ...], unsee
     assert rms(found.skeleton.length_m - model.skeleton.length_m) < 0.02
 
 
-def test_uncertainty_is_told() -> None:
+def test_uncertainty_is_reported() -> None:
     model = Model(somebody(5), SIX, float(np.deg2rad(1.0)), 0.0015, 0.006, beside_m=0.01)
     found = found_of(model)
     prior = np.sqrt(np.diag(space().covariance_m2))
@@ -142,7 +142,7 @@ def test_uncertainty_is_told() -> None:
     assert np.isfinite(found.condition)
 
 
-def test_a_strap_put_on_the_other_way_round_is_told_of() -> None:
+def test_a_strap_put_on_the_other_way_round_gives_a_hint() -> None:
     """A nominal strap gives no hint; a rotated one gives a hint, and the calibration is as good."""
     model = Model(somebody(6), straps=False)
     assert found_of(model).hints == ()
@@ -210,7 +210,7 @@ def test_a_pose_that_was_not_held_is_named(pose: int, instead: int, name: str) -
     assert "mm" in message
 
 
-def test_someone_who_moved_is_told_in_which_pose() -> None:
+def test_a_performer_who_moved_learns_in_which_pose() -> None:
     model = Model(somebody(10))
     held = model.held()
     held[3] = [replace(frame, position_m=frame.position_m + 0.2 * k * np.eye(6, 3)) for k, frame in enumerate(held[3])]

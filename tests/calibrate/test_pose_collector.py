@@ -125,7 +125,7 @@ def test_a_rest_is_no_pose(place: int) -> None:
     assert wanted in passed.why
 
 
-def test_a_repeated_pose_and_one_too_early_are_told() -> None:
+def test_a_repeated_pose_and_one_too_early_are_rejected() -> None:
     order = [0, 1, 2, 1, 4, 3, 4, 5, 6, 7]
     collector, said = collected(stream([pose(n) for n in order]))
     assert said == list(range(1, 9))
@@ -146,7 +146,7 @@ def test_another_number_of_holds(count: int) -> None:
         assert str(collector.rejected[0]).endswith("s on not taken: all 8 poses were taken before")
 
 
-def test_whoever_stops_early_is_told_what_there_was() -> None:
+def test_a_stream_that_ends_early_reports_the_poses_so_far() -> None:
     frames = eight()[: round(12.0 * RATE_HZ)]
     told: list[str] = []
     leading = PoseGuide(PoseCollector(SIX, 8, classifier()), POSES)

@@ -223,7 +223,7 @@ def refusal(session: Session, frames: Sequence[TrackerFrame]) -> str:
 
 
 @pytest.mark.parametrize("noise", ["clean", "default"])
-def test_someone_who_walks_is_told_to_stand(noise: str) -> None:
+def test_a_walking_performer_is_refused(noise: str) -> None:
     body, take = retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.5, rate_hz=40.0))
     session = Session(body, noise=noise)
     assert "moved" in refusal(session, session.seen(take.qpos)[0])
@@ -275,7 +275,7 @@ def test_a_station_that_was_out_for_a_while_is_no_matter() -> None:
     assert off_deg(found.bone_from_station, truth.bone_from_station).max() < 0.01
 
 
-def test_too_little_time_is_said() -> None:
+def test_a_hold_that_is_too_short_is_refused() -> None:
     session = Session(bodies()[0])
     assert "frames in 1.5 s are too few" in refusal(session, session.held(seconds=1.5)[0])
     assert "too few" in refusal(session, [])

@@ -266,7 +266,7 @@ def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coas
     assert law_cm * (1.0 - 0.026 / coast_s) ** 2 < worst_cm <= law_cm, "the last reading is up to 25 ms before the gap"
 
 
-def test_a_lost_station_keeps_sending_what_it_said_last(still: Still) -> None:
+def test_a_lost_station_repeats_its_last_reading(still: Still) -> None:
     seen = still(10.0)
     WhiteNoise().apply(seen)
     before = seen.position_m.copy()

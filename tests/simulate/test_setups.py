@@ -128,7 +128,7 @@ def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
     [("rate_hz", float("inf")), ("rate_hz", float("nan")), ("rate_hz", 0.0), ("latency_s", -5.0), ("baud", 0),
      ("queue_records", 0)],
 )  # fmt: skip
-def test_a_tracker_that_cannot_be_is_told_by_its_key(key: str, value: Any) -> None:
+def test_an_impossible_tracker_is_refused_with_its_key(key: str, value: Any) -> None:
     with pytest.raises(BadInput, match=f"^The tracker's {key} = {value:g}. Give a number"):
         TrackerConfig(**{key: value})
 

@@ -80,7 +80,7 @@ def test_clean_frames_are_the_truth_but_for_float32(boxer: Boxer) -> None:
     assert column(simulation, "quality").min() == 1.0
 
 
-def test_the_truth_is_told_at_the_mean_of_the_sampling_times(boxer: Boxer) -> None:
+def test_the_truth_is_that_of_the_mean_sampling_time(boxer: Boxer) -> None:
     simulation, trajectory = seen(boxer), Trajectory(*boxer)
     times_s = sampling_times_s(trajectory.duration_s, TrackerConfig(), 6)
     np.testing.assert_allclose(np.diff(times_s, axis=1), TrackerConfig().record_s, atol=1e-12)

@@ -202,7 +202,7 @@ def test_flesh_of_no_bone() -> None:
         soft_tissue.tissue_thickness_m("femur", 0.5)
 
 
-def test_loose_straps_slip_as_often_and_as_far_as_said(still: Still) -> None:
+def test_strap_slips_have_the_given_rate_and_size(still: Still) -> None:
     slipped, along, around = [], [], []
     for seed in range(60):
         true, seen = still(0.5, 8, seed=seed), still(0.5, 8, seed=seed)
