@@ -33,7 +33,7 @@ class Disturbance:
     station: str = ""
     """Station of `one_lost` and `one_off`; "" is the first."""
     from_s: float = 3.0
-    """When it begins [s]; `start_off` begins with the take."""
+    """Beginning [s]; `start_off` always begins with the take."""
     lasts_s: float = 2.0
     """Duration [s]."""
     off_m: float = 0.3

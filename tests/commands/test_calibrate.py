@@ -139,7 +139,7 @@ def test_poses_that_are_missing_are_told_and_nothing_is_written(
         (["--live", "--out", "me.toml", "--port", "x", "--pictures", "there"], "--pictures without --view frames"),
         (["--live", "--out", "me.toml", "--port", "no_such_port", "--scenario", "demo"], "no such port"),
         (["no_such.rec", "--out", "me.toml", "--scenario", "demo"], "no_such.rec"),
-        (["a.rec", "--out", "no/such/me.toml"], "no such folder"),
+        (["a.rec", "--out", "no/such/me.toml"], "folder does not exist"),
         (["a.rec", "--kind", "npose"], "invalid choice"),
     ],
 )

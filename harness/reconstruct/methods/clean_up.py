@@ -27,7 +27,7 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 SUFFIX = "+ik"
-"""What follows the other method's name."""
+"""Suffix of the other method's name."""
 
 
 @dataclass(frozen=True)

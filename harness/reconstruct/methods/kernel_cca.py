@@ -26,7 +26,9 @@ class KernelCca(LocalRegression):
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"held": "regularise_projection"}
 
     name: str = "kernel_cca"
-    summary: str = "kernel canonical correlation regression on the nearest examples, smoothed, then fitted"
+    summary: str = (
+        "kernel canonical correlation regression on the nearest examples, smoothed, then fitted to the trackers"
+    )
     neighbours: int = 12
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     bases: int = 12

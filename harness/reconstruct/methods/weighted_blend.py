@@ -22,7 +22,7 @@ class WeightedBlend(LocalRegression):
     """Options of the weighted blend, a `Method`."""
 
     name: str = "weighted_blend"
-    summary: str = "the nearest examples blended by their closeness, smoothed, then fitted to the trackers"
+    summary: str = "nearest examples weighted by inverse distance, smoothed, then fitted to the trackers"
     neighbours: int = 16
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     power: float = 4.0

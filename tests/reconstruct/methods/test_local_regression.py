@@ -1,4 +1,4 @@
-"""The second paper's methods: what they must do alike, and what each does by itself."""
+"""The methods of Kim et al. 2012: common properties, and those of each."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ IDS = [method.name for method in METHODS]
 
 
 def angle_error_deg(scene: Scene, qpos: np.ndarray) -> np.ndarray:
-    """(T,) mean over the hinges."""
+    """(T,) mean absolute hinge error [deg]."""
     off = unpack(qpos)[2] - unpack(scene.take.qpos)[2]
     return np.asarray(np.rad2deg(np.abs((off + np.pi) % (2.0 * np.pi) - np.pi)).mean(axis=1))
 
