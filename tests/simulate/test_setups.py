@@ -114,7 +114,7 @@ def test_the_message_names_component_field_and_range() -> None:
 
 
 def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
-    with pytest.raises(BadInput, match="a name twice"):
+    with pytest.raises(BadInput, match="a name occurs twice"):
         simulate_tracker(*boxer, worn("head", "head"), TrackerConfig(), Noise(), seed=1)
     with pytest.raises(BadInput, match="1 to 12"):
         simulate_tracker(*boxer, [], TrackerConfig(), Noise(), seed=1)
