@@ -1,6 +1,7 @@
-"""What methods are timed on: built-in takes to learn from, however many, and held-out ones as trackers see them.
+"""Clips for benchmarks of speed: any number of built-in takes to learn from, and simulated held-out takes.
 
-The setting is that of the accuracy tables: their body, stations and mounts, 40 Hz, exact calibration, level `clean`.
+Body, stations, mounts, rate (40 Hz) and calibration (exact) are those of the accuracy tables; the noise preset is
+`clean`.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,37 +28,37 @@ from harness.simulate.simulation import Simulation, simulate_tracker
 RATE_HZ, TAKE_S = 40.0, 20.0
 FRAMES_PER_TAKE = round(TAKE_S * RATE_HZ) + 1
 HELD_OUT_SEED_OFFSET = 1_000_000
-"""Seeds of held-out takes start so much higher."""
+"""Offset from the seeds of takes for training to those of held-out takes."""
 WARM_UP_FRAMES = round(1.0 * RATE_HZ)
-"""Frames at the start of every take that count neither for time nor for error, as in the tables."""
+"""Number of frames at the start of every take that are neither timed nor scored, as in the accuracy tables."""
 DEFAULT_SCENARIO = "walking"
-"""The scenario whose stations and tracker are taken, where no other is named."""
+"""Scenario that stations and tracker are taken from by default."""
 
 
 @dataclass(frozen=True, eq=False)
 class BenchmarkClip:
-    """A held-out take as the trackers read it, and its truth."""
+    """A held-out take with its simulated stream and its truth."""
 
     take: str
     simulation: Simulation
     truth: Floats
-    """(F, 55) at each frame."""
+    """(F, 55) true configuration at each frame."""
 
 
 def build_common_body() -> Body:
-    """The common body."""
+    """The body of the standard skeleton, on which benchmarks run."""
     return humanoid.build_body()
 
 
 def load_clean_scenario(name: str = DEFAULT_SCENARIO) -> Scenario:
-    """One of the project's own, as good as it can be: level `clean`."""
+    """A shipped scenario with the noise preset `clean`."""
     return replace(load_scenario(name), noise="clean", components={})
 
 
 def generate_take(
     which: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS, frames: int = FRAMES_PER_TAKE
 ) -> BodyMotion:
-    """One of endlessly many takes: behaviours and performers in turn, then a new seed; the angles as they are."""
+    """Take number `which` of an endless series: behaviours and performers in turn, then the next seed."""
     people = synthetic.performer_names()
     again, which = divmod(which, len(behaviours) * len(people))
     behaviour, who = behaviours[which % len(behaviours)], people[which // len(behaviours)]
@@ -69,7 +70,7 @@ def generate_take(
 def make_take_factories(
     frames: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS
 ) -> list[Callable[[], BodyMotion]]:
-    """Functions that make takes of exactly so many frames together, all with names of their own; the last is cut."""
+    """Functions that generate takes with `frames` frames in all and distinct names; the last take is cut."""
     whole, rest = divmod(frames, FRAMES_PER_TAKE)
     counts = [FRAMES_PER_TAKE] * whole + [rest] * (rest > 0)
     return [partial(generate_take, which, seed, behaviours, count) for which, count in enumerate(counts)]
@@ -78,7 +79,7 @@ def make_take_factories(
 def generate_held_out_takes(
     count: int, seed: int, seconds: float, behaviours: Sequence[str] = synthetic.BEHAVIOURS
 ) -> list[BodyMotion]:
-    """The first seconds of takes that are in no database of this seed."""
+    """The first seconds of `count` takes that no training database of this seed contains."""
     return [
         generate_take(w, seed + HELD_OUT_SEED_OFFSET, behaviours, round(seconds * RATE_HZ) + 1) for w in range(count)
     ]
@@ -92,28 +93,28 @@ def generate_held_out_clips(seed: int, seconds: float) -> list[BenchmarkClip]:
 
 
 def simulate_clips(takes: Sequence[BodyMotion], seed: int, worn: Scenario) -> list[BenchmarkClip]:
-    """Takes as the stations of a scenario read them."""
-    on, found = build_common_body(), []
+    """Simulate the streams of takes for the stations of a scenario."""
+    body, clips = build_common_body(), []
     for take in takes:
-        seen = simulate_tracker(on, take, mounts_of(worn), tracker_of(worn), noise_of(worn), seed=seed)
-        found.append(BenchmarkClip(take.name, seen, seen.truth_qpos[seen.frame_index]))
-    return found
+        seen = simulate_tracker(body, take, mounts_of(worn), tracker_of(worn), noise_of(worn), seed=seed)
+        clips.append(BenchmarkClip(take.name, seen, seen.truth_qpos[seen.frame_index]))
+    return clips
 
 
 def fit_named_method(name: str, learnt: MotionDatabase, seed: int) -> Reconstructor:
-    """The method of that name, which has learnt from a database."""
+    """The method of that name, fitted to a database on the standard body."""
     return fit_method(registry.resolve(name), build_common_body(), learnt, generator(seed, "method", name))
 
 
 def fit_method(method: Method, on: Body, learnt: MotionDatabase, rng: np.random.Generator) -> Reconstructor:
-    """Trained on a database; a method that asks for takes is given them."""
+    """Fit a method to a database; a method that takes examples receives the database's runs as takes."""
     if isinstance(method, DatabaseMethod):
         return method.fit_database(on, learnt, rng)
     return method.fit(on, extract_takes(learnt) if method.needs_examples else [], rng)
 
 
 def extract_takes(learnt: MotionDatabase) -> list[BodyMotion]:
-    """The runs of a database as takes that start at the origin."""
+    """The runs of a database as takes that begin at the origin."""
     found = []
     for run in learnt.runs:
         rows = slice(run.start, run.stop)
@@ -125,7 +126,7 @@ def extract_takes(learnt: MotionDatabase) -> list[BodyMotion]:
 
 
 def integrate_steps(step: Floats) -> Floats:
-    """(T, 3) ground frames (x, y, yaw) that steps (T, 3) lead through, from the origin."""
+    """Ground frames (T, 3) (x, y, yaw) [m, m, rad] after each of the steps (T, 3), starting at the origin."""
     yaw = np.cumsum(step[:, 2])
     before = yaw - step[:, 2]
     forward, left = step[:, 0], step[:, 1]
@@ -135,5 +136,5 @@ def integrate_steps(step: Floats) -> Floats:
 
 
 def joint_angle_error_deg(estimate: Floats, truth: Floats) -> float:
-    """Joint angle error (D1) of configurations (F, 55)."""
+    """Mean joint angle error (metric D1) of configurations (F, 55) [deg]."""
     return float(np.rad2deg(np.abs(wrap_angle(estimate[:, 7:] - truth[:, 7:])).mean()))

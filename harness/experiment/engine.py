@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -243,19 +244,20 @@ def _run_tasks(
             return []
         broken = []
         arguments = [(_session_id(), task, out.absolute(), stop.absolute()) for task in tasks]
-        for which, future in executor(run_task, arguments):
-            try:
-                for cell in future.result():
-                    record(cell)
-            except BrokenExecutor:
-                broken.append(tasks[which])
-            except HarnessError:
-                raise
-            except Exception:  # the task could not be sent or answered: its cells fail, the others go on
-                failure = traceback.format_exc()
-                for planned in tasks[which].cells():
-                    if str(planned) not in outcomes:
-                        record(CellOutcome(str(planned), failure=failure))
+        with closing(executor(run_task, arguments)) as ended:  # an interrupt stops its workers at once
+            for which, future in ended:
+                try:
+                    for cell in future.result():
+                        record(cell)
+                except BrokenExecutor:
+                    broken.append(tasks[which])
+                except HarnessError:
+                    raise
+                except Exception:  # the task could not be sent or answered: its cells fail, the others go on
+                    failure = traceback.format_exc()
+                    for planned in tasks[which].cells():
+                        if str(planned) not in outcomes:
+                            record(CellOutcome(str(planned), failure=failure))
         return broken
 
     with graceful_stop(stop):

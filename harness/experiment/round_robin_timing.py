@@ -1,4 +1,4 @@
-"""Methods that follow the same takes in turns, a second of motion each: what else the machine does meets all alike."""
+"""Round-robin timing: methods process the same takes in turns of one second, so that other load affects all alike."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -12,71 +12,71 @@ from harness.reconstruct.contract import Reconstructor
 from harness.stream.frame import TrackerFrame
 
 FRAMES_PER_TURN = 40
-"""Frames of one contender in a row."""
+"""Number of consecutive frames of one method."""
 
 ProgressCallback = Callable[[str, int, int], None]
 TimedStep = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
-"""Takes a frame and the true pose of the one before to a configuration (55,) and the seconds that it took."""
+"""Maps a frame and the true configuration of the previous frame to a configuration (55,) and its time [s]."""
 TimedMethod = Callable[[BenchmarkClip], TimedStep]
-"""Makes itself ready for a take."""
+"""Prepares a method for a clip."""
 
 
 @dataclass
 class MethodTimings:
-    """One contender's turns."""
+    """Timings and errors of one method."""
 
     turn_s: list[float] = field(default_factory=list)
     step_ms: list[float] = field(default_factory=list)
     error_deg: list[float] = field(default_factory=list)
     first_ms: list[float] = field(default_factory=list)
-    """The first step of each take, which no other figure has."""
+    """Time of the first step of each take [ms], which no other field includes."""
 
     @property
     def fps(self) -> float:
-        """The median turn's."""
+        """Frames per second of the median turn."""
         return FRAMES_PER_TURN / float(np.median(self.turn_s))
 
 
 def time_round_robin(
-    contenders: Mapping[str, TimedMethod], shown: Sequence[BenchmarkClip], progress: ProgressCallback
+    methods: Mapping[str, TimedMethod], clips: Sequence[BenchmarkClip], progress: ProgressCallback
 ) -> dict[str, MethodTimings]:
-    """All contenders on all takes, in turns; the first second of a take is not counted."""
-    tallies = {name: MethodTimings() for name in contenders}
-    planned = sum(len(trial.simulation.frames) // FRAMES_PER_TURN for trial in shown)
+    """Time all methods on all clips in turns; the first second of a clip is not counted."""
+    timings = {name: MethodTimings() for name in methods}
+    planned = sum(len(clip.simulation.frames) // FRAMES_PER_TURN for clip in clips)
     done = 0
-    for trial in shown:
-        followers = {name: begin(trial) for name, begin in contenders.items()}
-        for start in range(0, len(trial.simulation.frames) - FRAMES_PER_TURN + 1, FRAMES_PER_TURN):
-            progress(trial.take, done, planned)
+    for clip in clips:
+        steps = {name: begin(clip) for name, begin in methods.items()}
+        for start in range(0, len(clip.simulation.frames) - FRAMES_PER_TURN + 1, FRAMES_PER_TURN):
+            progress(clip.take, done, planned)
             done += 1
-            for name, follow in followers.items():
+            for name, step_timed in steps.items():
                 turn = [
-                    follow(trial.simulation.frames[t], trial.truth[max(t - 1, 0)])
+                    step_timed(clip.simulation.frames[t], clip.truth[max(t - 1, 0)])
                     for t in range(start, start + FRAMES_PER_TURN)
                 ]
-                found, seconds = np.array([qpos for qpos, _ in turn]), [spent for _, spent in turn]
+                qpos, seconds = np.array([estimate for estimate, _ in turn]), [spent for _, spent in turn]
                 if start == 0:
-                    tallies[name].first_ms.append(1e3 * seconds[0])
+                    timings[name].first_ms.append(1e3 * seconds[0])
                 if start >= WARM_UP_FRAMES:
-                    tallies[name].turn_s.append(sum(seconds))
-                    tallies[name].step_ms += [1e3 * spent for spent in seconds]
-                    tallies[name].error_deg.append(
-                        joint_angle_error_deg(found, trial.truth[start : start + FRAMES_PER_TURN])
+                    timings[name].turn_s.append(sum(seconds))
+                    timings[name].step_ms += [1e3 * spent for spent in seconds]
+                    timings[name].error_deg.append(
+                        joint_angle_error_deg(qpos, clip.truth[start : start + FRAMES_PER_TURN])
                     )
-    return tallies
+    return timings
 
 
-def time_method(learnt: Reconstructor) -> TimedMethod:
-    """A method that has learnt; only its steps are timed."""
+def time_method(reconstructor: Reconstructor) -> TimedMethod:
+    """A timed method from a fitted reconstructor; only its steps are timed."""
 
-    def begin(trial: BenchmarkClip) -> TimedStep:
-        step = learnt.begin(trial.simulation.calibration).step
+    def begin(clip: BenchmarkClip) -> TimedStep:
+        step = reconstructor.begin(clip.simulation.calibration).step
 
-        def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
+        def step_timed(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
             start = time.perf_counter()
             qpos = step(frame).qpos
             return qpos, time.perf_counter() - start
 
-        return follow
+        return step_timed
 
     return begin

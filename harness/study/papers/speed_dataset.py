@@ -70,7 +70,7 @@ def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], worn: Scen
     settings, wanted = _test_clip_settings(study, study.library, frames, worn), sum(frames.values())
     files = {entry.name: _digest(entry.path) for entry in MotionLibrary(study.library).entries()}
     content = {"files": files, "examples": settings[0].scenario.motion.examples, "frames": wanted}
-    learnt = build_database(folder, content, lambda: truncate_motions(settings[0].examples, wanted))
+    learnt = build_database(folder, content, lambda: truncate_motions(settings[0].training.examples, wanted))
     return SpeedDataset(learnt, [_benchmark_clip(setting) for setting in settings])
 
 
