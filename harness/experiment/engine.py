@@ -74,18 +74,7 @@ def run(
     content = asdict(scenario)
     del content["fault"]  # faults concern the emulator alone, a run does not depend on them
     with process_executor(jobs) as executor:
-        return _run_folder(
-            "run",
-            scenario.name,
-            content,
-            [scenario],
-            out,
-            folder=folder,
-            executor=executor,
-            workers=jobs,
-            command=command,
-            progress=progress,
-        )
+        return _run_folder("run", scenario.name, content, [scenario], out, folder, executor, jobs, command, progress)
 
 
 def run_sweep(
@@ -112,19 +101,7 @@ def run_sweep(
         },
         "methods": list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)),
     }
-    return _run_folder(
-        "sweep",
-        sweep.name,
-        content,
-        scenarios,
-        out,
-        folder=folder,
-        executor=executor,
-        workers=workers,
-        command=command,
-        only=only,
-        progress=progress,
-    )
+    return _run_folder("sweep", sweep.name, content, scenarios, out, folder, executor, workers, command, progress, only)
 
 
 def run_cells(
@@ -157,7 +134,6 @@ def _run_folder(
     content: Mapping[str, Any],
     scenarios: Sequence[Scenario],
     out: Path,
-    *,
     folder: Path | None,
     executor: TaskExecutor,
     workers: int,

@@ -10,7 +10,8 @@ A scenario requests it by varying its disturbance, for example
 
 Both cells of a pair have the same motion and the same draws of noise (`core.seeds`). The measure is the mean joint
 angle error over the second that begins 1 s after the last bad frame, divided by that of the undisturbed cell over the
-same frames. A ratio of up to 1.5 counts as recovered. `harness run` prints it below its table, and `summary.json` lists it.
+same frames. A ratio of up to 1.5 counts as recovered. `harness run` prints it below its table, and `summary.json` lists
+it.
 """
 
 import json
