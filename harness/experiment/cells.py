@@ -160,15 +160,15 @@ def _resolve_method(name: str) -> Method:
 
 
 def evaluate_cell(
-    setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
+    evaluation: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
 ) -> storage.Cell:
     """Fit a method, run it causally over the simulated stream, and score its estimates."""
-    scenario, simulation = setting.scenario, setting.simulation
-    seen = make_inputs(planned.inputs, simulation.stations)
-    known, fitted = setting.performer_calibration, setting.fit_method(method, planned.method)
-    qpos, status, step_ms, cpu_ms = run_method(fitted, known.calibration, simulation, seen)
+    scenario, simulation = evaluation.scenario, evaluation.simulation
+    inputs = make_inputs(planned.inputs, simulation.stations)
+    calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
+    qpos, status, step_ms, cpu_ms = run_method(fitted, calibration.calibration, simulation, inputs)
     scores = score_estimate(
-        setting.body.skeleton,
+        evaluation.body.skeleton,
         scenario.tracker.rate_hz,
         simulation.truth_qpos,
         qpos,
@@ -176,35 +176,35 @@ def evaluate_cell(
         status,
         step_ms,
         cpu_ms=cpu_ms,
-        estimate_skeleton=known.body.skeleton,
+        estimate_skeleton=calibration.body.skeleton,
     )
     frames = simulation.frames
     return storage.Cell(
         key=key,
         method=planned.method,
-        behaviour=setting.behaviour,
-        clip=str(setting.part),
-        motion_source=setting.source.title,
+        behaviour=evaluation.behaviour,
+        clip=str(evaluation.part),
+        motion_source=evaluation.source.title,
         stations=simulation.stations,
         mount=scenario.mount,
         rate_hz=scenario.tracker.rate_hz,
         inputs=planned.inputs,
         split=scenario.motion.split if method.needs_examples else "none",
-        calibration=known.calibration.kind,
+        calibration=calibration.calibration.kind,
         noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,
-        performer=setting.subject.performer,
+        performer=evaluation.subject.performer,
         varied=planned.varied,
         scenario=scenario.name,
-        defined_by=setting.conditions_of(method, planned.inputs),
+        defined_by=evaluation.conditions_of(method, planned.inputs),
         scores=scores,
         health=simulation.health,
-        calibration_errors=known.errors,
-        bone_m=setting.body.skeleton.bone_m,
-        estimate_bone_m=known.body.skeleton.bone_m,
+        calibration_errors=calibration.errors,
+        bone_m=evaluation.body.skeleton.bone_m,
+        estimate_bone_m=calibration.body.skeleton.bone_m,
         source_hash=manifest.source_hash(),
         reproduce=command,
-        notes=setting.notes(method),
+        notes=evaluation.notes(method),
         time_s=simulation.truth_s[simulation.frame_index],
         truth_qpos=simulation.truth_qpos[simulation.frame_index],
         estimate_qpos=qpos,

@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -74,18 +75,7 @@ def run(
     content = asdict(scenario)
     del content["fault"]  # faults concern the emulator alone, a run does not depend on them
     with process_executor(jobs) as executor:
-        return _run_folder(
-            "run",
-            scenario.name,
-            content,
-            [scenario],
-            out,
-            folder=folder,
-            executor=executor,
-            workers=jobs,
-            command=command,
-            progress=progress,
-        )
+        return _run_folder("run", scenario.name, content, [scenario], out, folder, executor, jobs, command, progress)
 
 
 def run_sweep(
@@ -112,19 +102,7 @@ def run_sweep(
         },
         "methods": list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)),
     }
-    return _run_folder(
-        "sweep",
-        sweep.name,
-        content,
-        scenarios,
-        out,
-        folder=folder,
-        executor=executor,
-        workers=workers,
-        command=command,
-        only=only,
-        progress=progress,
-    )
+    return _run_folder("sweep", sweep.name, content, scenarios, out, folder, executor, workers, command, progress, only)
 
 
 def run_cells(
@@ -157,7 +135,6 @@ def _run_folder(
     content: Mapping[str, Any],
     scenarios: Sequence[Scenario],
     out: Path,
-    *,
     folder: Path | None,
     executor: TaskExecutor,
     workers: int,
@@ -244,19 +221,20 @@ def _run_tasks(
             return []
         broken = []
         arguments = [(_session_id(), task, out.absolute(), stop.absolute()) for task in tasks]
-        for which, future in executor(run_task, arguments):
-            try:
-                for cell in future.result():
-                    record(cell)
-            except BrokenExecutor:
-                broken.append(tasks[which])
-            except HarnessError:
-                raise
-            except Exception:  # the task could not be sent or answered: its cells fail, the others go on
-                failure = traceback.format_exc()
-                for planned in tasks[which].cells():
-                    if str(planned) not in outcomes:
-                        record(CellOutcome(str(planned), failure=failure))
+        with closing(executor(run_task, arguments)) as ended:  # an interrupt stops its workers at once
+            for which, future in ended:
+                try:
+                    for cell in future.result():
+                        record(cell)
+                except BrokenExecutor:
+                    broken.append(tasks[which])
+                except HarnessError:
+                    raise
+                except Exception:  # the task could not be sent or answered: its cells fail, the others go on
+                    failure = traceback.format_exc()
+                    for planned in tasks[which].cells():
+                        if str(planned) not in outcomes:
+                            record(CellOutcome(str(planned), failure=failure))
         return broken
 
     with graceful_stop(stop):
