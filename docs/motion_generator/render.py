@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
+from contact_sheet import contact_sheet
+
 from harness.mocap import synthetic
-from harness.report.kit.contact_sheet import contact_sheet
 
 # behaviour, performer, take, first figure [s], between figures [s], bone whose heading is the view's
 SHEETS = (

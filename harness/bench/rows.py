@@ -3,6 +3,8 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
+from harness.core.text_table import Table
+
 
 @dataclass(frozen=True)
 class BenchmarkRow:
@@ -26,14 +28,11 @@ class BenchmarkRow:
 
 
 def format_rows(rows: Sequence[BenchmarkRow]) -> str:
-    """A table of rows, one a line."""
-    lines = [("what", "measured", "", "held to", "measured against, in the same run")]
-    lines += [
-        (r.name, f"{r.value:,.3g}" if r.value < 100 else f"{r.value:,.0f}", r.unit, r.target, r.reference) for r in rows
-    ]
-    widths = [max(len(line[i]) for line in lines) for i in range(5)]
-    aligned = [
-        f"{a:<{widths[0]}}  {b:>{widths[1]}} {c:<{widths[2]}}  {d:<{widths[3]}}  {e}".rstrip()
-        for a, b, c, d, e in lines
-    ]
-    return "\n".join(aligned)
+    """A text table with one line for each row."""
+    head = ["what", "measured", "target", "measured against, in the same run"]
+    cells = [[row.name, f"{_format_value(row.value)} {row.unit}".rstrip(), row.target, row.reference] for row in rows]
+    return "\n".join(Table(head, cells, text_columns=len(head)).lines())
+
+
+def _format_value(value: float) -> str:
+    return f"{value:,.3g}" if value < 100 else f"{value:,.0f}"

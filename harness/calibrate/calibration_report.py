@@ -1,6 +1,6 @@
 """What a calibration found, in words and numbers: for the file that keeps it, and for whoever reads a screen."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -8,6 +8,8 @@ import numpy as np
 from harness.calibrate.pose_calibration import PoseCalibration
 from harness.calibrate.poses import POSES
 from harness.calibrate.tpose_calibration import TPoseCalibration
+from harness.core.number_format import format_fixed
+from harness.core.text_table import Table
 
 CalibrationReport = tuple[dict[str, Any], list[str]]
 """For the file, and lines for the screen."""
@@ -61,7 +63,7 @@ def _bone_lines(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
         ]
         for name, one in lengths.items()
     ]
-    return _table([head, *rows])
+    return Table(head, rows).lines()
 
 
 def _mount_lines(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
@@ -73,7 +75,7 @@ def _mount_lines(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
         ]
         for name, one in mounts.items()
     ]
-    return _table([head, *rows])
+    return Table(head, rows).lines()
 
 
 def _fit_lines(found: PoseCalibration, miss_deg: Mapping[str, float]) -> list[str]:
@@ -96,25 +98,16 @@ def report_tpose_calibration(found: TPoseCalibration) -> CalibrationReport:
     rows = [[name, _mm(one["residual_m"]), _mm(one["moved_m"])] for name, one in stations.items()]
     heading_deg = float(np.rad2deg(found.heading_sd_rad))
     lines = [
-        *_table([["station", "off the T-pose [mm]", "moved [mm]"], *rows]),
+        *Table(["station", "off the T-pose [mm]", "moved [mm]"], rows).lines(),
         f"which way the performer faced is known to {heading_deg:.1f} deg; T-pose held for {found.seconds:.1f} s",
     ]
     return {"seconds": found.seconds, "heading_sd_deg": heading_deg, "stations": stations}, lines
 
 
 def _mm(length_m: float) -> str:
-    return f"{1e3 * length_m:.1f}" if np.isfinite(length_m) else "none"
+    return format_fixed(1e3 * length_m, 1) if np.isfinite(length_m) else "none"
 
 
 def _finite(row: Mapping[str, Any]) -> dict[str, Any]:
     """Without what has no bound: neither JSON nor a reader knows infinity."""
     return {name: value for name, value in row.items() if np.isfinite(value)}
-
-
-def _table(rows: Sequence[Sequence[str]]) -> list[str]:
-    """The first column to the left, the others to the right."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join([first.ljust(widths[0]), *(word.rjust(w) for word, w in zip(rest, widths[1:], strict=True))]).rstrip()
-        for first, *rest in rows
-    ]

@@ -115,21 +115,13 @@ def _score_methods(args: argparse.Namespace, stream: "RecordingStream") -> Outco
 
 
 def format_score_table(scores: "Sequence[RecordingScore]") -> str:
-    """Table with one row per method."""
-    from harness.report.run.text import COLUMNS
+    """A table with one row per method."""
+    from harness.core.number_format import format_fixed
+    from harness.core.text_table import Table
+    from harness.results.reported_metrics import TABLE_COLUMNS
 
-    lines = [["method", "matched", *(title for title, *_ in COLUMNS)]]
+    rows = []
     for score in scores:
-        figures = [_format_number(score.metrics[name], decimals) for _, name, decimals in COLUMNS]
-        lines.append([score.method, f"{score.frames_matched}/{score.frames_expected}", *figures])
-    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
-    return "\n".join(
-        "  ".join(
-            [words[0].ljust(widths[0]), *(word.rjust(w) for word, w in zip(words[1:], widths[1:], strict=True))]
-        ).rstrip()
-        for words in lines
-    )
-
-
-def _format_number(value: float | None, decimals: int) -> str:
-    return "not measured" if value is None else f"{value:.{decimals}f}"
+        figures = [format_fixed(score.metrics[name], decimals) for _, name, decimals in TABLE_COLUMNS]
+        rows.append([score.method, f"{score.frames_matched}/{score.frames_expected}", *figures])
+    return "\n".join(Table(["method", "matched", *(title for title, *_ in TABLE_COLUMNS)], rows).lines())

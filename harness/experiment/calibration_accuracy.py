@@ -17,8 +17,10 @@ from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.humanoid24 import standard_skeleton
+from harness.core.number_format import format_fixed
 from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
+from harness.core.text_table import Table
 from harness.experiment.simulated_calibration import TrackerSession
 from harness.mocap.skeletons import read_skeletons
 from harness.mocap.sources import POPULATION_SIZE
@@ -85,7 +87,11 @@ class ErrorStatistics:
 
     def row(self) -> list[str]:
         numbers = [self.rms, self.median, self.worst, self.bound, self.mean_skeleton]
-        return [f"{self.what} [{self.unit}]", *("" if np.isnan(x) else f"{x:.2f}" for x in numbers), str(self.count)]
+        return [
+            f"{self.what} [{self.unit}]",
+            *("" if np.isnan(x) else format_fixed(x, 2) for x in numbers),
+            str(self.count),
+        ]
 
 
 TABLE_HEADER = ["error", "rms", "median", "worst", "bound", "mean skeleton", "values"]
@@ -153,10 +159,8 @@ class CalibrationAccuracy:
         if self.done:
             found = np.rad2deg([trial.miss_rad for trial in self.done])
             told[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
-        rows = [TABLE_HEADER, *(spread.row() for spread in self.spreads())]
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        table = ["  ".join(word.ljust(w) for word, w in zip(row, widths, strict=True)).rstrip() for row in rows]
-        return [*told, *(table if self.done else []), *(f"{name}: {why}" for name, why in self.refused.items())]
+        table = Table(TABLE_HEADER, [spread.row() for spread in self.spreads()])
+        return [*told, *(table.lines() if self.done else []), *(f"{name}: {why}" for name, why in self.refused.items())]
 
 
 def measure_calibration_accuracy(

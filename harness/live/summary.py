@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from harness.live.latency import DurationHistogram
+from harness.core.number_format import format_fixed
+from harness.core.text_table import Table
 from harness.live.session import LiveResult
 
 
@@ -28,7 +29,7 @@ def as_dict(done: LiveResult, floor: Mapping[str, Any]) -> dict[str, Any]:
 def lines(done: LiveResult, floor: Mapping[str, Any]) -> list[str]:
     """A table of the times, with what the computer itself takes below, and the counts."""
     stages = done.stages
-    rows = [_stage_row(name, durations) for name, durations in stages.by_name().items()]
+    rows = [_time_row(name, durations.as_dict()) for name, durations in stages.by_name().items()]
     rows += [_time_row(name, floor[key]) for name, key in _JITTER_LABELS.items() if floor.get(key)]
     states = ", ".join(f"{count} {name}" for name, count in done.status.items())
     counts = f"{done.poses} poses in {done.seconds:.1f} s ({states}); {done.dropped} frames dropped"
@@ -37,7 +38,8 @@ def lines(done: LiveResult, floor: Mapping[str, Any]) -> list[str]:
     share = stages.missed / done.poses if done.poses else 0.0
     late = f"{stages.missed} poses ({share:.2%}) after their deadline, {1e3 * stages.deadline_s:.2f} ms"
     failed = [f"{name}: {why}" for name, why in done.failed.items()]
-    return [f"{'milliseconds':<32}{'p50':>8}{'p99':>8}{'max':>8}", *rows, "", counts, late, *failed]
+    table = Table(["milliseconds", "p50", "p99", "max"], rows)
+    return [*table.lines(), "", counts, late, *failed]
 
 
 _JITTER_LABELS = {
@@ -46,9 +48,5 @@ _JITTER_LABELS = {
 }
 
 
-def _stage_row(name: str, durations: DurationHistogram) -> str:
-    return _time_row(name, durations.as_dict())
-
-
-def _time_row(name: str, times: Mapping[str, float | None]) -> str:
-    return f"{name:<32}" + "".join(f"{'-' if ms is None else format(ms, '.2f'):>8}" for ms in times.values())
+def _time_row(name: str, times: Mapping[str, float | None]) -> list[str]:
+    return [name, *("-" if ms is None else format_fixed(ms, 2) for ms in times.values())]

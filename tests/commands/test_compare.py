@@ -43,7 +43,7 @@ def here(runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.mark.parametrize(
     ("words", "code", "word", "said"),
     [
-        ("main again", 0, "pass", "B is no worse than A"),
+        ("main again", 0, "pass", "B is not worse than A"),
         ("main worse", 1, "regressed", "B is worse than A"),
         ("worse main", 0, "pass", "better"),
         ("main torn", 3, "not comparable", "the interval holds zero"),

@@ -377,7 +377,7 @@ def test_a_line_that_is_too_slow_is_told_and_measures_nothing(tmp_path: Path) ->
     fast = replace(SMALL, methods=("mean_pose",), tracker=replace(SMALL.tracker, rate_hz=1000.0))
     assert engine.run(fast, tmp_path / "run") is Outcome.NOT_COMPARABLE
     said = run_table(read_summary(tmp_path / "run"))
-    assert "THE LINE IS TOO SLOW: 9" in said
+    assert "THE LINK IS TOO SLOW: 9" in said
     assert "not measured" in said
 
 

@@ -114,7 +114,7 @@ def test_what_is_not_comparable_fails_and_says_why(project: pytest.Pytester, mon
     monkeypatch.delenv("GITHUB_WORKSPACE", raising=False)
     result = gated(project)
     result.assert_outcomes(failed=1)
-    result.stdout.fnmatch_lines(["*cannot be told: inputs differ: tracker.rate_hz: 40* against 60*"])
+    result.stdout.fnmatch_lines(["*worse than A: inputs differ: tracker.rate_hz: 40* against 60*"])
     result.stdout.fnmatch_lines(["::error file=test_*.py,line=1,title=not comparable::inputs differ: *"])
 
 

@@ -1,7 +1,6 @@
-"""Paired slopes: each clip a line from A to B, and beside them the clips' differences with mean, interval and margin.
+"""Paired slopes: each clip as a line from A to B, next to the differences with mean, interval and margin.
 
-One small picture for each line of a comparison (an estimation plot, Gardner and Altman 1986; Ho et al. 2019), so that
-a page has as many beside each other as are wide enough to be read.
+There is one small chart for each line of a comparison: an estimation plot (Gardner and Altman 1986; Ho et al. 2019).
 """
 
 from typing import TYPE_CHECKING
@@ -10,19 +9,19 @@ import numpy as np
 
 from harness.compare.comparison import Difference
 from harness.core.arrays import Floats
+from harness.core.number_format import format_change_percent
 from harness.report.comparison.wording import (
     clip_steps,
     count_directions,
     format_interval,
     format_mean,
-    format_percent,
     format_signed,
     line_title,
     percent_of_a,
     rise_is_worse,
 )
+from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import COLOURS, FAINT, GRID, INK, PAPER, Chart
-from harness.report.run.charts import draw_chart
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,19 +30,20 @@ if TYPE_CHECKING:
 SIZE_IN = (3.3, 2.5)
 WORSE_COLOUR, BETTER_COLOUR = COLOURS[0], COLOURS[1]
 _SLOPE_AXES, _DIFFERENCE_AXES = (0.145, 0.17, 0.42, 0.72), (0.725, 0.17, 0.26, 0.72)
-"""Where the two axes are on the picture: left, bottom, width, height."""
+"""Positions of the two axes in the figure: left, bottom, width, height."""
 _FAINT_FROM = 20
-"""Clips from which lines are so many that each is faint."""
+"""Number of clips from which on lines are thinner."""
 
 
 def slope_chart(line: Difference, number: int) -> Chart:
-    """The picture of one line; `number` tells the files of a page apart."""
-    up, down, level = count_directions(line)
-    counts = ", ".join(f"{n} {what}" for n, what in ((up, "higher in B"), (down, "lower"), (level, "unchanged")) if n)
+    """The chart of one line; `number` distinguishes the files of a page."""
+    up, down, same = count_directions(line)
+    counts = ", ".join(f"{n} {what}" for n, what in ((up, "higher in B"), (down, "lower"), (same, "unchanged")) if n)
     caption = f"{len(line.clips)} clips: {counts}. {_largest_change(line)}"
     alt = (
-        f"{line_title(line)}: mean {format_mean(line, line.mean_a)} in A, {format_mean(line, line.mean_b)} in B [{line.unit}]; "
-        f"difference {format_signed(line, line.difference)} ({format_interval(line)}), {format_percent(percent_of_a(line, line.difference))} of A, "
+        f"{line_title(line)}: mean {format_mean(line, line.mean_a)} in A, {format_mean(line, line.mean_b)} in B "
+        f"[{line.unit}]; difference {format_signed(line, line.difference)} ({format_interval(line)}), "
+        f"{format_change_percent(percent_of_a(line, line.difference))} of A, "
         f"margin {format_mean(line, line.margin)}: {line.verdict}. {caption}"
     )
     name, (width_in, height_in) = f"slopes_{number}", SIZE_IN
@@ -86,7 +86,7 @@ def _draw_slopes(axes: "Axes", line: Difference, a: Floats, b: Floats) -> None:
 
 
 def _draw_differences(axes: "Axes", line: Difference, difference: Floats) -> None:
-    """Clips on the left, their mean and its interval on the right, over the band of the margin."""
+    """Draw the clips' differences, their mean and its interval over the band of the margin."""
     from matplotlib.ticker import MaxNLocator
 
     axes.axhspan(-line.margin, line.margin, color=GRID, linewidth=0, alpha=0.75)
@@ -105,28 +105,28 @@ def _draw_differences(axes: "Axes", line: Difference, difference: Floats) -> Non
 
 
 def _colours(line: Difference) -> list[str]:
-    """Of clips that are worse in B, better or neither; up and down are seen besides."""
+    """The colour of each clip: worse in B, better or equal."""
     worse = 1.0 if rise_is_worse(line.metric) else -1.0
     return [WORSE_COLOUR if worse * step > 0.0 else BETTER_COLOUR if step else FAINT for _, step in clip_steps(line)]
 
 
 def _beeswarm_offsets(values: Floats) -> Floats:
-    """(n,) places across, so that points of like height stand beside each other, the first in the middle."""
+    """(n,) horizontal offsets that put points of similar height next to each other, centred."""
     if not len(values) or np.ptp(values) == 0.0:
         return np.zeros(len(values))
     rows = np.floor((values - values.min()) / np.ptp(values) * 22.0)
     out = np.zeros(len(values))
     for row in np.unique(rows):
-        at = np.flatnonzero(rows == row)
-        out[at] = 0.11 * (np.arange(len(at)) - 0.5 * (len(at) - 1))
+        members = np.flatnonzero(rows == row)
+        out[members] = 0.11 * (np.arange(len(members)) - 0.5 * (len(members) - 1))
     widest = np.abs(out).max()
-    found: Floats = out * min(1.0, 0.42 / widest) if widest else out
-    return found
+    scaled: Floats = out * min(1.0, 0.42 / widest) if widest else out
+    return scaled
 
 
 def _largest_change(line: Difference) -> str:
-    """The clip that moved most."""
+    """The sentence on the clip with the largest change; empty if none changed."""
     if not line.clips:
         return ""
-    clip, step = max(clip_steps(line), key=lambda one: abs(one[1]))
-    return f"Furthest: {clip}, {format_signed(line, step)}." if step else ""
+    clip, step = max(clip_steps(line), key=lambda item: abs(item[1]))
+    return f"Largest change: {clip}, {format_signed(line, step)}." if step else ""

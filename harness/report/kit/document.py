@@ -1,4 +1,4 @@
-"""The frame of every page: one offline HTML file that asks nothing of anyone, with a heading, facts and sections."""
+"""The frame of every page: one HTML file that loads nothing from elsewhere, with a heading, facts and sections."""
 
 import base64
 from collections.abc import Mapping, Sequence
@@ -13,7 +13,7 @@ _CONTENT_SECURITY_POLICY = (
     "base-uri 'none'; form-action 'none'"
 )
 Section = tuple[str, str, Markup]
-"""Title, name for links, content; one without content is left out."""
+"""Title, name for links, content; a section without content is left out."""
 
 
 def document(
@@ -26,7 +26,7 @@ def document(
     sections: Sequence[Section],
     lead: Markup | None = None,
 ) -> str:
-    """The whole file: it opens on the heading, then `lead`, the facts, what is missing and links to the sections."""
+    """The HTML of a page: heading, `lead`, facts, what is missing, links to the sections, then the sections."""
     style = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
     head = tag(
         "head",
@@ -40,8 +40,8 @@ def document(
     links = tag("ul", *(tag("li", tag("a", title, href=f"#{name}")) for title, name, _ in shown))
     rows = [join(tag("dt", title), tag("dd", text)) for title, text in facts.items()]
     if missing:
-        gaps = [tag("span", text, tag("br")) for text in missing]
-        rows.append(join(tag("dt", "Missing here"), tag("dd", *gaps, class_="missing")))
+        texts = [tag("span", text, tag("br")) for text in missing]
+        rows.append(join(tag("dt", "Missing"), tag("dd", *texts, class_="missing")))
     body = tag(
         "body",
         tag(
@@ -58,13 +58,24 @@ def document(
 
 
 def chart_figure(chart: Chart, level: int = 0) -> Markup:
-    """A chart under a heading of this level, or with its title in the caption."""
-    image = tag("img", src=data_uri(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
+    """A chart under a heading of `level`; with level 0 the title stands in the caption."""
+    image = chart_image(chart)
     title = tag(f"h{level}", chart.title) if level else None
     caption: Any = chart.caption if level else join(tag("b", f"{chart.title}. "), chart.caption)
     return join(title, tag("figure", scroll_box(image, chart.title), tag("figcaption", caption), class_="chart"))
 
 
+def chart_panel(chart: Chart) -> Markup:
+    """A small chart with its title and caption, for a grid of charts."""
+    caption = tag("figcaption", chart.caption) if chart.caption else None
+    return tag("figure", tag("h3", chart.title), chart_image(chart), caption, class_="panel")
+
+
+def chart_image(chart: Chart) -> Markup:
+    """The chart as an image that follows the reader's light or dark screen."""
+    return tag("img", src=data_uri(chart.for_screen().encode(), "image/svg+xml"), alt=chart.alt)
+
+
 def data_uri(content: bytes, kind: str) -> str:
-    """A file as an address that holds it."""
+    """A data URI that holds the content of a file of this MIME type."""
     return f"data:{kind};base64,{base64.b64encode(content).decode()}"

@@ -1,22 +1,27 @@
-"""HTML from nested calls, escaped by default: text stays text, whatever a clip is called."""
+"""HTML from nested calls. Text is escaped by default, so no name of a clip or file can become markup."""
 
 import html
+import re
+from collections.abc import Sequence
 from typing import Any
 
 
 class Markup(str):
-    """Text that is HTML already."""
+    """Text that is HTML already and is not escaped again."""
 
     __slots__ = ()
 
 
 VOID_ELEMENTS = frozenset({"br", "col", "img", "input", "meta"})
+"""Elements without an end tag."""
+_CODE = re.compile(r"`([^`]+)`")
 
 
 def tag(name: str, /, *children: Any, **attributes: Any) -> Markup:
-    """An element; children are escaped unless Markup, None ones and attributes of None or False are left out.
+    """An HTML element. Children are escaped unless they are Markup; None is left out.
 
-    Trailing underscores of attribute names are dropped (`class_`), others become hyphens.
+    Attributes of None or False are left out. Trailing underscores of their names are dropped (`class_`), others become
+    hyphens.
     """
     words = [name]
     for key, value in attributes.items():
@@ -29,26 +34,28 @@ def tag(name: str, /, *children: Any, **attributes: Any) -> Markup:
 
 
 def join(*parts: Any) -> Markup:
-    """Several pieces as one, each escaped unless it is Markup."""
+    """Several pieces as one; each is escaped unless it is Markup, and None is left out."""
     return Markup("".join(p if isinstance(p, Markup) else html.escape(str(p)) for p in parts if p is not None))
 
 
-def table(caption: Any, head: list[Any], rows: list[list[Any]], *, label: str) -> Markup:
-    """A table whose first column names the rows; it scrolls in itself when it is wider than the page."""
-    top = tag("tr", *(tag("th", cell, scope="col") for cell in head))
-    body = [tag("tr", tag("th", row[0], scope="row"), *(tag("td", cell) for cell in row[1:])) for row in rows]
-    content = tag("table", tag("thead", top), tag("tbody", *body), aria_label=label)
-    return join(tag("p", caption, class_="caption"), scroll_box(content, label))
-
-
 def scroll_box(content: Any, label: str) -> Markup:
-    """Wider than a phone: scrolls sideways in its own box, by keyboard too."""
+    """A box whose content scrolls sideways, by keyboard too, when it is wider than the page."""
     return tag("div", content, class_="wide", tabindex="0", role="region", aria_label=label)
 
 
 def details(title: Any, *content: Any, id_: str | None = None) -> Markup:
-    """Closed until asked for."""
+    """A section that is folded until the reader opens it."""
     return tag("details", tag("summary", title), *content, id_=id_)
+
+
+def bullet_list(items: Sequence[Any], class_: str | None = "notes") -> Markup:
+    """A bulleted list; nothing without items."""
+    return tag("ul", *(tag("li", item) for item in items), class_=class_) if items else Markup()
+
+
+def inline_code(text: str) -> Markup:
+    """The text with everything between backticks set as code."""
+    return join(*(tag("code", part) if n % 2 else part for n, part in enumerate(_CODE.split(text))))
 
 
 def _attribute(key: str) -> str:

@@ -1,4 +1,4 @@
-"""Rendering in a process of its own: VTK without a working OpenGL may crash, and must not take the report with it."""
+"""Rendering in a separate process, because VTK may crash without a working OpenGL."""
 
 import os
 import signal
@@ -18,34 +18,34 @@ from harness.core.files import TEMPORARY
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
-"""Patience: until the first picture, and for every one [s]."""
+"""Time allowed for the start, and for each picture [s]."""
 _POLL_INTERVAL_S = 0.5
 
 ProgressCallback = Callable[[str, int, int], None]
-"""Called with what was done last, how many are finished and how many were planned."""
+"""Called with the name of the latest finished file, the number of finished files and the number planned."""
 
 
 @dataclass(frozen=True, eq=False)
 class RenderJob:
-    """One strip of pictures, or one movie, of K frames."""
+    """A strip of pictures or a movie to render, of K frames."""
 
     output: Path
     bone_m: Floats
-    """(B, 3) of the true body [m]."""
+    """(B, 3) bone vectors of the true body [m]."""
     estimate_bone_m: Floats
-    """(B, 3) of the estimated one [m]."""
+    """(B, 3) bone vectors of the estimated body [m]."""
     truth_qpos: Floats
-    """(K, 55)."""
+    """(K, 55) true configurations."""
     estimate_qpos: Floats
-    """(K, 55)."""
+    """(K, 55) estimated configurations."""
     fps: float = 0.0
-    """Of a movie; 0 makes a strip."""
+    """Frame rate of the movie [1/s]; 0 makes a strip."""
     title: str = ""
-    """Written into a movie."""
+    """Caption inside the movie."""
 
 
 class RenderProcess:
-    """Jobs being rendered while the caller does something else; `finish` waits."""
+    """Renders jobs in the background; `finish` waits for them."""
 
     def __init__(self, jobs: Sequence[RenderJob]) -> None:
         self._jobs = jobs
@@ -58,31 +58,31 @@ class RenderProcess:
             self._process = self._start()
 
     def finish(self, progress: ProgressCallback = lambda last, done, planned: None) -> str:
-        """Wait for the pictures: those that could be made are there. Why others are missing, "" if none is.
+        """Wait for the renderer; returns the reason why pictures are missing, "" if none is.
 
-        `progress` is told what was made last, how many are there and how many there shall be.
+        Pictures that were finished before a failure are kept.
         """
         if self._process is not None:
             frames = sum(len(job.truth_qpos) for job in self._jobs)
-            until_s = time.monotonic() + _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames
-            said: str | None = None
-            while said is None and time.monotonic() < until_s:
+            deadline_s = time.monotonic() + _STARTUP_TIMEOUT_S + _FRAME_TIMEOUT_S * frames
+            stderr: str | None = None
+            while stderr is None and time.monotonic() < deadline_s:
                 try:
-                    _, said = self._process.communicate(timeout=_POLL_INTERVAL_S)
+                    _, stderr = self._process.communicate(timeout=_POLL_INTERVAL_S)
                 except subprocess.TimeoutExpired:
-                    made = [job.output.name for job in self._jobs if job.output.exists()]
-                    progress(made[-1] if made else "", len(made), len(self._jobs))
-            if said is None:
+                    finished = [job.output.name for job in self._jobs if job.output.exists()]
+                    progress(finished[-1] if finished else "", len(finished), len(self._jobs))
+            if stderr is None:
                 self._process.kill()
                 self._process.communicate()
                 self._reason = "the renderer did not finish in time"
             else:
-                self._reason = "" if self._process.returncode == 0 else describe_exit(self._process.returncode, said)
+                self._reason = "" if self._process.returncode == 0 else describe_exit(self._process.returncode, stderr)
         self.close()
         return self._reason
 
     def close(self) -> None:
-        """End what still runs and remove its files."""
+        """Kill a renderer that still runs, and remove unfinished and temporary files."""
         if self._process is not None and self._process.poll() is None:
             self._process.kill()
             self._process.communicate()
@@ -109,26 +109,26 @@ class RenderProcess:
 
 
 def start_renderer(module: str, arguments: Sequence[str]) -> "subprocess.Popen[str]":
-    """A process that renders, where there is no screen too; what it says of its end goes to stderr."""
+    """Start a rendering module with arguments; it works without a screen and writes errors to stderr."""
     environment = dict(os.environ)
     if sys.platform == "linux" and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
-    command, none = [sys.executable, "-m", module, *arguments], subprocess.DEVNULL
-    return subprocess.Popen(command, env=environment, stdin=none, stdout=none, stderr=subprocess.PIPE, text=True)
+    command, devnull = [sys.executable, "-m", module, *arguments], subprocess.DEVNULL
+    return subprocess.Popen(command, env=environment, stdin=devnull, stdout=devnull, stderr=subprocess.PIPE, text=True)
 
 
 def _missing_package(jobs: Sequence[RenderJob]) -> str:
-    """Which package is not installed."""
+    """Message that names a package which the jobs need and which is not installed, or ""."""
     for package, needed in (("pyvista", bool(jobs)), ("imageio_ffmpeg", any(job.fps for job in jobs))):
         if needed and find_spec(package) is None:
             return str(MissingExtra("A rendered picture", package, "viz"))
     return ""
 
 
-def describe_exit(code: int, said: str) -> str:
-    """What ended the renderer, in one line."""
+def describe_exit(code: int, stderr: str) -> str:
+    """Why the renderer ended, in one line: the signal, or the last line of its stderr."""
     if code < 0:
         name = signal.Signals(-code).name
-        return f"the renderer was ended by {name}; does this machine have OpenGL (EGL) for off-screen pictures?"
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+        return f"the renderer was killed by {name}; does this machine have OpenGL (EGL) for off-screen rendering?"
+    lines = [line.strip() for line in stderr.splitlines() if line.strip()]
     return f"the renderer failed ({lines[-1] if lines else f'exit code {code}'})"

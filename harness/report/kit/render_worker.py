@@ -1,6 +1,6 @@
-"""The process that renders: `python -m harness.report.kit.render_worker JOB.npz ...`, started by `harness.report.kit.render_process`.
+"""The rendering process: `python -m harness.report.kit.render_worker JOB.npz ...`, started by `render_process`.
 
-Each job is a file of arrays (see `apart.Job`); every picture is there whole or not at all.
+Each job is a file of arrays (see `render_process.RenderJob`). A picture is written whole or not at all.
 """
 
 import sys
@@ -23,10 +23,12 @@ STRIP_SIZE, MOVIE_SIZE = (300, 384), (640, 640)
 def main(jobs: Sequence[str]) -> None:
     for job in jobs:
         with np.load(job, allow_pickle=False) as content:
-            true, believed = (standard_skeleton().with_bones(content[name]) for name in ("bone_m", "estimate_bone_m"))
+            true_skeleton, estimated_skeleton = (
+                standard_skeleton().with_bones(content[name]) for name in ("bone_m", "estimate_bone_m")
+            )
             truth, estimate = (
-                compute_poses(true, content["truth_qpos"]),
-                compute_poses(believed, content["estimate_qpos"]),
+                compute_poses(true_skeleton, content["truth_qpos"]),
+                compute_poses(estimated_skeleton, content["estimate_qpos"]),
             )
             output, fps, title = Path(str(content["output"])), float(content["fps"]), str(content["title"])
         with atomic_path(output) as temporary:
@@ -37,7 +39,7 @@ def main(jobs: Sequence[str]) -> None:
 
 
 def write_strip(truth: PoseSequence, estimate: PoseSequence, path: Path) -> None:
-    """Every frame side by side, in one PNG."""
+    """Write all frames side by side into one PNG."""
     from matplotlib.image import imsave
 
     pictures = list(_pictures(truth, estimate, STRIP_SIZE))
@@ -45,7 +47,7 @@ def write_strip(truth: PoseSequence, estimate: PoseSequence, path: Path) -> None
 
 
 def write_movie(truth: PoseSequence, estimate: PoseSequence, fps: float, title: str, path: Path) -> None:
-    """Every frame one after another with a caption, as H.264 that browsers play."""
+    """Write all frames with a caption as an H.264 movie that browsers play."""
     import imageio_ffmpeg
 
     options = {"fps": fps, "codec": "libx264", "quality": None, "macro_block_size": 2, "pix_fmt_out": "yuv420p"}
@@ -60,21 +62,21 @@ def write_movie(truth: PoseSequence, estimate: PoseSequence, fps: float, title: 
 
 
 def _add_caption(picture: Floats, title: str, time_s: float) -> bytes:
-    """The picture with what it shows and the time since its start, and which body is which."""
+    """The bytes of the picture with the title, the time since the start and a key to the two bodies."""
     from PIL import Image, ImageDraw, ImageFont
 
     image = Image.fromarray(picture)
     pen, font = ImageDraw.Draw(image), ImageFont.load_default(17)
     pen.text((20, 16), title, "#23282f", font)
     pen.text((20, 40), f"{time_s:.2f} s", "#5d6773", font)
-    for place, (name, colour) in enumerate((("truth", TRUTH), ("estimate", ESTIMATE))):
-        pen.ellipse((20 + 90 * place, 606, 32 + 90 * place, 618), colour)
-        pen.text((38 + 90 * place, 602), name, "#23282f", font)
+    for n, (name, colour) in enumerate((("truth", TRUTH), ("estimate", ESTIMATE))):
+        pen.ellipse((20 + 90 * n, 606, 32 + 90 * n, 618), colour)
+        pen.text((38 + 90 * n, 602), name, "#23282f", font)
     return image.tobytes()
 
 
 def _pictures(truth: PoseSequence, estimate: PoseSequence, size: tuple[int, int]) -> Iterator[Floats]:
-    """(height, width, 3) bytes of every frame."""
+    """Rendered frames, (height, width, 3) bytes each."""
     scene = Scene(truth.skeleton, estimate.skeleton, size, heading_rad(truth))
     try:
         for frame in range(len(truth.root_m)):

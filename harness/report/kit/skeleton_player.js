@@ -1,5 +1,5 @@
-// Plays the worst seconds in 3-D. Data and the charting library lie in the page, compressed, and are unpacked when
-// the view is first scrolled to, so that the page opens at once.
+// Plays the worst seconds in 3-D. The page holds the data and the charting library compressed. They are unpacked when
+// the view is first scrolled to, so that the page opens quickly.
 (() => {
   "use strict";
   const find = (id) => document.getElementById(id);
@@ -15,7 +15,7 @@
     [8, 6, 7], [9, 8, 1]];
   let bones, head, shots, frame = 0, timer = 0;
 
-  // From ahead and from the side of where the body faces.
+  // The camera looks from the front and the side of the body.
   function camera() {
     const from = shots[Number(choice.value)].heading_rad - 0.7;
     return { eye: { x: 1.2 * Math.cos(from), y: 1.2 * Math.sin(from), z: 0.24 }, center: { x: 0, y: 0, z: -0.1 },
@@ -29,7 +29,7 @@
     return new Response(stream).text();
   }
 
-  // Steps from frame to frame, in millimetres -> joint centres [frame][joint][axis] in metres.
+  // Differences from frame to frame in millimetres -> joint centres [frame][joint][axis] in metres.
   function unrolled(steps) {
     const now = new Array(steps[0].length).fill(0);
     return steps.map((step) => {
@@ -54,7 +54,7 @@
     return [from, corner(1, 0), corner(0, 1), corner(-1, 0), corner(0, -1), to];
   }
 
-  // All bones and the head as one mesh, seen from the true root: the camera goes along.
+  // All bones and the head as one mesh relative to the true root, so that the camera follows the root.
   function body(joints, at, girth) {
     const out = { x: [], y: [], z: [] };
     const put = (p) => { out.x.push(p[0] - at[0]); out.y.push(p[1] - at[1]); out.z.push(p[2]); };
@@ -65,7 +65,7 @@
     return out;
   }
 
-  // Which corners make the triangles of `body`.
+  // Vertex indices of the triangles of `body`.
   function triangles() {
     const out = { i: [], j: [], k: [] };
     const put = (first, faces) => faces.forEach(([i, j, k]) => {
@@ -115,7 +115,7 @@
     play.textContent = "Play";
   }
 
-  // In real time: what was too slow to draw is skipped.
+  // Plays in real time; frames that would be drawn too late are skipped.
   function start() {
     const shot = shots[Number(choice.value)], last = shot.time_ms.length - 1;
     if (frame >= last) frame = 0;

@@ -1,4 +1,4 @@
-"""How charts look: one ink, one grid, colours that the colour-blind can tell apart, for light and for dark screens."""
+"""The look of charts: ink, grid and colours that the colour-blind can distinguish, on light and dark screens."""
 
 import io
 import re
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 INK, FAINT, GRID, PAPER = "#23282f", "#6b7480", "#dfe3e8", "#fefefe"
 _DARK = {INK: "#e4e7eb", FAINT: "#9aa4b0", GRID: "#343b45", PAPER: "#14171b"}
 COLOURS = ("#d55e00", "#0072b2", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", FAINT)
-"""Okabe & Ito 2008, Color Universal Design, without the yellow that paper swallows."""
+"""Okabe & Ito 2008, Color Universal Design, without yellow, which is hardly visible on white."""
 DASHES: tuple[Any, ...] = ("solid", (0, (4, 1.5)), (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
-"""Change after every round of colours."""
+"""Line styles; the next one is used each time all colours have been used."""
 STYLES = len(COLOURS) * len(DASHES)
-"""Lines that look different."""
+"""Number of lines that can be told apart."""
 SETTINGS: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 10.0,
@@ -45,7 +45,7 @@ SETTINGS: dict[Any, Any] = {
     "svg.fonttype": "none",
     "path.simplify_threshold": 0.5,
 }
-"""Given to `matplotlib.rc_context` while a chart is made; nothing stays set."""
+"""Settings for `matplotlib.rc_context` while a chart is drawn; none of them stays set."""
 
 
 @dataclass(frozen=True)
@@ -53,23 +53,23 @@ class Chart:
     """A finished chart."""
 
     name: str
-    """Of the file, without ending."""
+    """File name without its suffix."""
     title: str
     caption: str
     alt: str
-    """What it shows, for those who cannot see it."""
+    """Alternative text: what the chart shows, for readers who cannot see it."""
     svg: str
     png: bytes = b""
-    """The same on white, where one was asked for."""
+    """The chart on white as PNG; empty unless `draw_chart` was called with `raster`."""
 
     def write(self, folder: Path) -> None:
-        """As an SVG that any program opens, and the PNG if there is one."""
+        """Write FOLDER/name.svg, and FOLDER/name.png if there is a PNG."""
         (folder / f"{self.name}.svg").write_text(self.svg, encoding="utf-8")
         if self.png:
             (folder / f"{self.name}.png").write_bytes(self.png)
 
     def for_screen(self) -> str:
-        """The SVG with ink and grid that follow the reader's light or dark screen."""
+        """The SVG with colours of ink and grid that follow the reader's light or dark screen."""
         text, light, dark = self.svg, "", ""
         for n, (colour, on_dark) in enumerate(_DARK.items()):
             text = text.replace(colour, f"var(--c{n})")
@@ -81,7 +81,7 @@ class Chart:
 
 
 def to_svg(figure: "Figure", name: str) -> str:
-    """The drawing as SVG text; the same figure gives the same bytes."""
+    """The figure as SVG text; the same figure gives the same bytes."""
     import matplotlib
 
     file = io.StringIO()
@@ -91,22 +91,22 @@ def to_svg(figure: "Figure", name: str) -> str:
 
 
 def to_png(figure: "Figure") -> bytes:
-    """The drawing as a picture on white; the same figure gives the same bytes."""
+    """The figure as PNG on white; the same figure gives the same bytes."""
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=130, facecolor="white", metadata={"Software": None})
     return file.getvalue()
 
 
-def line_style(place: int) -> dict[str, Any]:
+def line_style(n: int) -> dict[str, Any]:
     """Colour and dashes of the n-th series."""
     return {
-        "color": COLOURS[place % len(COLOURS)],
-        "linestyle": DASHES[place // len(COLOURS) % len(DASHES)],
+        "color": COLOURS[n % len(COLOURS)],
+        "linestyle": DASHES[n // len(COLOURS) % len(DASHES)],
     }
 
 
 def hide_frame(axes: "Axes") -> None:
-    """No frame, no grid, no ticks on the left: for bands that are read by name."""
+    """Hide frame, grid and ticks of axes whose rows are labelled bands."""
     axes.grid(False)
     axes.tick_params(length=0)
     for spine in axes.spines.values():

@@ -1,4 +1,4 @@
-"""Bars of a paper's page: lying or standing, with intervals, standard deviations and the paper's own figures."""
+"""Bar charts of a paper's page, horizontal or vertical: values, intervals, standard deviations, published values."""
 
 import textwrap
 from collections.abc import Mapping
@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.number_format import format_number
+from harness.report.kit.chart import add_legend
 from harness.report.kit.style import COLOURS, FAINT, INK, PAPER
-from harness.report.paper.figure_table import SeriesValues, format_with_minus, series_values
-from harness.report.run.charts import add_legend
+from harness.report.paper.figure_table import SeriesValues, series_values
 from harness.results.findings import BarChart
 
 if TYPE_CHECKING:
@@ -18,20 +19,20 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _HATCHES = ("", "////", "....", "xxxx")
-"""Change after every round of colours, as dashes of lines do."""
+"""Fill patterns; the next one is used each time all colours have been used."""
 _LETTERS, _HORIZONTAL_LETTERS, _MOST_ROWS = 96, 34, 3
-"""Under all standing bars together; before a lying one; rows of letters under a standing one."""
+"""Letters under all vertical bars together; before a horizontal bar; most rows of text under a vertical bar."""
 _MOST_VERTICAL, _MOST_NUMBERED, _MOST_HORIZONTAL_NUMBERED = 45, 25, 64
-"""Bars side by side; bars that have room for their number at their end, standing and lying."""
+"""Most vertical bars; most bars with their number at the end, vertical and horizontal."""
 _BAR_IN, _THIN_IN, _GROUP_IN, _FRAME_IN, _VERTICAL_IN = 0.15, 0.07, 0.09, 0.75, 3.4
-"""Height of a lying bar with its number, without, of the space between groups, of what is around; of standing bars."""
+"""Heights [in]: a horizontal bar with its number and without, gap between groups, frame; chart of vertical bars."""
 _GROUP = 0.82
-"""Of the distance between groups, filled by bars."""
+"""Share of the distance between groups that bars fill."""
 
 
 @dataclass(frozen=True)
 class _BarSeries:
-    """One series: where its bars stand, and everything that is drawn at them; NaN where nothing is known."""
+    """One series of G groups: (G,) positions of its bars and the values drawn there; NaN where there is none."""
 
     name: str
     along: Floats
@@ -43,39 +44,39 @@ class _BarSeries:
 
     @property
     def tips(self) -> Floats:
-        """How far anything reaches."""
+        """(G,) the largest value that is drawn at each bar."""
         out: Floats = np.fmax.reduce([self.length, self.length + self.spread, self.high, self.published])
         return np.maximum(np.nan_to_num(out), 0.0)
 
 
-def draw_bars(canvas: "Figure", bars: BarChart, places: Mapping[str, int]) -> None:
-    """The whole chart; `places` says which colour each series has."""
-    axes, lying = canvas.subplots(), is_horizontal(bars)
+def draw_bars(figure: "Figure", bars: BarChart, colour_indices: Mapping[str, int]) -> None:
+    """Draw the chart; `colour_indices` gives each series the index of its colour."""
+    axes, horizontal = figure.subplots(), is_horizontal(bars)
     thick = _GROUP / max(len(bars.series), 1)
     rows = _bar_series(bars, thick)
     for row in rows:
-        bar = axes.barh if lying else axes.bar
-        bar(row.along, row.length, 0.94 * thick, label=row.name, **_bar_style(places[row.name]))
-        _draw_whiskers(axes, row, lying)
+        bar = axes.barh if horizontal else axes.bar
+        bar(row.along, row.length, 0.94 * thick, label=row.name, **_bar_style(colour_indices[row.name]))
+        _draw_whiskers(axes, row, horizontal)
         if _has_numbers(bars):
-            _draw_numbers(axes, row, bars.unit, lying)
-    _draw_published(axes, rows, lying)
+            _draw_numbers(axes, row, bars.unit, horizontal)
+    _draw_published(axes, rows, horizontal)
     if any(np.nanmin(row.length, initial=0.0) < 0.0 for row in rows):
-        (axes.axvline if lying else axes.axhline)(0.0, color=INK, linewidth=0.8)
-    _label_axes(axes, bars, lying)
+        (axes.axvline if horizontal else axes.axhline)(0.0, color=INK, linewidth=0.8)
+    _label_axes(axes, bars, horizontal)
     if len(rows) > 1 or has_values(bars.published):
-        add_legend(canvas, axes)
+        add_legend(figure, axes)
 
 
 def height_in(bars: BarChart) -> float:
-    """Of the chart [in]."""
+    """Height of the chart [in]."""
     bar_in = _BAR_IN if _has_numbers(bars) else _THIN_IN
-    lying_in = _FRAME_IN + len(bars.groups) * (_GROUP_IN + bar_in * max(len(bars.series), 1))
-    return max(lying_in, 1.6) if is_horizontal(bars) else _VERTICAL_IN
+    horizontal_in = _FRAME_IN + len(bars.groups) * (_GROUP_IN + bar_in * max(len(bars.series), 1))
+    return max(horizontal_in, 1.6) if is_horizontal(bars) else _VERTICAL_IN
 
 
 def is_horizontal(bars: BarChart) -> bool:
-    """Whether bars lie: asked for, too many, or with names too long to stand under them."""
+    """Whether bars are horizontal: on request, if there are many, or if their names are too long to stand below."""
     room = max(_LETTERS // max(len(bars.groups), 1), 1)
     rows = [textwrap.wrap(group, room, break_long_words=False) for group in bars.groups]
     too_long = any(len(lines) > _MOST_ROWS or max(map(len, lines), default=0) > room for lines in rows)
@@ -83,23 +84,24 @@ def is_horizontal(bars: BarChart) -> bool:
 
 
 def explain_signs(bars: BarChart) -> str:
-    """What the signs on the bars mean."""
+    """Sentences that explain the marks that the chart has."""
     signs: dict[str, SeriesValues] = {
         "Whiskers: 95 % interval.": bars.high,
         "Thin grey lines: standard deviation over clips.": bars.spread,
-        "Diamonds: published.": bars.published,
+        "Diamonds: published values.": bars.published,
     }
-    said = [text for text, values in signs.items() if has_values(values)]
+    sentences = [text for text, values in signs.items() if has_values(values)]
     absent = any(value is None for values in bars.series.values() for value in values)
-    return " ".join([*said, *(["A dash: not measured."] if absent else [])])
+    return " ".join([*sentences, *(["A dash: not measured."] if absent else [])])
 
 
 def has_values(values: SeriesValues) -> bool:
+    """Whether any series has a value."""
     return any(value is not None for row in values.values() for value in row)
 
 
 def _has_numbers(bars: BarChart) -> bool:
-    """Whether each bar's number fits to it; else they are in the table alone."""
+    """Whether each bar has room for its number; otherwise only the table has them."""
     return len(bars.groups) * len(bars.series) <= (_MOST_HORIZONTAL_NUMBERED if is_horizontal(bars) else _MOST_NUMBERED)
 
 
@@ -113,53 +115,53 @@ def _bar_series(bars: BarChart, thick: float) -> list[_BarSeries]:
     ]
 
 
-def _bar_style(place: int) -> dict[str, Any]:
+def _bar_style(n: int) -> dict[str, Any]:
     """Colour and hatches of the n-th series."""
-    hatch = _HATCHES[place // len(COLOURS) % len(_HATCHES)] or None
-    return {"color": COLOURS[place % len(COLOURS)], "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.6}
+    hatch = _HATCHES[n // len(COLOURS) % len(_HATCHES)] or None
+    return {"color": COLOURS[n % len(COLOURS)], "hatch": hatch, "edgecolor": PAPER, "linewidth": 0.6}
 
 
-def _draw_whiskers(axes: "Axes", row: _BarSeries, lying: bool) -> None:
-    """Standard deviations thin, intervals with caps."""
-    line = axes.hlines if lying else axes.vlines
+def _draw_whiskers(axes: "Axes", row: _BarSeries, horizontal: bool) -> None:
+    """Draw standard deviations as thin lines and intervals with caps."""
+    line = axes.hlines if horizontal else axes.vlines
     line(row.along, np.maximum(row.length - row.spread, 0.0), row.length + row.spread, color=FAINT, linewidth=0.9)
     line(row.along, row.low, row.high, color=INK, linewidth=1.3)
     for end in (row.low, row.high):
-        at = (end, row.along) if lying else (row.along, end)
-        axes.plot(*at, "|" if lying else "_", color=INK, markersize=6, markeredgewidth=1.3)
+        at = (end, row.along) if horizontal else (row.along, end)
+        axes.plot(*at, "|" if horizontal else "_", color=INK, markersize=6, markeredgewidth=1.3)
 
 
-def _draw_numbers(axes: "Axes", row: _BarSeries, unit: str, lying: bool) -> None:
-    """The value of every bar beyond its tip, a dash for a bar that is not there."""
-    for along, value, tip, theirs in zip(row.along, row.length, row.tips, row.published, strict=True):
-        off = 10 if tip == theirs else 4
+def _draw_numbers(axes: "Axes", row: _BarSeries, unit: str, horizontal: bool) -> None:
+    """Write the value of every bar beyond its tip, and a dash for a missing bar."""
+    for along, value, tip, published in zip(row.along, row.length, row.tips, row.published, strict=True):
+        off = 10 if tip == published else 4
         axes.annotate(
-            format_with_minus(value, unit) if np.isfinite(value) else "–",
-            (tip, along) if lying else (along, tip),
-            xytext=(off, 0) if lying else (0, off),
+            format_number(float(value), unit) if np.isfinite(value) else "–",
+            (tip, along) if horizontal else (along, tip),
+            xytext=(off, 0) if horizontal else (0, off),
             textcoords="offset points",
-            ha="left" if lying else "center",
-            va="center_baseline" if lying else "bottom",
+            ha="left" if horizontal else "center",
+            va="center_baseline" if horizontal else "bottom",
             fontsize=8,
             color=INK,
         )
 
 
-def _draw_published(axes: "Axes", rows: list[_BarSeries], lying: bool) -> None:
-    """A diamond where the paper's figure is; one entry in the legend."""
+def _draw_published(axes: "Axes", rows: list[_BarSeries], horizontal: bool) -> None:
+    """Draw a diamond at each published value, with one entry in the legend."""
     label: str | None = "published"
     for row in rows:
         if np.isfinite(row.published).any():
-            at = (row.published, row.along) if lying else (row.along, row.published)
+            at = (row.published, row.along) if horizontal else (row.along, row.published)
             axes.plot(*at, "D", color=PAPER, markeredgecolor=INK, markersize=6, label=label, zorder=4)
             label = None
 
 
-def _label_axes(axes: "Axes", bars: BarChart, lying: bool) -> None:
+def _label_axes(axes: "Axes", bars: BarChart, horizontal: bool) -> None:
     middles = np.arange(len(bars.groups))
-    letters = _HORIZONTAL_LETTERS if lying else _LETTERS // max(len(bars.groups), 1)
+    letters = _HORIZONTAL_LETTERS if horizontal else _LETTERS // max(len(bars.groups), 1)
     names = [textwrap.fill(group, letters) for group in bars.groups]
-    if lying:
+    if horizontal:
         axes.set_yticks(middles, names)
         axes.set_ylim(len(middles) - 0.45, -0.55)
         axes.set_xlabel(bars.unit)
@@ -168,5 +170,5 @@ def _label_axes(axes: "Axes", bars: BarChart, lying: bool) -> None:
         axes.set_xticks(middles, names)
         axes.set_ylabel(bars.unit)
         axes.margins(y=0.12)
-    axes.grid(False, axis="y" if lying else "x")
-    axes.tick_params(axis="y" if lying else "x", length=0)
+    axes.grid(False, axis="y" if horizontal else "x")
+    axes.tick_params(axis="y" if horizontal else "x", length=0)

@@ -1,24 +1,29 @@
-"""The charts of a paper's page: one for each figure, a method in one colour throughout."""
+"""The charts of a paper's page, one for each figure; a method has the same colour in all of them."""
 
 from collections import Counter
 from collections.abc import Mapping
 from itertools import count
+from typing import TYPE_CHECKING
 
+from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import Chart
+from harness.report.kit.text import to_file_name
 from harness.report.paper.bar_chart import draw_bars, explain_signs, height_in
 from harness.report.paper.figure_table import alt_text, is_measured
 from harness.report.paper.line_chart import draw_lines
-from harness.report.run.charts import draw_chart
-from harness.report.run.data import to_file_name
 from harness.results.findings import BarChart, LineChart, PaperFindings
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 _LINES_IN = 3.4
+"""Height of a line chart [in]."""
 
 
 def charts(findings: PaperFindings) -> dict[str, list[Chart | None]]:
-    """Name of the experiment -> its figures, None for one of which nothing was measured."""
+    """Name of the experiment -> its charts, None for a figure without any measured value."""
     names = Counter(name for e in findings.experiments for figure in e.figures for name in figure.series)
-    shared = {name: place for place, name in enumerate(name for name, figures in names.items() if figures > 1)}
+    shared = {name: n for n, name in enumerate(name for name, figures in names.items() if figures > 1)}
     return {
         experiment.name: [
             _chart(f"{to_file_name(experiment.name)}_{n}", figure, _colour_indices(figure, shared))
@@ -31,19 +36,20 @@ def charts(findings: PaperFindings) -> dict[str, list[Chart | None]]:
 
 
 def _colour_indices(figure: BarChart | LineChart, shared: Mapping[str, int]) -> dict[str, int]:
-    """Series -> which colour: what several figures draw has one for the whole page, the others what is left."""
+    """Series -> index of its colour: fixed for series of several figures, the remaining ones for the others."""
     taken = {name: shared[name] for name in figure.series if name in shared}
-    free = (place for place in count() if place not in taken.values())
+    free = (n for n in count() if n not in taken.values())
     return {name: taken[name] if name in taken else next(free) for name in figure.series}
 
 
-def _chart(name: str, figure: BarChart | LineChart, places: Mapping[str, int]) -> Chart:
-    title, alt = figure.title, alt_text(figure)
-    if isinstance(figure, LineChart):
-        return draw_chart(
-            name, title, figure.caption, alt, lambda canvas: draw_lines(canvas, figure, places), _LINES_IN, raster=True
-        )
-    caption = f"{figure.caption} {explain_signs(figure)}".strip()
-    return draw_chart(
-        name, title, caption, alt, lambda canvas: draw_bars(canvas, figure, places), height_in(figure), raster=True
-    )
+def _chart(name: str, content: BarChart | LineChart, colours: Mapping[str, int]) -> Chart:
+    def draw(figure: "Figure") -> None:
+        if isinstance(content, LineChart):
+            draw_lines(figure, content, colours)
+        else:
+            draw_bars(figure, content, colours)
+
+    caption, height = content.caption, _LINES_IN
+    if isinstance(content, BarChart):
+        caption, height = f"{caption} {explain_signs(content)}".strip(), height_in(content)
+    return draw_chart(name, content.title, caption, alt_text(content), draw, height, raster=True)

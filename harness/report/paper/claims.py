@@ -1,31 +1,19 @@
-"""The verdicts of a paper's page: how many there are of each, and every claim beside ours."""
+"""The table of claims on a paper's page: each published statement next to the measured result."""
 
 from collections.abc import Sequence
 
-from harness.report.kit.markup import Markup, join, tag
-from harness.report.paper.table import inline_code
-from harness.report.paper.verdicts import MARKS, MEANINGS, count_verdicts, format_difference, format_interval
-from harness.report.run.data import to_file_name
-from harness.results.findings import Claim, ClaimVerdict, PaperExperiment, PaperFindings
+from harness.report.kit.markup import Markup, inline_code, join, tag
+from harness.report.kit.table import stacked_cell
+from harness.report.kit.text import to_file_name
+from harness.report.kit.verdict_badge import verdict_badge
+from harness.report.paper.verdicts import MARKS, format_difference, format_interval
+from harness.results.findings import Claim, PaperExperiment, PaperFindings
 
 _HEAD = ("published statement", "published", "ours", "difference", "clips", "verdict")
 
 
-def tally_list(found: list[Claim]) -> Markup:
-    """A number for each verdict, and what the verdict means."""
-    items = []
-    for kind, count in count_verdicts(found).items():
-        items.append(tag("li", tag("b", count), _verdict(kind), tag("span", MEANINGS[kind], class_="meaning")))
-    return tag("ul", *items, class_="tally")
-
-
-def _verdict(kind: ClaimVerdict) -> Markup:
-    mark = tag("span", MARKS[kind], aria_hidden="true", class_="mark")
-    return tag("span", mark, kind, class_=f"verdict {to_file_name(kind)}")
-
-
 def claims_table(findings: PaperFindings) -> Markup:
-    """One table, a group of rows for each experiment."""
+    """All claims in one table, a group of rows for each experiment."""
     groups = []
     for experiment in findings.experiments:
         if experiment.claims:
@@ -36,36 +24,36 @@ def claims_table(findings: PaperFindings) -> Markup:
     return _table(groups) if groups else Markup()
 
 
-def claims_list(found: Sequence[Claim]) -> Markup:
-    """The same table of a few claims that belong to no experiment."""
-    rows = [_claim(claim) for claim in found]
+def claims_list(claims: Sequence[Claim]) -> Markup:
+    """The table of claims that belong to no experiment; nothing without claims."""
+    rows = [_claim(claim) for claim in claims]
     return _table([tag("tbody", *rows, role="rowgroup")]) if rows else Markup()
 
 
 def _table(groups: Sequence[Markup]) -> Markup:
     top = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in _HEAD), role="row")
     text = (
-        "Difference: the mean of paired differences over clips and its 95 % interval, positive on the published side. "
-        "Under a statement: why its verdict is what it is."
+        "Difference: mean of the paired differences over clips and its 95 % interval; positive values agree with the "
+        "paper. The text under a statement gives the reason for its verdict."
     )
-    whole = tag(
+    content = tag(
         "table", tag("thead", top, role="rowgroup"), *groups, class_="claims", role="table", aria_label="claims"
     )
-    return join(tag("p", text, class_="caption"), whole)
+    return join(tag("p", text, class_="caption"), content)
 
 
 def _claim(claim: Claim) -> Markup:
     why = tag("small", inline_code(claim.why)) if claim.why else None
-    within = format_interval(claim)
-    distance = join(format_difference(claim), tag("span", within, class_="spread under") if within else None)
-    cells = [claim.published, claim.ours, distance, claim.clips or "", _verdict(claim.verdict)]
-    named = [
+    difference = stacked_cell(format_difference(claim), format_interval(claim))
+    badge = verdict_badge(claim.verdict, MARKS[claim.verdict])
+    cells = [claim.published, claim.ours, difference, claim.clips or "", badge]
+    titled = [
         tag("td", cell, data_label=name, role="cell", class_=None if cell else "empty")
         for name, cell in zip(_HEAD[1:], cells, strict=True)
     ]
-    return tag("tr", tag("th", claim.text, why, scope="row", role="rowheader"), *named, role="row")
+    return tag("tr", tag("th", claim.text, why, scope="row", role="rowheader"), *titled, role="row")
 
 
 def anchor(experiment: PaperExperiment) -> str:
-    """What links to its section name."""
+    """The anchor of the experiment's section."""
     return f"experiment-{to_file_name(experiment.name)}"

@@ -1,4 +1,4 @@
-"""The tables that a README shows, between markers: those of each paper and motion are replaced by the last ones."""
+"""Updates the tables of a paper in a README, which stand between two markers for each paper and motion."""
 
 import re
 from pathlib import Path
@@ -12,11 +12,11 @@ _NEWLINE = "\n"
 
 
 def update_readme(readme: Path, findings: PaperFindings) -> None:
-    """Put the tables where those of this paper and motion stand, at the end if none do; the rest keeps every byte.
+    """Replace the tables of this paper and motion in `readme`, or append them; no other byte changes.
 
-    BadFile when the page cannot be read, or has one marker without the other.
+    BadFile if the file cannot be read, or if the two markers are not there exactly once and in order.
     """
-    expected = "a page of text"
+    expected = "a text file with both markers or none"
     try:
         text = readme.read_bytes().decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -24,15 +24,15 @@ def update_readme(readme: Path, findings: PaperFindings) -> None:
     start, end = _markers(findings)
     section = f"{start}\n{_section(findings)}\n{end}"
     if text.count(start) != text.count(end) or text.count(start) > 1 or text.find(start) > text.find(end):
-        why = f"the markers {start} and {end} are not there once each, in this order"
-        raise BadFile(readme, why, expected, "Restore them, or remove both: they are then put at the end.")
+        why = f"the markers {start} and {end} do not occur once each in this order"
+        raise BadFile(readme, why, expected, "Restore both markers, or remove both to append the tables at the end.")
     if start in text:
         before, _, rest = text.partition(start)
-        whole = before + section + rest.partition(end)[2]
+        updated = before + section + rest.partition(end)[2]
     else:
-        whole = f"{text}{'' if text.endswith(_NEWLINE) else _NEWLINE}\n{section}\n"
-    if whole != text:
-        write_text(readme, whole)
+        updated = f"{text}{'' if text.endswith(_NEWLINE) else _NEWLINE}\n{section}\n"
+    if updated != text:
+        write_text(readme, updated)
 
 
 def _markers(findings: PaperFindings) -> tuple[str, str]:
@@ -41,15 +41,16 @@ def _markers(findings: PaperFindings) -> tuple[str, str]:
 
 
 def _section(findings: PaperFindings) -> str:
-    """The command and what it printed, as a block that no text in it can end."""
-    made = findings.circumstances
-    commit = f"commit {str(made['commit'])[:12]}" if made.get("commit") else "no commit"
+    """Title, version, command and tables; no text in them can end the block."""
+    versions = findings.circumstances
+    commit = f"commit {str(versions['commit'])[:12]}" if versions.get("commit") else "no commit"
     title = f"### {findings.paper}, {findings.motion}"
-    by = f"By harness {made.get('harness')}, {commit}{' with changes' if made.get('dirty') else ''}:"
+    changes = " with uncommitted changes" if versions.get("dirty") else ""
+    made_by = f"Made by harness {versions.get('harness')}, {commit}{changes}:"
     block = [f"    {line}".rstrip() for line in (findings.command, "", *text_tables(findings).split("\n"))]
-    return "\n".join([_escape_markers(title), "", _escape_markers(by), "", *map(_escape_markers, block)])
+    return "\n".join([_escape_markers(title), "", _escape_markers(made_by), "", *map(_escape_markers, block)])
 
 
 def _escape_markers(line: str) -> str:
-    """On one line, and no marker."""
+    """The line without line breaks, and with no text that could be taken for a marker."""
     return re.sub(r"[\r\n]+", " ", line).replace("<!--", "<! --")

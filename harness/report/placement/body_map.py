@@ -1,7 +1,7 @@
-"""The body heat map: skin coloured by what a station there is worth, from ahead and from behind, with a colour bar.
+"""The body map: skin coloured by the contribution of a station there, from the front and from behind.
 
-Skin takes the colour of places on its own bone alone; a bone on which nothing was tried stays grey. The body is
-rendered in a process of its own; letters, lines and colour bar are drawn around it and follow the reader's screen.
+Skin takes the colour of places on its own bone only; a bone on which no place was tried stays grey. The body is
+rendered in a separate process. Labels, lines and colour bar are drawn around it and follow the reader's screen colours.
 """
 
 import subprocess
@@ -16,11 +16,10 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.errors import MissingExtra
+from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import describe_exit, start_renderer
 from harness.report.kit.style import FAINT, INK, Chart
-from harness.report.paper.line_chart import spread_positions
 from harness.report.placement.wording import format_signed, plain_name
-from harness.report.run.charts import draw_chart
 from harness.results.placement_findings import MarginalContribution, StationNames, StationPlacement
 
 if TYPE_CHECKING:
@@ -29,60 +28,61 @@ if TYPE_CHECKING:
 
 _COLOURS = "viridis"
 _SOFTENING_M = 0.02
-"""As large as a ball: nearer than this a place does not count more."""
+"""Radius of a ball [m]; within this distance the weight of a place hardly grows."""
 _TIMEOUT_S = 120.0
+"""Time allowed for rendering [s]."""
 _HEIGHT_IN, _MOST_NAMED, _GAP = 4.9, 18, 0.048
-"""Of the chart; places with names, those worth most; between two names, as a share of the picture's height."""
+"""Height of the chart [in]; most places with names, those with the largest contributions; distance of two names, as a
+share of the picture's height."""
 _TOP, _ARMS, _TRUNK, _OUTER = 0.04, (0.145, 0.34), 0.12, 0.25
 _NECK = 0.17
-"""Shares of the picture: the first name from above, what lies above and below the arms; half of the trunk's width, and
-how far from the edge hands and forearms are."""
+"""Shares of the picture: height of the first name; limits of the arms' height; half of the trunk's width; distance of
+hands and forearms from the edge; height of the neck."""
 CandidateValues = Mapping[str, float | None]
-"""Candidate -> what it is worth; None where that was not measured."""
+"""Candidate -> its contribution; None where it was not measured."""
 
 
 @dataclass(frozen=True)
 class BodyMapValues:
-    """One map: what each candidate is worth in one way of asking."""
+    """Contributions of candidates, measured in one way, for one body map."""
 
     values: CandidateValues
     description: str
-    """The same in words."""
+    """How the contribution was measured, in words."""
     base: StationNames = ()
-    """What is worn already: it has no value, and a dark ball."""
+    """Stations that are already worn: they have no value and are drawn as dark balls."""
 
 
 def draw_body_map(
     places: Sequence[StationPlacement], shown: BodyMapValues, *, unit: str, number: int = 1
 ) -> tuple[Chart | None, str]:
-    """The chart, or None and why there is none.
+    """The chart and "", or None and the reason in one line why there is none.
 
-    Places that have no value and are not worn are left out. Without matplotlib or pyvista, or where nothing can be
-    rendered, the reason is in one line, as the report lists it.
+    Places that have no value and are not worn are left out. The chart needs matplotlib, pyvista and OpenGL.
     """
-    here = [place for place in places if place.name in shown.base or shown.values.get(place.name) is not None]
-    known = [value for place in here if (value := shown.values.get(place.name)) is not None]
-    if not known:
+    shown_places = [place for place in places if place.name in shown.base or shown.values.get(place.name) is not None]
+    measured = [value for place in shown_places if (value := shown.values.get(place.name)) is not None]
+    if not measured:
         return None, "no candidate has a value"
     for package in ("matplotlib", "pyvista"):
         if find_spec(package) is None:
             return None, str(MissingExtra("A rendered picture", package, "viz"))
-    low, high = min(0.0, *known), max(0.0, *known)
+    low, high = min(0.0, *measured), max(0.0, *measured)
     ends = (low, high if high > low else low + 1.0)
-    views, reason = _render(here, shown.values, ends)
+    views, reason = _render(shown_places, shown.values, ends)
     if views is None:
         return None, reason
-    return _chart(here, shown, views, ends, unit, number), ""
+    return _chart(shown_places, shown, views, ends, unit, number), ""
 
 
 def _render(
     places: Sequence[StationPlacement], values: CandidateValues, ends: tuple[float, float]
 ) -> tuple[dict[str, np.ndarray] | None, str]:
-    """The pictures of both sides and where the places are on them (see `body_scene`), or why there are none."""
+    """Pictures of both sides and the places on them (see `body_map_worker.main`), or None and the reason."""
     from matplotlib import colormaps
 
-    found, (low, high) = [values.get(place.name) for place in places], ends
-    shares = [0.0 if value is None else (value - low) / (high - low) for value in found]
+    contributions, (low, high) = [values.get(place.name) for place in places], ends
+    shares = [0.0 if value is None else (value - low) / (high - low) for value in contributions]
     with TemporaryDirectory(prefix="harness-report-") as folder:
         job, output = Path(folder) / "job.npz", Path(folder) / "views.npz"
         np.savez(
@@ -92,11 +92,11 @@ def _render(
             around_rad=np.deg2rad([place.around_deg for place in places]),
             stand_off_m=np.zeros(len(places)),
             colour=colormaps[_COLOURS](shares)[:, :3],
-            known=np.array([value is not None for value in found]),
+            known=np.array([value is not None for value in contributions]),
         )
         process = start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)])
         try:
-            _, said = process.communicate(timeout=_TIMEOUT_S)
+            _, stderr = process.communicate(timeout=_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             return None, "the renderer did not finish in time"
         finally:
@@ -104,7 +104,7 @@ def _render(
                 process.kill()
                 process.communicate()
         if process.returncode != 0 or not output.exists():
-            return None, describe_exit(process.returncode, said)
+            return None, describe_exit(process.returncode, stderr)
         with np.load(output, allow_pickle=False) as content:
             return {name: content[name] for name in content.files}, ""
 
@@ -122,38 +122,43 @@ def _chart(
     texts = {n: f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order[:_MOST_NAMED]}
     texts |= {n: f"{plain_name(place.name)} (worn)" for n, place in enumerate(places) if n not in values}
 
-    def draw(canvas: "Figure") -> None:
+    def draw(figure: "Figure") -> None:
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import Normalize
 
-        grid = canvas.add_gridspec(2, 2, height_ratios=(1.0, 0.035))
+        grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 0.035))
         at = views["at"]
-        for side, title in enumerate(("from ahead", "from behind")):
-            axes = canvas.add_subplot(grid[0, side])
+        for side, title in enumerate(("from the front", "from behind")):
+            axes = figure.add_subplot(grid[0, side])
             axes.imshow(views["picture"][side], interpolation="none")
             axes.set_axis_off()
             axes.text(0.5, 0.0, title, transform=axes.transAxes, ha="center", va="top", color=FAINT)
-            here = [n for n in texts if (at[1, n, 2] > at[0, n, 2] + 1e-6) == bool(side)]
-            _label_places(axes, at[side], {n: texts[n] for n in here}, views["picture"].shape[1:3])
-        bar = canvas.add_subplot(grid[1, :])
-        canvas.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
+            visible = [n for n in texts if (at[1, n, 2] > at[0, n, 2] + 1e-6) == bool(side)]
+            _label_places(axes, at[side], {n: texts[n] for n in visible}, views["picture"].shape[1:3])
+        bar = figure.add_subplot(grid[1, :])
+        figure.colorbar(ScalarMappable(Normalize(*ends), _COLOURS), cax=bar, orientation="horizontal")
         bar.set_xlabel(f"{shown.description} [{unit}]")
         bar.grid(False)
 
-    most = f" Names: the {_MOST_NAMED} of {len(order)} places worth most." if len(order) > _MOST_NAMED else ""
-    worn = " Dark balls: worn already." if len(values) < len(places) else ""
+    most = (
+        f" Named: the {_MOST_NAMED} of {len(order)} places with the largest contributions."
+        if len(order) > _MOST_NAMED
+        else ""
+    )
+    worn = " Dark balls: stations that are already worn." if len(values) < len(places) else ""
     named = {places[n].name: value for n, value in values.items()}
-    alike = any(
+    has_pairs = any(
         named.get(name.replace("left_", "right_", 1)) == value for name, value in named.items() if "left_" in name
     )
-    pairs = " Both of a pair that is worn together have the pair's value." if alike else ""
-    said = ", ".join(f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order)
+    pairs = " Both stations of a pair that is worn together have the pair's value." if has_pairs else ""
+    contributions = ", ".join(f"{plain_name(places[n].name)} {format_signed(values[n])}" for n in order)
     return draw_chart(
         f"body_map_{number}",
         f"{shown.description[0].upper()}{shown.description[1:]}",
-        f"Balls: places that were tried, with what they are worth [{unit}]. Skin has the colour of the places on its "
-        f"own bone, nearer ones more; grey bones had none.{worn}{pairs}{most} Seen from ahead, left is right.",
-        f"The body coloured by {shown.description}: {said} {unit}.",
+        f"Balls: places that were tried, with their contribution [{unit}]. Skin has the colour of the places on its "
+        f"own bone, weighted by distance; no place was tried on grey bones.{worn}{pairs}{most} In the front view the "
+        "body's left side is on the right.",
+        f"The body coloured by {shown.description}: {contributions} {unit}.",
         draw,
         _HEIGHT_IN,
         raster=True,
@@ -161,14 +166,14 @@ def _chart(
 
 
 def _label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tuple[int, int]) -> None:
-    """A name for each place with a line to its ball: over the arms, and in columns beside the rest of the body."""
+    """Write a name with a line to its ball for each place: above the arms, and in columns next to the rest."""
     height, width = size
     for right in (False, True):
         members = [n for n in texts if bool(at[n, 0] > 0.5 * width) is right]
         inwards = {n: 0.5 - abs(float(at[n, 0]) / width - 0.5) for n in members}
         arms = [n for n in members if inwards[n] < 0.5 - _TRUNK and at[n, 1] < _ARMS[1] * height]
         ends: dict[int, tuple[float, float, bool, float]] = {}
-        """How far from the edge of the picture, how far down, whether it begins there, where in it its line begins."""
+        # Place -> distance from the edge of the picture, height, whether the name starts there, start of its line.
         for k, n in enumerate(sorted(arms, key=lambda n: -inwards[n])):
             down, outer = _ARMS[0] - _GAP * k, inwards[n] < _OUTER
             ends[n] = (
@@ -203,28 +208,31 @@ def _label_places(axes: "Axes", at: Floats, texts: Mapping[int, str], size: tupl
 
 
 def interpolate_colours(points_m: Floats, places_m: Floats, colours: Floats) -> Floats:
-    """(P, 3) colours of points on a skin (P, 3) [m], of places on it (N, 3) that have colours (N, 3): nearer places
-    count more, by the inverse square of the distance (Shepard 1968, Proc. ACM National Conference)."""
-    gap_m = np.linalg.norm(points_m[:, None] - places_m, axis=2)
-    weight = 1.0 / (gap_m**2 + _SOFTENING_M**2)
+    """(P, 3) colours of skin points (P, 3) [m], interpolated from places (N, 3) [m] with colours (N, 3).
+
+    Weights are inverse squares of the distance (Shepard 1968, Proc. ACM National Conference).
+    """
+    distance_m = np.linalg.norm(points_m[:, None] - places_m, axis=2)
+    weight = 1.0 / (distance_m**2 + _SOFTENING_M**2)
     out: Floats = (weight / weight.sum(axis=1, keepdims=True)) @ colours
     return out
 
 
 def select_body_maps(worth: Sequence[MarginalContribution]) -> list[BodyMapValues]:
-    """What there is to show: candidates among each other, as many as can be, and what one more is worth."""
+    """The maps to draw: one that compares candidates with each other, and one of adding a station, if there are any."""
     groups: dict[tuple[str, StationNames], dict[str, float | None]] = {}
-    for each in worth:
-        groups.setdefault((each.mode, each.base), {})[each.candidate] = each.difference
+    for contribution in worth:
+        group = groups.setdefault((contribution.mode, contribution.base), {})
+        group[contribution.candidate] = contribution.difference
     words = {
-        "ablate": "error without it, of {count} trackers, less error with it",
-        "add": "what one more takes off the error",
-        "exhaustive": "error of sets without it less error of sets with it, on average",
+        "ablate": "error without it minus error with all {count} stations",
+        "add": "reduction of the error by one more station",
+        "exhaustive": "mean error of sets without it minus mean error of sets with it",
     }
-    found = [
+    maps = [
         BodyMapValues(values, words[mode].format(count=len(base)), base if mode == "add" else ())
         for (mode, base), values in sorted(groups.items(), key=lambda group: group[0][0] != "exhaustive")
         if any(value is not None for value in values.values())
     ]
-    among, more = [one for one in found if not one.base], [one for one in found if one.base]
-    return [max(kind, key=lambda one: len(one.values)) for kind in (among, more) if kind]
+    kinds = [m for m in maps if not m.base], [m for m in maps if m.base]
+    return [max(kind, key=lambda m: len(m.values)) for kind in kinds if kind]

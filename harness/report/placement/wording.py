@@ -1,10 +1,17 @@
-"""A placement study in words: what to wear in one sentence, sets by short names, figures with decimals enough."""
+"""A placement study in words: the recommended stations in one sentence, names of sets, and formats of numbers."""
 
-import math
 from collections.abc import Sequence
 
 from harness.compare.paired_statistics import MIN_CLIPS, compare_paired
-from harness.report.paper.verdicts import MINUS
+from harness.core.number_format import (
+    NOT_MEASURED,
+    count_noun,
+    decimals_for,
+    format_fixed,
+    format_interval,
+    format_share,
+)
+from harness.report.kit.text import list_first
 from harness.results.placement_findings import (
     BestSet,
     MarginalContribution,
@@ -17,41 +24,41 @@ from harness.results.placement_findings import (
 
 _SIDES = ("left_", "right_")
 _IRREGULAR = {"foot": "feet", "calf": "calves", "humerus": "humeri", "femur": "femora", "tibia": "tibiae"}
-_MOST_DECIMALS = 4
 TIE_NOTE = (
-    "A tie is not surely worse than the first by sign flips over clips, counting all comparisons (Holm 1979); an "
-    "interval is of one pair alone, so that it may leave zero out and still be a tie."
+    "A tied set is not significantly worse than the first one: sign-flip test over clips, corrected for all "
+    "comparisons (Holm 1979). Intervals are not corrected, so that the interval of a tied set may exclude zero."
 )
-"""What tables and pictures mean by a tie."""
-_WORTH_LABELS = {"ablate": "left out of", "add": "added to", "exhaustive": "with it against without it, over all sets"}
+"""What tables and charts mean by a tie."""
+_WORTH_LABELS = {"ablate": "left out of", "add": "added to", "exhaustive": "sets with it against sets without it"}
 
 
 def set_name(stations: StationNames) -> str:
-    """ "both ankles + pelvis": pairs first, then the others, in the order of the set."""
+    """The name of a set, "both ankles + pelvis": pairs first, then the others, in the order of the set."""
     left, right = ({n.removeprefix(side) for n in stations if n.startswith(side)} for side in _SIDES)
     parts = []
     for name in stations:
-        bare = name.removeprefix(_SIDES[0]).removeprefix(_SIDES[1])
-        if bare not in left & right:
+        without_side = name.removeprefix(_SIDES[0]).removeprefix(_SIDES[1])
+        if without_side not in left & right:
             parts.append(plain_name(name))
         elif name.startswith(_SIDES[0]):
-            parts.append(f"both {_plural(plain_name(bare))}")
+            parts.append(f"both {_plural(plain_name(without_side))}")
     return " + ".join(sorted(parts, key=lambda part: not part.startswith("both "))) or "none"
 
 
 def original_candidates(findings: PlacementFindings) -> list[StationPlacement]:
-    """The candidates that the study names, without those that it moved."""
+    """The candidates that the study names, without the positions that it derived by moving them."""
     return [place for place in findings.candidates if not place.moved_from]
 
 
 def worth_label(findings: PlacementFindings, worth: MarginalContribution) -> str:
-    """In which way a candidate's worth was found: "left out of all 5"."""
-    whole = len(worth.base) == len(original_candidates(findings))
-    base = "" if not worth.base else f"all {len(worth.base)}" if whole else set_name(worth.base)
+    """How the contribution of a candidate was measured: "left out of all 5"."""
+    is_full = len(worth.base) == len(original_candidates(findings))
+    base = "" if not worth.base else f"all {len(worth.base)}" if is_full else set_name(worth.base)
     return f"{_WORTH_LABELS[worth.mode]} {base}".strip()
 
 
 def plain_name(name: str) -> str:
+    """A name with blanks instead of underscores."""
     return name.replace("_", " ")
 
 
@@ -61,133 +68,125 @@ def _plural(name: str) -> str:
 
 
 def sentence(findings: PlacementFindings) -> str:
-    """What to wear: the fewest stations that nothing shows to be worse than the best set of any size."""
-    chosen = smallest_sufficient_set(findings)
-    if chosen is None:
+    """The recommended set: the smallest one that is not significantly worse than the best set of any size."""
+    best = smallest_sufficient_set(findings)
+    if best is None:
         return "No set of stations was measured."
-    tried = findings.of(chosen.stations)
-    ties = _ties(chosen)
-    held = format_held_out(findings, chosen)
-    elsewhere = f", and {held} on {chosen.held_out_clips} clips on which nothing was chosen" if held else ""
-    return (
-        f"{_opening(findings, chosen)}: {set_name(chosen.stations)}, {format_error(findings, tried)}{elsewhere}{ties}."
-    )
+    error = format_error(findings, findings.of(best.stations))
+    sentences = [f"{_recommendation(findings, best)}: {set_name(best.stations)}, {error}."]
+    if held_out := format_held_out(findings, best):
+        sentences.append(f"On {count_noun(best.held_out_clips, 'held-out clip')} the error is {held_out}.")
+    if best.ties:
+        sets = "Another set of this size is" if len(best.ties) == 1 else f"{len(best.ties)} other sets of this size are"
+        sentences.append(f"{sets} tied with it.")
+    return " ".join(sentences)
 
 
-def _opening(findings: PlacementFindings, chosen: BestSet) -> str:
-    """How many, and how that was found."""
-    count = len(chosen.stations)
-    most = max(len(best.stations) for best in findings.best)
-    noun = f"{count} tracker{'s'[: count != 1]}"
+def _recommendation(findings: PlacementFindings, best: BestSet) -> str:
+    """How many stations are recommended, and on what grounds."""
+    count = len(best.stations)
+    most = max(len(other.stations) for other in findings.best)
+    noun = count_noun(count, "station")
     clips = max((len(measured_errors(tried)) for tried in findings.tried), default=0)
     if clips < MIN_CLIPS:
-        return f"The least error came with {noun}, on too few clips ({clips}) to tell it from others"
+        return f"The lowest error was measured with {noun}, but {count_noun(clips, 'clip')} are too few to compare sets"
     if count == most:
-        return f"Of 1 to {most} trackers {count} err least" if count > 1 else "One tracker"
-    return f"{noun[0].upper() + noun[1:]} {'serve' if count != 1 else 'serves'} as well as up to {most}"
-
-
-def _ties(best: BestSet) -> str:
-    if not best.ties:
-        return ""
-    others = "another set" if len(best.ties) == 1 else f"{len(best.ties)} other sets"
-    return f"; nothing tells it from {others} of as many"
+        return f"Of 1 to {most} stations, {count} have the lowest error" if count > 1 else "One station"
+    return f"{noun} {'is' if count == 1 else 'are'} as good as up to {most}"
 
 
 def smallest_sufficient_set(findings: PlacementFindings) -> BestSet | None:
-    """The smallest set among the best of each size that nothing shows to be worse than the best of them all."""
-    found = [
+    """The smallest of the best sets of each size that is not significantly worse than the best of all sizes."""
+    measured = [
         (best, tried) for best in findings.best if (tried := findings.of(best.stations)) and tried.mean is not None
     ]
-    if not found:
+    if not measured:
         return None
     sign = 1.0 if findings.better == "lower" else -1.0
-    best, top = min(found, key=lambda each: sign * (each[1].mean or 0.0))
-    smaller = (each for each in found if len(each[0].stations) < len(best.stations))
+    best, top = min(measured, key=lambda pair: sign * (pair[1].mean or 0.0))
+    smaller = (pair for pair in measured if len(pair[0].stations) < len(best.stations))
     return next((other for other, tried in smaller if not _is_worse(tried, top, sign)), best)
 
 
 def _is_worse(tried: StationSetResult, top: StationSetResult, sign: float) -> bool:
-    """Whether its paired interval lies on the bad side of `top` as a whole; with too few clips it counts as worse."""
-    behind = compare_paired(tried.errors, top.errors)
-    if behind.low is None or behind.high is None:
+    """Whether the whole paired interval is on the worse side of `top`; with too few clips a set counts as worse."""
+    difference = compare_paired(tried.errors, top.errors)
+    if difference.low is None or difference.high is None:
         return True
-    return min(sign * behind.low, sign * behind.high) > 0.0
+    return min(sign * difference.low, sign * difference.high) > 0.0
 
 
 def measured_errors(tried: StationSetResult) -> dict[str, float]:
-    """Clip -> error, of clips on which there is one."""
+    """Clip -> error, for the clips on which it was measured."""
     return {clip: value for clip, value in tried.errors.items() if value is not None}
 
 
 def format_error(findings: PlacementFindings, tried: StationSetResult | None) -> str:
-    """ "1.90 deg (1.78 to 2.02)"."""
+    """The mean error of a set with its interval: "1.90 deg (1.78 to 2.02)"."""
     if tried is None or tried.mean is None:
-        return "not measured"
+        return NOT_MEASURED
     return format_mean(findings, tried.mean, tried.low, tried.high)
 
 
 def format_held_out(findings: PlacementFindings, best: BestSet) -> str:
-    """Its error on the clips that were held out, "" where there are none."""
+    """The error of a set on held-out clips; "" where there are none."""
     if best.held_out is None:
         return ""
     return format_mean(findings, best.held_out, best.held_out_low, best.held_out_high)
 
 
 def format_mean(findings: PlacementFindings, mean: float, low: float | None, high: float | None) -> str:
-    """ "1.90 deg (1.78 to 2.02)"."""
+    """A mean with its unit and interval: "1.90 deg (1.78 to 2.02)"."""
     text = f"{format_value(mean)} {findings.unit}".rstrip()
-    return f"{text} ({format_value(low)} to {format_value(high)})" if low is not None else text
+    interval = format_value_interval(low, high)
+    return f"{text} ({interval})" if interval else text
 
 
 def search_gain_sentence(search: PlacementSearch, unit: str) -> str:
-    """What a search is worth where nothing was chosen, "" where that was not judged."""
+    """How much a search improves the error on held-out clips; "" where that was not measured."""
     if search.held_out is None:
         return ""
     gain = format_difference(search.held_out, search.held_out_low, search.held_out_high)
-    return f"On {search.held_out_clips} clips on which nothing was chosen the last set saves {gain} {unit}".rstrip()
+    clips = count_noun(search.held_out_clips, "held-out clip")
+    return f"On {clips} the last set lowers the error by {gain} {unit}".rstrip()
 
 
 def format_difference(mean: float | None, low: float | None, high: float | None) -> str:
-    """ "+0.30 (0.21 to 0.38)", with as many decimals as the smallest of the three needs."""
-    if mean is None:
-        return "not measured"
-    decimals = decimals_needed(mean, low, high)
-    within = "" if low is None else f" ({format_signed(low, decimals)} to {format_signed(high, decimals)})"
-    return f"{format_signed(mean, decimals)}{within}"
+    """ "+0.30 (+0.21 to +0.38)", with the decimals that the smallest of the three needs not to read 0.00."""
+    decimals = max(2, decimals_for(mean, low, high))
+    interval = format_interval(low, high, decimals, signed=True)
+    text = format_fixed(mean, decimals, signed=True)
+    return f"{text} ({interval})" if interval and mean is not None else text
 
 
-def format_signed(value: float | None, decimals: int = 2) -> str:
+def format_signed(value: float | None) -> str:
+    """A difference with its sign and two decimals."""
+    return format_fixed(value, 2, signed=True)
+
+
+def format_value(value: float | None) -> str:
+    """Two decimals; more for small values that would read 0.00, fewer for values from 100 on."""
     if value is None:
-        return "not measured"
-    text = f"{value:+.{decimals}f}"
-    return (text if text.strip("+-0.") else text.lstrip("+-")).replace("-", MINUS)
+        return NOT_MEASURED
+    decimals = 0 if abs(value) >= 1000.0 else 1 if abs(value) >= 100.0 else max(2, decimals_for(value))
+    return format_fixed(value, decimals, grouped=True)
 
 
-def format_value(value: float | None, decimals: int = 2) -> str:
-    """Two decimals, more for what would read 0.00, none for large ones."""
-    if value is None:
-        return "not measured"
-    decimals = 0 if abs(value) >= 1000.0 else 1 if abs(value) >= 100.0 else max(decimals, decimals_needed(value))
-    return f"{value:,.{decimals}f}".replace("-", MINUS)
+def format_value_interval(low: float | None, high: float | None) -> str:
+    """ "1.78 to 2.02"; empty where the interval was not computed."""
+    return "" if low is None or high is None else f"{format_value(low)} to {format_value(high)}"
 
 
-def decimals_needed(*values: float | None) -> int:
-    """Decimals, 2 at least, so that none that is not zero reads 0.00."""
-    finest = min((abs(v) for v in values if v), default=1.0)
-    return min(max(math.ceil(-math.log10(finest)), 2), _MOST_DECIMALS)
-
-
-def format_percent(value: float | None) -> str:
-    """In per cent, "" of none."""
-    return "" if value is None else f"{100.0 * value:.0f} %"
+def format_stays(share: float | None) -> str:
+    """The share of resamples in which a set stays best, in per cent; empty for None."""
+    return "" if share is None else format_share(share)
 
 
 def format_rank_range(rank_low: int, rank_high: int) -> str:
+    """The ranks that are compatible with the intervals: "3", or "2 to 5"."""
     return str(rank_low) if rank_low == rank_high else f"{rank_low} to {rank_high}"
 
 
 def list_sets(sets: Sequence[StationNames], most: int = 3) -> str:
-    """A few sets by name, and how many more."""
-    names = [set_name(stations) for stations in sets[:most]]
-    return "; ".join([*names, *([f"{len(sets) - most} more"] if len(sets) > most else [])])
+    """The names of the first sets, and the number of the others."""
+    return list_first([set_name(stations) for stations in sets], most, separator="; ")

@@ -1,11 +1,14 @@
-"""What calibration found against the truth, for the terminal and for the page; nothing when all was known."""
+"""Errors of the calibration against the truth, for the terminal and the page; nothing when every one was exact."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from harness.report.kit.markup import Markup, join, table, tag
+from harness.core.number_format import format_fixed
+from harness.core.text_table import Table
+from harness.report.kit.markup import Markup, join, tag
+from harness.report.kit.table import html_table
 from harness.results.cell import varied_text
 
 _COLUMNS = (
@@ -17,62 +20,50 @@ _COLUMNS = (
 )
 """Title, error (see `Cell.calibration_errors`) and decimals."""
 _CAPTION = (
-    "what it found against the truth: mounts, root mean square over stations; bone lengths, likewise over bones; the "
-    "room's frame, its turn about the vertical and its origin"
+    "errors against the truth. Mounts: root mean square over stations; bone lengths: root mean square over bones; "
+    "room: its heading about the vertical and its origin"
 )
-_STATISTIC_NOTE = "mean over clips (worst clip)"
+_STATISTIC_NOTE = "Mean over clips (worst clip)"
 _POSITION_NOTE = (
-    "Nothing is aligned, so positions have the room's error in them: 17 mm for each degree of heading and metre from "
-    "where the performer stood model; mpjpe_pa_mm has not."
+    "Nothing is aligned, so position errors contain the room's error: 17 mm for each degree of heading and metre of "
+    "distance from where the performer stood model. mpjpe_pa_mm does not contain it."
 )
 
 
-def table_rows(cells: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """The table's cells, head first; empty when every calibration was exact."""
+def calibration_table(cells: Sequence[Mapping[str, Any]]) -> Table | None:
+    """A row for each kind of calibration; None when every calibration was exact."""
     if not any(cell["calibration_errors"] for cell in cells):
-        return []
+        return None
     sessions: dict[tuple[str, str], dict[str, Mapping[str, float]]] = {}
-    for cell in cells:  # methods and inputs share a session
-        named = str(cell["calibration"]), varied_text(cell["varied"])
-        sessions.setdefault(named, {})[str(cell["clip"])] = cell["calibration_errors"]
+    for cell in cells:  # methods and inputs share a calibration session
+        key = str(cell["calibration"]), varied_text(cell["varied"])
+        sessions.setdefault(key, {})[str(cell["clip"])] = cell["calibration_errors"]
     several = len({varied for _, varied in sessions}) > len({kind for kind, _ in sessions})
-    found = [["calibration", *(["varied"] if several else []), "clips", *(title for title, *_ in _COLUMNS)]]
+    head = ["calibration", *(["varied"] if several else []), "clips", *(title for title, *_ in _COLUMNS)]
+    rows = []
     for (kind, varied), by_clip in sessions.items():
         errors = [_format_error(kind, name, decimals, list(by_clip.values())) for _, name, decimals in _COLUMNS]
-        found.append([kind, *([varied] if several else []), str(len(by_clip)), *errors])
-    return found
+        rows.append([kind, *([varied] if several else []), str(len(by_clip)), *errors])
+    return Table(head, rows, text_columns=len(head))
 
 
 def text(summary: Mapping[str, Any]) -> list[str]:
-    """Lines for the terminal."""
-    found = table_rows(summary.get("cells", []))
-    if not found:
+    """The table as lines for the terminal."""
+    table = calibration_table(summary.get("cells", []))
+    if table is None:
         return []
-    return [f"calibration: {_CAPTION}; {_STATISTIC_NOTE}", _POSITION_NOTE, "", *align_left(found), ""]
-
-
-def align_left(found: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table in columns, all to the left."""
-    widths = [max(len(line[i]) for line in found) for i in range(len(found[0]))]
-    return ["  ".join(word.ljust(width) for word, width in zip(line, widths, strict=True)).rstrip() for line in found]
+    return [f"calibration: {_CAPTION}. {_STATISTIC_NOTE}", _POSITION_NOTE, "", *table.lines(), ""]
 
 
 def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
-    """The same for the page."""
-    found = table_rows(cells)
-    if not found:
-        return Markup()
-    head, *rows = found
-    return table(
-        join(tag("b", "Calibration"), f": {_CAPTION}; {_STATISTIC_NOTE}. {_POSITION_NOTE}"),
-        head,
-        rows,
-        label="calibration",
-    )
+    """The table for the page."""
+    table = calibration_table(cells)
+    caption = join(tag("b", "Calibration"), f": {_CAPTION}. {_STATISTIC_NOTE}. {_POSITION_NOTE}")
+    return html_table(table, caption, label="calibration") if table else Markup()
 
 
 def _format_error(kind: str, name: str, decimals: int, sessions: Sequence[Mapping[str, float]]) -> str:
     values = [errors[name] for errors in sessions if name in errors]
     if not values or (name == "length_mm" and kind == "tpose"):
         return "known"
-    return f"{np.mean(values):.{decimals}f} ({max(values):.{decimals}f})"
+    return f"{format_fixed(float(np.mean(values)), decimals)} ({format_fixed(max(values), decimals)})"

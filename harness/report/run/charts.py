@@ -1,58 +1,52 @@
-"""The charts of the page: error over time with quality under it, per-joint boxes, error CDF."""
+"""Charts of a run's page: error over time with station quality, errors per joint, error distribution."""
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import standard_skeleton
+from harness.report.kit.chart import add_legend, decimate, draw_chart
 from harness.report.kit.style import (
     COLOURS,
     FAINT,
     GRID,
     INK,
     PAPER,
-    SETTINGS,
     Chart,
     hide_frame,
     line_style,
-    to_png,
-    to_svg,
 )
-from harness.report.run.data import RunData, Trace, to_file_name
+from harness.report.kit.text import to_file_name
+from harness.report.run.data import RunData, Trace
+from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.pair import hinged_bones, joint_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_WIDTH_IN = 8.6
-_LETTERS, _HANDLE_LETTERS, _ROW_IN = 105, 9, 0.2
-"""Of a legend: the width of the page and of a line's sign with its margins in average letters, and one row's height."""
-_MOST_POINTS = 1500
-"""Along one line; more are no sharper on a screen."""
-ANGLE_METRIC, POSITION_METRIC = "joint_angle_mean_deg", "mpjpe_mm"
-UNITS = {ANGLE_METRIC: "joint angle error [deg]", POSITION_METRIC: "joint position error [mm]"}
+AXIS_LABELS = {PRIMARY_METRIC: "joint angle error [deg]", SECONDARY_METRIC: "joint position error [mm]"}
+"""Metric -> label of its axis."""
 
 
 def error_over_time(run: RunData, behaviour: str) -> Chart:
-    """Error of every method on the clip of this behaviour with the largest mean error, and station quality."""
+    """Error over time of every method on the behaviour's clip with the largest mean error, and station quality."""
     traces = [trace for trace in run.traces if trace.behaviour == behaviour]
     clips = tuple(dict.fromkeys(trace.clip for trace in traces))
-    clip = max(clips, key=lambda name: _mean([t.errors[ANGLE_METRIC][t.scored] for t in traces if t.clip == name]))
+    clip = max(clips, key=lambda name: _mean([t.errors[PRIMARY_METRIC][t.scored] for t in traces if t.clip == name]))
     shown = [trace for trace in traces if trace.clip == clip]
-    which = f"{clip}" + (f", of {len(clips)} clips the one with the largest error" if len(clips) > 1 else "")
+    which = clip + (f", the clip with the largest error of {len(clips)}" if len(clips) > 1 else "")
 
     def draw(figure: "Figure") -> None:
         error, quality = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 0.22 * len(shown[0].stations) + 0.25))
         for trace in (trace for trace in shown if trace.series in run.charted_series):
-            values = np.where(trace.scored, trace.errors[ANGLE_METRIC], np.nan)
+            values = np.where(trace.scored, trace.errors[PRIMARY_METRIC], np.nan)
             time_s, values = decimate(*_insert_gaps(trace.time_s, values))
             error.plot(time_s, values, label=trace.series, **line_style(run.charted_series.index(trace.series)))
         _set_log_scale(error, "y")
-        error.set_ylabel(UNITS[ANGLE_METRIC])
+        error.set_ylabel(AXIS_LABELS[PRIMARY_METRIC])
         start = min((float(t.time_s[t.scored][0]) for t in shown if t.scored.any()), default=0.0)
         error.axvspan(0.0, start, color=GRID, linewidth=0, alpha=0.7)
         add_legend(figure, error)
@@ -61,7 +55,8 @@ def error_over_time(run: RunData, behaviour: str) -> Chart:
     return draw_chart(
         f"error_{to_file_name(behaviour)}",
         behaviour.replace("_", " "),
-        f"{which}. Grey: warm-up, not scored. Below: quality of each station, blue 1 to red 0 (lost).{omitted_series_note(run)}",
+        f"{which}. Grey: warm-up, not scored. Below: quality of each station, from 1 (blue) to 0 (red, lost)."
+        f"{omitted_series_note(run)}",
         f"Joint angle error of methods over time on {clip}, and the quality of every station below it.",
         draw,
         2.6 + 0.2 * len(shown[0].stations),
@@ -69,14 +64,14 @@ def error_over_time(run: RunData, behaviour: str) -> Chart:
 
 
 def error_per_joint(run: RunData, series: str) -> Chart:
-    """Boxes of the errors of each joint for one method; medians of others as points, as many as colours tell apart."""
+    """Box plots of each joint's errors for one method; medians of other methods as points in distinct colours."""
     skeleton = standard_skeleton()
     bones = [skeleton.names[b] for b in hinged_bones(skeleton)]
     joints = list(joint_names(skeleton))
-    own = _pooled_errors(run, series)
+    boxes = _pooled_errors(run, series)
     others = [name for name in run.ranked if name != series and len(_pooled_errors(run, name)[0])]
     shown = others[: len(COLOURS) - 1]
-    which = f"the {len(shown)} methods with the next least error" if len(shown) < len(others) else "the other methods"
+    which = f"the {len(shown)} methods with the next lowest errors" if len(shown) < len(others) else "the other methods"
 
     def draw(figure: "Figure") -> None:
         left, right = figure.subplots(1, 2)
@@ -84,12 +79,12 @@ def error_per_joint(run: RunData, series: str) -> Chart:
             (left, bones, 0, "rotation relative to the parent [deg]"),
             (right, joints, 1, "position of the far end [mm]"),
         ):
-            places = np.arange(len(names))
-            _draw_boxes(axes, own[part], COLOURS[0])
+            rows = np.arange(len(names))
+            _draw_boxes(axes, boxes[part], COLOURS[0])
             for colour, name in zip(COLOURS[1:], shown, strict=False):
-                middle = np.median(_pooled_errors(run, name)[part], axis=0)
-                axes.plot(middle, places, "o", markersize=3.5, color=colour, label=name)
-            axes.set_yticks(places, names)
+                median = np.median(_pooled_errors(run, name)[part], axis=0)
+                axes.plot(median, rows, "o", markersize=3.5, color=colour, label=name)
+            axes.set_yticks(rows, names)
             axes.set_ylim(len(names) - 0.3, -0.7)
             axes.set_xscale("function", functions=(np.sqrt, np.square))
             axes.set_xlim(left=0.0)
@@ -103,8 +98,8 @@ def error_per_joint(run: RunData, series: str) -> Chart:
     return draw_chart(
         "per_joint",
         f"Each joint, {series}",
-        f"{series}: box from quartile to quartile, line at the median, whiskers at the 5th and 95th percentile of all "
-        f"scored frames. Points: medians of {which}. The axes are square-root scaled.",
+        f"{series}: boxes from quartile to quartile, lines at the median, whiskers at the 5th and 95th percentile of "
+        f"all scored frames. Points: medians of {which}. The axes have a square-root scale.",
         f"Box plots of the rotation error of 22 bones and the position error of 25 joint centres for {series}.",
         draw,
         6.4,
@@ -112,29 +107,30 @@ def error_per_joint(run: RunData, series: str) -> Chart:
 
 
 def error_distribution(run: RunData) -> Chart:
-    """How many of the frames stay below an error, for every method."""
+    """Cumulative distribution of the errors of every method."""
     shares = np.concatenate([np.linspace(0.0, 0.98, 150), np.linspace(0.981, 1.0, 60)])
 
     def draw(figure: "Figure") -> None:
-        for axes, metric in zip(figure.subplots(1, 2, sharey=True), UNITS, strict=True):
-            for place, name in enumerate(run.charted_series):
+        for axes, metric in zip(figure.subplots(1, 2, sharey=True), AXIS_LABELS, strict=True):
+            for n, name in enumerate(run.charted_series):
                 values = np.concatenate(
                     [t.errors[metric][t.scored] for t in run.traces if t.series == name] or [np.empty(0)]
                 )
                 values = values[np.isfinite(values)]
                 if len(values):
-                    axes.plot(np.quantile(values, shares), 100.0 * shares, label=name, **line_style(place))
+                    axes.plot(np.quantile(values, shares), 100.0 * shares, label=name, **line_style(n))
             _set_log_scale(axes, "x")
-            axes.set_xlabel(UNITS[metric])
+            axes.set_xlabel(AXIS_LABELS[metric])
             axes.set_ylim(0.0, 100.0)
         first = figure.axes[0]
-        first.set_ylabel("frames below [%]")
+        first.set_ylabel("frames below the error [%]")
         add_legend(figure, first)
 
     return draw_chart(
         "error_cdf",
-        "How often an error stays below",
-        f"All scored frames of all clips; the axis of the error is logarithmic. Further left is better.{omitted_series_note(run)}",
+        "Error distribution",
+        "Share of all scored frames of all clips whose error is below a value. Curves further left are better."
+        f"{omitted_series_note(run)}",
         "Cumulative distribution of joint angle and joint position error of methods.",
         draw,
         3.3,
@@ -142,40 +138,13 @@ def error_distribution(run: RunData) -> Chart:
 
 
 def omitted_series_note(run: RunData) -> str:
-    """What a caption says of series that have no line."""
+    """Sentence of a caption that says how many series have no line, or ""."""
     lines, series = len(run.charted_series), len(run.series)
-    return f" Shown are the {lines} of {series} with the least error." if lines < series else ""
-
-
-def draw_chart(
-    name: str,
-    title: str,
-    caption: str,
-    alt: str,
-    draw: Callable[["Figure"], None],
-    height_in: float,
-    *,
-    width_in: float = _WIDTH_IN,
-    layout: Literal["constrained"] | None = "constrained",
-    raster: bool = False,
-) -> Chart:
-    """What `draw` puts on a figure as wide as the page; with `raster` as a PNG too.
-
-    Without a layout the axes stay where `draw` puts them, which is quicker.
-    """
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(SETTINGS):
-        figure = Figure(figsize=(width_in, height_in), layout=layout)
-        draw(figure)
-        svg = to_svg(figure, name)
-        figure.set_layout_engine("none")  # it is laid out now
-        return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"")
+    return f" Only the {lines} of {series} methods with the lowest errors are shown." if lines < series else ""
 
 
 def _draw_quality(axes: "Axes", trace: Trace) -> None:
-    """A band for each station."""
+    """A band for each station, coloured by its quality."""
     from matplotlib.colors import LinearSegmentedColormap
 
     colours = LinearSegmentedColormap.from_list("quality", ["#b2182b", "#f4a582", "#c6dcec", "#7fb2d6"])
@@ -193,13 +162,13 @@ def _draw_quality(axes: "Axes", trace: Trace) -> None:
 
 
 def _pooled_errors(run: RunData, series: str) -> tuple[Floats, Floats]:
-    """Rotation (N, 22) and position (N, 25) errors of every scored frame of a method."""
+    """Rotation (N, 22) [deg] and position (N, 25) [mm] errors of every scored frame of a series."""
     traces = [trace for trace in run.traces if trace.series == series]
     return np.concatenate([t.rotation_deg for t in traces]), np.concatenate([t.position_mm for t in traces])
 
 
 def _draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
-    """One lying box for each column of (N, M) values. Axes.boxplot would pull in pyplot and its global state."""
+    """A horizontal box for each column of (N, M) values. Axes.boxplot would import pyplot with its global state."""
     low, q1, middle, q3, high = np.quantile(values, [0.05, 0.25, 0.5, 0.75, 0.95], axis=0)
     places = np.arange(values.shape[1])
     axes.hlines(places, low, high, color=FAINT, linewidth=1.0)
@@ -207,30 +176,15 @@ def _draw_boxes(axes: "Axes", values: Floats, colour: str) -> None:
     axes.vlines(middle, places - 0.31, places + 0.31, color=INK, linewidth=1.6)
 
 
-def add_legend(figure: "Figure", axes: "Axes") -> None:
-    """What the lines of `axes` are called, above the chart; it grows by the rows that do not fit into the first."""
-    handles, names = axes.get_legend_handles_labels()
-    room = _LETTERS * figure.get_figwidth() / _WIDTH_IN
-    columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= room), 1)
-    figure.legend(handles, names, loc="outside upper left", ncols=columns)
-    further_rows = max(math.ceil(len(names) / columns) - 1, 0)
-    figure.set_figheight(figure.get_figheight() + _ROW_IN * further_rows)
-
-
-def _legend_letters(names: Sequence[str], columns: int) -> int:
-    """As wide as so many letters; matplotlib fills columns one after another."""
-    return sum(_HANDLE_LETTERS + max(map(len, part)) for part in np.array_split(np.array(names, object), columns))
-
-
-def _set_log_scale(axes: "Axes", which: Literal["x", "y"]) -> None:
-    """A logarithmic axis with plain numbers, unless nothing on it is above zero (a perfect method)."""
+def _set_log_scale(axes: "Axes", side: Literal["x", "y"]) -> None:
+    """Make an axis logarithmic, with plain numbers, unless no value on it is above zero (a perfect method)."""
     from matplotlib.ticker import LogLocator, NullLocator
 
-    column = 0 if which == "x" else 1
+    column = 0 if side == "x" else 1
     values = np.concatenate([np.asarray(line.get_data()[column], dtype=float) for line in axes.lines] or [np.zeros(1)])
     if np.nanmax(values, initial=0.0) > 0.0:
-        axes.set(**{f"{which}scale": "log"})
-        axis = axes.xaxis if which == "x" else axes.yaxis
+        axes.set(**{f"{side}scale": "log"})
+        axis = axes.xaxis if side == "x" else axes.yaxis
         few = np.nanmin(values[values > 0.0]) * 300.0 < np.nanmax(values)
         axis.set_major_locator(LogLocator(subs=(1.0,) if few else (1.0, 2.0, 5.0)))
         axis.set_minor_locator(NullLocator())
@@ -238,7 +192,7 @@ def _set_log_scale(axes: "Axes", which: Literal["x", "y"]) -> None:
 
 
 def _root_ticks(end: float) -> list[float]:
-    """Round numbers for a square-root axis from 0 to `end`, none too near its neighbour."""
+    """Round tick values for a square-root axis from 0 to `end`, spaced widely enough to be read."""
     ticks = [0.0]
     for power in range(-3, 5):
         for tick in (digit * 10.0**power for digit in (1, 2, 5)):
@@ -248,19 +202,13 @@ def _root_ticks(end: float) -> list[float]:
 
 
 def _insert_gaps(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """A NaN wherever frames are missing, so that no line is drawn across."""
+    """The curve with a NaN wherever frames are missing, so that no line is drawn across the gap."""
     step_s = np.diff(time_s)
-    holes = np.flatnonzero(step_s > 1.5 * np.min(step_s, initial=np.inf)) + 1
-    return np.insert(time_s, holes, time_s[holes - 1]), np.insert(values, holes, np.nan)
-
-
-def decimate(time_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Every n-th point of a long line."""
-    every = max(1, len(time_s) // _MOST_POINTS)
-    return time_s[::every], values[::every]
+    gaps = np.flatnonzero(step_s > 1.5 * np.min(step_s, initial=np.inf)) + 1
+    return np.insert(time_s, gaps, time_s[gaps - 1]), np.insert(values, gaps, np.nan)
 
 
 def _mean(parts: Sequence[Floats]) -> float:
     values = np.concatenate(parts)
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if len(known) else -1.0
+    finite = values[np.isfinite(values)]
+    return float(finite.mean()) if len(finite) else -1.0

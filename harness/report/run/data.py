@@ -1,4 +1,4 @@
-"""What the page needs of a run: its summary, and of every cell the numbers that are drawn, without the poses."""
+"""The data of a run's page: the summary and, for every cell, the errors that are drawn, without the poses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,16 +29,16 @@ WORST_METRICS = (
     "jitter_m_s3",
     "foot_skate_mm_s",
 )
-"""Whose worst two seconds are shown."""
+"""Metrics whose worst two seconds are shown."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """One cell over time, F frames of S stations."""
+    """Errors and stream health of one cell over time: F frames, S stations, N scored frames."""
 
     key: str
     series: str
-    """Name of the group that it belongs to, see `RunData.series`."""
+    """The series of the cell, see `RunData.series`."""
     behaviour: str
     clip: str
     stations: tuple[str, ...]
@@ -47,13 +47,13 @@ class Trace:
     time_s: Floats
     scored: Bools
     errors: Mapping[str, Floats]
-    """(F,) of each of WORST_METRICS; NaN where undefined."""
+    """Metric -> (F,) error, for WORST_METRICS; NaN where undefined."""
     rotation_deg: Floats
     """(N, 22) geodesic error of each hinged bone in the scored frames, float32."""
     position_mm: Floats
     """(N, 25) error of each joint centre in the scored frames, float32."""
     quality: Floats
-    """(F, S)."""
+    """(F, S) quality of each station, 0 to 1."""
     position_valid: Bools
     orientation_valid: Bools
     suspect: Bools
@@ -61,14 +61,14 @@ class Trace:
 
 @dataclass(frozen=True, eq=False)
 class RunData:
-    """A finished run, ready to be shown."""
+    """A finished run as its page shows it."""
 
     out: Path
     manifest: Manifest
     summary: Row
     traces: tuple[Trace, ...]
     full_summary: Row
-    """The summary with every combination of varied values; `summary` has the last one alone."""
+    """The summary of all combinations of varied values; `summary` has only the last one."""
 
     @property
     def name(self) -> str:
@@ -76,29 +76,29 @@ class RunData:
 
     @property
     def cells(self) -> Sequence[Row]:
-        """A row for each finished cell."""
+        """The rows of the finished cells."""
         rows: Sequence[Row] = self.summary["cells"]
         return rows
 
     @property
     def varied_label(self) -> str:
-        """The varied values that are shown, as text; empty when the scenario varies none."""
+        """The varied values that the page shows, as text; empty when the scenario varies none."""
         return varied_text(self.cells[0]["varied"]) if self.cells else ""
 
     @cached_property
     def series(self) -> tuple[str, ...]:
-        """Names of the groups that are compared: methods, told apart by inputs, split, performer where they vary."""
+        """Names of what is compared: methods, qualified by inputs, split and performer where these vary."""
         return tuple(dict.fromkeys(self.series_of(row) for row in self.summary["methods"]))
 
     @cached_property
     def ranked(self) -> tuple[str, ...]:
-        """The series, that with the least mean error first."""
+        """The series, sorted by mean error, the lowest first."""
         errors = {self.series_of(row): row["metrics"][WORST_METRICS[0]]["mean"] for row in self.summary["methods"]}
         return tuple(sorted(self.series, key=lambda name: np.inf if errors[name] is None else errors[name]))
 
     @cached_property
     def charted_series(self) -> tuple[str, ...]:
-        """The series that charts show: as many as colours and dashes tell apart, those with the least error."""
+        """The series with the lowest errors, as many as colours and dashes can distinguish."""
         return tuple(name for name in self.series if name in self.ranked[:STYLES])
 
     @cached_property
@@ -109,7 +109,7 @@ class RunData:
         return next(trace for trace in self.traces if trace.key == key)
 
     def series_of(self, row: Row) -> str:
-        """Name of the group of a row of the summary."""
+        """The series that a row of the summary belongs to."""
         rows = self.full_summary["methods"]
         parts = []
         if len({r["inputs"] for r in rows}) > 1:
@@ -125,15 +125,15 @@ class RunData:
 
 
 def read_run(out: Path) -> RunData:
-    """Read it, one cell at a time; BadFile when the folder holds no run or a damaged one."""
-    manifest, whole = Manifest.read(out / "manifest.json"), read_summary(out)
-    run = RunData(out, manifest, _last_varied(whole), (), whole)
+    """Read the run in `out` one cell at a time; BadFile if the folder holds no run or a damaged one."""
+    manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
+    run = RunData(out, manifest, _last_varied(summary), (), summary)
     keys = [str(row["key"]) for row in run.cells]
     return replace(run, traces=tuple(_trace(run, run.cell(key)) for key in keys))
 
 
 def _last_varied(summary: Row) -> Row:
-    """The summary of the cells with the last combination of varied values."""
+    """The part of a summary with the last combination of varied values."""
     if not summary["cells"]:
         return summary
     last = summary["cells"][-1]["varied"]
@@ -164,17 +164,15 @@ def _trace(run: RunData, cell: Cell) -> Trace:
 
 
 def scored_pair(cell: Cell) -> Pair:
-    """Truth and estimate of the scored frames."""
+    """Truth and estimate of the scored frames of a cell."""
     rows = cell.scores.scored
     return Pair(*pose_pair(cell, rows), cell.frame_index[rows], cell.rate_hz)
 
 
 def pose_pair(cell: Cell, rows: Bools | Ints) -> tuple[PoseSequence, PoseSequence]:
-    """Truth and estimate at some of its frames, each on its own skeleton."""
-    true, believed = (standard_skeleton().with_bones(bone_m) for bone_m in (cell.bone_m, cell.estimate_bone_m))
-    return compute_poses(true, cell.truth_qpos[rows]), compute_poses(believed, cell.estimate_qpos[rows])
-
-
-def to_file_name(text: str) -> str:
-    """Letters, digits and underscores only."""
-    return "".join(letter if letter.isalnum() and letter.isascii() else "_" for letter in text)
+    """Truth and estimate in some frames of a cell, each on its own skeleton."""
+    true_skeleton, estimated_skeleton = (
+        standard_skeleton().with_bones(bone_m) for bone_m in (cell.bone_m, cell.estimate_bone_m)
+    )
+    truth, estimate = cell.truth_qpos[rows], cell.estimate_qpos[rows]
+    return compute_poses(true_skeleton, truth), compute_poses(estimated_skeleton, estimate)

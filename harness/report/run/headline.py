@@ -1,71 +1,76 @@
-"""The sentence that the page opens on, and the facts that qualify it."""
+"""The sentences that open the page of a run, and the facts below them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from harness.core.number_format import count_noun, format_share
+from harness.report.kit.text import describe_motion_source
 from harness.report.run.data import RunData
 from harness.results.cell import varied_text
+from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
-PRIMARY_METRIC, SECONDARY_METRIC = "joint_angle_mean_deg", "mpjpe_mm"
 SequenceKey = tuple[str, str, int]
 """Behaviour, clip and seed."""
+_Errors = Mapping[str, Mapping[SequenceKey, float]]
+"""Series -> sequence -> error."""
+_MOST_UNMEASURED = 8
+"""Metrics without a value that are listed one by one."""
 
 
 @dataclass(frozen=True)
 class Headline:
-    """Plain text throughout; whoever prints it escapes it."""
+    """What a run found, as plain text; the page escapes it."""
 
     sentence: str
     best: str | None
-    """The leading series; None when nothing was measured."""
+    """The series with the lowest error; None when no series leads."""
     facts: Mapping[str, str]
     """Title -> text: motion, coverage, what was not measured."""
 
 
 def build_headline(run: RunData) -> Headline:
-    """Which method is best, by how much, on what, and what is missing."""
+    """Which method is best, by how much and on what motion, and what is missing."""
     facts = {
         "Motion": _motion(run),
         "Tracker": _tracker(run),
         "Learning": _learning(run),
         "Varied": _varied(run),
         "Coverage": _coverage(run),
-        "Line": _link_loss(run),
+        "Link": _link_loss(run),
         "Not measured": _unmeasured(run),
     }
     facts = {title: text for title, text in facts.items() if text}
-    measured = {name: values for name in run.series if (values := _by_sequence(run, name, PRIMARY_METRIC))}
+    measured = {name: errors for name in run.series if (errors := _by_sequence(run, name, PRIMARY_METRIC))}
     if not measured:
         return Headline(f"Nothing was measured: {_progress(run)}.", None, facts)
-    kinds: dict[str, dict[str, dict[SequenceKey, float]]] = {}
-    for name, values in measured.items():
-        kinds.setdefault(_performer(run, name), {})[name] = values
-    said = [_ranking_sentence(run, kind, found) for kind, found in kinds.items()]
-    return Headline(" ".join(sentence for sentence, _ in said), said[0][1], facts)
+    by_performer: dict[str, dict[str, dict[SequenceKey, float]]] = {}
+    for name, errors in measured.items():
+        by_performer.setdefault(_performer(run, name), {})[name] = errors
+    rankings = [_ranking(run, performer, errors) for performer, errors in by_performer.items()]
+    return Headline(" ".join(sentence for sentence, _ in rankings), rankings[0][1], facts)
 
 
-def _ranking_sentence(
-    run: RunData, kind: str, measured: Mapping[str, Mapping[SequenceKey, float]]
-) -> tuple[str, str | None]:
-    """The sentence about methods that saw the same kind of performer, and which of them leads."""
-    shared = sorted(set.intersection(*(set(values) for values in measured.values())))
+def _ranking(run: RunData, performer: str, measured: _Errors) -> tuple[str, str | None]:
+    """The sentences about series with the same kind of performer, and which of them is best."""
+    shared = sorted(set.intersection(*(set(errors) for errors in measured.values())))
     if not shared:
-        return f"{', '.join(measured)} share no measured sequence: none is best.", None
-    means = {name: float(np.mean([values[k] for k in shared])) for name, values in measured.items()}
+        return f"{', '.join(measured)} share no measured sequence, so they are not ranked.", None
+    means = {name: float(np.mean([errors[k] for k in shared])) for name, errors in measured.items()}
     order = sorted(means, key=lambda name: means[name])
-    sequences = _count_noun(len(shared), "sequence")
+    best = order[0]
+    sequences = count_noun(len(shared), "sequence")
     if len(shared) < max(map(len, measured.values())):
         sequences = f"the {sequences} that all methods were measured on"
-    best = f"{order[0]} is best" if len(order) > 1 else order[0]
     several = len({_performer(run, name) for name in run.series}) > 1
-    whose = f" by {kind} performers" if several and kind else ""
-    start = f"{best}: {means[order[0]]:.2f}° mean joint-angle error on {sequences} of {_source(run)}{whose}"
-    lead = _lead_text(measured, order[0], order[1], shared) if len(order) > 1 else "; no other method was measured"
-    at = f", with {run.varied_label}" if run.varied_label else ""
-    return f"{start}{lead}{at}.{_positions(run, order, shared)}", order[0]
+    motion = _source(run) + (f" by {performer} performers" if several and performer else "")
+    setting = f", with {run.varied_label}" if run.varied_label else ""
+    start = f"{best} is best" if len(order) > 1 else best
+    sentences = [f"{start}: {means[best]:.2f}° mean joint-angle error on {sequences} of {motion}{setting}."]
+    sentences.append(_lead(measured, best, order[1], shared) if len(order) > 1 else "No other method was measured.")
+    return " ".join([*sentences, *_positions(run, order, shared)]), best
 
 
 def _performer(run: RunData, series: str) -> str:
@@ -73,33 +78,33 @@ def _performer(run: RunData, series: str) -> str:
     return next(str(row["performer"]) for row in run.summary["methods"] if run.series_of(row) == series)
 
 
-def _positions(run: RunData, order: Sequence[str], shared: Sequence[SequenceKey]) -> str:
-    """Whether the joints' positions say the same; nothing where they were not measured."""
-    found = {name: _by_sequence(run, name, SECONDARY_METRIC) for name in order}
-    means = {name: np.mean([v[k] for k in shared]) for name, v in found.items() if set(shared) <= set(v)}
-    if order[0] not in means:
-        return ""
-    first = min(means, key=lambda name: means[name])
-    if first == order[0]:
-        return f" Its joints are {means[first]:.0f} mm off" + (", the least too." if len(means) > 1 else ".")
-    return f" In joint position {first} is better: {means[first]:.0f} mm off, {order[0]} {means[order[0]]:.0f} mm."
+def _lead(measured: _Errors, best: str, second: str, shared: Sequence[SequenceKey]) -> str:
+    """The sentence on how much lower the best error is than the second."""
+    lowest, next_lowest = (np.array([measured[name][k] for k in shared]) for name in (best, second))
+    difference, wins = float(np.mean(next_lowest - lowest)), int(np.sum(lowest < next_lowest))
+    if difference < 0.005:
+        return f"{second}, the next, has the same error."
+    how_often = "" if len(shared) == 1 else f", and lower on {wins} of {len(shared)} sequences"
+    share = format_share(difference / next_lowest.mean())
+    return f"That is {difference:.2f}° ({share}) less than {second}, the next{how_often}."
 
 
-def _lead_text(
-    measured: Mapping[str, Mapping[SequenceKey, float]], best: str, second: str, shared: Sequence[SequenceKey]
-) -> str:
-    """How far the next one is behind."""
-    ours, others = (np.array([measured[name][k] for k in shared]) for name in (best, second))
-    less, ahead = float(np.mean(others - ours)), int(np.sum(ours < others))
-    if less < 0.005:
-        return f", as much as {second}, the next"
-    share = f" ({100.0 * less / others.mean():.0f} %)"
-    how_often = "" if len(shared) == 1 else f", and better on {ahead} of {len(shared)}"
-    return f", {less:.2f}°{share} less than {second}, the next{how_often}"
+def _positions(run: RunData, order: Sequence[str], shared: Sequence[SequenceKey]) -> list[str]:
+    """The sentence on joint positions; none where they were not measured."""
+    errors = {name: _by_sequence(run, name, SECONDARY_METRIC) for name in order}
+    means = {name: np.mean([e[k] for k in shared]) for name, e in errors.items() if set(shared) <= set(e)}
+    best = order[0]
+    if best not in means:
+        return []
+    lowest = min(means, key=lambda name: means[name])
+    if lowest == best:
+        also = ", also the lowest" if len(means) > 1 else ""
+        return [f"Its mean joint position error is {means[best]:.0f} mm{also}."]
+    return [f"{lowest} has the lowest joint position error: {means[lowest]:.0f} mm ({best}: {means[best]:.0f} mm)."]
 
 
 def _by_sequence(run: RunData, series: str, metric: str) -> dict[SequenceKey, float]:
-    """The metric of every sequence where it was measured."""
+    """The metric of every sequence on which it was measured."""
     return {
         (str(row["behaviour"]), str(row["clip"]), int(row["seed"])): float(row[metric])
         for row in run.cells
@@ -113,11 +118,10 @@ def _source(run: RunData) -> str:
 
 
 def _motion(run: RunData) -> str:
-    source = str(run.manifest.inputs.get("motion_source", "unknown"))
-    made_up = " (generated by a procedure, not recorded from a person)" if "built-in" in source else ""
+    source = describe_motion_source(str(run.manifest.inputs.get("motion_source", "unknown")))
     clips = {str(row["clip"]) for row in run.cells}
-    shown = ", ".join(name.replace("_", " ") for name in run.behaviours)
-    return f"{source}{made_up}; {shown}; {_count_noun(len(clips), 'clip')}"
+    behaviours = ", ".join(name.replace("_", " ") for name in run.behaviours)
+    return f"{source}; {behaviours}; {count_noun(len(clips), 'clip')}"
 
 
 def _tracker(run: RunData) -> str:
@@ -133,19 +137,21 @@ def _tracker(run: RunData) -> str:
 
 
 def _learning(run: RunData) -> str:
-    """What methods that learn were allowed to see."""
-    learners: dict[str, dict[str, None]] = {}
+    """The split that limits what each method may learn from."""
+    by_split: dict[str, dict[str, None]] = {}
     for row in run.summary["methods"]:
-        learners.setdefault(str(row["split"]), {})[str(row["method"])] = None
-    without = learners.pop("none", {})
-    parts = [f"{', '.join(names)} from other motion (split {split})" for split, names in learners.items()]
-    return "; ".join([*parts, *([f"{', '.join(without)} from none"] if without else [])])
+        by_split.setdefault(str(row["split"]), {})[str(row["method"])] = None
+    without = by_split.pop("none", {})
+    parts = [f"split {split}: {', '.join(names)}" for split, names in by_split.items()]
+    return "; ".join([*parts, *([f"no examples: {', '.join(without)}"] if without else [])])
 
 
 def _varied(run: RunData) -> str:
-    """The combinations that were run, and which of them is shown."""
+    """The combinations of varied values that were run, and which of them the page shows."""
+    if not run.varied_label:
+        return ""
     texts = list(dict.fromkeys(varied_text(row["varied"]) for row in run.full_summary["cells"]))
-    return f"{'; '.join(texts)}. From the results on everything is about {run.varied_label}" if run.varied_label else ""
+    return f"{'; '.join(texts)}. All sections from Results on show {run.varied_label}"
 
 
 def _progress(run: RunData) -> str:
@@ -155,27 +161,23 @@ def _progress(run: RunData) -> str:
 def _coverage(run: RunData) -> str:
     matched = sum(int(row["frames_matched"]) for row in run.cells)
     expected = sum(int(row["frames_expected"]) for row in run.cells)
-    share = f" ({100.0 * matched / expected:.1f} %)" if expected else ""
+    share = f" ({format_share(matched / expected, 1)})" if expected else ""
     return f"{matched:,} of {expected:,} frames matched{share}; {_progress(run)}"
 
 
 def _link_loss(run: RunData) -> str:
-    """What the line between tracker and host could not carry."""
-    totals = [
-        [float(row["health"].get(name, 0.0)) for row in run.cells] for name in ("records_sent", "records_dropped")
-    ]
-    sent, lost = map(sum, totals)
-    return f"too slow: {100.0 * lost / (sent + lost):.0f} % of the records were dropped" if lost else ""
+    """The share of records that the link between tracker and host could not carry."""
+    sent, dropped = (
+        sum(float(row["health"].get(name, 0.0)) for row in run.cells) for name in ("records_sent", "records_dropped")
+    )
+    return f"too slow: {format_share(dropped / (sent + dropped))} of the records were dropped" if dropped else ""
 
 
 def _unmeasured(run: RunData) -> str:
-    """Metrics without a value, by how many of the cells lack them."""
+    """Metrics without a value, and how many cells lack them."""
     lacking = {name: sum(row[name] is None for row in run.cells) for name in DEFINITIONS}
-    parts = [f"{name} in {_count_noun(count, 'cell')} of {len(run.cells)}" for name, count in lacking.items() if count]
-    if len(parts) > 8:
-        parts = [f"{len(parts)} of {len(DEFINITIONS)} metrics in some cells", *parts[:3], "and so on (see all metrics)"]
+    parts = [f"{name} in {count_noun(count, 'cell')} of {len(run.cells)}" for name, count in lacking.items() if count]
+    if len(parts) > _MOST_UNMEASURED:
+        start = f"{len(parts)} of {len(DEFINITIONS)} metrics in some cells"
+        parts = [start, *parts[:3], "and others (see all metrics)"]
     return ", ".join(parts)
-
-
-def _count_noun(count: int, what: str) -> str:
-    return f"{count} {what}" + ("" if count == 1 else "s")

@@ -1,4 +1,4 @@
-"""The page of a run: its verdict, tables and pictures in order."""
+"""The page of a run: headline, tables, charts and pictures."""
 
 import json
 import shlex
@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from harness.core.files import to_json_types
+from harness.core.number_format import format_number
+from harness.core.text_table import Table
 from harness.report.kit.document import Section, chart_figure, data_uri, document
-from harness.report.kit.markup import Markup, details, join, scroll_box, table, tag
+from harness.report.kit.markup import Markup, bullet_list, details, join, scroll_box, tag
 from harness.report.kit.style import Chart
+from harness.report.kit.table import NOT_MEASURED_CELL, html_table, stacked_cell
 from harness.report.run import (
     calibration_cost,
     calibration_errors,
@@ -24,27 +27,30 @@ from harness.report.run.headline import Headline
 from harness.report.run.worst_window import WorstWindow
 from harness.score.metrics import DEFINITIONS
 
-_REPRODUCE_NOTE = "Run it where the scenario file and, for recorded motion, the library lie."
+_REPRODUCE_NOTE = (
+    "Run the command in a folder from which it finds the scenario file and, for recorded motion, the library. To write "
+    "this page alone again: "
+)
 
 
 @dataclass(frozen=True)
 class FilmStrip:
-    """The worst two seconds of the leading method by one metric, as a picture."""
+    """A picture of the two seconds in which the leading method was worst by some metric."""
 
     windows: Sequence[WorstWindow]
-    """Which coincide; the first is shown."""
+    """Windows of several metrics that coincide; the first is shown."""
     title: str
     instants_s: Sequence[float]
     picture: Path
-    """May be absent: then the page says so."""
+    """PNG file; if it does not exist, the page leaves the strip out and says why under "Missing"."""
 
 
 @dataclass(frozen=True)
 class RunContent:
-    """All that the page shows."""
+    """Everything that the page of a run shows."""
 
     run: RunData
-    verdict: Headline
+    headline: Headline
     varied: Sequence[Chart]
     over_time: Sequence[Chart]
     per_joint: Chart | None
@@ -52,20 +58,21 @@ class RunContent:
     windows: Mapping[tuple[str, str], WorstWindow]
     """(series, metric) -> its worst two seconds."""
     strips: Sequence[FilmStrip]
-    scrubber: Markup
+    player: Markup
+    """Interactive 3-D view; empty without one."""
     movies: Sequence[Path]
     missing: Sequence[str]
-    """What is not on the page, and why."""
+    """Parts that are not on the page, and why."""
 
 
 def run_page(content: RunContent) -> str:
-    """The whole file."""
+    """The HTML of the page."""
     run = content.run
     return document(
         title=f"{run.name}: harness report",
         kicker=f"harness report · {run.name}",
-        heading=content.verdict.sentence,
-        facts=content.verdict.facts,
+        heading=content.headline.sentence,
+        facts=content.headline.facts,
         missing=content.missing,
         sections=_sections(content),
     )
@@ -75,12 +82,9 @@ def _sections(content: RunContent) -> list[Section]:
     run = content.run
     measured = bool(run.cells)
     nothing, cells = Markup(), run.full_summary["cells"]
+    effects = join(*(chart_figure(chart, 3) for chart in content.varied), parameter_effects.effect_tables(run))
     return [
-        (
-            "Varied",
-            "varied",
-            join(*(chart_figure(chart, 3) for chart in content.varied), parameter_effects.effect_tables(run)),
-        ),
+        ("Varied", "varied", effects),
         ("Expected orders", "expected_orders", expected_orders.section(run.full_summary)),
         ("Calibration", "calibration", join(calibration_errors.section(cells), calibration_cost.section(cells))),
         ("Results", "results", tables.results_tables(run) if measured else nothing),
@@ -92,11 +96,7 @@ def _sections(content: RunContent) -> list[Section]:
         ("Stream health", "health", tables.health_tables(run) if measured else nothing),
         ("Worst two seconds", "worst", _worst_section(content) if content.windows else nothing),
         ("In 3-D", "look", _view_3d(content)),
-        (
-            "Every metric",
-            "metrics",
-            _every_metric(run) if measured else nothing,
-        ),
+        ("Every metric", "metrics", _every_metric(run) if measured else nothing),
         ("Manifest", "manifest", _manifest(run)),
         ("Reproduce", "reproduce", _reproduce(run)),
     ]
@@ -111,18 +111,18 @@ def _worst_section(content: RunContent) -> Markup:
         for metric in metrics:
             window = content.windows.get((series, metric))
             if window is None:
-                cells.append(tables.NOT_MEASURED)
+                cells.append(NOT_MEASURED_CELL)
                 continue
-            place = join(clips[window.key], tag("br"), _format_span(window))
-            cells.append(join(_format_mean(window), tag("span", place, class_="spread under")))
+            where = join(clips[window.key], tag("br"), _format_span(window))
+            cells.append(stacked_cell(_format_mean(window), where))
         rows.append([series, *cells])
     head = ["method", *metrics]
-    caption = "The two seconds with the largest mean of each metric, and where they are."
-    summary = table(caption, head, rows, label="worst two seconds")
-    key = tag("p", "The leading method, where it was worst. ", _colour_key())
+    caption = "The two seconds with the largest mean of each metric: mean, clip and time."
+    summary = html_table(Table(head, rows), caption, label="worst two seconds")
+    key = tag("p", "The best method in its worst two seconds. ", _colour_key())
     strips = [_film_strip(strip) for strip in content.strips if strip.picture.is_file()]
-    links = [tag("li", tag("a", path.name, href=path.name)) for path in content.movies]
-    movies = join(tag("h3", "Movies"), tag("ul", *links)) if links else None
+    links = bullet_list([tag("a", path.name, href=path.name) for path in content.movies], class_=None)
+    movies = join(tag("h3", "Movies"), links) if links else None
     return join(summary, key if strips else None, *strips, movies)
 
 
@@ -137,14 +137,14 @@ def _film_strip(strip: FilmStrip) -> Markup:
 
 def _colour_key() -> Markup:
     truth, estimate = (tag("span", class_=f"chip {name}") for name in ("truth", "estimate"))
-    return join(truth, "truth, pale and full; ", estimate, "estimate, slimmer: where it is right it lies inside.")
+    return join(truth, "truth, pale; ", estimate, "estimate, slimmer: it lies inside the truth where it is right.")
 
 
 def _view_3d(content: RunContent) -> Markup:
-    if not content.scrubber:
+    if not content.player:
         return Markup()
-    text = "The worst two seconds of every method. Drag to turn; the camera follows the true root."
-    return join(tag("p", text, " ", _colour_key()), content.scrubber)
+    text = "The worst two seconds of every method. Drag to rotate the view; the camera follows the true root."
+    return join(tag("p", text, " ", _colour_key()), content.player)
 
 
 def _every_metric(run: RunData) -> Markup:
@@ -154,23 +154,21 @@ def _every_metric(run: RunData) -> Markup:
 def _manifest(run: RunData) -> Markup:
     text = json.dumps(to_json_types(run.manifest.as_dict()), indent=2, ensure_ascii=False)
     notes = list(dict.fromkeys(f"{trace.clip}: {note}" for trace in run.traces for note in trace.notes))
-    listed = details("Notes on the motion", tag("ul", *(tag("li", note) for note in notes))) if notes else None
-    return join(details("Inputs, metric versions, circumstances", tag("pre", text)), listed)
+    motion_notes = details("Notes on the motion", bullet_list(notes, class_=None)) if notes else None
+    return join(details("Inputs, metric versions, circumstances", tag("pre", text)), motion_notes)
 
 
 def _reproduce(run: RunData) -> Markup:
     command = run.manifest.circumstances.get("command")
-    again = shlex.join(["harness", "report", str(run.out)])
+    report_command = shlex.join(["harness", "report", str(run.out)])
     if not command:
-        return tag("p", "The run was started from a program: no command was recorded.")
-    return join(
-        tag("pre", tag("code", str(command))), tag("p", f"{_REPRODUCE_NOTE} This page alone: ", tag("code", again))
-    )
+        return tag("p", "The run was started from Python, so no command was recorded.")
+    return join(tag("pre", tag("code", str(command))), tag("p", _REPRODUCE_NOTE, tag("code", report_command), "."))
 
 
 def _format_mean(window: WorstWindow) -> str:
     unit = DEFINITIONS[window.metric].unit
-    return f"{tables.format_number(window.mean, unit)} {unit}"
+    return f"{format_number(window.mean, unit)} {unit}"
 
 
 def _format_span(window: WorstWindow) -> str:

@@ -1,16 +1,21 @@
-"""The page's tables: errors of methods by behaviour, coverage, stream health, every metric."""
+"""Tables of a run's page: errors of methods by behaviour, coverage, stream health, every metric."""
 
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from harness.report.kit.markup import Markup, details, join, table, tag
+from harness.core.number_format import count_noun, format_number, format_share
+from harness.core.text_table import Table
+from harness.report.kit.markup import Markup, bullet_list, details, join, tag
+from harness.report.kit.table import NOT_MEASURED_CELL, count_note, html_table, stacked_cell, statistic_cell
+from harness.report.kit.text import last_line
 from harness.report.run.data import Row, RunData, Trace
+from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
-OPEN_METRICS = ("joint_angle_mean_deg", "mpjpe_mm")
-"""Metrics whose table by behaviour is open."""
+OPEN_METRICS = (PRIMARY_METRIC, SECONDARY_METRIC)
+"""Metrics whose table by behaviour is shown."""
 FOLDED_METRICS = (
     "joint_angle_rms_deg",
     "mpjre_deg",
@@ -20,36 +25,21 @@ FOLDED_METRICS = (
     "lag_ms",
     "step_p50_ms",
 )
+"""Metrics whose table by behaviour is folded."""
+_FRAME_COUNTS = ("matched", "expected", "held", "lost", "not_finite")
 _UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
-"""Where the lowest is not the best: truth has jitter of its own, and a lag has a sign."""
-NOT_MEASURED = tag("span", "not measured", class_="none")
-_DECIMALS = {"deg": 2, "mm": 1, "mm/s": 1, "m/s³": 1, "ms": 2, "frames/s": 0, "%": 1}
+"""Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
 
 
-def format_number(value: float, unit: str, *, decimals: int = 0) -> str:
-    """With the decimals that suit the unit, `decimals` of them at least."""
-    return f"{value:,.{max(decimals, _DECIMALS.get(unit, 2))}f}"
-
-
-def format_statistics(found: Mapping[str, Any] | None, unit: str, *, n: int | None = None) -> Markup:
-    """Mean ± standard deviation over sequences, and their number where it differs from `n`."""
-    if found is None or found["mean"] is None:
-        return NOT_MEASURED
-    spread = None if found["sd"] is None else tag("span", f" ± {format_number(found['sd'], unit)}", class_="spread")
-    return join(
-        format_number(found["mean"], unit),
-        spread,
-        None if found["sequences"] == n else format_count(found["sequences"]),
-    )
-
-
-def format_count(n: int | str) -> Markup:
-    """Of how many sequences, never broken across lines."""
-    return tag("span", f" n\u00a0{n}", class_="spread")
+def summary_cell(statistics: Mapping[str, Any] | None, unit: str, *, column_n: int = 0) -> Markup:
+    """Mean ± standard deviation of the summary, with the number of sequences where it is not `column_n`."""
+    if statistics is None:
+        return NOT_MEASURED_CELL
+    return statistic_cell(statistics["mean"], statistics["sd"], unit, n=statistics["sequences"], column_n=column_n)
 
 
 def results_tables(run: RunData) -> Markup:
-    """Methods by behaviours: the first metrics open, further ones folded."""
+    """Methods by behaviour: a table for each metric, most of them folded."""
     further = [behaviour_table(run, metric) for metric in FOLDED_METRICS]
     return join(
         *(behaviour_table(run, metric) for metric in OPEN_METRICS), details("More metrics by behaviour", *further)
@@ -57,65 +47,67 @@ def results_tables(run: RunData) -> Markup:
 
 
 def behaviour_table(run: RunData, metric: str) -> Markup:
-    """One metric: a row for each method, a column for each behaviour, then all sequences of several."""
-    found: dict[tuple[str, str | None], Row] = {}
+    """One metric: a row for each method, a column for each behaviour and, if there are several, one for all."""
+    statistics: dict[tuple[str, str | None], Row] = {}
     for row in run.summary["behaviours"]:
-        found[run.series_of(row), str(row["behaviour"])] = row["metrics"][metric]
+        statistics[run.series_of(row), str(row["behaviour"])] = row["metrics"][metric]
     for row in run.summary["methods"]:
-        found[run.series_of(row), None] = row["metrics"][metric]
+        statistics[run.series_of(row), None] = row["metrics"][metric]
     unit = DEFINITIONS[metric].unit
     columns = [*run.behaviours, *([None] if len(run.behaviours) > 1 else [])]
     counts, best = {}, {}
     for column in columns:
-        here = {name: found[name, column] for name in run.series if (name, column) in found}
-        counts[column] = max((s["sequences"] for s in here.values()), default=0)
-        means = {name: s["mean"] for name, s in here.items() if s["mean"] is not None}
+        by_name = {name: statistics[name, column] for name in run.series if (name, column) in statistics}
+        counts[column] = max((s["sequences"] for s in by_name.values()), default=0)
+        means = {name: s["mean"] for name, s in by_name.items() if s["mean"] is not None}
         ranked = len(means) > 1 and metric not in _UNRANKED_METRICS
         best[column] = min(means, key=lambda name: means[name]) if ranked else None
 
     def cell(name: str, column: str | None) -> Markup:
-        text = format_statistics(found.get((name, column)), unit, n=counts[column])
+        text = summary_cell(statistics.get((name, column)), unit, column_n=counts[column])
         return tag("strong", text) if name == best[column] else text
 
-    numbers = [format_count(counts[column]) for column in columns]
+    numbers = [count_note(counts[column]) for column in columns]
     names = [(column or "all").replace("_", " ") for column in columns]
     titles = [join(name, n) for name, n in zip(names, numbers, strict=True)]
     rows = [[name, *(cell(name, column) for column in columns)] for name in run.series]
     caption = join(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")
-    return table(caption, ["method", *titles], rows, label=metric)
+    return html_table(Table(["method", *titles], rows), caption, label=metric)
 
 
 def coverage_tables(run: RunData) -> Markup:
-    """How much of the motion each method answered for."""
+    """How many frames each method estimated, and which cells failed."""
     rows = []
     for row in run.summary["methods"]:
-        share = f"{100.0 * row['coverage']:.1f} %"
-        counts = [f"{row[name]:,}" for name in ("frames_matched", "frames_expected")]
-        doubtful = [f"{row[name]:,}" for name in ("frames_held", "frames_lost", "frames_not_finite")]
-        rows.append([run.series_of(row), row["sequences"], *counts, share, *doubtful])
+        share = format_share(row["coverage"], 1)
+        matched, expected, *others = (f"{row[f'frames_{name}']:,}" for name in _FRAME_COUNTS)
+        rows.append([run.series_of(row), row["sequences"], matched, expected, share, *others])
     head = ["method", "sequences", "frames matched", "expected", "share", "held", "lost", "not finite"]
     caption = (
-        "Frames after the warm-up. Held: carried on because too little came in; "
-        "lost: most stations had been gone for long; not finite counts as not matched."
+        "Frames after the warm-up. Held: the last pose was kept because too few stations were valid. Lost: most "
+        "stations had been missing for long. Not finite: the estimate is no number and counts as not matched."
     )
-    failures = [tag("li", tag("b", cell), details(_last_line(text), tag("pre", text))) for cell, text in _failures(run)]
-    failed = join(tag("h3", "Failed cells"), tag("ul", *failures)) if failures else None
+    failures = [
+        join(tag("b", cell), details(last_line(text), tag("pre", text)))
+        for cell, text in run.summary["failures"].items()
+    ]
+    failed = join(tag("h3", "Failed cells"), bullet_list(failures, class_=None)) if failures else None
     finished, planned = run.summary["cells_finished"], run.summary["cells_planned"]
     return join(
         tag("p", f"{finished} of {planned} cells finished."),
-        table(caption, head, rows, label="coverage") if rows else None,
+        html_table(Table(head, rows), caption, label="coverage") if rows else None,
         failed,
     )
 
 
 def health_tables(run: RunData) -> Markup:
-    """What the stream lost, by station and by clip; every method on a clip was shown the same stream."""
+    """What the stream lost, by station and by clip; all methods received the same stream of a clip."""
     streams: dict[str, Trace] = {}
     for trace in sorted(run.traces, key=lambda trace: -len(trace.time_s)):
         if len(trace.time_s):
             streams.setdefault(trace.clip, trace)
     if not streams:
-        return NOT_MEASURED
+        return NOT_MEASURED_CELL
     rows = []
     for station in dict.fromkeys(name for trace in streams.values() for name in trace.stations):
         parts = [(trace, trace.stations.index(station)) for trace in streams.values() if station in trace.stations]
@@ -123,41 +115,31 @@ def health_tables(run: RunData) -> Markup:
         quality = np.concatenate([t.quality[:, s] for t, s in parts])
         suspect = np.concatenate([t.suspect[:, s] for t, s in parts])
         gap_s = max(_longest_gap_s(t, s) for t, s in parts)
-        shares = [f"{100.0 * np.mean(column):.2f} %" for column in (valid, suspect)]
+        shares = [format_share(float(np.mean(column)), 2) for column in (valid, suspect)]
         rows.append([station.replace("_", " "), *shares, f"{np.nanmean(quality):.3f}", f"{gap_s:.2f}"])
     head = ["station", "valid", "suspect", "mean quality", "longest gap [s]"]
-    caption = f"All frames of {len(streams)} clip{'s'[: len(streams) != 1]}. Gap: a run of frames without position."
+    caption = f"All frames of {count_noun(len(streams), 'clip')}. Gap: consecutive frames without position."
     names = list(dict.fromkeys(name for trace in streams.values() for name in trace.health))
     counts = [[clip, *(_format_plain(trace.health.get(name)) for name in names)] for clip, trace in streams.items()]
-    by_clip = table("Counts of the stream, by clip", ["clip", *names], counts, label="stream counts")
-    return join(table(caption, head, rows, label="stream health"), details("Counts by clip", by_clip))
+    by_clip = html_table(Table(["clip", *names], counts), "Counts of the stream, by clip", label="stream counts")
+    return join(html_table(Table(head, rows), caption, label="stream health"), details("Counts by clip", by_clip))
 
 
 def all_metrics_table(run: RunData) -> Markup:
     """Every metric of every method over all sequences, with its definition."""
-    found = {run.series_of(row): row["metrics"] for row in run.summary["methods"]}
+    by_series = {run.series_of(row): row["metrics"] for row in run.summary["methods"]}
     rows = []
     for metric, definition in DEFINITIONS.items():
-        if not all(metric in metrics for metrics in found.values()):
+        if not all(metric in metrics for metrics in by_series.values()):
             continue
         cells = []
-        for metrics in found.values():
-            frames = metrics[metric]["frame_weighted"]
-            below = (
-                None if frames is None else tag("span", format_number(frames, definition.unit), class_="spread under")
-            )
-            cells.append(join(format_statistics(metrics[metric], definition.unit), below))
+        for metrics in by_series.values():
+            pooled = metrics[metric]["frame_weighted"]
+            lower = "" if pooled is None else format_number(pooled, definition.unit)
+            cells.append(stacked_cell(summary_cell(metrics[metric], definition.unit), lower))
         rows.append([join(f"{metric} [{definition.unit}]", tag("small", definition.text)), *cells])
-    caption = "Mean ± sd over sequences; below it the figure over all frames together, where there is one."
-    return table(caption, ["metric", *found], rows, label="every metric")
-
-
-def _failures(run: RunData) -> list[tuple[str, str]]:
-    return [(str(cell), str(text)) for cell, text in run.summary["failures"].items()]
-
-
-def _last_line(text: str) -> str:
-    return (text.strip().splitlines() or ["no message"])[-1]
+    caption = "Mean ± sd over sequences; below it the value over all frames pooled, where it is defined."
+    return html_table(Table(["metric", *by_series], rows), caption, label="every metric")
 
 
 def _longest_gap_s(trace: Trace, station: int) -> float:
@@ -171,7 +153,7 @@ def _longest_gap_s(trace: Trace, station: int) -> float:
 
 def _format_plain(value: Any) -> Any:
     if value is None:
-        return NOT_MEASURED
+        return NOT_MEASURED_CELL
     if isinstance(value, Mapping):
         return ", ".join(f"{name} {_format_plain(item)}" for name, item in value.items())
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""Where a method was worst: the two seconds with the largest mean of a metric."""
+"""The two seconds of a cell with the largest mean of a metric."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,10 +12,10 @@ WINDOW_S = 2.0
 
 @dataclass(frozen=True)
 class WorstWindow:
-    """Some two seconds of one cell, the whole of a shorter one."""
+    """A window of two seconds in one cell, or all of a shorter cell."""
 
     key: str
-    """Of the cell."""
+    """Key of the cell."""
     metric: str
     first: int
     stop: int
@@ -23,24 +23,24 @@ class WorstWindow:
     start_s: float
     end_s: float
     mean: float
-    """Of the metric over the window's scored frames, in its unit."""
+    """Mean of the metric over the window's scored frames, in the metric's unit."""
 
 
 def find_worst_window(key: str, metric: str, time_s: Floats, values: Floats, scored: Bools) -> WorstWindow | None:
     """The worst of all windows that begin at a scored frame, or None if the metric has no value in any of them.
 
-    A window holds the frames within 2 s of its first one; `time_s` (F,) rises. It counts only if at least half as
-    many of its frames have a value as in the fullest window: one bad frame beside a gap is no bad two seconds.
+    A window holds the frames within 2 s of its first one; `time_s` (F,) rises. Windows with less than half as many
+    values as the fullest one are left out, so that a single bad frame next to a gap does not count as two bad seconds.
     """
-    known = scored & np.isfinite(values)
-    if not known.any():
+    valid = scored & np.isfinite(values)
+    if not valid.any():
         return None
     period_s = float(np.min(np.diff(time_s), initial=np.inf))
-    whole = scored & (time_s + WINDOW_S <= time_s[-1] + 1.5 * period_s)
-    begins = whole if whole.any() else np.arange(len(scored)) == np.argmax(scored)
+    complete = scored & (time_s + WINDOW_S <= time_s[-1] + 1.5 * period_s)
+    begins = complete if complete.any() else np.arange(len(scored)) == np.argmax(scored)
     stop = np.searchsorted(time_s, time_s + WINDOW_S - 0.5 * period_s)
-    count = _window_sums(known.astype(float), stop)
-    total = _window_sums(np.where(known, values, 0.0), stop)
+    count = _window_sums(valid.astype(float), stop)
+    total = _window_sums(np.where(valid, values, 0.0), stop)
     begins = begins & (count > 0.0) & (count >= 0.5 * np.max(count[begins]))
     if not begins.any():
         return None
@@ -51,12 +51,12 @@ def find_worst_window(key: str, metric: str, time_s: Floats, values: Floats, sco
 
 
 def select_worst(windows: Iterable[WorstWindow]) -> WorstWindow | None:
-    """The one with the largest mean; the first of equals."""
+    """The window with the largest mean; the first of equal ones."""
     return max(windows, key=lambda window: window.mean, default=None)
 
 
 def group_overlapping(windows: Iterable[WorstWindow]) -> list[tuple[WorstWindow, ...]]:
-    """Windows of one cell that overlap by more than half, so that the same moment is shown once; the first leads."""
+    """Groups of windows of one cell that overlap the group's first window by more than half."""
     groups: list[list[WorstWindow]] = []
     for window in windows:
         for group in groups:
@@ -71,7 +71,7 @@ def group_overlapping(windows: Iterable[WorstWindow]) -> list[tuple[WorstWindow,
 
 
 def _window_sums(values: Floats, stop: Ints) -> Floats:
-    """Sums (F,) from each frame to the end of its window."""
+    """(F,) sums from each frame to the end of its window."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     out: Floats = sums[stop] - sums[: len(values)]
     return out

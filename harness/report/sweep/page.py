@@ -1,4 +1,4 @@
-"""The page of a sweep, written from its index: what was found, what was varied, what failed, and where the table is."""
+"""The page of a sweep, written from its index: best method, effect of varied keys, failures, data files."""
 
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
@@ -7,10 +7,9 @@ from typing import Any
 
 from harness.compare.paired_statistics import MIN_CLIPS
 from harness.core.files import write_text
-from harness.report.comparison.wording import list_first
-from harness.report.kit.document import Section, data_uri, document
-from harness.report.kit.markup import Markup, details, join, tag
-from harness.report.kit.style import Chart
+from harness.report.kit.document import Section, chart_panel, document
+from harness.report.kit.markup import Markup, bullet_list, details, join, tag
+from harness.report.kit.text import list_first
 from harness.report.sweep.charts import (
     MAX_INTERVALS,
     MAX_SCENARIOS,
@@ -20,19 +19,20 @@ from harness.report.sweep.charts import (
     scenarios_varying,
     sweep_chart,
 )
-from harness.report.sweep.data import METRICS, PRIMARY_METRIC, SECONDARY_METRIC, SweepData, VariedKey
+from harness.report.sweep.data import METRICS, SweepData, VariedKey
 from harness.report.sweep.reader import read_sweep
 from harness.report.sweep.tables import failures, scenario_table, value_table
 from harness.report.sweep.wording import describe_effect, list_values, sentence
 from harness.results.index import INDEX_FILE
+from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 
 _EXAMPLE = "SELECT scenario, method, avg(mpjpe_mm) FROM cells GROUP BY scenario, method"
 
 
 def write_sweep_page(out: Path) -> Path:
-    """Write OUT/report.html of the sweep in `out` and return it; BadFile when there is none.
+    """Write OUT/report.html of the sweep in `out` and return its path; BadFile if `out` holds no sweep.
 
-    Without matplotlib it has the tables alone.
+    Without matplotlib the page has only tables.
     """
     path = out / "report.html"
     write_text(path, sweep_page(read_sweep(out)))
@@ -40,23 +40,23 @@ def write_sweep_page(out: Path) -> Path:
 
 
 def sweep_page(sweep: SweepData) -> str:
-    """The whole file."""
-    draw, missing = find_spec("matplotlib") is not None, []
-    wanted = min(len(sweep.series), MAX_SERIES) * sum(
+    """The HTML of the page."""
+    can_draw, missing = find_spec("matplotlib") is not None, []
+    intervals = min(len(sweep.series), MAX_SERIES) * sum(
         len(key.labels) * len(scenarios_varying(sweep, key)[:MAX_SCENARIOS]) for key in sweep.keys
     )
-    ends = wanted <= MAX_INTERVALS
-    if sweep.keys and not draw:
-        missing.append("Charts: matplotlib is not installed; their numbers are tables")
-    if not ends:
+    with_intervals = intervals <= MAX_INTERVALS
+    if sweep.keys and not can_draw:
+        missing.append("Charts: matplotlib is not installed; tables show their numbers")
+    if not with_intervals:
         missing.append(
-            f"Intervals: {wanted:,} would take too long; sweeps of fewer values, scenarios or methods have them"
+            f"Intervals: {intervals:,} take too long to compute; use fewer values, scenarios or methods to see them"
         )
     sections: list[Section] = [
-        ("What was varied", "varied", _varied(sweep, ends=ends, draw=draw)),
+        ("Varied keys", "varied", _varied(sweep, with_intervals=with_intervals, can_draw=can_draw)),
         ("Methods by scenario", "scenarios", _scenarios(sweep)),
         ("Failures", "failures", failures(sweep)),
-        ("The whole table", "table", _files(sweep)),
+        ("Data files", "table", _files(sweep)),
     ]
     return document(
         title=f"{sweep.name}: harness sweep",
@@ -79,40 +79,34 @@ def _facts(sweep: SweepData) -> Mapping[str, str]:
     return {title: text for title, text in facts.items() if text}
 
 
-def _varied(sweep: SweepData, *, ends: bool, draw: bool) -> Markup:
-    """For each key a chart for each scenario that varies it, and the figures folded."""
+def _varied(sweep: SweepData, *, with_intervals: bool, can_draw: bool) -> Markup:
+    """For each key a chart for each scenario that varies it, and the numbers folded."""
     if not sweep.keys:
         return Markup()
     text = (
-        f"Mean {PRIMARY_METRIC} over clips, each averaged over what else is varied. Bars: 95 % interval, where there "
-        f"are {MIN_CLIPS} clips at least."
+        f"Mean {PRIMARY_METRIC} over clips; each clip is first averaged over all other varied values. Bars: 95 % "
+        f"interval, if there are at least {MIN_CLIPS} clips."
     )
     charts: list[Markup] = []
     tables: list[Markup] = []
     for key in sweep.keys:
         scenarios = scenarios_varying(sweep, key)
-        found = {scenario: curves(sweep, key, scenario, ends=ends) for scenario in scenarios[:MAX_SCENARIOS]}
-        charts += [_figure(sweep_chart(sweep, key, n, those)) for n, those in found.items() if those and draw]
-        if (more := len(scenarios) - len(found)) > 0:
-            text += f" Of {key.name} {more:,} more scenarios are in the table alone."
-        figures = [_tables(sweep, key, n, those) for n, those in found.items()]
-        tables.append(details(f"Figures: {key.name}", *figures) if draw else join(tag("h3", key.name), *figures))
+        by_scenario = {n: curves(sweep, key, n, with_intervals=with_intervals) for n in scenarios[:MAX_SCENARIOS]}
+        if can_draw:
+            charts += [chart_panel(sweep_chart(sweep, key, n, lines)) for n, lines in by_scenario.items() if lines]
+        if (more := len(scenarios) - len(by_scenario)) > 0:
+            text += f" For {key.name}, {more:,} more scenarios are only in table.csv."
+        numbers = [_tables(sweep, key, n, lines) for n, lines in by_scenario.items()]
+        tables.append(details(f"Numbers: {key.name}", *numbers) if can_draw else join(tag("h3", key.name), *numbers))
     return join(tag("p", text), tag("div", *charts, class_="panels broad") if charts else None, *tables)
 
 
-def _tables(sweep: SweepData, key: VariedKey, scenario: int, found: Sequence[Curve]) -> Markup:
-    second = curves(sweep, key, scenario, SECONDARY_METRIC, ends=False)
+def _tables(sweep: SweepData, key: VariedKey, scenario: int, primary: Sequence[Curve]) -> Markup:
+    secondary = curves(sweep, key, scenario, SECONDARY_METRIC, with_intervals=False)
     return join(
-        *(
-            value_table(sweep, key, scenario, those, m)
-            for those, m in ((found, PRIMARY_METRIC), (second, SECONDARY_METRIC))
-        )
+        value_table(sweep, key, scenario, primary, PRIMARY_METRIC),
+        value_table(sweep, key, scenario, secondary, SECONDARY_METRIC),
     )
-
-
-def _figure(drawn: Chart) -> Markup:
-    image = tag("img", src=data_uri(drawn.for_screen().encode(), "image/svg+xml"), alt=drawn.alt)
-    return tag("figure", tag("h3", drawn.title), image, tag("figcaption", drawn.caption), class_="panel")
 
 
 def _scenarios(sweep: SweepData) -> Markup:
@@ -128,8 +122,11 @@ def _files(sweep: SweepData) -> Markup:
         return tag("code", name)
 
     items: list[Any] = [
-        join(file("summary.csv"), f": {len(sweep):,} rows in planned order, with every metric."),
-        join(file(INDEX_FILE), ": the same for questions, and more, such as how long each cell took:"),
+        join(file("summary.csv"), f": {len(sweep):,} rows in the order of the plan, with every metric."),
+        join(
+            file(INDEX_FILE),
+            ": a database with the same data and more, such as the run time of each cell. An example query:",
+        ),
     ]
     query = tag("pre", tag("code", f'sqlite3 {INDEX_FILE} "{_EXAMPLE}"'))
-    return join(tag("ul", *(tag("li", item) for item in items), class_="notes"), query)
+    return join(bullet_list(items), query)

@@ -1,4 +1,4 @@
-"""A sweep read from its index: every finished cell, as far as its page needs it."""
+"""Reads the finished cells of a sweep from its index, with the columns that the page needs."""
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
@@ -13,12 +13,12 @@ from harness.results.cell import varied_text
 from harness.results.index import CellIndex
 
 _GROUP_COLUMNS = ("inputs", "split", "performer")
-"""Never pooled, the performer last: a method has a series for each combination of them that it has."""
+"""Columns that are never pooled: each combination of them is a series of its own. The performer must be last."""
 _COLUMNS = ("scenario", "clip", "method", *_GROUP_COLUMNS, "varied", *METRICS)
 
 
 def read_sweep(out: Path) -> SweepData:
-    """Everything that is finished in the folder of a sweep, also while it runs; BadFile when it is none."""
+    """The finished cells of the sweep in `out`, also while it runs; BadFile if `out` holds no sweep."""
     with CellIndex(out, read_only=True) as index:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
@@ -33,13 +33,13 @@ def read_sweep(out: Path) -> SweepData:
 def collect_cells(
     cells: Iterable[Sequence[Any]], *, name: str, planned: int, failures: Mapping[str, str], command: str = ""
 ) -> SweepData:
-    """From the index's columns, a cell at a time."""
+    """The data of a sweep from its cells, each a row of the index's columns."""
     scenarios, clips, groups, values = _LabelEncoder(), _LabelEncoder(), _LabelEncoder(), _LabelEncoder()
     codes: list[tuple[int, int, int, int]] = []
     figures: list[Sequence[float | None]] = []
-    for scenario, clip, method, *telling in cells:
-        group = (method, *telling[: len(_GROUP_COLUMNS)])
-        varied, *metrics = telling[len(_GROUP_COLUMNS) :]
+    for scenario, clip, method, *others in cells:
+        group = (method, *others[: len(_GROUP_COLUMNS)])
+        varied, *metrics = others[len(_GROUP_COLUMNS) :]
         clip_code = clips.code(f"{scenario}: {clip}")
         codes.append((scenarios.code(scenario), clip_code, groups.code(group), values.code(varied)))
         figures.append(metrics)
@@ -65,45 +65,47 @@ def collect_cells(
 
 
 class _LabelEncoder:
-    """Numbers for names, in the order in which they are met."""
+    """Consecutive integer codes for names, in order of first occurrence."""
 
     def __init__(self) -> None:
         self.names: list[Any] = []
-        self._places: dict[Any, int] = {}
+        self._codes: dict[Any, int] = {}
 
     def code(self, name: Any) -> int:
-        if name not in self._places:
-            self._places[name] = len(self.names)
+        if name not in self._codes:
+            self._codes[name] = len(self.names)
             self.names.append(name)
-        return self._places[name]
+        return self._codes[name]
 
 
 def _series_names(groups: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
-    """Methods, with what tells series of one method apart."""
+    """Names of the methods, qualified by what distinguishes series of one method."""
     names = []
-    for method, *telling in groups:
+    for method, *group in groups:
         same = [other for other in groups if other[0] == method]
-        apart = [text or "–" for n, text in enumerate(telling, start=1) if len({other[n] for other in same}) > 1]
-        names.append(f"{method} ({', '.join(apart)})" if apart else method)
+        words = [text or "–" for n, text in enumerate(group, start=1) if len({other[n] for other in same}) > 1]
+        names.append(f"{method} ({', '.join(words)})" if words else method)
     return tuple(names)
 
 
-def _varied_keys(found: Sequence[Mapping[str, Any]], varied_of: Ints) -> tuple[tuple[VariedKey, ...], dict[str, Ints]]:
-    """Those that take several values, and which value each cell has; `found` are the combinations that there are."""
+def _varied_keys(
+    combinations: Sequence[Mapping[str, Any]], varied_of: Ints
+) -> tuple[tuple[VariedKey, ...], dict[str, Ints]]:
+    """Keys with several values, and the value of each key in each cell; `varied_of` indexes `combinations`."""
     keys, value_of = [], {}
-    for name in dict.fromkeys(name for varied in found for name in varied):
-        values = {_value_label(name, varied[name]): varied[name] for varied in found if name in varied}
+    for name in dict.fromkeys(name for varied in combinations for name in varied):
+        values = {_value_label(name, varied[name]): varied[name] for varied in combinations if name in varied}
         if len(values) < 2:
             continue
         if numeric := all(isinstance(value, int | float) and not isinstance(value, bool) for value in values.values()):
             values = dict(sorted(values.items(), key=lambda item: float(item[1])))
         keys.append(VariedKey(name, tuple(values), tuple(map(float, values.values())) if numeric else ()))
-        place = {text: n for n, text in enumerate(values)}
-        each = [place[_value_label(name, varied[name])] if name in varied else -1 for varied in found]
-        value_of[name] = np.array(each, dtype=np.int64)[varied_of]
+        code = {text: n for n, text in enumerate(values)}
+        codes = [code[_value_label(name, varied[name])] if name in varied else -1 for varied in combinations]
+        value_of[name] = np.array(codes, dtype=np.int64)[varied_of]
     return tuple(keys), value_of
 
 
 def _value_label(name: str, value: Any) -> str:
-    """As tables have it, without the key."""
+    """The value as text, as in tables but without the key."""
     return varied_text({name: value}).removeprefix(f"{name}=")

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.number_format import format_fixed, format_share
+from harness.core.text_table import Table
 from harness.stream.frame import TrackerFrame
 
 
@@ -54,14 +56,12 @@ class StreamSummary:
     def __str__(self) -> str:
         rate = f", {(self._frames - 1) / self.duration_s:.2f} Hz" if self.duration_s > 0.0 else ""
         head = f"{self._frames} frames in {self.duration_s:.2f} s{rate}, longest gap {1e3 * self._longest_s:.0f} ms"
-        width = max(map(len, (*self._stations, "station")))
-        lines = [head, "", f"{'station':<{width}}  with a record  position  orientation  suspect  mean quality"]
+        rows = []
         for i, station in enumerate(self._stations):
             came, placed, turned = (
-                f"{100.0 * count[i] / max(self._frames, 1):.1f} %" for count in (self._came, self._placed, self._turned)
+                format_share(count[i] / max(self._frames, 1), 1) for count in (self._came, self._placed, self._turned)
             )
             quality = self._quality[i] / max(self._frames, 1)
-            lines.append(
-                f"{station:<{width}}  {came:>13}  {placed:>8}  {turned:>11}  {self._suspect[i]:>7}  {quality:>12.2f}"
-            )
-        return "\n".join(lines)
+            rows.append([station, came, placed, turned, str(self._suspect[i]), format_fixed(quality, 2)])
+        table = Table(["station", "with a record", "position", "orientation", "suspect", "mean quality"], rows)
+        return "\n".join([head, "", *table.lines()])

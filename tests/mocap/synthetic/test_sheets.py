@@ -1,5 +1,6 @@
 """Contact sheets: a picture of the size the documentation can carry, and the committed ones are of every behaviour."""
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -8,9 +9,9 @@ from PIL import Image
 
 from harness.errors import BadInput
 from harness.mocap import synthetic
-from harness.report.kit.contact_sheet import contact_sheet
 
 DOCS = Path(__file__).parents[3] / "docs" / "performer"
+contact_sheet = runpy.run_path(str(DOCS / "contact_sheet.py"))["contact_sheet"]
 
 
 def test_a_sheet_shows_figures_of_both_sides(tmp_path: Path) -> None:

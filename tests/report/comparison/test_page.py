@@ -9,6 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.compare.comparison import Comparison, Difference
+from harness.core.number_format import format_change_percent
 from harness.errors import Outcome
 from harness.report.comparison import writer as report
 from harness.report.comparison.interval_chart import _draw as draw_intervals
@@ -23,13 +24,12 @@ from harness.report.comparison.wording import (
     count_directions,
     count_verdicts,
     format_interval,
-    format_percent,
     format_signed,
     sentence,
 )
 from harness.report.comparison.writer import text, write_comparison_page
+from harness.report.kit.chart import draw_chart
 from harness.report.kit.style import Chart
-from harness.report.run.charts import draw_chart
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_comparison import CIRCUMSTANCES, GROUP, METRICS, comparison, line, whole
 from tests.report.reading import read, text_of
@@ -56,7 +56,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_first_line_is_the_verdict() -> None:
     first, a, b = text(comparison()).splitlines()[:3]
     (worse,) = (found for found in comparison().differences if found.verdict == "worse")
-    share = format_percent(100.0 * worse.difference / worse.mean_a)
+    share = format_change_percent(100.0 * worse.difference / worse.mean_a)
     assert first == f"B is worse than A in 1 of 6 gated lines on 24 clips: local_pca mpjpe_mm {share}."
     assert (a, b) == ("A: baseline gate", "B: results/gate")
 
@@ -65,10 +65,10 @@ def test_the_first_line_is_the_verdict() -> None:
 @pytest.mark.parametrize(
     ("shown", "said"),
     [
-        (comparison(methods=("ik", "dynamic_map")), "B is no worse than A: of 4 gated lines on 24 clips"),
-        (comparison(3), "Whether B is worse than A cannot be told: 7 lines were judged."),
+        (comparison(methods=("ik", "dynamic_map")), "B is not worse than A: of 4 gated lines on 24 clips"),
+        (comparison(3), "It cannot be decided whether B is worse than A: 7 lines were judged."),
         (told([], outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik"), "missing: A: ik."),
-        (told([], why="no cell of A has a partner in B"), "cannot be told: no cell of A has a partner in B."),
+        (told([], why="no cell of A has a partner in B"), "It cannot be decided whether B is worse than A: no cell of A has a partner in B."),
     ],
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:
@@ -194,7 +194,7 @@ def test_what_differs_is_named_and_long_lists_are_counted(tmp_path: Path) -> Non
         assert "tracker.rate_hz: 40 against 60" in found
         assert "ik on walking_0, ik on walking_1" in found
         assert all(name in found for name, _, _ in CIRCUMSTANCES)
-    assert "cells in a alone: 500 (ik on walking_0, ik on walking_1, ik on walking_2 and 497 more)" in printed
+    assert "cells only in a: 500 (ik on walking_0, ik on walking_1, ik on walking_2 and 497 more)" in printed
     assert "and 300 more" in said
     assert max(map(len, printed.splitlines())) < 200
 
@@ -232,7 +232,7 @@ def test_equal_sides_are_the_same_and_nothing_differs(tmp_path: Path) -> None:
     assert shown.outcome is Outcome.PASS
     assert "6 clips: 6 unchanged." in slope_chart(shown.differences[0], 1).alt
     said = text_of(write_comparison_page(shown, tmp_path / "page.html"))
-    assert "Nothing: same inputs, same circumstances, the same cells." in said
+    assert "Nothing: inputs, circumstances and cells are the same." in said
 
 
 @pytest.mark.usefixtures("undrawn")

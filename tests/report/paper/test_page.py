@@ -72,7 +72,7 @@ def test_what_several_experiments_differ_in_is_told_once(study: Path) -> None:
     said = text_of(study / "report.html")
     assert said.count("The motion comes from a generator") == 1
     assert said.count("Golf has 2 clips only.") == 1
-    assert said.count("what several experiments differ in") == 2
+    assert said.count("differences of several experiments") == 2
 
 
 def test_figures_are_told_in_words_and_kept_as_files(study: Path) -> None:
@@ -154,7 +154,7 @@ def test_an_experiment_may_be_empty(tmp_path: Path) -> None:
         tmp_path / "one", EMPTY, replace(EMPTY, name="table", tables=(FindingsTable("Errors", ("a", "b"), ()),))
     )
     said = text_of(page)
-    assert "No published statement was held against a figure of ours." in said
+    assert "No published statement was compared with a measured result." in said
     assert "Errors : nothing was measured." in said
     assert "Circumstances" in text_of(alone(tmp_path / "none"))
 
@@ -206,7 +206,7 @@ def test_very_long_names_do_not_break_the_page(tmp_path: Path) -> None:
 def test_without_matplotlib_the_numbers_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(writer, "find_spec", lambda name: None)
     said = text_of(write_paper_page(write_study(tmp_path, kim())))
-    assert "Missing here Figures: matplotlib is not installed; their numbers are tables" in said
+    assert "Missing Figures: matplotlib is not installed; tables show their numbers" in said
     assert "RH+LH+RA+LA+PEL" in said
     assert "walking_p1_01: mean joint-angle error [deg]" in said
     assert not list((tmp_path / "plots").iterdir())

@@ -29,8 +29,8 @@ from tests.report.reading import text_of
 
 NO_PICTURE = "the renderer was ended by SIGABRT"
 ANSWER = (
-    "Of 1 to 3 trackers 3 err least: both ankles + pelvis, 2.40 deg (2.01 to 2.79), and 2.52 deg (2.12 to 2.92) on 6 "
-    "clips on which nothing was chosen."
+    "Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis, 2.40 deg (2.01 to 2.79). "
+    "On 6 held-out clips the error is 2.52 deg (2.12 to 2.92)."
 )
 
 
@@ -75,9 +75,9 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
     chosen = smallest_sufficient_set(alike)
     assert chosen is not None
     assert chosen.stations == two
-    assert sentence(alike).startswith("2 trackers serve as well as up to 3: both ankles, 2.00 deg")
+    assert sentence(alike).startswith("2 stations are as good as up to 3: both ankles, 2.00 deg")
     apart = study_of({two: [b + 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)})
-    assert sentence(apart).startswith("Of 1 to 3 trackers 3 err least: both ankles + pelvis")
+    assert sentence(apart).startswith("Of 1 to 3 stations, 3 have the lowest error: both ankles + pelvis")
     fps = study_of({two: [b - 0.5 + w for b, w in zip(base, wiggle, strict=True)], three: list(base)}, "higher")
     chosen = smallest_sufficient_set(fps)
     assert chosen is not None
@@ -86,7 +86,7 @@ def test_the_fewest_that_nothing_shows_to_be_worse_are_enough() -> None:
 
 def test_too_few_clips_are_said_to_be_too_few() -> None:
     few = study_of({("pelvis",): [2.0, 2.1, 2.2], ("head", "pelvis"): [1.0, 1.1, 1.2]})
-    assert "on too few clips (3) to tell it from others: head + pelvis" in sentence(few)
+    assert "but 3 clips are too few to compare sets: head + pelvis" in sentence(few)
 
 
 def test_where_nothing_was_measured_nothing_is_recommended() -> None:
@@ -122,7 +122,7 @@ def test_the_text_opens_on_the_answer_and_has_every_table(findings: PlacementFin
     whole = "\n".join(lines)
     for part in (
         "3         both ankles + pelvis  2.40 deg (2.01 to 2.79)  2.52 deg (2.12 to 2.92)",
-        "On 6 clips on which nothing was chosen the last set saves +1.20 (+0.90 to +1.60) deg",
+        "On 6 held-out clips the last set lowers the error by +1.20 (+0.90 to +1.60) deg",
         "reproduced",
         "exhaustive: 3 of 11 places",
         "and 8 more",
@@ -156,7 +156,7 @@ def test_the_page_opens_on_the_answer_and_says_what_is_missing(tmp_path: Path, f
     content, said = page.read_text(encoding="utf-8"), text_of(page)
     assert f"<h1>{ANSWER}</h1>" in content
     assert content.index("<h1>") < content.index('aria-label="best sets"') < content.index("<nav")
-    assert f"The body in colours: {NO_PICTURE}" in said
+    assert f"The body map: {NO_PICTURE}" in said
     assert hostile not in content
     assert hostile in said
     for place in PLACES:
@@ -201,7 +201,7 @@ def test_the_report_verb_writes_the_same_page_again(tmp_path: Path, capsys: pyte
 def test_candidates_are_shown_among_each_other_and_beside_what_is_worn(findings: PlacementFindings) -> None:
     among, more = select_body_maps(findings.worth)
     assert len(among.values) == len(PLACES)
-    assert among.description == "error without it, of 11 trackers, less error with it"
+    assert among.description == "error without it minus error with all 11 stations"
     assert among.base == ()
     assert more.base == ("pelvis", "left_ankle", "right_ankle")
     assert set(more.values) == {place.name for place in PLACES} - set(more.base)
@@ -239,7 +239,7 @@ def test_names_stand_beside_the_body_and_apart(monkeypatch: pytest.MonkeyPatch, 
         assert said in chart.svg, said
         assert said in chart.alt
     assert "worth [deg]" in chart.svg
-    assert "Dark balls: worn already." in chart.caption
+    assert "Dark balls: stations that are already worn." in chart.caption
 
 
 def test_a_renderer_that_dies_takes_nothing_with_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -60,8 +60,10 @@ def test_what_calibrating_costs_is_paired_by_clip() -> None:
     exact = [judged("exact", clip, float(n)) for n, clip in enumerate(clips)]
     cost = [judged("poses", clip, n + 0.5) for n, clip in enumerate(clips)]
     few = [judged("tpose", clip, n + 1.0 if n else None) for n, clip in enumerate(clips)]
-    head, angle, place = calibration_cost.table_rows([*exact, *cost, *few])
-    assert head == ["behaviour", "method", "error", "exact", "poses", "tpose"]
+    table = calibration_cost.cost_table([*exact, *cost, *few])
+    assert table is not None
+    angle, place = table.rows
+    assert table.head == ["behaviour", "method", "error", "exact", "poses", "tpose"]
     assert angle[2:] == ["joint angle [deg]", "2.50", "+0.50 (+0.50 to +0.50)", "+1.00 (too few clips)"]
     assert place[2:4] == ["mpjpe_pa [mm]", "2.5"]
     assert "+0.50 to +0.50" in "\n".join(calibration_cost.text({"cells": [*exact, *cost]}))
@@ -69,6 +71,6 @@ def test_what_calibrating_costs_is_paired_by_clip() -> None:
 
 
 def test_no_cost_is_told_without_something_to_hold_it_against() -> None:
-    assert calibration_cost.table_rows([judged("poses", "a", 1.0)]) == []
+    assert calibration_cost.cost_table([judged("poses", "a", 1.0)]) is None
     assert calibration_cost.text({"cells": [judged("exact", "a", 1.0)]}) == []
     assert calibration_cost.section([]) == ""

@@ -6,7 +6,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.experiment.scenario import load_scenario
-from harness.report.run.charts import add_legend, draw_chart
+from harness.report.kit.chart import add_legend, draw_chart
 
 LONG = load_scenario("boxing_outliers").methods
 ALL = load_scenario("boxing").methods

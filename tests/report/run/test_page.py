@@ -42,7 +42,7 @@ def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     assert page.index("<h1>") < page.index("<table")
     assert heading[1].startswith("best_match+ik is best: ")
     assert "on 2 sequences of built-in motion" in heading[1]
-    assert "better on 2 of 2" in heading[1]
+    assert "lower on 2 of 2 sequences" in heading[1]
 
 
 def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None:
@@ -56,10 +56,10 @@ def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None
 
 def test_the_verdict_says_when_positions_tell_another_story(run_folder: Path) -> None:
     run = read_run(run_folder)
-    assert build_headline(run).sentence.endswith(" mm off, the least too.")
+    assert build_headline(run).sentence.endswith(" mm, also the lowest.")
     cells = [{**row, "mpjpe_mm": 1.0 if row["method"] == "ik" else 60.0} for row in run.cells]
     told = build_headline(replace(run, summary={**run.summary, "cells": cells})).sentence
-    assert told.endswith("In joint position ik is better: 1 mm off, best_match+ik 60 mm.")
+    assert told.endswith("ik has the lowest joint position error: 1 mm (best_match+ik: 60 mm).")
 
 
 def test_methods_without_a_common_sequence_are_not_ranked(run_folder: Path) -> None:
@@ -67,7 +67,7 @@ def test_methods_without_a_common_sequence_are_not_ranked(run_folder: Path) -> N
     cells = [row for row in run.cells if (row["method"] == "ik") == (row["behaviour"] == "walking")]
     found = build_headline(replace(run, summary={**run.summary, "cells": cells}))
     assert found.best is None
-    assert found.sentence.endswith("share no measured sequence: none is best.")
+    assert found.sentence.endswith("share no measured sequence, so they are not ranked.")
 
 
 def test_every_number_of_the_table_is_in_the_summary(run_folder: Path) -> None:
@@ -140,8 +140,8 @@ def test_a_run_without_any_finished_cell_has_a_page(tmp_path: Path) -> None:
 def test_a_perfect_method_breaks_no_axis(tmp_path: Path) -> None:
     plan = Plan(behaviours=("walking",), methods={"oracle": 0.0}, duration_s=4.0)
     said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
-    assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion; no other" in said
-    assert "Its joints are 0 mm off." in said
+    assert "oracle: 0.00° mean joint-angle error on 1 sequence of built-in motion. No other" in said
+    assert "Its mean joint position error is 0 mm." in said
 
 
 def test_inputs_and_several_takes_are_told_apart(tmp_path: Path) -> None:
@@ -149,7 +149,7 @@ def test_inputs_and_several_takes_are_told_apart(tmp_path: Path) -> None:
     said = text_of(write_run_page(fabricate(tmp_path / "run", plan), rendered=False))
     assert "ik (pos+ori)" in said
     assert "ik (pos)" in said
-    assert "of 2 clips the one with the largest error" in said
+    assert "the clip with the largest error of 2" in said
     assert " ± " in said
 
 
@@ -169,7 +169,7 @@ def test_a_varied_number_gives_a_curve_and_its_table(tmp_path: Path) -> None:
         assert f" {row['metrics']['joint_angle_mean_deg']['mean']:.2f} " in said
     last = next(r["metrics"]["joint_angle_mean_deg"]["mean"] for r in rows[4:] if r["method"] == "ik")
     assert f"ik is best: {last:.2f}° mean joint-angle error on 1 sequence" in said
-    assert "the next, with components.echo.share=0.1." in said
+    assert "of built-in motion, with components.echo.share=0.1. That" in said
     assert {trace.key for trace in read_run(out).traces} == {
         row["key"] for row in read_run(out).full_summary["cells"][-2:]
     }
@@ -187,8 +187,8 @@ def test_charts_show_no_more_lines_than_look_different(tmp_path: Path, monkeypat
             "best_match",
             "best_match+ik",
         ]
-    assert page.count("Shown are the 3 of 5 with the least error.") == 2
-    assert "medians of the 2 methods with the next least error" in page
+    assert page.count("Only the 3 of 5 methods with the lowest errors are shown.") == 2
+    assert "medians of the 2 methods with the next lowest errors" in page
 
 
 def test_varied_words_give_a_table_and_no_curve(tmp_path: Path) -> None:
@@ -279,7 +279,7 @@ def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tupl
         assert "Nothing was measured: 2 of 2 cells finished." in said
         assert "0 of 162 frames matched (0.0 %)" in said
     else:
-        assert re.search(r"mean_pose: \d+\.\d\d° .*; no other method was measured", said)
+        assert re.search(r"mean_pose: \d+\.\d\d° .*\. No other method was measured", said)
         assert "81 of 162 frames matched (50.0 %)" in said
     assert "nan" not in said.lower().split()
 
@@ -287,9 +287,9 @@ def test_methods_that_never_answer_are_not_measured(tmp_path: Path, silent: tupl
 def test_importing_the_report_draws_in_no_heavy_library_and_no_global_plot_state(tmp_path: Path) -> None:
     fabricate(tmp_path / "run", Plan(behaviours=("walking",), methods={"ik": 2.0}, duration_s=2.0))
     code = (
-        "import sys; from pathlib import Path; from harness.report.run.writer import write_report;"
+        "import sys; from pathlib import Path; from harness.report.run.writer import write_run_page;"
         "assert not {'pyvista', 'vtk', 'matplotlib', 'plotly'} & set(sys.modules);"
-        "import matplotlib; before = matplotlib.rcParams.copy(); write_report(Path(sys.argv[1]), rendered=False);"
+        "import matplotlib; before = matplotlib.rcParams.copy(); write_run_page(Path(sys.argv[1]), rendered=False);"
         "assert matplotlib.rcParams.copy() == before; assert 'matplotlib.pyplot' not in sys.modules;"
         "assert 'pyvista' not in sys.modules"
     )

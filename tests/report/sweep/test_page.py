@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from harness.cli import main
 from harness.compare.paired_statistics import bootstrap_interval
 from harness.errors import BadFile
-from harness.report.run.charts import draw_chart
+from harness.report.kit.chart import draw_chart
 from harness.report.sweep import page as sweep_page
 from harness.report.sweep.charts import (
     MAX_SERIES,
@@ -57,8 +57,8 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     sweep = read_sweep(folder)
     said = sentence(sweep)
-    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to come. dynamic_map errs least: ")
-    assert re.search(r"error over 14 clips; next ik with [\d.]+ deg, worse by [\d.]+ to [\d.]+ deg \(95 %\)\.$", said)
+    assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map has the lowest error: ")
+    assert re.search(r"error over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$", said)
     raw = (folder / "report.html").read_text(encoding="utf-8")
     assert f"<h1>{said}</h1>" in raw
     places = [raw.index(f'id="{name}"') for name in ("varied", "scenarios", "failures", "table")]
@@ -74,7 +74,7 @@ def test_a_mean_is_of_clips_that_are_means_of_their_cells(folder: Path) -> None:
     rows = [row for row in cells if row[:2] == ("walking", "ik") and json.loads(row[2])[RATE] == 60]
     means = [np.mean([error for *_, name, error in rows if name == clip]) for clip in sorted({row[3] for row in rows})]
     series, value = sweep.series.index("ik"), next(k for k in sweep.keys if k.name == RATE).labels.index("60")
-    found = sweep.statistic(PRIMARY_METRIC, sweep.select(0, series, **{RATE: value}), ends=True)
+    found = sweep.statistic(PRIMARY_METRIC, sweep.select(0, series, **{RATE: value}), with_interval=True)
     assert (found.clips, len(rows)) == (7, 14)
     assert found.mean == pytest.approx(np.mean(means))
     assert found.sd == pytest.approx(np.std(means, ddof=1))
@@ -138,10 +138,10 @@ def test_the_query_on_the_page_works(folder: Path) -> None:
     [
         (Plan(failing=("ik", "local_pca", "dynamic_map")), "0 of 42 cells finished, 42 failed."),
         (Plan(clips=1, unmeasured=("ik", "local_pca", "dynamic_map")), "6 of 6 cells finished. Nothing was measured."),
-        (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to come."),
+        (Plan(clips=0, to_come=3), "0 of 3 cells finished, 3 still to run."),
         (Plan(methods={"ik": 1.0}, clips=1), "2 of 2 cells finished. ik: "),
-        (Plan(performers=("known", "new")), "dynamic_map (known) errs least: "),
-        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map errs least: "),
+        (Plan(performers=("known", "new")), "dynamic_map (known) has the lowest error: "),
+        (Plan(clips=1, unmeasured=("ik",)), "dynamic_map has the lowest error: "),
     ],
 )
 def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path) -> None:
@@ -155,7 +155,7 @@ def test_nothing_is_too_little_to_be_told(plan: Plan, said: str, tmp_path: Path)
 def test_known_and_new_performers_are_never_pooled(tmp_path: Path) -> None:
     sweep = read_sweep(fabricate_sweep(tmp_path, Plan(performers=("known", "new"))))
     assert {f"ik ({kind})" for kind in ("known", "new")} < set(sweep.series)
-    assert sentence(sweep).count("errs least") == 2
+    assert sentence(sweep).count("has the lowest error") == 2
 
 
 def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
@@ -167,8 +167,8 @@ def test_seeds_of_a_clip_are_one_clip(tmp_path: Path) -> None:
 def test_a_lead_that_clips_do_not_show_is_none(tmp_path: Path) -> None:
     few = fabricate_sweep(tmp_path / "few", Plan(scenarios=("walking",), clips=5))
     alike = fabricate_sweep(tmp_path / "alike", Plan(methods={"ik": 1.5, "local_pca": 1.5}))
-    assert sentence(read_sweep(few)).endswith("which so few clips cannot tell apart.")
-    assert sentence(read_sweep(alike)).endswith("which these clips cannot tell apart.")
+    assert sentence(read_sweep(few)).endswith("there are too few clips to establish a difference.")
+    assert sentence(read_sweep(alike)).endswith("the 95 % interval of the difference contains zero.")
 
 
 def test_few_clips_have_a_mean_and_no_interval(tmp_path: Path) -> None:

@@ -1,0 +1,125 @@
+"""Drawing of charts: one figure to SVG and PNG, legends and line labels that do not collide, thinning of long lines."""
+
+import math
+import textwrap
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.report.kit.style import INK, SETTINGS, Chart, to_png, to_svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_WIDTH_IN = 8.6
+"""Width of a chart as wide as the page [in]."""
+_LETTERS, _HANDLE_LETTERS, _ROW_IN = 105, 9, 0.2
+"""Of a legend: the page's width and that of a line's sign with margins [average letters]; the height of a row [in]."""
+_MOST_POINTS = 1500
+"""Points of one line; more do not look sharper on a screen."""
+_LABEL_HEIGHT = 0.06
+"""Height of a name at the end of a line, as a share of the axes' height."""
+_LABEL_LETTERS = 40
+"""Letters of such a name."""
+
+
+def draw_chart(
+    name: str,
+    title: str,
+    caption: str,
+    alt: str,
+    draw: Callable[["Figure"], None],
+    height_in: float,
+    *,
+    width_in: float = _WIDTH_IN,
+    layout: Literal["constrained"] | None = "constrained",
+    raster: bool = False,
+) -> Chart:
+    """The chart that `draw` draws on an empty figure; `raster` adds a PNG to the SVG.
+
+    Without a layout the axes stay where `draw` puts them, which is faster.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(SETTINGS):
+        figure = Figure(figsize=(width_in, height_in), layout=layout)
+        draw(figure)
+        svg = to_svg(figure, name)
+        figure.set_layout_engine("none")  # to_svg has computed the layout; the PNG uses the same
+        return Chart(name, title, caption, alt, svg, to_png(figure) if raster else b"")
+
+
+def clear_plots(folder: Path) -> Path:
+    """Make FOLDER/plots, delete the charts of an earlier report in it, and return it."""
+    plots = folder / "plots"
+    plots.mkdir(exist_ok=True)
+    for old in (*plots.glob("*.svg"), *plots.glob("*.png")):
+        old.unlink()
+    return plots
+
+
+def add_legend(figure: "Figure", axes: "Axes") -> None:
+    """Name the lines of `axes` above the chart; the figure grows by the rows beyond the first."""
+    handles, names = axes.get_legend_handles_labels()
+    room = _LETTERS * figure.get_figwidth() / _WIDTH_IN
+    columns = next((n for n in range(len(names), 1, -1) if _legend_letters(names, n) <= room), 1)
+    figure.legend(handles, names, loc="outside upper left", ncols=columns)
+    further_rows = max(math.ceil(len(names) / columns) - 1, 0)
+    figure.set_figheight(figure.get_figheight() + _ROW_IN * further_rows)
+
+
+def _legend_letters(names: Sequence[str], columns: int) -> int:
+    """Width of a legend in average letters; matplotlib fills one column after another."""
+    return sum(_HANDLE_LETTERS + max(map(len, part)) for part in np.array_split(np.array(names, object), columns))
+
+
+def decimate(x: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Every n-th point of a long line, so that about 1,500 points remain."""
+    every = max(1, len(x) // _MOST_POINTS)
+    return x[::every], values[::every]
+
+
+def spread_positions(wanted: Sequence[float], gap: float) -> list[float]:
+    """Rising positions at least `gap` apart, as near as possible to the wanted ones, which rise too.
+
+    Least squares by pooling adjacent violators. If the last position would exceed 1, all are moved down together.
+    """
+    blocks: list[list[float]] = []
+    for n, value in enumerate(wanted):
+        blocks.append([value - gap * n])
+        while len(blocks) > 1 and np.mean(blocks[-2]) > np.mean(blocks[-1]):
+            last = blocks.pop()
+            blocks[-1].extend(last)
+    level = [float(np.mean(block)) for block in blocks for _ in block]
+    positions = [value + gap * n for n, value in enumerate(level)]
+    too_high = max(positions[-1] - 1.0, 0.0) if positions else 0.0
+    return [position - too_high for position in positions]
+
+
+def label_line_ends(axes: "Axes", ends: Sequence[tuple[float, str, str]]) -> None:
+    """Write each line's name to the right of its end, with a leader in its colour; names are moved apart.
+
+    `ends` are the last value, name and colour of each line.
+    """
+    low, high = axes.get_ylim()
+    ends = sorted(ends)
+    starts = [(value - low) / (high - low) for value, *_ in ends]
+    inside = axes.transAxes
+    for start, height, (_, name, colour) in zip(starts, spread_positions(starts, _LABEL_HEIGHT), ends, strict=True):
+        axes.annotate(
+            textwrap.shorten(name, _LABEL_LETTERS, placeholder="…"),
+            (1.0, start),
+            (1.04, height),
+            xycoords=inside,
+            textcoords=inside,
+            va="center",
+            color=INK,
+            fontsize=9.5,
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 2.0, "shrinkA": 2.0, "shrinkB": 0.0},
+            annotation_clip=False,
+        )
