@@ -68,9 +68,10 @@ def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[BenchmarkRo
 
 def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
     """The last answers, as windows: `dynamic_map:window`."""
-    windows = database.windows(POSES, followed=True)
+    windows = database.windows(POSES, with_successor=True)
     queries = [
-        _single_motion_database(body, take).windows(POSES, followed=True).gather(_QUERY_FRAMES) for take in held_out
+        _single_motion_database(body, take).windows(POSES, with_successor=True).gather(_QUERY_FRAMES)
+        for take in held_out
     ]
     return SearchProblem(f"{POSES} poses", windows, queries, EXAMPLES, windows.consecutive)
 
@@ -108,7 +109,7 @@ def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[Bod
     known = method.fit_database(body, database, generator(0, "bench")).regression(_exact_calibration(body))
     vectors = known.search(np.ones(known.size, bool), method.index, method.neighbours).vectors
     asked = [
-        replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, followed=True))
+        replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, with_successor=True))
         for take in held_out
     ]
     return SearchProblem("evidence", vectors, [z.gather(_QUERY_FRAMES) for z in asked], method.neighbours, None)

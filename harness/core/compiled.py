@@ -1,33 +1,101 @@
-"""Functions compiled to machine code at their first call, and kept on disk between runs.
+"""Functions that numba compiles to machine code at their first call and keeps on disk between runs.
 
-For loops over stations and joints, where a call of numpy costs more than the numbers it works on. What is compiled
-sees numbers, arrays and named tuples of them, and only compiled functions of its own file: a kept one is made anew
-when its file changes, not when another does.
+They serve loops over stations and joints, where one call of numpy costs more than the numbers it works on. A compiled
+function takes numbers, arrays and named tuples of them. It may call compiled functions of its own and of other modules,
+and it may use their constants.
+
+The machine code of a function contains everything that the function calls, but numba checks only the function's own
+file before it loads that code from disk. Here the check covers the file, the compiled modules that it imports, directly
+or not, and the values of constants.
 """
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
+from numba.core import caching
+from numba.core.dispatcher import Dispatcher
 
 F = TypeVar("F", bound=Callable[..., Any])
+_FunctionCache: Any = caching.FunctionCache  # numba has no types
+
+_source_hashes: dict[str, bytes] = {}
+"""SHA-256 of the file of each compiled module, by module name; read while the module is imported, for it may change."""
 
 
 def compiled(function: F) -> F:
-    """The same function, fast; IEEE arithmetic in the order written, so that the bytes stay the same.
+    """A compiled version of a function, with IEEE arithmetic in the written order: results stay the same to the bit.
 
-    Other threads go on meanwhile: one that reads a tracker need not wait for one that solves.
+    It releases the interpreter lock, so a thread that reads a tracker does not wait for one that solves. Without a
+    writable folder or a source file, every process compiles anew.
     """
-    try:
-        return cast(F, numba.njit(cache=True, error_model="numpy", nogil=True)(function))
-    except RuntimeError:  # nowhere to keep it: neither beside its file nor in a cache of the user's
-        return cast(F, numba.njit(error_model="numpy", nogil=True)(function))
+    dispatcher: Any = numba.njit(error_model="numpy", nogil=True)(function)
+    with suppress(RuntimeError, OSError):  # no writable folder; no source file
+        module = function.__module__
+        if module not in _source_hashes:
+            _source_hashes[module] = hashlib.sha256(Path(function.__code__.co_filename).read_bytes()).digest()
+        dispatcher._cache = _ModuleCache(function)
+    return cast(F, dispatcher)
 
 
 def specialise(function: F, *arguments: Any) -> F:
-    """A compiled function for arguments of the very types of these, for loops that give it the same arrays.
+    """A compiled function for arguments of exactly these types, for loops that always pass the same arrays.
 
-    Finding out what it is given takes a compiled function longer than many a small task does. This one does not look:
-    given anything else, it reads nonsense.
+    It skips the inspection of argument types, which takes longer than a small task does. Arguments of any other type
+    are misread without an error.
     """
     return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))
+
+
+class _ModuleCache(_FunctionCache):  # type: ignore[misc]
+    """numba's cache on disk, with a stamp that also covers imported compiled modules and constants."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The machine code from disk, or None; numba calls this before it compiles, and so before it saves."""
+        self._cache_file._source_stamp = module_stamp(self._py_func.__globals__)
+        try:
+            return super().load_overload(sig, target_context)
+        except (AttributeError, ImportError):  # the file names a class that has been renamed or moved
+            self.flush()
+            return None
+
+
+def module_stamp(namespace: Mapping[str, Any]) -> str:
+    """Hexadecimal digest of everything that the machine code of a module depends on, from the module's globals."""
+    digest = hashlib.sha256()
+    _add_module(digest, namespace, set())
+    return digest.hexdigest()
+
+
+def _add_module(digest: Any, namespace: Mapping[str, Any], visited: set[str]) -> None:
+    """Add a module's source, constants and records, and the modules behind its compiled functions and imports."""
+    module = namespace["__name__"]
+    if module in visited:
+        return
+    visited.add(module)
+    digest.update(module.encode() + _source_hashes.get(module, b""))
+    for name, value in sorted(namespace.items()):
+        if name.startswith("__"):
+            continue
+        if isinstance(value, Dispatcher):
+            _add_module(digest, value.py_func.__globals__, visited)
+        elif isinstance(value, ModuleType) and value.__name__.split(".")[0] == module.split(".")[0]:
+            _add_module(digest, vars(value), visited)
+        elif isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
+            digest.update(repr((name, value.__module__, value._fields)).encode())
+        elif isinstance(value, np.ndarray) and value.dtype != object:
+            digest.update(repr((name, value.dtype, value.shape)).encode() + value.tobytes())
+        elif _is_constant(value):
+            digest.update(repr((name, value)).encode())
+
+
+def _is_constant(value: Any) -> bool:
+    """Whether a value is a number, a text, or a tuple of such."""
+    if isinstance(value, tuple):
+        return all(map(_is_constant, value))
+    return isinstance(value, bool | int | float | complex | str | bytes | np.generic)

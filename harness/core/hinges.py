@@ -1,9 +1,9 @@
-"""Rotations as the angles of a bone's one, two or three orthogonal hinges, innermost first, and back.
+"""Conversion between rotations and the angles of a bone's one, two or three orthogonal hinges, innermost first.
 
-Three orthogonal hinges reach any rotation (closed-form Euler angles), by two names each: `equivalent_euler_angles` gives the other. For
-one or two, with q the wanted quaternion, the nearest rotation maximises its product with the hinges' quaternion, which
-is bilinear in the half-angle vectors (cos, sin): the best angles are the leading singular vectors of a matrix of at
-most 2 x 2.
+Three orthogonal hinges reach any rotation (closed-form Euler angles), each by two sets of angles; see
+`equivalent_euler_angles`. One or two hinges give the nearest rotation: the one whose quaternion has the largest inner
+product with the wanted quaternion. That product is bilinear in the half-angle vectors (cos, sin), so the best angles
+are the leading singular vectors of a matrix of at most 2 x 2.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from harness.core.arrays import Floats
 
 
 def hinge_angles(axes: Floats, parent_from_bone: Floats) -> Floats:
-    """Angles (T, N) of N <= 3 orthogonal hinges (innermost first) that come nearest to rotations (T, 4) [rad]."""
+    """Angles (T, N) [rad] of N <= 3 orthogonal hinges (innermost first) whose rotations are nearest to (T, 4)."""
     if len(axes) == 3:
         return _euler(axes, parent_from_bone)
     w, v = parent_from_bone[:, :1], parent_from_bone[:, 1:]
@@ -29,15 +29,18 @@ def hinge_angles(axes: Floats, parent_from_bone: Floats) -> Floats:
 
 
 def hinge_rotation(axes: Floats, angles_rad: Floats) -> Floats:
-    """Quaternions (T, 4) of hinges turned by (T, N), the last outermost."""
-    turn = np.broadcast_to(rotations.IDENTITY, (len(angles_rad), 4))
+    """Quaternions (T, 4) of hinges (N, 3) at angles (T, N) [rad], innermost first."""
+    out = np.broadcast_to(rotations.IDENTITY, (len(angles_rad), 4))
     for k, axis in enumerate(axes):
-        turn = rotations.multiply(rotations.exp(angles_rad[:, k, None] * axis), turn)
-    return turn
+        out = rotations.multiply(rotations.exp(angles_rad[:, k, None] * axis), out)
+    return out
 
 
 def _euler(axes: Floats, parent_from_bone: Floats) -> Floats:
-    """R = R(c) R(b) R(a) about right-handed orthogonal axes; where b is +-90 deg only a +- c counts and a is 0."""
+    """Angles (T, 3) a, b, c of R = R(c) R(b) R(a) about right-handed orthogonal axes.
+
+    Where b is +-90 deg only a + c or a - c is determined, and a is 0.
+    """
     m = axes @ rotations.to_matrix(parent_from_bone) @ axes.T
     b = np.arctan2(-m[:, 2, 0], np.hypot(m[:, 2, 1], m[:, 2, 2]))
     locked = np.hypot(m[:, 2, 1], m[:, 2, 2]) < 1e-9
@@ -47,7 +50,7 @@ def _euler(axes: Floats, parent_from_bone: Floats) -> Floats:
 
 
 def are_gimbal(axes: Floats) -> bool:
-    """Whether the hinges are three and orthogonal."""
+    """Whether the axes (N, 3) are three and orthogonal."""
     return len(axes) == 3 and bool(np.allclose(axes @ axes.T, np.eye(3), atol=1e-9))
 
 

@@ -1,4 +1,4 @@
-"""Rotations as unit quaternions (w, x, y, z), on scipy where it is fast enough.
+"""Rotations as unit quaternions (w, x, y, z) in numpy arrays; uses scipy where that is fast enough.
 
 `a_from_b` takes vectors of frame b into frame a, so products read by adjacency:
 `a_from_c = multiply(a_from_b, b_from_c)`. All functions broadcast over leading axes.
@@ -27,13 +27,13 @@ def multiply(a_from_b: Floats, b_from_c: Floats) -> Floats:
 
 
 def inverse(a_from_b: Floats) -> Floats:
-    """`b_from_a`, (..., 4); of a unit quaternion."""
+    """`b_from_a`, (..., 4), the inverse of a unit quaternion."""
     out: Floats = np.asarray(a_from_b, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
     return out
 
 
 def rotate(a_from_b: Floats, v_b: Floats) -> Floats:
-    """Vectors (..., 3) of frame b in frame a."""
+    """Vectors (..., 3) given in frame b, expressed in frame a."""
     q, v = np.asarray(a_from_b, dtype=float), np.asarray(v_b, dtype=float)
     w, u = q[..., :1], q[..., 1:]
     t = 2.0 * _cross(u, v)
@@ -42,7 +42,7 @@ def rotate(a_from_b: Floats, v_b: Floats) -> Floats:
 
 
 def _cross(u: Floats, v: Floats) -> Floats:
-    """Products (..., 3), to the bit those of `np.cross`, which takes four times as long over few."""
+    """Cross products (..., 3), equal to `np.cross` to the bit, in a quarter of its time for few vectors."""
     x1, y1, z1 = u[..., 0], u[..., 1], u[..., 2]
     x2, y2, z2 = v[..., 0], v[..., 1], v[..., 2]
     x = y1 * z2 - z1 * y2
@@ -54,14 +54,14 @@ def _cross(u: Floats, v: Floats) -> Floats:
 
 
 def exp(rotation_vector_rad: Floats) -> Floats:
-    """Unit quaternion of a rotation vector (..., 3) [rad]."""
+    """Unit quaternions (..., 4) of rotation vectors (..., 3) [rad]."""
     v = np.asarray(rotation_vector_rad, dtype=float)
     half = 0.5 * np.linalg.norm(v, axis=-1, keepdims=True)
     return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1)
 
 
 def log(quaternion: Floats) -> Floats:
-    """Rotation vector (..., 3) [rad] of the shorter turn; the inverse of `exp` below pi."""
+    """Rotation vectors (..., 3) [rad], at most pi long; the inverse of `exp` below pi."""
     q = np.asarray(quaternion, dtype=float)
     q = np.where(q[..., :1] < 0.0, -q, q)
     s = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
@@ -72,14 +72,14 @@ def log(quaternion: Floats) -> Floats:
 
 
 def angle_between_rad(p: Floats, q: Floats) -> Floats:
-    """Geodesic distance of two unit quaternions (...,) in 0..pi; accurate near 0 and near pi."""
+    """Geodesic distance (...,) between unit quaternions (..., 4), in 0..pi [rad]; accurate near 0 and near pi."""
     turn = multiply(inverse(p), q)
     out: Floats = 2.0 * np.arctan2(np.linalg.norm(turn[..., 1:], axis=-1), np.abs(turn[..., 0]))
     return out
 
 
 def to_matrix(quaternion: Floats) -> Floats:
-    """Rotation matrices (..., 3, 3)."""
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     q = np.asarray(quaternion, dtype=float)
     w, x, y, z = q[..., 0], q[..., 1], q[..., 2], q[..., 3]
     out = np.empty((*w.shape, 3, 3))
@@ -97,7 +97,7 @@ def from_matrix(matrix: Floats) -> Floats:
 
 
 def continuous(quaternions: Floats) -> Floats:
-    """The same rotations (T, ..., 4) with signs such that neighbours along the first axis never flip."""
+    """The same rotations (T, ..., 4) with signs such that consecutive quaternions have no negative inner product."""
     q = np.array(quaternions, dtype=float)
     if len(q) > 1:
         flips = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
@@ -106,7 +106,7 @@ def continuous(quaternions: Floats) -> Floats:
 
 
 def yaw_rad(world_from_body: Floats) -> Floats:
-    """Heading (...,) about the world's z of the body's x axis (forward) [rad]."""
+    """Heading (...,) of the body's x axis (forward) about the world's z axis [rad]."""
     w, x, y, z = np.moveaxis(np.asarray(world_from_body, dtype=float), -1, 0)
     out: Floats = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
     return out
@@ -119,7 +119,7 @@ def wrap_angle(angle_rad: Floats) -> Floats:
 
 
 def about_z(angle_rad: float | Floats) -> Floats:
-    """Unit quaternion (..., 4) of a turn about z."""
+    """Unit quaternions (..., 4) of rotations about z."""
     half = 0.5 * np.asarray(angle_rad, dtype=float)
     zero = np.zeros_like(half)
     return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=-1)

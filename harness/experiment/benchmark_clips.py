@@ -115,7 +115,7 @@ def fit_method(method: Method, on: Body, learnt: MotionDatabase, rng: np.random.
 def extract_takes(learnt: MotionDatabase) -> list[BodyMotion]:
     """The runs of a database as takes that start at the origin."""
     found = []
-    for run in learnt.runs:
+    for run in learnt.segments:
         rows = slice(run.start, run.stop)
         ground = integrate_steps(np.asarray(learnt.step[rows], float))
         found.append(

@@ -17,9 +17,9 @@ def learnt() -> MotionDatabase:
 
 
 def test_a_database_is_of_distinct_takes_and_of_none_that_is_held_out(learnt: MotionDatabase) -> None:
-    assert len({run.take for run in learnt.runs}) == len(learnt.runs)
-    assert {run.behaviour for run in learnt.runs} == set(synthetic.BEHAVIOURS)
-    assert not {run.take for run in learnt.runs} & {
+    assert len({run.take for run in learnt.segments}) == len(learnt.segments)
+    assert {run.behaviour for run in learnt.segments} == set(synthetic.BEHAVIOURS)
+    assert not {run.take for run in learnt.segments} & {
         take.name for take in benchmark_clips.generate_held_out_takes(10, 1, 2.0)
     }
 

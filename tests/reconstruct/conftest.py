@@ -15,6 +15,7 @@ from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.mocap import synthetic
 from harness.reconstruct.contract import Method
+from harness.reconstruct.solver.normal_equations import normal_equations
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import make_inputs
@@ -62,6 +63,13 @@ def scene(behaviour: str, take: int = 1, seconds: float = 3.0) -> Scene:
     body, on_body = retarget_to_own_body(clip)
     calibration = exact_calibration(body)
     return Scene(body, calibration, on_body, exact_frames(body, calibration, on_body.qpos))
+
+
+def normal_equations_of(residuals: Residuals) -> tuple[Floats, Floats]:
+    """The Gauss-Newton matrix (54, 54) and the descent (54,) at the configuration that was evaluated last."""
+    hessian, descent = np.zeros((54, 54)), np.empty(54)
+    normal_equations(residuals.tree, residuals.state, hessian, descent)
+    return hessian + np.tril(hessian, -1).T, descent
 
 
 def moved(qpos: Floats, yaw_rad: float, by_m: tuple[float, float, float]) -> Floats:

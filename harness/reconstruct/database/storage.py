@@ -1,7 +1,7 @@
-"""A database on disk: `posture.npy`, `step.npy` and `database.json`, read as memory maps; nothing is ever unpickled.
+"""A motion database on disk: `posture.npy`, `step.npy` and `database.json`. Arrays are read as memory maps.
 
-Frames are written as they come to a folder beside the final one, which takes its name once all is there. So a killed
-run leaves nothing that looks finished, and nothing is overwritten.
+Frames are written as they come into a temporary folder beside the final one, which is renamed once all are there. So a
+killed process leaves nothing that looks finished. Nothing is overwritten, and nothing is unpickled.
 """
 
 import json
@@ -18,7 +18,7 @@ import numpy as np
 from harness.core.arrays import Singles
 from harness.core.files import flush, move_into_place, temporary_path, write_text
 from harness.errors import BadFile, BadInput
-from harness.reconstruct.database.motion_database import MotionDatabase, TakeSegment
+from harness.reconstruct.database.frames import MotionFrames, TakeSegment
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 FORMAT, VERSION = "tracker-harness motion database", 1
@@ -28,7 +28,7 @@ _REBUILD_ADVICE = "Build the database again."
 
 
 class MemoryWriter:
-    """Collects runs in memory."""
+    """Collects segments in memory."""
 
     def __init__(self) -> None:
         self.segments: list[TakeSegment] = []
@@ -41,112 +41,112 @@ class MemoryWriter:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def add(self, run: TakeSegment, rate_hz: float, posture: Singles, step: Singles) -> None:
-        """Append a run; BadInput when its rate is another than the others'."""
+    def add(self, segment: TakeSegment, rate_hz: float, posture: Singles, step: Singles) -> None:
+        """Append a segment; BadInput when its rate differs from that of the others."""
         if self.segments and rate_hz != self.rate_hz:
-            found = f"{run.take} has {rate_hz:g} frames a second, and {self.segments[0].take} {self.rate_hz:g}."
-            raise BadInput(found, "Bring all takes to the tracker's rate first.")
+            rates = f"{segment.take} has {rate_hz:g} frames a second, {self.segments[0].take} {self.rate_hz:g}."
+            raise BadInput(rates, "Resample all takes to the tracker's rate first.")
         start = self.segments[-1].stop if self.segments else 0
         self.rate_hz = rate_hz
-        self.segments.append(replace(run, start=start, stop=start + len(posture)))
+        self.segments.append(replace(segment, start=start, stop=start + len(posture)))
         self._store("posture", posture)
         self._store("step", step)
 
     def _store(self, name: str, rows: Singles) -> None:
         self._parts[name].append(rows)
 
-    def result(self) -> MotionDatabase:
+    def result(self) -> MotionFrames:
+        """All segments that were added; the writer is empty afterwards."""
         posture, step = (np.concatenate(self._parts.pop(name)) for name in COLUMNS)
         for array in (posture, step):
             array.setflags(write=False)
-        return MotionDatabase(self.rate_hz, posture, step, tuple(self.segments))
+        return MotionFrames(self.rate_hz, posture, step, tuple(self.segments))
 
 
 class FolderWriter(MemoryWriter):
-    """Appends runs to files."""
+    """Appends segments to files in the folder `temporary`, which becomes `folder`."""
 
-    def __init__(self, folder: Path, beside: Path) -> None:
+    def __init__(self, folder: Path, temporary: Path) -> None:
         super().__init__()
-        self._folder, self._beside = folder, beside
+        self._folder, self._temporary = folder, temporary
         self._files: dict[str, BinaryIO] = {}
         for name in COLUMNS:
-            self._files[name] = open(beside / f"{name}.npy", "w+b")  # noqa: SIM115  # until `close`
-            self._header(name, 0)
+            self._files[name] = open(temporary / f"{name}.npy", "w+b")  # noqa: SIM115  # until `close`
+            self._write_header(name, 0)
 
     def _store(self, name: str, rows: Singles) -> None:
         self._files[name].write(np.ascontiguousarray(rows, "<f4").data)
 
-    def _header(self, name: str, count: int) -> None:
-        """The same length for any count: numpy leaves room for the first axis to grow."""
+    def _write_header(self, name: str, count: int) -> None:
+        """Write the npy header for `count` rows; numpy leaves room for the count, so the length is constant."""
         card = {"descr": "<f4", "fortran_order": False, "shape": (count, COLUMNS[name])}
         self._files[name].seek(0)
         np.lib.format.write_array_header_1_0(self._files[name], card)
 
     def finish(self) -> None:
-        """All files complete and on the disk."""
+        """Complete all files and flush them to the disk."""
         for name, file in self._files.items():
-            self._header(name, self.segments[-1].stop)
+            self._write_header(name, self.segments[-1].stop)
             file.flush()
-            flush(self._beside / f"{name}.npy")
-        card = {
-            "format": FORMAT,
-            "version": VERSION,
-            "rate_hz": self.rate_hz,
-            "runs": [asdict(r) for r in self.segments],
-        }
+            flush(self._temporary / f"{name}.npy")
+        card = {"format": FORMAT, "version": VERSION, "rate_hz": self.rate_hz}
+        card["runs"] = [asdict(segment) for segment in self.segments]
         text = json.dumps(card, indent=0, allow_nan=False, ensure_ascii=False)
-        write_text(self._beside / _HEADER_FILE, text)
+        write_text(self._temporary / _HEADER_FILE, text)
 
     def close(self) -> None:
         for file in self._files.values():
             file.close()
 
-    def result(self) -> MotionDatabase:
+    def result(self) -> MotionFrames:
+        """The finished folder, memory-mapped."""
         return open_database(self._folder)
 
 
 @contextmanager
 def open_writer(folder: Path) -> Iterator[FolderWriter]:
-    """A writer whose folder appears when all went well; BadFile when something of that name is there already."""
-    taken = BadFile(folder, "is there already", "a name for a new folder", "Nothing is overwritten: choose another.")
+    """A writer whose folder appears when the block ends without an error; BadFile when the name is taken."""
+    taken = BadFile(
+        folder, "exists already", "the name of a new folder", "Choose another name: nothing is overwritten."
+    )
     if os.path.lexists(folder):
         raise taken
     folder.parent.mkdir(parents=True, exist_ok=True)
-    beside = temporary_path(folder)
-    beside.mkdir()
+    temporary = temporary_path(folder)
+    temporary.mkdir()
     try:
-        writer = FolderWriter(folder, beside)
+        writer = FolderWriter(folder, temporary)
         try:
             yield writer
             writer.finish()
         finally:
             writer.close()
         try:
-            move_into_place(beside, folder)  # fails on a folder that has anything in it
+            move_into_place(temporary, folder)  # fails on a folder that has anything in it
         except OSError as error:
             raise taken from error
     finally:
-        shutil.rmtree(beside, ignore_errors=True)
+        shutil.rmtree(temporary, ignore_errors=True)
 
 
-def save_database(database: MotionDatabase, folder: Path) -> None:
-    """`MotionDatabase.save`."""
+def save_database(database: MotionFrames, folder: Path) -> None:
+    """Write frames to a new folder; see `MotionDatabase.save`."""
     with open_writer(folder) as writer:
-        for run in database.runs:
-            where = slice(run.start, run.stop)
-            writer.add(run, database.rate_hz, database.posture[where], database.step[where])
+        for segment in database.segments:
+            where = slice(segment.start, segment.stop)
+            writer.add(segment, database.rate_hz, database.posture[where], database.step[where])
 
 
-def open_database(folder: Path) -> MotionDatabase:
-    """`MotionDatabase.open`."""
+def open_database(folder: Path) -> MotionFrames:
+    """The frames of a folder, memory-mapped; see `MotionDatabase.open`."""
     card = _read_header(folder / _HEADER_FILE)
-    runs = _read_segments(folder / _HEADER_FILE, card)
-    arrays = {name: _map_array(folder / f"{name}.npy", (runs[-1].stop, width)) for name, width in COLUMNS.items()}
-    return MotionDatabase(float(card["rate_hz"]), arrays["posture"], arrays["step"], runs)
+    segments = _read_segments(folder / _HEADER_FILE, card)
+    arrays = {name: _map_array(folder / f"{name}.npy", (segments[-1].stop, width)) for name, width in COLUMNS.items()}
+    return MotionFrames(float(card["rate_hz"]), arrays["posture"], arrays["step"], segments)
 
 
 def _read_header(path: Path) -> dict[str, Any]:
-    expected = f"the card of a motion database, version {VERSION}"
+    expected = f"the header of a motion database, version {VERSION}"
     try:
         card = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -154,7 +154,7 @@ def _read_header(path: Path) -> dict[str, Any]:
     except ValueError as error:
         raise BadFile(path, f"not JSON: {error}", expected, _REBUILD_ADVICE) from error
     if not isinstance(card, dict) or card.get("format") != FORMAT:
-        raise BadFile(path, "of some other kind", expected, "Is this a motion database?")
+        raise BadFile(path, "not a motion database", expected, "Is this a motion database?")
     if card.get("version") != VERSION:
         raise BadFile(path, f"version {card.get('version')!r}", expected, _REBUILD_ADVICE)
     rate_hz = card.get("rate_hz")
@@ -164,22 +164,33 @@ def _read_header(path: Path) -> dict[str, Any]:
 
 
 def _read_segments(path: Path, card: dict[str, Any]) -> tuple[TakeSegment, ...]:
-    """Runs that follow each other from row 0 on, or BadFile."""
-    known = {field.name: field.type for field in fields(TakeSegment)}
-    runs: list[TakeSegment] = []
+    """The segments, which must follow each other from row 0 on; BadFile otherwise."""
+    types = {field.name: field.type for field in fields(TakeSegment)}
+    segments: list[TakeSegment] = []
     entries = card.get("runs")
-    for which, entry in enumerate(entries if isinstance(entries, list) else []):
-        if not isinstance(entry, dict) or entry.keys() != known.keys():
-            raise BadFile(path, f"run {which} is {entry!r:.80}", f"an entry of {', '.join(known)}", _REBUILD_ADVICE)
-        if any(type(entry[name]) is not kind for name, kind in known.items()):
-            raise BadFile(path, f"run {which} has fields of the wrong kind", "texts and whole numbers", _REBUILD_ADVICE)
-        run = TakeSegment(**entry)
-        if run.start != (runs[-1].stop if runs else 0) or run.stop <= run.start or run.first_frame < 0:
-            raise BadFile(path, f"run {which} has rows {run.start} to {run.stop}", "runs that join", _REBUILD_ADVICE)
-        runs.append(run)
-    if not runs:
+    for number, entry in enumerate(entries if isinstance(entries, list) else []):
+        if not isinstance(entry, dict) or entry.keys() != types.keys():
+            raise BadFile(path, f"run {number} is {entry!r:.80}", f"an entry of {', '.join(types)}", _REBUILD_ADVICE)
+        if any(type(entry[name]) is not type_ for name, type_ in types.items()):
+            raise BadFile(
+                path, f"run {number} has fields of the wrong type", "texts and whole numbers", _REBUILD_ADVICE
+            )
+        segment = TakeSegment(**entry)
+        if (
+            segment.start != (segments[-1].stop if segments else 0)
+            or segment.stop <= segment.start
+            or segment.first_frame < 0
+        ):
+            raise BadFile(
+                path,
+                f"run {number} has rows {segment.start} to {segment.stop}",
+                "runs that follow each other",
+                _REBUILD_ADVICE,
+            )
+        segments.append(segment)
+    if not segments:
         raise BadFile(path, "no runs", "one or more", _REBUILD_ADVICE)
-    return tuple(runs)
+    return tuple(segments)
 
 
 def _map_array(path: Path, shape: tuple[int, int]) -> Singles:

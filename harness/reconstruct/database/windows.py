@@ -1,51 +1,48 @@
 """Windows of the last m poses, as vectors for a search: E, "world invariance" (docs/methods.md).
 
 The window of frame k holds the poses k, k-1, ... k-m+1, newest first: the posture of k, then for every older pose its
-ground frame seen from that of k (forward, left, turn) and its posture; metres and radians. So a window is
-52 m + 3 (m - 1) numbers that neither place nor heading changes. Vectors are made on demand: only the numbers of
+ground frame relative to that of k (forward, left, turn) and its posture, in metres and radians. These
+52 m + 3 (m - 1) numbers depend neither on position nor on heading. Vectors are made on demand: only the numbers of
 frames are stored.
 
-Two conventions meet here. A method that wants the poses themselves (local PCA) takes `frames[rows]`. One that predicts
-(Liu et al. 2011, A4: query q~_{t-1}.. q~_{t-m}, target y_k = q_{t_k}) asks for windows that are `followed`, and
-`successors(rows)` are its targets: the frames after, seen from the ground of the window's newest pose.
+Methods use windows in two ways. One that needs the poses themselves (local PCA) takes `frames[rows]`. One that predicts
+(Liu et al. 2011, A4: query q~_{t-1}.. q~_{t-m}, target y_k = q_{t_k}) asks for windows with a successor; its targets
+are `successors(rows)`, the frames after, relative to the ground frame of the window's newest pose.
 """
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.compiled import compiled
+from harness.reconstruct.database.frames import MotionFrames
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
-
-if TYPE_CHECKING:
-    from harness.reconstruct.database.motion_database import MotionDatabase
 
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """The windows of a database, W in number; a `Vectors` that an index can be made of."""
+    """W windows of a database: `Vectors` for an index (`index.protocol`)."""
 
-    database: "MotionDatabase"
+    database: MotionFrames
     length: int
-    """m, poses in a window."""
+    """m, the number of poses in a window."""
     frames: Ints
-    """(W,) frame of the database that each window ends with, ascending."""
+    """(W,) rows of the database with the newest pose of each window, ascending."""
     scale: Singles | None = None
-    """(D,) multiplies every vector: distances are those of eq. 6 with D_w = diag(scale^2); None is 1."""
+    """(D,) factor on every vector: distances are those of eq. 6 with D_w = diag(scale^2); None for 1."""
 
     def __len__(self) -> int:
         return len(self.frames)
 
     @property
     def size(self) -> int:
-        """D, numbers in a vector."""
+        """D, the length of a vector."""
         return (POSTURE_SIZE + 3) * self.length - 3
 
     def gather(self, rows: Ints | slice) -> Singles:
-        """Vectors (K, D) of some windows."""
+        """Vectors (K, D) of these windows."""
         newest, database = self.frames[rows], self.database
         out = np.empty((len(newest), self.size), np.float32)
         _fill_windows(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest, out)
@@ -55,22 +52,24 @@ class Windows:
 
     @property
     def consecutive(self) -> Bools:
-        """(W,) whether the next window is that of the next frame of the same take."""
+        """(W,) whether the next window ends one frame later in the same segment."""
         out = np.zeros(len(self), bool)
         out[:-1] = np.diff(self.frames) == 1
-        ends = np.searchsorted(self.frames, [run.stop for run in self.database.runs])
+        ends = np.searchsorted(self.frames, [segment.stop for segment in self.database.segments])
         out[ends[ends > 0] - 1] = False
         return out
 
     def successors(self, rows: Ints | slice) -> Singles:
-        """(K, 55) posture (52) and step (3) of the frame after each window; only of `followed` windows."""
+        """(K, 55) posture (52) and step (3) of the frame after each window; IndexError at the end of the database."""
         newest, database = self.frames[rows], self.database
         if len(newest) and newest.max() + 1 >= len(database):
-            raise IndexError("the last window of the database has no successor: ask for windows that are followed")
+            raise IndexError(
+                "the last window of the database has no successor: ask for windows(..., with_successor=True)"
+            )
         return _gather_successors(database.posture.view(np.ndarray), database.step.view(np.ndarray), newest)
 
     def query(self, qpos: Floats) -> Singles:
-        """The vector (D,) of m configurations (m, 55), newest first, hinges in the database's representation."""
+        """The vector (D,) of m configurations (m, 55), newest first, with hinges in the database's representation."""
         out = np.empty(self.size, np.float32)
         _fill_query(np.ascontiguousarray(qpos[: self.length]), out)
         return out if self.scale is None else out * self.scale
@@ -82,11 +81,15 @@ class Windows:
 
 @compiled
 def _fill_windows(posture: Singles, step: Singles, newest: Ints, out: Singles) -> None:
-    """Fill vectors (K, D) of windows that end with frames (K,)."""
+    """Fill in the vectors (K, D) of windows whose newest frames are `newest` (K,).
+
+    Steps lead from each frame to the next one, in its ground frame. Going back in time, the heading is reduced by the
+    step's turn first, and then the step is subtracted in the axes of the older frame.
+    """
     for k in range(len(newest)):
         frame = newest[k]
         out[k, :POSTURE_SIZE] = posture[frame]
-        x, y, yaw = 0.0, 0.0, 0.0  # of the older frame's ground, seen from the newest's
+        x, y, yaw = 0.0, 0.0, 0.0  # the older ground frame, relative to the newest
         for age in range(1, (out.shape[1] + 3) // (POSTURE_SIZE + 3)):
             forward, left, turn = step[frame - age + 1]
             yaw -= np.float64(turn)
@@ -100,7 +103,7 @@ def _fill_windows(posture: Singles, step: Singles, newest: Ints, out: Singles) -
 
 @compiled
 def _gather_successors(posture: Singles, step: Singles, newest: Ints) -> Singles:
-    """(K, 55) posture and step of the frames after some (K,)."""
+    """(K, 55) posture and step of the frames after `newest` (K,)."""
     width = posture.shape[1]
     out = np.empty((len(newest), width + 3), np.float32)
     for k in range(len(newest)):
@@ -114,7 +117,10 @@ def _gather_successors(posture: Singles, step: Singles, newest: Ints) -> Singles
 
 @compiled
 def _fill_query(qpos: Floats, out: Singles) -> None:
-    """Fill the vector (D,) of configurations (m, 55): `posture_of`, and `seen_from` of their `ground_of`."""
+    """Fill in the vector (D,) of configurations (m, 55), newest first.
+
+    It has `posture_from_qpos` of each, and `relative_ground` of their `ground_from_qpos` for the older ones.
+    """
     newest = 2.0 * math.atan2(qpos[0, 6], qpos[0, 3])
     cosine, sine = math.cos(newest), math.sin(newest)
     for age in range((len(out) + 3) // (POSTURE_SIZE + 3)):

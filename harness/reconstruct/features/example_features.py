@@ -62,7 +62,7 @@ class ExampleFeatures:
         """(S, 4) quaternions are taken with the sign that is nearer to it: to the first frame's."""
         self._database, self._trackers = database, VirtualTrackers(body, worn)
         self._posture: Singles = np.asarray(database.posture)
-        for run in database.runs:
+        for run in database.segments:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
         database.release_memory()

@@ -1,4 +1,4 @@
-"""Nearest neighbours among many vectors: one protocol, several ways."""
+"""Nearest-neighbour search among many vectors: one protocol, several implementations."""
 
 from harness.reconstruct.index.flat import FlatIndex
 from harness.reconstruct.index.inverted_file import InvertedFile

@@ -1,4 +1,4 @@
-"""Exact search by looking at every vector: for small sets, and the judge of all others."""
+"""Exact search by comparison with every vector: for small sets, and the reference for all other indexes."""
 
 import numpy as np
 
@@ -6,13 +6,13 @@ from harness.core.arrays import Ints, Singles
 from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
 
 _ROUNDING = 1e-6
-"""Of the first pass, beside the largest of its terms."""
+"""Rounding error of the first pass, relative to the largest of its terms."""
 
 
 class FlatIndex:
-    """An `Index`: |q - x|^2 = |q|^2 - 2 q x + |x|^2 for all x at once, then exactly for the few that are left.
+    """An `Index`: |q - x|^2 = |q|^2 - 2 q x + |x|^2 for all x at once, then exact distances for the few candidates.
 
-    Vectors are kept about their mean, so that little is lost to rounding in the first pass.
+    Vectors are stored relative to their mean, which keeps rounding in the first pass small.
     """
 
     def __init__(self, vectors: Vectors) -> None:
@@ -29,23 +29,23 @@ class FlatIndex:
         return len(self._values)
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
-        """As `Index`."""
+        """See `Lookup`."""
         rows, squared, _ = self.nearest_with_offsets(query, count)
         return rows, squared
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
-        """As `Index`."""
-        asked = np.asarray(query, np.float32) - self._mean
-        score = self._half_squares - self._values @ asked
+        """See `Index`."""
+        centred = np.asarray(query, np.float32) - self._mean
+        score = self._half_squares - self._values @ centred
         count = min(count, len(score))
         last = np.partition(score, count - 1)[count - 1]
-        rounding = _ROUNDING * float(self._largest + asked @ asked)
+        rounding = _ROUNDING * float(self._largest + centred @ centred)
         rows = np.flatnonzero(score <= last + rounding)
-        return rank_neighbours(rows, self._values[rows] - asked, count)
+        return rank_neighbours(rows, self._values[rows] - centred, count)
 
 
-def rank_neighbours(rows: Ints, away: Singles, count: int) -> Neighbours:
-    """The nearest of candidates (M,) whose differences from the query are (M, D), nearest first."""
-    squared = np.vecdot(away, away)
+def rank_neighbours(rows: Ints, offsets: Singles, count: int) -> Neighbours:
+    """The nearest of candidate rows (M,) with offsets (M, D) from the query, nearest first, then by row."""
+    squared = np.vecdot(offsets, offsets)
     order = np.lexsort((rows, squared))[:count]
-    return Neighbours(rows[order], squared[order], away[order])
+    return Neighbours(rows[order], squared[order], offsets[order])

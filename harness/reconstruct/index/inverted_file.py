@@ -1,11 +1,15 @@
 """Approximate search for large sets: an inverted file over the leading principal axes, in 16 bits.
 
-Vectors fall into cells around centroids, which faiss finds; a query looks only into the cells nearest to it. What a
-query costs is the memory that it reads, and human poses hardly vary along most axes, so vectors are first rotated onto
-their principal axes, cut off where next to nothing is left, and kept as whole multiples of one small step: a third of
-the memory. Unlike a graph of neighbours an inverted file does not care in which order frames were added
-(docs/methods.md E, traps). Cells are looked into by a loop of our own: faiss keeps a heap of the best, which for
-hundreds of neighbours takes longer than all distances (`harness bench index` has both).
+Vectors are assigned to cells around centroids, which faiss computes; a query scans only the cells nearest to it. The
+cost of a query is the memory that it reads, and human poses hardly vary along most axes. So vectors are rotated onto
+their principal axes, truncated to the leading ones, and stored as 16-bit multiples of one small step: a third of the
+memory. Unlike a neighbour graph, an inverted file does not depend on the order in which frames were added
+(docs/methods.md E, traps). Cells are scanned by a compiled loop of this module. The heap in which faiss keeps the best
+takes longer than all distances when hundreds of neighbours are wanted (`harness bench index` measures both).
+
+Memory layout. `_rows` lists the vectors cell after cell; cell c occupies places `_starts[c]` to `_starts[c + 1]`.
+Within a cell of n vectors the codes are stored by axis: n numbers for the first axis, then n for the second, and so
+on. So the scan adds up one axis for all vectors of a cell in a contiguous loop, which the compiler vectorises.
 """
 
 import math
@@ -25,133 +29,137 @@ from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
 Codes = NDArray[np.int16]
 Places = NDArray[np.int32]
 PROBES, PROBES_PER_ROOT = 4.0, 0.4
-"""Cells looked into: so many, and for each square root of the number of neighbours that are wanted so many more."""
+"""Number of cells to scan: the first, plus the second times the square root of the number of wanted neighbours."""
 VARIANCE_SHARE = 0.9995
-"""Share of the variance that the axes keep."""
+"""Share of the variance that the axes hold."""
 _MIN_CANDIDATES_PER_NEIGHBOUR = 3.0
-"""Vectors looked into for each neighbour that is wanted, at least."""
+"""Vectors to scan for each wanted neighbour, at least."""
 _VECTORS_PER_CELL, _CLUSTERING_ROUNDS = 39, 6
-"""Of the clustering: vectors that each centroid is found from, and rounds."""
+"""For k-means: training vectors for each centroid, and iterations."""
 _MAX_CODE, _MAX_QUERY = 32_000, 1e9
-"""Steps to the farthest number from the middle; and of queries, whose squares must not overflow."""
+"""Largest code, in steps; largest number of a query in steps, whose square must not overflow."""
 _ROW_BITS = 32
 _ROW_MASK = (1 << _ROW_BITS) - 1
-"""Candidates are sorted as whole numbers: the bits of a distance, which rise with it, then those of the row."""
+"""Candidates are sorted as 64-bit integers: the squared distance in the high bits, the row in the low ones. The bits of
+a float32 that is not negative, read as an integer, have the order of the float. So one integer sort orders by
+distance, then by row."""
 
 
 class InvertedFile:
-    """An `Index`; squared distances are those along the axes that were kept, in whole steps."""
+    """An approximate `Index`; distances are those along the leading axes, between quantised vectors and the query."""
 
     def __init__(self, vectors: Vectors, wanted: int = 100) -> None:
-        """For queries of so many neighbours."""
+        """Build the index for queries of `wanted` neighbours."""
         count = len(vectors)
         rng = generator(0, "inverted file", count)
         self._principal = PrincipalAxes(vectors, rng, VARIANCE_SHARE)
         width, cells = self._principal.width, cells_for(count)
         sample = np.sort(rng.choice(count, min(count, _VECTORS_PER_CELL * cells), replace=False))
-        seen = np.empty((len(sample), width), np.float32)
+        projected = np.empty((len(sample), width), np.float32)
         for rows in chunks(np.arange(len(sample))):
-            seen[rows] = self._principal.project(vectors.gather(sample[rows]))
+            projected[rows] = self._principal.project(vectors.gather(sample[rows]))
         with _faiss() as faiss:
             flat = faiss.IndexFlatL2(width)
             clustering = faiss.Clustering(width, cells)
             clustering.seed, clustering.niter = 1, _CLUSTERING_ROUNDS
             clustering.min_points_per_centroid, clustering.max_points_per_centroid = 1, _VECTORS_PER_CELL
-            clustering.train(seen, flat)
+            clustering.train(projected, flat)
             cell_of = np.empty(count, np.int32)
             farthest = 0.0
             for start in range(0, count, CHUNK):
-                seen = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
-                cell_of[start : start + CHUNK] = flat.search(seen, 1)[1][:, 0]
-                farthest = max(farthest, float(np.abs(seen).max()))
+                projected = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
+                cell_of[start : start + CHUNK] = flat.search(projected, 1)[1][:, 0]
+                farthest = max(farthest, float(np.abs(projected).max()))
             centroids = flat.reconstruct_n(0, cells)
         self._probes = min(probes_for(wanted, count), cells)
         self._rows: Places = np.argsort(cell_of, kind="stable").astype(np.int32)
-        """(N,) cell after cell."""
+        """(N,) rows of the vectors, cell after cell."""
         self._starts: Ints = np.searchsorted(cell_of[self._rows], np.arange(cells + 1))
-        """(C + 1,) where each cell begins among them."""
+        """(C + 1,) first place of each cell; the next entry ends it."""
         self._step = np.float32(max(farthest, 1e-6) / _MAX_CODE)
         self._centroids: Singles = np.ascontiguousarray(centroids.T / self._step)
-        """(d, C) in steps."""
+        """(d, C) centroids in steps."""
         self._codes: Codes = np.empty(count * width, np.int16)
-        """(N d,) cell after cell (d, n): one number of all vectors of a cell lies together."""
+        """(N d,) codes, cell after cell, each (d, n)."""
         self._cell_of = cell_of
-        """(N,) of each row."""
-        self._where = where = np.empty(count, np.int32)
-        """(N,) of each row among `_rows`."""
-        where[self._rows] = np.arange(count, dtype=np.int32)
+        """(N,) cell of each row."""
+        self._place = place = np.empty(count, np.int32)
+        """(N,) place of each row in `_rows`."""
+        place[self._rows] = np.arange(count, dtype=np.int32)
         for start in range(0, count, CHUNK):
             some = slice(start, start + CHUNK)
-            seen = np.rint(self._principal.project(vectors.gather(some)) / self._step)
-            _store_codes(seen.astype(np.int16), where[some], cell_of[some], self._starts, self._codes)
+            codes = np.rint(self._principal.project(vectors.gather(some)) / self._step).astype(np.int16)
+            _store_codes(codes, place[some], cell_of[some], self._starts, self._codes)
 
     def __len__(self) -> int:
         return len(self._rows)
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
-        """As `Index`; most of the nearest, not always all."""
-        rows, squared, _ = self._searched(query, count)
+        """See `Lookup`; finds most of the nearest, not always all."""
+        rows, squared, _ = self._search(query, count)
         return rows, squared
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
-        """As `Index`, along the axes that were kept."""
-        rows, squared, asked = self._searched(query, count)
-        away = _gather_offsets(self._codes, self._starts, self._cell_of, self._where, rows, asked, self._step)
-        return Neighbours(rows, squared, away)
+        """See `Index`; offsets are along the leading principal axes."""
+        rows, squared, target = self._search(query, count)
+        offsets = _gather_offsets(self._codes, self._starts, self._cell_of, self._place, rows, target, self._step)
+        return Neighbours(rows, squared, offsets)
 
-    def _searched(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles]:
+    def _search(self, query: Singles, count: int) -> tuple[Ints, Singles, Singles]:
         """Rows (K,), squared distances (K,), and the query in steps (d,)."""
         count, probes = min(count, len(self)), self._probes
-        asked = self._principal.project(np.asarray(query, np.float32)) / self._step
-        if np.isnan(asked).any():
+        target = self._principal.project(np.asarray(query, np.float32)) / self._step
+        if np.isnan(target).any():
             raise ArithmeticError(
-                "a query for neighbours holds something that is not a number: is a reading not finite?"
+                "A query for neighbours contains a value that is not a number: is a reading not finite?"
             )
-        np.clip(asked, -_MAX_QUERY, _MAX_QUERY, out=asked)
-        found = _scan_cells(self._centroids, self._starts, self._codes, self._rows, asked, probes)
-        while len(found) < count:  # the cells looked into hold fewer
+        np.clip(target, -_MAX_QUERY, _MAX_QUERY, out=target)
+        candidates = _scan_cells(self._centroids, self._starts, self._codes, self._rows, target, probes)
+        while len(candidates) < count:  # the scanned cells hold too few
             probes = min(4 * probes, len(self._starts) - 1)
-            found = _scan_cells(self._centroids, self._starts, self._codes, self._rows, asked, probes)
-        found.partition(count - 1)
-        best = np.sort(found[:count])
+            candidates = _scan_cells(self._centroids, self._starts, self._codes, self._rows, target, probes)
+        candidates.partition(count - 1)
+        best = np.sort(candidates[:count])
         squared = (best >> _ROW_BITS).astype(np.int32).view(np.float32)
-        return best & _ROW_MASK, squared * self._step**2, asked
+        return best & _ROW_MASK, squared * self._step**2, target
 
 
 def cells_for(count: int) -> int:
-    """Cells for so many vectors."""
+    """Number of cells for `count` vectors."""
     return max(1, min(round(2.0 * math.sqrt(count)), count // _VECTORS_PER_CELL))
 
 
 def probes_for(wanted: int, count: int) -> int:
-    """Cells to look into for so many neighbours among so many vectors.
+    """Number of cells to scan for `wanted` neighbours among `count` vectors.
 
-    A recall of 0.96 and more at 66,000 and at 1,000,000 frames: `harness bench index`, `harness bench methods --large`.
+    Recall is 0.96 or more at 66,000 and at 1,000,000 frames: `harness bench index`, `harness bench methods --large`.
     """
     enough = _MIN_CANDIDATES_PER_NEIGHBOUR * wanted * cells_for(count) / max(count, 1)
     return math.ceil(max(PROBES + PROBES_PER_ROOT * math.sqrt(wanted), enough))
 
 
 @compiled
-def _store_codes(seen: Codes, where: Places, cell_of: Places, starts: Ints, codes: Codes) -> None:
-    """Put vectors (M, d) where they belong among the codes."""
-    width = seen.shape[1]
-    for k in range(len(seen)):
+def _store_codes(values: Codes, place: Places, cell_of: Places, starts: Ints, codes: Codes) -> None:
+    """Write the codes (M, d) of vectors to their places in `codes`, where they are `last - first` numbers apart."""
+    width = values.shape[1]
+    for k in range(len(values)):
         first, last = starts[cell_of[k]], starts[cell_of[k] + 1]
-        begin = first * width + where[k] - first
+        begin = first * width + place[k] - first
         for i in range(width):
-            codes[begin + i * (last - first)] = seen[k, i]
+            codes[begin + i * (last - first)] = values[k, i]
 
 
 @compiled
-def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, asked: Singles, probes: int) -> Ints:
-    """(M,) squared distances and rows of all vectors in the nearest cells, as whole numbers."""
+def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, target: Singles, probes: int) -> Ints:
+    """(M,) integers of squared distance and row, for all vectors of the `probes` cells nearest to `target` (d,)."""
     width, cells = centroids.shape
+    # 1. Squared distances to all centroids, axis by axis, so that the inner loop runs over contiguous numbers.
     far = np.zeros(cells, np.float32)
     for i in range(width):
-        here, value = centroids[i], asked[i]
+        coordinate, value = centroids[i], target[i]
         for c in range(cells):
-            far[c] += (here[c] - value) * (here[c] - value)
+            far[c] += (coordinate[c] - value) * (coordinate[c] - value)
+    # 2. The nearest cells by repeated minimum, since only few are needed.
     nearest, total, most = np.empty(probes, np.int64), 0, 0
     for p in range(probes):
         best = 0
@@ -160,17 +168,18 @@ def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, as
                 best = c
         nearest[p], far[best] = best, np.inf
         total, most = total + starts[best + 1] - starts[best], max(most, starts[best + 1] - starts[best])
+    # 3. Squared distances to their vectors. `bits` is the same memory as `squared`, read as integers.
     out, squared, done = np.empty(total, np.int64), np.empty(most, np.float32), 0
     bits = squared.view(np.int32)
     for cell in nearest:
         first, count = starts[cell], starts[cell + 1] - starts[cell]
         squared[:count] = 0.0
         for i in range(width):
-            begin, value = first * width + i * count, asked[i]
-            here = codes[begin : begin + count]
+            begin, value = first * width + i * count, target[i]
+            coordinates = codes[begin : begin + count]
             for j in range(count):
-                away = np.float32(here[j]) - value
-                squared[j] += away * away
+                offset = np.float32(coordinates[j]) - value
+                squared[j] += offset * offset
         for j in range(count):
             out[done + j] = (np.int64(bits[j]) << _ROW_BITS) | np.int64(rows[first + j])
         done += count
@@ -179,33 +188,33 @@ def _scan_cells(centroids: Singles, starts: Ints, codes: Codes, rows: Places, as
 
 @compiled
 def _gather_offsets(
-    codes: Codes, starts: Ints, cell_of: Places, where: Places, rows: Ints, asked: Singles, step: np.float32
+    codes: Codes, starts: Ints, cell_of: Places, place: Places, rows: Ints, target: Singles, step: np.float32
 ) -> Singles:
-    """(K, d) the vectors of some rows, minus the query in steps (d,)."""
-    width = len(asked)
+    """(K, d) the vectors of these rows minus the query, which is given in steps (d,)."""
+    width = len(target)
     out = np.empty((len(rows), width), np.float32)
     for k in range(len(rows)):
         cell = cell_of[rows[k]]
         first, last = starts[cell], starts[cell + 1]
-        begin = first * width + where[rows[k]] - first
+        begin = first * width + place[rows[k]] - first
         for i in range(width):
-            out[k, i] = (codes[begin + i * (last - first)] - asked[i]) * step
+            out[k, i] = (codes[begin + i * (last - first)] - target[i]) * step
     return out
 
 
 @contextmanager
 def _faiss() -> Iterator[Any]:
-    """faiss, imported when it is first needed, with one thread: so that equal input gives equal cells.
+    """The faiss module, imported at its first use, with one thread so that equal input gives equal cells.
 
-    Vectors are compared with centroids few at a time, for which a megabyte is enough.
+    Vectors are compared with centroids in blocks of 256, for which a megabyte of memory suffices.
     """
     import faiss
 
-    threads, at_once = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
+    threads, block_size = faiss.omp_get_max_threads(), faiss.cvar.distance_compute_blas_query_bs
     faiss.omp_set_num_threads(1)
     faiss.cvar.distance_compute_blas_query_bs = 256
     try:
         yield faiss
     finally:
         faiss.omp_set_num_threads(threads)
-        faiss.cvar.distance_compute_blas_query_bs = at_once
+        faiss.cvar.distance_compute_blas_query_bs = block_size

@@ -1,7 +1,7 @@
 """Exact search in few dimensions: the kd-tree of Kim et al. 2012 (docs/methods.md B3).
 
-Turned onto the principal axes first, all of them, which changes no distance: a tree that splits along the axis of the
-widest spread then looks at half as many vectors.
+Vectors are rotated onto all of their principal axes first, which changes no distance. A tree that splits along the axis
+of the widest spread then visits half as many vectors.
 """
 
 import numpy as np
@@ -14,35 +14,38 @@ from harness.reconstruct.index.principal_axes import PrincipalAxes
 from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
 
 _EXTRA_CANDIDATES = 4
-"""Looked up beyond the answer, for rounding may have swapped those about the last place."""
+"""Candidates beyond the answer, for rounding may have swapped some near the last place."""
 
 
 class KDTree:
-    """An `Index`, exact; keeps the source of the vectors and ranks the last few by what it says.
+    """An exact `Index`. It keeps the source of the vectors, and ranks the candidates by exact distances.
 
-    The tree is scipy's and in double precision: for large sets an inverted file needs a sixth of its memory.
+    The tree is that of scipy, in double precision: for large sets an inverted file needs a sixth of its memory.
     """
 
     def __init__(self, vectors: Vectors) -> None:
         count = len(vectors)
-        self._vectors, self._principal = vectors, PrincipalAxes(vectors, generator(0, "kd-tree", count), kept=1.0)
-        seen: Floats = np.empty((count, self._principal.width))
+        self._vectors, self._principal = (
+            vectors,
+            PrincipalAxes(vectors, generator(0, "kd-tree", count), variance_share=1.0),
+        )
+        projected: Floats = np.empty((count, self._principal.width))
         for start in range(0, count, CHUNK):
-            seen[start : start + CHUNK] = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
-        self._tree = cKDTree(seen, balanced_tree=False)
+            projected[start : start + CHUNK] = self._principal.project(vectors.gather(slice(start, start + CHUNK)))
+        self._tree = cKDTree(projected, balanced_tree=False)
 
     def __len__(self) -> int:
         return len(self._vectors)
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
-        """As `Index`."""
+        """See `Lookup`."""
         rows, squared, _ = self.nearest_with_offsets(query, count)
         return rows, squared
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
-        """As `Index`."""
+        """See `Index`."""
         query = np.asarray(query, np.float32)
         count = min(count, len(self))
-        _, found = self._tree.query(self._principal.project(query), min(count + _EXTRA_CANDIDATES, len(self)))
-        rows: Ints = np.asarray(found, np.int64).reshape(-1)
+        _, candidates = self._tree.query(self._principal.project(query), min(count + _EXTRA_CANDIDATES, len(self)))
+        rows: Ints = np.asarray(candidates, np.int64).reshape(-1)
         return rank_neighbours(rows, self._vectors.gather(rows) - query, count)

@@ -1,9 +1,9 @@
-"""Search when part of the query is not known: a silent station, a velocity across a gap, positions only.
+"""Nearest neighbours of a partly unknown query: a lost station, a velocity across a gap, positions only.
 
-No index can be asked for some columns only, and one for every set of silent stations would cost seconds as each falls
-silent. So the caller fills the unknown columns with what its last estimate says; the index proposes several times as
-many vectors as are asked for; and of those the nearest in the known columns are answered. What was filled in decides
-who is proposed, never who is chosen. Columns may also weigh less, by the quality of their station.
+No index can search some columns only, and a separate index for every set of lost stations would take seconds to build.
+So the caller fills the unknown columns from its last estimate. The index proposes several times as many vectors as are
+needed, and of those the nearest in the known columns are returned. The filled values decide which vectors are proposed,
+never which are chosen. A column may also have a reduced weight, by the quality of its station.
 """
 
 import numpy as np
@@ -12,19 +12,20 @@ from harness.core.arrays import Ints, Singles
 from harness.reconstruct.index.protocol import Index, Vectors
 
 CANDIDATE_FACTOR = 8
-"""Vectors proposed for each that is asked for."""
+"""Vectors proposed for each neighbour that is wanted."""
 
 
 def nearest_partial(
     index: Index, vectors: Vectors, query: Singles, weight: Singles, count: int, wider: int = CANDIDATE_FACTOR
 ) -> tuple[Ints, Singles]:
-    """Of the vectors proposed for a filled query (D,), the nearest with squares times `weight` (D,), 0 where unknown.
+    """The `count` nearest vectors by squared differences times `weight` (D,), which is 0 where the query is unknown.
 
-    Returns as `Index.nearest` does, the squared distances weighted.
+    `query` (D,) has all columns filled; the index proposes `wider` times as many vectors. Returns rows and weighted
+    squared distances, as `Lookup.nearest`.
     """
     proposed, _ = index.nearest(query, wider * count)
-    away = vectors.gather(proposed) - np.asarray(query, np.float32)
-    away *= np.sqrt(weight, dtype=np.float32)
-    squared = np.vecdot(away, away)
+    offsets = vectors.gather(proposed) - np.asarray(query, np.float32)
+    offsets *= np.sqrt(weight, dtype=np.float32)
+    squared = np.vecdot(offsets, offsets)
     order = np.lexsort((proposed, squared))[:count]
     return proposed[order], squared[order]

@@ -1,4 +1,4 @@
-"""What an index searches, and what it answers."""
+"""Protocols of nearest-neighbour search: the vectors, the lookup, and its answer."""
 
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
@@ -6,60 +6,60 @@ from typing import NamedTuple, Protocol
 from harness.core.arrays import Ints, Singles
 
 CHUNK = 1024
-"""Vectors gathered at a time while an index is made."""
+"""Number of vectors gathered at a time while an index is built."""
 
 
 class Vectors(Protocol):
-    """N vectors of D numbers, made on demand (`Windows`, `StationFeatures`) or in memory (`ArrayVectors`)."""
+    """N vectors of D numbers, computed on demand (`Windows`, `StationFeatures`) or in memory (`ArrayVectors`)."""
 
     def __len__(self) -> int: ...
 
     @property
     def size(self) -> int:
-        """D."""
+        """D, the length of a vector."""
         ...
 
     def gather(self, rows: Ints | slice) -> Singles:
-        """(K, D) of some rows."""
+        """The vectors (K, D) of these rows."""
         ...
 
 
 class Neighbours(NamedTuple):
-    """K vectors, nearest first."""
+    """The K nearest vectors, nearest first."""
 
     rows: Ints
-    """(K,)"""
+    """(K,) row of each."""
     squared: Singles
-    """(K,) distances from the query."""
+    """(K,) squared distances from the query."""
     offsets: Singles
-    """(K, d) the vectors minus the query, along axes of the index's choice."""
+    """(K, d) the vectors minus the query, along axes that the index chooses."""
 
 
 class Lookup(Protocol):
-    """Something that finds the nearest of N vectors."""
+    """A search for the nearest of N vectors."""
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
         """Rows (count,) of the nearest vectors to a query (D,), and their squared Euclidean distances (count,).
 
-        Nearest first, of equals that were found the lower row first. There are fewer when N is smaller.
+        Nearest first, and at equal distances the lower row first. There are fewer than `count` when N is smaller.
         """
         ...
 
 
 class Index(Lookup, Protocol):
-    """A search among N vectors: immutable, deterministic, shared by sessions."""
+    """A search structure over N vectors: immutable, deterministic, shared by sessions."""
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
-        """The same, and how the vectors differ from the query."""
+        """The nearest vectors as `nearest` finds them, and their offsets from the query."""
         ...
 
 
 @dataclass(frozen=True, eq=False)
 class ArrayVectors:
-    """`Vectors` that are all in memory."""
+    """`Vectors` in memory."""
 
     values: Singles
-    """(N, D)"""
+    """(N, D) the vectors."""
 
     def __len__(self) -> int:
         return len(self.values)

@@ -1,4 +1,4 @@
-"""Which index serves a set best: as measured by `harness bench index`."""
+"""Choice of the fastest index for a set of vectors, as measured by `harness bench index`."""
 
 from collections.abc import Callable
 
@@ -15,13 +15,15 @@ INDEXES: dict[str, Callable[[Vectors, int], Index]] = {
 }
 AUTO = "auto"
 FLAT_MAX_VECTORS, KD_TREE_MAX_DIMENSIONS, KD_TREE_MAX_NEIGHBOURS = 3000, 20, 16
-"""Up to so many vectors all are looked at; those of up to so many numbers go into a kd-tree when no more than so many
-neighbours are wanted: in more dimensions, and asked for hundreds, a tree looks at nearly all."""
+"""Limits of the choice: the flat index up to the first number of vectors; the kd-tree up to this many dimensions and
+wanted neighbours. In more dimensions, or for hundreds of neighbours, a tree visits nearly all vectors."""
 
 
 def make_index(kind: str, vectors: Vectors, wanted: int = KD_TREE_MAX_NEIGHBOURS) -> Index:
-    """The named index of these vectors, for queries of so many neighbours; "auto" is the quickest that misses next to
-    nothing. UnknownName."""
+    """An index of these vectors for queries of `wanted` neighbours; UnknownName.
+
+    "auto" takes the fastest whose recall is near 1 (`best_index`).
+    """
     if kind == AUTO:
         return make_index(best_index(len(vectors), vectors.size, wanted), vectors, wanted)
     if kind not in INDEXES:
@@ -30,7 +32,7 @@ def make_index(kind: str, vectors: Vectors, wanted: int = KD_TREE_MAX_NEIGHBOURS
 
 
 def best_index(count: int, size: int, wanted: int) -> str:
-    """The kind for so many vectors of so many numbers."""
+    """The kind of index for `count` vectors of `size` numbers and queries of `wanted` neighbours."""
     if count <= FLAT_MAX_VECTORS:
         return "flat"
     return "kd_tree" if size <= KD_TREE_MAX_DIMENSIONS and wanted <= KD_TREE_MAX_NEIGHBOURS else "inverted_file"

@@ -20,7 +20,6 @@ from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
-from harness.reconstruct.descent import qpos_from_posture
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.neighbour_search import FeatureSearch, NeighbourSearch, PoseHistorySearch
@@ -28,7 +27,7 @@ from harness.reconstruct.features.reduced_rank_regression import ReducedRankOpti
 from harness.reconstruct.index import Index, make_index
 from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
 from harness.reconstruct.methods.mean_pose import mean_posture
-from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE_SIZE, TILT
+from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE_SIZE, TILT, qpos_from_posture
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping
@@ -100,7 +99,7 @@ class DynamicMap:
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
         """From a database that may lie on disk."""
-        windows = database.windows(self.poses, followed=True)
+        windows = database.windows(self.poses, with_successor=True)
         index = make_index(self.index, windows, self.neighbours) if self.like == "window" else None
         return FittedDynamicMap(self, body, windows, index, mean_posture(body, database))
 

@@ -73,7 +73,7 @@ class LocalPca:
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalPca":
         """From a database that may lie on disk."""
-        return FittedLocalPca(self, body, database.windows(_HISTORY, followed=True), mean_posture(body, database))
+        return FittedLocalPca(self, body, database.windows(_HISTORY, with_successor=True), mean_posture(body, database))
 
 
 @dataclass(frozen=True, eq=False)

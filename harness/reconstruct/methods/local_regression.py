@@ -20,14 +20,13 @@ from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import qpos_from_posture
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
 from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.features.smoothing import smooth
 from harness.reconstruct.methods.mean_pose import mean_posture, spread_rad
-from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
+from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.limb_solver import LimbSolver

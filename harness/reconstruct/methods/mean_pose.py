@@ -49,7 +49,7 @@ def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, abou
 def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
     """Principal hinge angles (T, 48), some at a time, for a database may be larger than memory."""
     if isinstance(examples, MotionDatabase):
-        for run in examples.runs:
+        for run in examples.segments:
             yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
         examples.release_memory()
     else:

@@ -1,9 +1,9 @@
-"""Poses without place and heading: a ground frame (x, y, yaw), and the posture that stands on it.
+"""Poses split into a ground frame (x, y, yaw) and a posture that depends neither on position nor on heading.
 
-The ground frame lies on the floor below the root and is turned about the vertical by the root's twist about it, the
-`yaw` of q = about_z(yaw) tilt, where tilt turns about a horizontal axis. That heading is smooth for every posture but
-one upside down, while the direction of the root's x axis flips as soon as someone bends over. A turn or a shift of
-the room changes the ground frame alone.
+The ground frame lies on the floor below the root. Its heading is the root's twist about the vertical: the `yaw` of
+q = about_z(yaw) tilt, where tilt rotates about a horizontal axis. That heading is smooth for every posture but one
+upside down, while the direction of the root's x axis flips as soon as someone bends over. A rotation or shift of the
+room changes the ground frame alone.
 
 Arrays of ground frames are (..., 3): x, y [m] and yaw [rad]. Postures are (..., 52): height [m], tilt as a rotation
 vector (its z is 0) [rad], 48 hinges in the order of `qpos[7:]` [rad].
@@ -13,10 +13,11 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats, Singles
+from harness.core.compiled import compiled
 
 POSTURE_SIZE = 52
 HEIGHT, TILT, HINGES = 0, slice(1, 4), slice(4, 52)
-"""Where a posture has what."""
+"""Indices into a posture."""
 
 
 def ground_from_qpos(qpos: Floats) -> Floats:
@@ -25,22 +26,25 @@ def ground_from_qpos(qpos: Floats) -> Floats:
 
 
 def posture_from_qpos(qpos: Floats) -> Floats:
-    """Postures (..., 52) of configurations (..., 55); hinge angles as they are."""
+    """Postures (..., 52) of configurations (..., 55); hinge angles are copied."""
     out = np.empty((*qpos.shape[:-1], POSTURE_SIZE))
     w, x, y, z = np.moveaxis(qpos[..., 3:7], -1, 0)
     level, lean = np.hypot(w, z), np.hypot(x, y)
     # about_z(-yaw) q = (level, (x w + y z) / level, (y w - x z) / level, 0)
-    along = 2.0 * np.arctan2(lean, level) / np.maximum(level * lean, 1e-30)
+    factor = 2.0 * np.arctan2(lean, level) / np.maximum(level * lean, 1e-30)
     out[..., HEIGHT] = qpos[..., 2]
-    out[..., 1] = along * (x * w + y * z)
-    out[..., 2] = along * (y * w - x * z)
+    out[..., 1] = factor * (x * w + y * z)
+    out[..., 2] = factor * (y * w - x * z)
     out[..., 3] = 0.0
     out[..., HINGES] = qpos[..., 7:]
     return out
 
 
 def qpos_from_postures(posture: Floats | Singles, ground: Floats) -> Floats:
-    """Configurations (..., 55) of postures (..., 52) on ground frames (..., 3): undoes `posture_from_qpos` and `ground_from_qpos`."""
+    """Configurations (..., 55) of postures (..., 52) on ground frames (..., 3).
+
+    The inverse of `posture_from_qpos` and `ground_from_qpos`.
+    """
     tilt = np.asarray(posture[..., TILT], dtype=float)
     out = np.empty((*np.broadcast_shapes(posture.shape[:-1], ground.shape[:-1]), 55))
     out[..., :2] = ground[..., :2]
@@ -51,7 +55,7 @@ def qpos_from_postures(posture: Floats | Singles, ground: Floats) -> Floats:
 
 
 def relative_ground(ground: Floats, other: Floats) -> Floats:
-    """Ground frames `other` (..., 3) in the axes of `ground` (..., 3): forward, left [m], turn within +-pi [rad]."""
+    """Ground frames `other` (..., 3) relative to `ground` (..., 3): forward, left [m], turn within +-pi [rad]."""
     cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
     x, y = other[..., 0] - ground[..., 0], other[..., 1] - ground[..., 1]
     turn = other[..., 2] - ground[..., 2]
@@ -60,8 +64,22 @@ def relative_ground(ground: Floats, other: Floats) -> Floats:
 
 
 def step_grounds(ground: Floats, step: Floats) -> Floats:
-    """The ground frame (..., 3) a step (..., 3) away: undoes `relative_ground` up to whole turns."""
+    """Ground frames (..., 3) after a step (..., 3) each: the inverse of `relative_ground` up to full turns."""
     cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
     forward, left = step[..., 0], step[..., 1]
     x, y = ground[..., 0] + cosine * forward - sine * left, ground[..., 1] + sine * forward + cosine * left
     return np.stack([x, y, ground[..., 2] + step[..., 2]], axis=-1)
+
+
+@compiled
+def qpos_from_posture(posture: Floats, ground: Floats) -> Floats:
+    """The configuration (P + 3,) of one posture (P,) on a ground frame (3,): `qpos_from_postures`, compiled."""
+    out = np.empty(len(posture) + 3)
+    out[0], out[1], out[2] = ground[0], ground[1], posture[0]
+    angle = np.sqrt(posture[1] ** 2 + posture[2] ** 2 + posture[3] ** 2)
+    share = np.sin(0.5 * angle) / angle if angle > 1e-12 else 0.5
+    w, x, y, z = np.cos(0.5 * angle), share * posture[1], share * posture[2], share * posture[3]
+    c, s = np.cos(0.5 * ground[2]), np.sin(0.5 * ground[2])
+    out[3], out[4], out[5], out[6] = c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w
+    out[7:] = posture[4:]
+    return out

@@ -1,4 +1,4 @@
-"""Following a performer with a memory: the last answers, one for each period of the examples."""
+"""Tracking with a history: the last answers, one for each period of the examples."""
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
@@ -14,62 +14,62 @@ from harness.stream.frame import TrackerFrame
 
 
 class HistorySession(IKSession, ABC):
-    """A `Session` that answers by `continued` as soon as it has enough of a past, and by inverse kinematics before.
+    """A `Session` that solves by `solve_next` once its history is long enough, and by inverse kinematics before.
 
-    Examples advance by one period from row to row, so the past must, too: over a short gap it is filled by what
-    `bridged` says, after a longer one it begins anew; a frame that comes within half a period replaces the last.
+    Examples advance by one period from row to row, so the history must, too. A short gap is filled by `predict_gap`; a
+    longer one clears the history. A frame within half a period of the last one replaces it in the history.
     """
 
     longest_gap: ClassVar[int] = 8
-    """Periods that a gap may last: 0.2 s at 40 Hz, over which a stride or a punch is still the same."""
+    """Longest gap that is filled, in periods: 0.2 s at 40 Hz, within which a stride or a punch continues."""
 
     def __init__(
         self,
         body: Body,
         calibration: Calibration,
-        manner: SolverOptions,
-        leaning: PosturePrior,
+        options: SolverOptions,
+        posture_prior: PosturePrior,
         poses: int,
         rate_hz: float,
     ) -> None:
-        super().__init__(body, calibration, manner, leaning)
+        super().__init__(body, calibration, options, posture_prior)
         self.past: Floats = np.tile(self.qpos, (poses, 1))
         """(m, 55) the last answers, newest first."""
-        self._rate_hz, self._known, self._noted_s = rate_hz, 0, -np.inf
-        self._free = np.isinf(self.limits.high_rad)
-        self._replaced = np.array(self.past[-1])
+        self._rate_hz, self._length, self._recorded_s = rate_hz, 0, -np.inf
+        self._unlimited = np.isinf(self.limits.high_rad)
+        self._dropped = np.array(self.past[-1])  # the oldest, in case that the newest is replaced
 
     @abstractmethod
     def solve_next(self) -> IKSolution:
-        """The pose that follows `past`."""
+        """The solution for this frame, whose readings are in `residuals`, after `past`."""
 
     @abstractmethod
     def predict_gap(self) -> Floats:
-        """The configuration (55,) that follows `past` when nothing was read."""
+        """The configuration (55,) one period after `past`, without readings."""
 
     def track(self, frame: TrackerFrame) -> IKSolution:
-        if self._known >= len(self.past):
-            periods = round((self.now_s - self._noted_s) * self._rate_hz)
+        if self._length >= len(self.past):
+            periods = round((self.now_s - self._recorded_s) * self._rate_hz)
             if periods == 0:
-                self.past[:-1], self.past[-1] = self.past[1:].copy(), self._replaced
+                self.past[:-1], self.past[-1] = self.past[1:].copy(), self._dropped
             if periods <= self.longest_gap:
                 for _ in range(periods - 1):
-                    self._remember(self.predict_gap())
+                    self._push(self.predict_gap())
                 return self.solve_next()
-            self._known = 0
+            self._length = 0
         return super().track(frame)
 
-    def record(self, frame: TrackerFrame, anew: bool) -> None:
-        self._known = 0 if anew else self._known
-        self._remember(self.qpos)
-        self._noted_s = self.now_s
+    def record(self, frame: TrackerFrame, cold: bool) -> None:
+        self._length = 0 if cold else self._length
+        self._push(self.qpos)
+        self._recorded_s = self.now_s
 
-    def _remember(self, qpos: Floats) -> None:
-        """In the representation that most examples share."""
+    def _push(self, qpos: Floats) -> None:
+        """Add a configuration as the newest, in the representation of hinge angles that most examples share."""
         qpos = np.array(qpos)
-        if np.abs(qpos[7:][self._free]).max(initial=0.0) > np.pi:
+        if np.abs(qpos[7:][self._unlimited]).max(initial=0.0) > np.pi:
             qpos[7:] = self.limits.principal(qpos[7:])
-        self._replaced = np.array(self.past[-1])
+        self._dropped = np.array(self.past[-1])
         self.past[1:] = self.past[:-1].copy()
         self.past[0] = qpos
-        self._known += 1
+        self._length += 1

@@ -1,8 +1,8 @@
-"""Following one performer through a take: what every session that solves for poses has in common.
+"""Inverse kinematics over a take: what all sessions that solve for poses have in common.
 
-Frame by frame the pose is solved from the one before. It is sought anew, from the T-pose and its kin and without
-trust in the past, at the start, after a loss, when most readings jump at once, and when the readings go on
-contradicting the pose; the cheaper of the two wins.
+Each frame is solved from the pose of the frame before (warm start). A cold start solves from the T-pose, a few other
+postures and the last pose, without trust in the past. It happens at the start, after a loss, when most readings jump at
+once, and when readings keep contradicting the pose. The solution of lower cost is used.
 """
 
 from dataclasses import dataclass, field, replace
@@ -23,33 +23,35 @@ from harness.reconstruct.solver.status_monitor import LOST_AFTER_S, StatusMonito
 from harness.stream.frame import TrackerFrame
 
 POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
-"""Of hinges about the examples' mean posture, while there is no past to go by [rad]."""
+"""Standard deviation of hinges about the examples' mean posture, for methods without a history yet [rad]."""
 _OUTLIER_SCALES = 2.0
-"""A reading contradicts the pose when it is off by more than so many times the Lorentzian's scale: 6 cm, 16 deg."""
+"""A reading contradicts the pose when its residual exceeds this many Lorentzian scales: 6 cm, 16 deg."""
 _OUTLIER_SHARE = 0.25
-"""When this share of the readings does so, the pose is sought anew at once; else once it has lasted `PATIENCE_S`."""
+"""From this share of contradicting readings on, a cold start follows at once; below it, after `PATIENCE_S`."""
 _LOSS_SCALE_FACTORS = (10.0, 3.0, 1.0)
+"""Successive factors on the Lorentzian's scale in a cold start, so that distant readings attract at first."""
 _PROBE_STEPS, _PROBE_COST_RATIO = 6, 3.0
-"""A start is looked at for so many steps, and left when it is so many times as dear as the best one by then: most
-have all but arrived, and those that stand upside down never do."""
+"""Each start is solved for this many steps. It is dropped if it then costs this many times as much as the cheapest one:
+most have nearly converged by then, and those that are upside down never will."""
 _DUPLICATE_TOLERANCE = 1e-3
-"""Configurations that differ nowhere by more are one [m, rad]."""
-"""How much farther the Lorentzian reaches while a cold start closes in."""
+"""Configurations whose numbers all differ by less count as one [m, rad]."""
+_COLD_COST_RATIO = 0.8
+"""A cold solution replaces a warm one when it costs less than this share of it."""
 
 
 @dataclass(frozen=True, eq=False)
 class PosturePrior:
-    """The weak prior that fills in what trackers leave open when nothing better is known. The root has none."""
+    """A weak prior on hinges, for what trackers leave open and no example determines. The root has none."""
 
     mean_qpos: Floats | None
-    """(55,) mean posture of examples; None when there is nothing to learn it from."""
+    """(55,) mean posture of examples; None without examples."""
     spread_rad: Floats
     """(48,) standard deviation of each hinge; inf for no prior."""
     towards_mean: float = 1.0
-    """Where the prior's mean lies between the previous pose, 0, and the mean posture, 1."""
+    """Position of the prior's mean between the previous pose, 0, and the mean posture, 1."""
 
     def prior(self, limits: HingeLimits, previous: Floats) -> Prior:
-        """Seen from a pose (55,)."""
+        """The prior after a previous pose (55,)."""
         mean, precision = previous, np.zeros(6 + len(self.spread_rad))
         precision[6:] = self.spread_rad**-2.0
         if self.mean_qpos is not None:
@@ -61,122 +63,120 @@ class PosturePrior:
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """How a performer is followed."""
+    """Options of a session that solves for poses."""
 
     loss: Loss = field(default_factory=Loss)
     limits: bool = True
     """Keep hinges within the body's limits."""
     jump_m: float = JUMP_M
-    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
+    """A position that jumps farther than this from its expected place is left out for a while; inf for never [m]."""
     lost_after_s: float = LOST_AFTER_S
+    """Time without enough stations after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
 
 
 class IKSession:
-    """A `Session`. What differs from method to method is `followed`, and `noted` for those that remember."""
+    """A `Session` by inverse kinematics. Methods override `track`, and `record` if they keep a history."""
 
-    def __init__(self, body: Body, calibration: Calibration, manner: SolverOptions, leaning: PosturePrior) -> None:
-        self.residuals = Residuals(body, calibration, manner.loss)
-        self.limits = HingeLimits(body, keep=manner.limits)
-        self.solver = IKSolver(self.residuals, self.limits, manner.stopping)
-        few = min(_PROBE_STEPS, manner.stopping.most_steps)
-        self._first_look = IKSolver(self.residuals, self.limits, replace(manner.stopping, most_steps=few))
-        self.qpos = starting_postures(body)[0]
+    def __init__(
+        self, body: Body, calibration: Calibration, options: SolverOptions, posture_prior: PosturePrior
+    ) -> None:
+        self.residuals = Residuals(body, calibration, options.loss)
+        self.limits = HingeLimits(body, keep=options.limits)
+        self.solver = IKSolver(self.residuals, self.limits, options.stopping)
+        probe_steps = min(_PROBE_STEPS, options.stopping.most_steps)
+        self._probe = IKSolver(self.residuals, self.limits, replace(options.stopping, most_steps=probe_steps))
+        postures = starting_postures(body)
+        self.qpos = postures[0]
         """(55,) the last answer."""
-        self._leaning = leaning
-        self._coverage = StatusMonitor(manner.lost_after_s)
-        self._gate = OutlierGate(len(calibration.stations), manner.jump_m)
+        self._posture_prior = posture_prior
+        self._monitor = StatusMonitor(options.lost_after_s)
+        self._gate = OutlierGate(len(calibration.stations), options.jump_m)
         self._time, self.now_s = DeviceTime(), 0.0
-        """The moment of this frame [s]."""
-        self._starts = [*starting_postures(body), *([] if leaning.mean_qpos is None else [leaning.mean_qpos])]
-        self._started, self._following = False, False
+        """Time of this frame [s]."""
+        self._postures = postures if posture_prior.mean_qpos is None else (*postures, posture_prior.mean_qpos)
+        self._started, self._tracking = False, False
         self._contradicted_since_s: float | None = None
 
     def track(self, frame: TrackerFrame) -> IKSolution:
-        """The pose of a frame that continues what went before; its readings are in `residuals`."""
+        """The solution of a frame that continues the last one; its readings are in `residuals`."""
         return self.solve_with_prior(self.qpos, self.qpos)
 
-    def record(self, frame: TrackerFrame, anew: bool) -> None:
-        """`qpos` is the answer to this frame; `anew` when it rests on nothing that went before."""
+    def record(self, frame: TrackerFrame, cold: bool) -> None:
+        """Called when `qpos` answers this frame; `cold` after a cold start, which depends on no earlier frame."""
 
     def solve_with_prior(self, start: Floats, previous: Floats) -> IKSolution:
-        """Inverse kinematics with the weak prior alone."""
-        return self.solver.solve(start, self._leaning.prior(self.limits, previous))
+        """Inverse kinematics from a start (55,) with the posture prior after a previous pose (55,)."""
+        return self.solver.solve(start, self._posture_prior.prior(self.limits, previous))
 
     def outlier_share(self) -> float:
-        """The share of readings that lie far from the pose."""
+        """The share of measured rows that contradict the pose evaluated last."""
         far = (self.residuals.distance > _OUTLIER_SCALES * self.residuals.scale) & self.residuals.measured
         return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.update(frame)
+        """The estimate after one frame; without any valid reading, the last pose again."""
+        status, any_valid = self._monitor.update(frame)
         self.now_s = self._time.frame_time_s(frame)
-        if any_seen:
+        if any_valid:
             self._gate.read(frame, self.residuals)
-            anew = self._gate.all_moved or (not self._following and (status is Status.SOLVED or not self._started))
-            if anew:
+            cold = self._gate.all_moved or (not self._tracking and (status is Status.SOLVED or not self._started))
+            if cold:
                 solution = self._solve_cold()
             else:
-                solution, anew = self._verify(self.track(frame))
+                solution, cold = self._verify(self.track(frame))
             self.qpos = self._canonical(solution.qpos)
             self._started = True
-            self.record(frame, anew)
+            self.record(frame, cold)
             self._gate.update(self.residuals, self.qpos)
-        self._following = status is Status.SOLVED or (self._following and status is not Status.LOST)
+        self._tracking = status is Status.SOLVED or (self._tracking and status is not Status.LOST)
         return Estimate(self.qpos, status)
 
     def _verify(self, warm: IKSolution) -> tuple[IKSolution, bool]:
-        """The pose as it was followed, or one sought anew when the readings contradict it; and whether so."""
-        contradicted = self.outlier_share()
-        if contradicted == 0.0 and not self._gate.left_out:
+        """The warm solution, or a cold one if readings contradict the warm one for too long; and whether it is cold."""
+        contradicting = self.outlier_share()
+        if contradicting == 0.0 and not self._gate.left_out:
             self._contradicted_since_s = None
             return warm, False
         if self._contradicted_since_s is None:
             self._contradicted_since_s = self.now_s
-        if contradicted < _OUTLIER_SHARE and (
+        if contradicting < _OUTLIER_SHARE and (
             self._gate.left_out or self.now_s - self._contradicted_since_s < PATIENCE_S
         ):
             return warm, False
         self._contradicted_since_s = self.now_s
         cold = self._solve_cold()
-        return (cold, True) if cold.cost < 0.8 * warm.cost else (warm, False)
+        return (cold, True) if cold.cost < _COLD_COST_RATIO * warm.cost else (warm, False)
 
     def _solve_cold(self) -> IKSolution:
-        """The cheapest pose found from the last one and from the starting postures, stood where the readings are."""
-        postures_here = (self.qpos, *self._starts)
-        starts = _unique(
-            [start for posture in postures_here for start in candidate_placements(self.residuals, posture)]
-        )
+        """The cheapest solution from the last pose and the starting postures, each placed at the readings."""
+        starts: list[Floats] = []
+        for posture in (self.qpos, *self._postures):
+            for start in candidate_placements(self.residuals, posture):
+                if _is_new(start, starts):
+                    starts.append(start)
         self.residuals.widen(_LOSS_SCALE_FACTORS[0])
-        looked = [self._first_look.solve(start, self._leaning.prior(self.limits, start)) for start in starts]
-        dearest = _PROBE_COST_RATIO * min(solution.cost for solution in looked)
-        found: list[IKSolution] = []
-        arrived: list[Floats] = []
-        for start, solution in zip(starts, looked, strict=True):
-            if solution.cost > dearest or not _is_new(solution.qpos, arrived):
+        probes = [self._probe.solve(start, self._posture_prior.prior(self.limits, start)) for start in starts]
+        max_cost = _PROBE_COST_RATIO * min(solution.cost for solution in probes)
+        solutions: list[IKSolution] = []
+        reached: list[Floats] = []
+        for start, solution in zip(starts, probes, strict=True):
+            if solution.cost > max_cost or not _is_new(solution.qpos, reached):
                 continue
-            arrived.append(solution.qpos)
+            reached.append(solution.qpos)
             for factor in _LOSS_SCALE_FACTORS:
                 self.residuals.widen(factor)
                 solution = self.solve_with_prior(solution.qpos, start)
-            found.append(solution)
-        return min(found, key=lambda solution: solution.cost)
+            solutions.append(solution)
+        return min(solutions, key=lambda solution: solution.cost)
 
     def _canonical(self, qpos: Floats) -> Floats:
-        """The same pose in lawful angles: past a gimbal's pole the limits hold for the twin."""
+        """The same pose in principal hinge angles, for which the limits hold also beyond a gimbal's pole."""
         if self.limits.past_gimbal(qpos[7:]):
             qpos = np.concatenate([qpos[:7], self.limits.principal(qpos[7:])])
         return qpos
 
 
-def _unique(poses: list[Floats]) -> list[Floats]:
-    """Those configurations (55,) that none before them is all but equal to."""
-    out: list[Floats] = []
-    for qpos in poses:
-        if _is_new(qpos, out):
-            out.append(qpos)
-    return out
-
-
 def _is_new(qpos: Floats, known: list[Floats]) -> bool:
+    """Whether a configuration (55,) differs from all others."""
     return all(np.abs(qpos - other).max() > _DUPLICATE_TOLERANCE for other in known)

@@ -1,10 +1,10 @@
-"""Levenberg and Marquardt's method on the pose: residuals of trackers, a Gaussian prior, and joint limits.
+"""Inverse kinematics by the Levenberg-Marquardt method: residuals of trackers, a Gaussian prior, and joint limits.
 
-Minimises  data cost + 1/2 sum_d precision_d (q_d - mean_d)^2  over configurations within the limits. Steps live in
-the tangent space (root translation in world axes, root turn in its own, hinges) and solve a box-constrained
-quadratic model, so that a hinge at its limit does not stall the rest. The first model is Gauss and Newton's, which
-is the better one from afar; the later ones have the full curvature wherever that is positive definite. A step that
-raises the cost is taken back and damped.
+It minimises  data cost + 1/2 sum_d precision_d (q_d - mean_d)^2  over configurations within the limits. Steps lie in
+the tangent space (root translation in world axes, root rotation in its own, hinges). Each solves a box-constrained
+quadratic model, so that a hinge at its limit does not stall the others. The first model is that of Gauss-Newton, which
+is better from a distance; later ones have the full curvature wherever that is positive definite. A step that raises the
+cost is undone, and the damping is raised.
 """
 
 from dataclasses import dataclass
@@ -13,52 +13,55 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import specialise
-from harness.reconstruct import descent
 from harness.reconstruct.solver.hinge_limits import HingeLimits
+from harness.reconstruct.solver.levenberg_marquardt import PriorAndLimits, minimise, new_quadratic_model
 from harness.reconstruct.solver.residuals import Residuals
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """A Gaussian around a configuration."""
+    """A Gaussian prior about a configuration."""
 
     qpos: Floats
     """(55,) its mean."""
     precision: Floats | None
-    """(54,) one over the variance along each direction of the tangent [1/m^2, 1/rad^2]; 0 or None knows nothing."""
+    """(54,) one over the variance along each tangent direction [1/m^2, 1/rad^2]; 0, or None for all, for no prior."""
 
 
 @dataclass(frozen=True)
 class Stopping:
-    """When a solve is finished: converged, or out of steps."""
+    """Criteria of convergence, and the limit of steps."""
 
     step: float = 1e-4
     """Converged once no component of an undamped step is larger [m, rad]: 0.1 mm, 0.006 deg."""
     decrease: float = 1e-5
-    """Converged, too, once an undamped step promises to lower the cost, a log likelihood, by less."""
+    """Converged, too, once an undamped step is predicted to lower the cost, a log likelihood, by less."""
     most_steps: int = 30
+    """Steps after which a solve ends without convergence."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class IKSolution:
-    """Where a solve ended."""
+    """The result of a solve."""
 
     qpos: Floats
-    """(55,)"""
+    """(55,) the configuration."""
     cost: float
-    """Data and prior, before the last step."""
+    """Cost of data and prior before the last step."""
     steps: int
+    """Number of steps."""
     converged: bool
+    """False when the steps were used up."""
 
 
 class IKSolver:
-    """Solves for whatever frame its residuals have read; deterministic, each call by itself."""
+    """Solves for the frame that its residuals have read; deterministic, and without memory between calls."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self.residuals, self.limits, self.stopping = residuals, limits, stopping
         nv = residuals.kinematics.nv
-        self._model = descent.new_quadratic_model(residuals.tree)
-        self._trust = descent.PriorAndLimits(
+        self._model = new_quadratic_model(residuals.tree)
+        self._problem = PriorAndLimits(
             mean=np.zeros(nv + 1),
             precision=np.zeros(nv),
             low_rad=np.array(limits.low_rad),
@@ -67,16 +70,18 @@ class IKSolver:
             decrease=stopping.decrease,
             most_steps=stopping.most_steps,
         )
-        self._arrays = (residuals.tree, residuals.targets, residuals.state, self._model, self._trust)
-        self._descend = specialise(descent.minimise, *self._arrays, np.zeros(nv + 1))
+        self._arrays = (residuals.tree, residuals.targets, residuals.state, self._model, self._problem)
+        self._minimise = specialise(minimise, *self._arrays, np.zeros(nv + 1))
 
     def solve(self, start: Floats, prior: Prior) -> IKSolution:
-        """From a configuration (55,), clipped to the limits, downhill to a minimum."""
-        trust = self._trust
-        trust.mean[:] = prior.qpos
-        trust.precision[:] = 0.0 if prior.precision is None else prior.precision
+        """The local minimum reached from a configuration (55,), which is clipped to the limits first.
+
+        ArithmeticError when a reading is not finite.
+        """
+        self._problem.mean[:] = prior.qpos
+        self._problem.precision[:] = 0.0 if prior.precision is None else prior.precision
         qpos = np.array(start, dtype=float)
-        cost, steps, converged = self._descend(*self._arrays, qpos)
+        cost, steps, converged = self._minimise(*self._arrays, qpos)
         if steps < 0:
-            raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
+            raise ArithmeticError("The normal equations are not positive definite: is a reading not finite?")
         return IKSolution(qpos, cost, steps, converged)

@@ -1,11 +1,11 @@
-"""Arms and legs put on their trackers in closed form: the analytic final step of Kim et al. 2012 (docs/methods.md B5).
+"""Closed-form inverse kinematics of arms and legs: the analytic final step of Kim et al. 2012 (docs/methods.md B5).
 
 A limb is a ball joint (three hinges), one hinge, and an end of two or three hinges. The distance from shoulder or hip
-to a point beyond the elbow or knee depends on that one hinge alone, and the law of cosines gives its angle; the upper
-bone is then turned the shortest way until the point lies where it was measured. What is left is a turn about the line
-from joint to point. It stays as predicted, unless a measured orientation determines it: that of the shin or forearm, or
-of a foot, whose two hinges cannot reach every orientation. Hinges keep their limits, at the point's cost.
-The algebra of 3 x 3 matrices is at the end, for compiled functions call only those of their own file (`core.compiled`).
+to a point beyond the elbow or knee depends on that one hinge alone, and the law of cosines gives its angle. The upper
+bone is then rotated by the smallest turn that brings the point to its measured position. What remains free is the
+swivel, a rotation about the line from joint to point. It stays as predicted unless a measured orientation determines
+it: that of the shin or forearm, or of a foot, whose two hinges cannot reach every orientation. Hinges keep their
+limits, at the cost of the point's position.
 """
 
 from typing import NamedTuple
@@ -14,13 +14,25 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.reconstruct.solver.matrix_algebra import (
+    angle_about,
+    axis_rotation,
+    cross,
+    dot3,
+    multiply,
+    multiply_transposed,
+    multiply_vector,
+    shortest_rotation,
+    transposed_multiply,
+)
+from harness.reconstruct.solver.quaternion_algebra import matrix_from_quaternion
 
 UPPER, LOWER, TWIST, END = 0, 1, 2, 3
-"""What carries a station: upper arm or thigh, forearm or shin on its hinge, the turning forearm, hand or foot."""
+"""Levels, the bones of a limb: upper arm or thigh; forearm or shin; the twisting part of the forearm; hand or foot."""
 
 
 class Limb(NamedTuple):
-    """Axes and vectors in the frames of their bones, as in the rest pose."""
+    """Hinge axes and bone vectors of a limb, in the frames of their bones."""
 
     ball: Floats
     """(3, 3) rows: the upper bone's hinges, innermost first, orthogonal and right-handed."""
@@ -29,181 +41,192 @@ class Limb(NamedTuple):
     hinge: Floats
     """(3,) axis of elbow or knee."""
     lower_m: Floats
-    """(3,) from there to the end of forearm or shin, or to where the forearm starts turning."""
+    """(3,) from there to the end of the shin, or to where the forearm starts to twist."""
     twist: Floats
-    """(3,) axis about which the forearm turns; 0 for a leg."""
+    """(3,) axis about which the forearm twists; 0 for a leg."""
     twist_m: Floats
     """(3,) from there to the wrist; 0 for a leg."""
     end: Floats
     """(2, 3) rows: the hinges of hand or foot, innermost first, orthogonal."""
     low_rad: Floats
-    """(7,) limits of ball (3), hinge, twist, end (2)."""
+    """(7,) lower limits of ball (3), hinge, twist, end (2)."""
     high_rad: Floats
+    """(7,) upper limits."""
 
 
 class LimbBase(NamedTuple):
-    """Where a limb hangs."""
+    """The pose of the joint that a limb starts from."""
 
-    parent: Floats
+    world_from_parent: Floats
     """(4,) orientation of the bone that carries it."""
     joint_m: Floats
-    """(3,) shoulder or hip."""
+    """(3,) position of shoulder or hip [m]."""
 
 
 class LimbTarget(NamedTuple):
-    """A station on a limb, and where it was measured."""
+    """A station on a limb, and its measured pose."""
 
     level: int
-    """What carries it."""
+    """The bone that carries it: UPPER, LOWER, TWIST or END."""
     mount_m: Floats
-    """(3,) in that bone's frame."""
+    """(3,) its position in that bone's frame [m]."""
     point_m: Floats
-    """(3,) position, if `here`."""
-    turned: Floats
-    """(4,) orientation of that bone, if `facing`."""
-    here: bool
-    facing: bool
+    """(3,) measured position [m], if `has_position`."""
+    world_from_bone: Floats
+    """(4,) measured orientation of that bone, if `has_orientation`."""
+    has_position: bool
+    has_orientation: bool
 
 
 @compiled
-def solve_limb(limb: Limb, angles: Floats, hung: LimbBase, aim: LimbTarget) -> None:
-    """Changes angles (7,) so that the station comes to where it was measured."""
-    parent, bone = _matrix(hung.parent), _matrix(aim.turned)
-    if aim.level == UPPER:
-        if aim.facing:
-            _set_ball(limb, angles, _transposed_multiply(parent, bone))
+def solve_limb(limb: Limb, angles: Floats, base: LimbBase, target: LimbTarget) -> None:
+    """Change the angles (7,) of a limb, in place, so that its station gets the measured pose."""
+    parent = matrix_from_quaternion(base.world_from_parent)
+    bone = matrix_from_quaternion(target.world_from_bone)
+    if target.level == UPPER:
+        if target.has_orientation:
+            _set_ball(limb, angles, transposed_multiply(parent, bone))
         return
-    if aim.here:
-        _reach_point(limb, angles, parent, aim.point_m - hung.joint_m, aim, bone)
-    if aim.facing:
-        lower = _multiply(_multiply(parent, _ball_rotation(limb, angles)), _axis_rotation(limb.hinge, angles[3]))
-        _turn_end(limb, angles, aim.level, _transposed_multiply(lower, bone))
+    if target.has_position:
+        _reach_point(limb, angles, parent, target.point_m - base.joint_m, target, bone)
+    if target.has_orientation:
+        lower = multiply(multiply(parent, _ball_rotation(limb, angles)), axis_rotation(limb.hinge, angles[3]))
+        _turn_end(limb, angles, target.level, transposed_multiply(lower, bone))
 
 
 @compiled
-def _reach_point(limb: Limb, angles: Floats, parent: Floats, goal: Floats, aim: LimbTarget, turned: Floats) -> None:
-    """To a goal (3,) seen from the joint, with orientations (3, 3) of the bones that carry limb and station."""
-    twist = _axis_rotation(limb.twist, angles[4])
-    if aim.level == LOWER:
-        beyond = aim.mount_m
-    elif aim.level == TWIST and aim.facing:  # where the forearm starts turning, which its turning does not move
-        goal = goal - _rotate(turned, aim.mount_m)
-        beyond = limb.lower_m
-    elif aim.level == TWIST:
-        beyond = limb.lower_m + _rotate(twist, aim.mount_m)
-    elif aim.facing:  # the end is where its own orientation puts it
-        goal = goal - _rotate(turned, aim.mount_m)
-        beyond = limb.lower_m + _rotate(twist, limb.twist_m)
-    else:
-        end = _multiply(_axis_rotation(limb.end[1], angles[6]), _axis_rotation(limb.end[0], angles[5]))
-        beyond = limb.lower_m + _rotate(twist, limb.twist_m + _rotate(end, aim.mount_m))
-    far = np.sqrt(_dot(goal, goal))
-    if far < 1e-9:
-        return
-    angles[3] = hinge_angle_rad(limb, beyond, far, angles[3])
-    bend = _axis_rotation(limb.hinge, angles[3])
-    world = _multiply(parent, _ball_rotation(limb, angles))
-    way = goal / far
-    world = _multiply(_shortest_rotation(_rotate(world, limb.upper_m + _rotate(bend, beyond)), way), world)
-    if aim.facing:
-        world = _multiply(_axis_rotation(way, _swivel(limb, aim.level, way, _multiply(world, bend), turned)), world)
-    _set_ball(limb, angles, _transposed_multiply(parent, world))
+def _reach_point(
+    limb: Limb, angles: Floats, parent: Floats, goal: Floats, target: LimbTarget, measured: Floats
+) -> None:
+    """Bring the station to a goal (3,) relative to the joint.
 
-
-@compiled
-def hinge_angle_rad(limb: Limb, beyond_m: Floats, far_m: float, before_rad: float) -> float:
-    """The angle of elbow or knee at which a point beyond it is `far_m` from the joint: the law of cosines.
-
-    Of its two solutions the lawful one nearest to the angle before; as near as the limits and the lengths allow.
+    `parent` and `measured` are orientations (3, 3): of the bone that carries the limb, and of the station's bone.
     """
-    along = _dot(limb.hinge, beyond_m)
+    twist = axis_rotation(limb.twist, angles[4])
+    if target.level == LOWER:
+        beyond = target.mount_m
+    elif target.level == TWIST and target.has_orientation:  # aim at where the twist starts: twisting does not move it
+        goal = goal - multiply_vector(measured, target.mount_m)
+        beyond = limb.lower_m
+    elif target.level == TWIST:
+        beyond = limb.lower_m + multiply_vector(twist, target.mount_m)
+    elif target.has_orientation:  # aim at wrist or ankle: the measured orientation says where
+        goal = goal - multiply_vector(measured, target.mount_m)
+        beyond = limb.lower_m + multiply_vector(twist, limb.twist_m)
+    else:
+        end = multiply(axis_rotation(limb.end[1], angles[6]), axis_rotation(limb.end[0], angles[5]))
+        beyond = limb.lower_m + multiply_vector(twist, limb.twist_m + multiply_vector(end, target.mount_m))
+    distance = np.sqrt(dot3(goal, goal))
+    if distance < 1e-9:
+        return
+    angles[3] = hinge_angle_rad(limb, beyond, distance, angles[3])
+    bend = axis_rotation(limb.hinge, angles[3])
+    world = multiply(parent, _ball_rotation(limb, angles))
+    direction = goal / distance
+    world = multiply(
+        shortest_rotation(multiply_vector(world, limb.upper_m + multiply_vector(bend, beyond)), direction), world
+    )
+    if target.has_orientation:
+        swivel = _swivel(limb, target.level, direction, multiply(world, bend), measured)
+        world = multiply(axis_rotation(direction, swivel), world)
+    _set_ball(limb, angles, transposed_multiply(parent, world))
+
+
+@compiled
+def hinge_angle_rad(limb: Limb, beyond_m: Floats, distance_m: float, before_rad: float) -> float:
+    """The angle of elbow or knee at which a point beyond it is `distance_m` from the joint, by the law of cosines.
+
+    Of the two solutions it is the one within the limits and nearest to `before_rad`, or as near to it as limits and
+    lengths allow.
+    """
+    along = dot3(limb.hinge, beyond_m)
     flat = beyond_m - along * limb.hinge
-    cosine, sine = _dot(limb.upper_m, flat), _dot(limb.upper_m, _cross(limb.hinge, flat))
-    wanted = 0.5 * (far_m**2 - _dot(limb.upper_m, limb.upper_m) - _dot(beyond_m, beyond_m))
-    wanted -= along * _dot(limb.hinge, limb.upper_m)
+    cosine, sine = dot3(limb.upper_m, flat), dot3(limb.upper_m, cross(limb.hinge, flat))
+    projection = 0.5 * (distance_m**2 - dot3(limb.upper_m, limb.upper_m) - dot3(beyond_m, beyond_m))
+    projection -= along * dot3(limb.hinge, limb.upper_m)
     swing = np.hypot(cosine, sine)
     if swing < 1e-12:
         return before_rad
     middle = np.arctan2(sine, cosine)
-    half = np.arccos(min(max(wanted / swing, -1.0), 1.0))
+    half = np.arccos(min(max(projection / swing, -1.0), 1.0))
     low, high = limb.low_rad[3], limb.high_rad[3]
-    best, least = before_rad, np.inf
+    best, least_cost = before_rad, np.inf
     for angle in (middle + half, middle - half):
         near = _nearest_equivalent_angle(angle, before_rad)
-        lawful = min(max(near, low), high)
-        cost = 100.0 * abs(near - lawful) + abs(lawful - before_rad)
-        if cost < least:
-            best, least = lawful, cost
+        clipped = min(max(near, low), high)
+        cost = 100.0 * abs(near - clipped) + abs(clipped - before_rad)
+        if cost < least_cost:
+            best, least_cost = clipped, cost
     return best
 
 
 @compiled
-def _swivel(limb: Limb, level: int, way: Floats, lower: Floats, turned: Floats) -> float:
-    """The turn about `way` (3,) of forearm or shin (3, 3) that suits the measured orientation best."""
-    if level == LOWER:  # the largest trace of turned^T R(way, angle) lower
-        product = _multiply_transposed(lower, turned)
-        skew = np.array([product[2, 1] - product[1, 2], product[0, 2] - product[2, 0], product[1, 0] - product[0, 1]])
-        trace = product[0, 0] + product[1, 1] + product[2, 2]
-        return -float(np.arctan2(_dot(way, skew), trace - _dot(way, _rotate(product, way))))
+def _swivel(limb: Limb, level: int, direction: Floats, lower: Floats, measured: Floats) -> float:
+    """The angle about `direction` (3,) by which forearm or shin (3, 3) comes nearest to the measured orientation."""
+    if level == LOWER:  # maximises the trace of measured^T R(direction, angle) lower
+        product = multiply_transposed(lower, measured)
+        return -angle_about(direction, product)
     if level == TWIST:
-        have, want = _rotate(lower, limb.twist), _rotate(turned, limb.twist)
-        across = _dot(have, want) - _dot(way, have) * _dot(way, want)
-        return float(np.arctan2(_dot(way, _cross(have, want)), across))
-    if _dot(limb.twist, limb.twist) > 0.0:  # a hand's three hinges reach any orientation
+        current, wanted = multiply_vector(lower, limb.twist), multiply_vector(measured, limb.twist)
+        across = dot3(current, wanted) - dot3(direction, current) * dot3(direction, wanted)
+        return float(np.arctan2(dot3(direction, cross(current, wanted)), across))
+    if dot3(limb.twist, limb.twist) > 0.0:  # a hand's three hinges reach any orientation
         return 0.0
-    # a foot's inner axis must stay square to its outer one
-    inner, outer = _rotate(turned, limb.end[0]), _rotate(lower, limb.end[1])
-    still = _dot(inner, way) * _dot(way, outer)
-    cosine, sine = _dot(inner, outer) - still, _dot(inner, _cross(way, outer))
+    # A foot has two hinges: its inner axis, as measured, must become perpendicular to the outer one on the shin.
+    inner, outer = multiply_vector(measured, limb.end[0]), multiply_vector(lower, limb.end[1])
+    still = dot3(inner, direction) * dot3(direction, outer)
+    cosine, sine = dot3(inner, outer) - still, dot3(inner, cross(direction, outer))
     swing = np.hypot(cosine, sine)
     if swing < 1e-12:
         return 0.0
     middle, half = np.arctan2(sine, cosine), np.arccos(min(max(-still / swing, -1.0), 1.0))
-    one, other = _nearest_equivalent_angle(middle + half, 0.0), _nearest_equivalent_angle(middle - half, 0.0)
-    return one if abs(one) < abs(other) else other
+    first, second = _nearest_equivalent_angle(middle + half, 0.0), _nearest_equivalent_angle(middle - half, 0.0)
+    return first if abs(first) < abs(second) else second
 
 
 @compiled
 def _turn_end(limb: Limb, angles: Floats, level: int, lower_from_bone: Floats) -> None:
-    """Twist and end hinges for an orientation (3, 3) relative to the lower bone."""
+    """Set twist and end hinges for an orientation (3, 3) relative to the lower bone."""
     if level == TWIST:
-        angles[4] = _clipped(limb, 4, _nearest_equivalent_angle(_angle_about(limb.twist, lower_from_bone), angles[4]))
+        angles[4] = _clip(limb, 4, _nearest_equivalent_angle(angle_about(limb.twist, lower_from_bone), angles[4]))
     elif level == END:
         inner, outer = limb.end[0], limb.end[1]
-        third = _cross(inner, outer)
-        found = _euler(np.stack((inner, outer, third)), lower_from_bone)
-        if _dot(limb.twist, limb.twist) > 0.0:
-            sign = 1.0 if _dot(third, limb.twist) > 0.0 else -1.0
+        third = cross(inner, outer)
+        euler = _euler(np.stack((inner, outer, third)), lower_from_bone)
+        if dot3(limb.twist, limb.twist) > 0.0:
+            sign = 1.0 if dot3(third, limb.twist) > 0.0 else -1.0
             before = np.array([angles[5], angles[6], sign * angles[4]])
-            found = _nearer_twin(found, before)
-            angles[4] = _clipped(limb, 4, sign * found[2])
-        else:  # without the third: zero wherever the hinges can reach
+            euler = _nearest_euler(euler, before)
+            angles[4] = _clip(limb, 4, sign * euler[2])
+        else:  # a foot has no third hinge: its angle is zero for orientations in reach, and ignored for others
             before = np.array([angles[5], angles[6], 0.0])
-            found = _nearer_twin(found, before)
-        angles[5], angles[6] = _clipped(limb, 5, found[0]), _clipped(limb, 6, found[1])
+            euler = _nearest_euler(euler, before)
+        angles[5], angles[6] = _clip(limb, 5, euler[0]), _clip(limb, 6, euler[1])
 
 
 @compiled
 def _set_ball(limb: Limb, angles: Floats, parent_from_upper: Floats) -> None:
-    found = _nearer_twin(_euler(limb.ball, parent_from_upper), angles[:3])
+    """Set the ball joint's hinges for an orientation (3, 3) of the upper bone relative to the limb's parent."""
+    euler = _nearest_euler(_euler(limb.ball, parent_from_upper), angles[:3])
     for k in range(3):
-        angles[k] = _clipped(limb, k, found[k])
+        angles[k] = _clip(limb, k, euler[k])
 
 
 @compiled
 def _ball_rotation(limb: Limb, angles: Floats) -> Floats:
-    inner = _multiply(_axis_rotation(limb.ball[1], angles[1]), _axis_rotation(limb.ball[0], angles[0]))
-    return _multiply(_axis_rotation(limb.ball[2], angles[2]), inner)
+    """(3, 3) rotation of the upper bone relative to the limb's parent."""
+    inner = multiply(axis_rotation(limb.ball[1], angles[1]), axis_rotation(limb.ball[0], angles[0]))
+    return multiply(axis_rotation(limb.ball[2], angles[2]), inner)
 
 
 @compiled
-def _euler(axes: Floats, turn: Floats) -> Floats:
-    """Angles (3,) about right-handed axes (3, 3), innermost first (`core.hinges`)."""
+def _euler(axes: Floats, rotation: Floats) -> Floats:
+    """Angles (3,) about right-handed orthogonal axes (3, 3) that give a rotation (3, 3); see `core.hinges`."""
     m = np.empty((3, 3))
     for j in range(3):
-        column = _rotate(turn, axes[j])
+        column = multiply_vector(rotation, axes[j])
         for i in range(3):
-            m[i, j] = _dot(axes[i], column)
+            m[i, j] = dot3(axes[i], column)
     out = np.empty(3)
     level = np.hypot(m[2, 1], m[2, 2])
     out[1] = np.arctan2(-m[2, 0], level)
@@ -215,110 +238,22 @@ def _euler(axes: Floats, turn: Floats) -> Floats:
 
 
 @compiled
-def _nearer_twin(angles: Floats, before: Floats) -> Floats:
-    """The representation of three hinges' rotation that is nearest to angles (3,) before."""
-    one, other = np.empty(3), np.empty(3)
+def _nearest_euler(angles: Floats, before: Floats) -> Floats:
+    """Of the two representations of three hinges' rotation, the one nearest to `before` (3,)."""
+    first, second = np.empty(3), np.empty(3)
     for k in range(3):
-        one[k] = _nearest_equivalent_angle(angles[k], before[k])
-        other[k] = _nearest_equivalent_angle(np.pi - angles[k] if k == 1 else np.pi + angles[k], before[k])
-    return one if _dot(one - before, one - before) <= _dot(other - before, other - before) else other
+        first[k] = _nearest_equivalent_angle(angles[k], before[k])
+        second[k] = _nearest_equivalent_angle(np.pi - angles[k] if k == 1 else np.pi + angles[k], before[k])
+    return first if dot3(first - before, first - before) <= dot3(second - before, second - before) else second
 
 
 @compiled
-def _nearest_equivalent_angle(angle: float, other: float) -> float:
-    return float(angle - 2.0 * np.pi * np.round((angle - other) / (2.0 * np.pi)))
+def _nearest_equivalent_angle(angle: float, before: float) -> float:
+    """The angle plus the full turns that bring it nearest to `before` [rad]."""
+    return float(angle - 2.0 * np.pi * np.round((angle - before) / (2.0 * np.pi)))
 
 
 @compiled
-def _clipped(limb: Limb, k: int, angle: float) -> float:
+def _clip(limb: Limb, k: int, angle: float) -> float:
+    """An angle within the limits of hinge k [rad]."""
     return float(min(max(angle, limb.low_rad[k]), limb.high_rad[k]))
-
-
-@compiled
-def _angle_about(axis: Floats, turn: Floats) -> float:
-    """The turn about an axis that comes nearest to a rotation (3, 3)."""
-    skew = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
-    return float(np.arctan2(_dot(axis, skew), trace - _dot(axis, _rotate(turn, axis))))
-
-
-@compiled
-def _shortest_rotation(start: Floats, way: Floats) -> Floats:
-    """(3, 3) the shortest turn of a vector (3,) into a direction (3,)."""
-    length = np.sqrt(_dot(start, start))
-    axis, cosine = _cross(start, way) / length, _dot(start, way) / length
-    sine = np.sqrt(_dot(axis, axis))
-    if sine < 1e-12:
-        if cosine > 0.0:
-            return np.eye(3)
-        least = np.zeros(3)
-        least[np.argmin(np.abs(way))] = 1.0
-        axis = _cross(way, least)
-        return _axis_rotation(axis / np.sqrt(_dot(axis, axis)), np.pi)
-    return _axis_rotation(axis / sine, np.arctan2(sine, cosine))
-
-
-@compiled
-def _axis_rotation(axis: Floats, angle: float) -> Floats:
-    """(3, 3) about a unit axis; nothing about a zero one."""
-    c, s = np.cos(angle), np.sin(angle)
-    x, y, z = axis[0], axis[1], axis[2]
-    if x * x + y * y + z * z == 0.0:
-        return np.eye(3)
-    u = 1.0 - c
-    return np.array(
-        [
-            [c + u * x * x, u * x * y - s * z, u * x * z + s * y],
-            [u * x * y + s * z, c + u * y * y, u * y * z - s * x],
-            [u * x * z - s * y, u * y * z + s * x, c + u * z * z],
-        ]
-    )
-
-
-@compiled
-def _matrix(q: Floats) -> Floats:
-    """(3, 3) of a unit quaternion."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
-
-
-@compiled
-def _dot(a: Floats, b: Floats) -> float:
-    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
-
-
-@compiled
-def _cross(a: Floats, b: Floats) -> Floats:
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-@compiled
-def _rotate(turn: Floats, v: Floats) -> Floats:
-    return np.array([_dot(turn[0], v), _dot(turn[1], v), _dot(turn[2], v)])
-
-
-@compiled
-def _multiply(a: Floats, b: Floats) -> Floats:
-    out = np.zeros((3, 3))
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
-    return out
-
-
-@compiled
-def _multiply_transposed(a: Floats, b: Floats) -> Floats:
-    """a b^T."""
-    return _multiply(a, np.ascontiguousarray(b.T))
-
-
-@compiled
-def _transposed_multiply(a: Floats, b: Floats) -> Floats:
-    """a^T b."""
-    return _multiply(np.ascontiguousarray(a.T), b)

@@ -1,8 +1,8 @@
-"""Leaves out a position that jumps away from where the body's own motion carries its station (docs/methods.md F7).
+"""The outlier gate: it leaves out a position that jumps away from the predicted one (docs/methods.md F7).
 
-A robust loss alone cannot reject an echo: under a wide prior the limb simply follows it. Readings are held against
-the estimated body, not against their own past: over one period at 40 Hz even a punch (100 m/s^2) strays 6 cm from its
-last velocity. When many jump at once the person moved, and after `patience_s` the reading is believed.
+A robust loss alone cannot reject an echo: under a wide prior the limb simply follows it. The prediction extrapolates
+the estimated body, not the readings. Over one period at 40 Hz even a punch (100 m/s^2) departs only 6 cm from its last
+velocity. When many positions jump at once, the performer has moved; after `patience_s` a reading is accepted anyway.
 """
 
 import numpy as np
@@ -14,28 +14,28 @@ from harness.reconstruct.solver.residuals import Residuals
 from harness.stream.frame import TrackerFrame
 
 JUMP_M, PATIENCE_S = 0.15, 0.25
-"""Farther than motion strays within a period; longer than a burst of echoes (8 records at 40 Hz)."""
+"""More than motion departs from a prediction within a period; longer than a burst of echoes (8 records at 40 Hz)."""
 _MAX_PERIOD_S = 0.1
-"""After a longer gap nothing can be said about where stations should be."""
+"""After a longer gap no position is predicted."""
 
 
 class OutlierGate:
-    """Watches the positions of S stations through one session."""
+    """The outlier gate for the positions of S stations, for one session."""
 
     def __init__(self, stations: int, jump_m: float = JUMP_M, patience_s: float = PATIENCE_S) -> None:
         self._jump_m, self._patience_s = jump_m, patience_s
         self._station_m: Floats = np.zeros((stations, 3))
         self._velocity_m_s: Floats = np.zeros((stations, 3))
-        self._believed_at_s: Floats = np.full(stations, -np.inf)
-        self._known_at_s, self._moving = -np.inf, False
+        self._accepted_at_s: Floats = np.full(stations, -np.inf)
+        self._updated_at_s, self._moving = -np.inf, False
         self._time, self._now_s = DeviceTime(), -np.inf
         self.left_out = False
         """Whether anything was left out of the last frame."""
         self.all_moved = False
-        """Whether at least half of the last frame's positions jumped: the performer is somewhere else."""
+        """Whether at least half of the last frame's positions jumped, so that the performer has moved."""
 
     def read(self, frame: TrackerFrame, residuals: Residuals) -> None:
-        """Have the residuals read the frame, but for what jumped."""
+        """Let the residuals read a frame, then leave out the positions that jumped."""
         residuals.read(frame)
         self._now_s = self._time.frame_time_s(frame)
         jumped = self.find_jumps(self._now_s, residuals.target_m, frame.position_valid)
@@ -44,31 +44,31 @@ class OutlierGate:
             residuals.leave_out(np.concatenate([jumped, np.zeros_like(jumped)]))
 
     def update(self, residuals: Residuals, qpos: Floats) -> None:
-        """The configuration (55,) that was given for the frame that was read."""
+        """Take the configuration (55,) that answers the frame read last, for the next prediction."""
         residuals.evaluate(qpos)
         self.update_stations(self._now_s, residuals.station_m)
 
     def find_jumps(self, now_s: float, target_m: Floats, measured: Bools) -> Bools:
-        """(S,) measured positions to leave out of this frame, at `target_m` (S, 3) in the world [m]."""
+        """(S,) which of the measured positions `target_m` (S, 3), in the world [m], to leave out of this frame."""
         out, self.all_moved = np.zeros(len(measured), bool), False
-        period_s = now_s - self._known_at_s
+        period_s = now_s - self._updated_at_s
         if self._moving and 0.0 < period_s <= _MAX_PERIOD_S:
             expected_m = self._station_m + period_s * self._velocity_m_s
             self.all_moved = _find_jumps(
                 *(target_m, measured, expected_m, self._jump_m),
-                *(now_s, self._patience_s, self._believed_at_s, out),
+                *(now_s, self._patience_s, self._accepted_at_s, out),
             )
         else:
-            self._believed_at_s[:] = now_s
+            self._accepted_at_s[:] = now_s
         return out
 
     def update_stations(self, now_s: float, station_m: Floats) -> None:
-        """Where the answer to this frame puts the stations (S, 3) [m]."""
-        period_s = now_s - self._known_at_s
+        """Take the stations' positions (S, 3) in the answer to this frame [m]."""
+        period_s = now_s - self._updated_at_s
         self._moving = 0.0 < period_s <= _MAX_PERIOD_S
         if self._moving:
             self._velocity_m_s = (station_m - self._station_m) / period_s
-        self._station_m, self._known_at_s = station_m.copy(), now_s
+        self._station_m, self._updated_at_s = station_m.copy(), now_s
 
 
 @compiled
@@ -79,12 +79,12 @@ def _find_jumps(
     jump_m: float,
     now_s: float,
     patience_s: float,
-    believed_at_s: Floats,
+    accepted_at_s: Floats,
     out: Bools,
 ) -> bool:
-    """Which of the measured (S,) are farther than a jump from where they were expected, and not for too long.
+    """Fill in which measured positions (S,) are farther than a jump from the expected ones, and not for too long.
 
-    When at least half of them are, that is the answer, and none is left out. All others are believed now.
+    Returns whether at least half of the measured ones are; then none is left out. The others are accepted now.
     """
     far = 0
     for s in range(len(out)):
@@ -94,8 +94,8 @@ def _find_jumps(
         out[s] = measured[s] and squared > jump_m**2
         far += out[s]
         if not out[s]:
-            believed_at_s[s] = now_s
+            accepted_at_s[s] = now_s
     all_moved = bool(far > 0 and 2 * far >= measured.sum())
     for s in range(len(out)):
-        out[s] = out[s] and not all_moved and now_s - believed_at_s[s] <= patience_s
+        out[s] = out[s] and not all_moved and now_s - accepted_at_s[s] <= patience_s
     return all_moved

@@ -1,9 +1,9 @@
-"""What separates a pose from the readings of one frame, as the solvers weigh it.
+"""Residuals between a pose and the readings of one frame, as the solvers weigh them.
 
-One residual per tracker and kind: the vector from the modelled to the measured position, and the rotation vector
-from the modelled to the measured orientation, both along world axes (docs/methods.md A5, E). Its norm e enters either
+Each station has two: the vector from the modelled to the measured position, and the rotation vector from the modelled
+to the measured orientation, both along world axes (docs/methods.md A5, E). A residual's norm e enters the cost either
 squared, e^2 / 2 sd^2, or through the Lorentzian of Liu et al. 2011, eq. 12, with a scale sL of its own:
-rho(e) = sL^2/sd^2 log(1 + e^2 / 2 sL^2), which is the square for small e and lets go of large ones.
+rho(e) = sL^2/sd^2 log(1 + e^2 / 2 sL^2). That is the square for small e, and gives little weight to large ones.
 """
 
 import math
@@ -18,33 +18,41 @@ from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import specialise
 from harness.errors import ShapeError
-from harness.reconstruct import descent
+from harness.reconstruct.solver.kinematic_tree import build_tree, new_state
+from harness.reconstruct.solver.normal_equations import (
+    MeasurementModel,
+    StationTargets,
+    evaluate,
+    update_targets,
+)
 from harness.stream.frame import TrackerFrame
 
 
 @dataclass(frozen=True)
 class Loss:
-    """How far readings are trusted."""
+    """The noise model of readings and the robust loss."""
 
     position_sigma_m: float = 0.003
-    """The tracker's own noise [m]."""
+    """Standard deviation of measured positions [m]."""
     orientation_sigma_rad: float = math.radians(0.5)
+    """Standard deviation of measured orientations [rad]."""
     robust: bool = True
     """Lorentzian instead of squared residuals."""
     position_scale_m: float = 0.03
-    """Where the Lorentzian starts to let go [m]."""
+    """The Lorentzian's scale for positions [m]."""
     orientation_scale_rad: float = math.radians(8.0)
+    """The Lorentzian's scale for orientations [rad]."""
     quality: bool = True
     """Weigh every reading by its station's quality, 0 to 1: a standard deviation of sigma / sqrt(quality)."""
     suspect_weight: float = 0.1
-    """What a suspect reading counts beside that; 1 takes it for any other, 0 leaves it out."""
+    """Further factor on the precision of a suspect reading: 1 treats it like any other, 0 leaves it out."""
 
 
 class Residuals:
-    """Residuals of S stations on one body, for one session: `read` a frame, `place` poses, ask for slopes.
+    """Residuals of S stations on one body, for one session: `read` a frame, then `evaluate` configurations.
 
-    Rows are the S positions, then the S orientations; a row that was not measured counts nothing. Everything is
-    written into arrays made once, which the compiled loops of `descent` share.
+    Rows are the S positions, then the S orientations; a row that was not measured has no weight. All results are
+    written into arrays made once, which the compiled loops share.
     """
 
     def __init__(self, body: Body, calibration: Calibration, loss: Loss) -> None:
@@ -55,23 +63,23 @@ class Residuals:
         self.measured: Bools = np.zeros(2 * count, bool)
         """(2S,) which rows the last frame measured."""
         self.confidence: Floats = np.zeros(2 * count)
-        """(2S,) how much each row counts, by quality and suspicion: 1 fully; 0 where not measured."""
+        """(2S,) weight of each row by quality and suspicion: 1 full; 0 where not measured."""
         self.target_m: Floats = np.zeros((count, 3))
         """(S, 3) measured station positions in the world [m]; 0 where not measured."""
         self.world_from_target: Floats = np.tile(rotations.IDENTITY, (count, 1))
         """(S, 4) measured orientation of the bones that carry the stations; identity where not measured."""
         self.scale: Floats = np.repeat([loss.position_scale_m, loss.orientation_scale_rad], count)
-        """(2S,) where each row's Lorentzian starts to let go [m; rad]."""
-        self.tree = descent.build_tree(body, self.bones, self.mount_m)
-        self.targets = descent.StationTargets(self.target_m, self.world_from_target, *np.zeros((2, 2 * count)))
-        self.state = descent.new_state(self.tree)
+        """(2S,) the Lorentzian's scale of each row [m; rad]."""
+        self.tree = build_tree(body, self.bones, self.mount_m)
+        self.targets = StationTargets(self.target_m, self.world_from_target, *np.zeros((2, 2 * count)))
+        self.state = new_state(self.tree)
         self.error: Floats = self.state.error
-        """(2S, 3) measured minus modelled [m; rad]; means nothing in rows that were not measured."""
+        """(2S, 3) measured minus modelled [m; rad]; undefined in rows that were not measured."""
         self.station_m: Floats = self.state.station_m
         """(S, 3) modelled station positions in the world [m]."""
 
         self._qpos = np.zeros(body.model.nq)
-        self._tracker = descent.MeasurementModel(
+        self._measurement = MeasurementModel(
             world_from_tracker=rotations.to_matrix(calibration.world_from_tracker),
             origin_m=np.array(calibration.tracker_origin_m),
             bone_from_reading=_left_multiplication(calibration.world_from_tracker)
@@ -81,17 +89,13 @@ class Residuals:
             by_quality=loss.quality,
             suspect_weight=loss.suspect_weight,
         )
-        silent, never = np.zeros(count), np.zeros(count, bool)
-        nothing = TrackerFrame(0.0, silent, np.zeros((count, 3)), np.zeros((count, 4)), never, never, silent, never)
-        self._read = specialise(
-            descent.update_targets,
-            self._tracker,
-            self.targets,
-            *_frame_arguments(nothing),
-            self.measured,
-            self.confidence,
+        zeros, never = np.zeros(count), np.zeros(count, bool)
+        empty = TrackerFrame(0.0, zeros, np.zeros((count, 3)), np.zeros((count, 4)), never, never, zeros, never)
+        self._update_targets = specialise(
+            *(update_targets, self._measurement, self.targets, *_frame_arguments(empty)),
+            *(self.measured, self.confidence),
         )
-        self._place = specialise(descent.evaluate, self.tree, self.targets, self.state, self._qpos)
+        self._evaluate = specialise(evaluate, self.tree, self.targets, self.state, self._qpos)
 
     @property
     def distance(self) -> Floats:
@@ -100,13 +104,14 @@ class Residuals:
         return out
 
     def read(self, frame: TrackerFrame) -> None:
-        """Take up the valid readings of a frame; ShapeError when it is not of the calibration's stations."""
+        """Take the valid readings of a frame as targets; ShapeError when it has other stations than the calibration."""
         if len(frame.position_m) != len(self.bones):
             raise ShapeError(
                 "TrackerFrame", "position_m", frame.position_m.shape, f"({len(self.bones)}, 3), as calibrated"
             )
         self.measured = np.empty(2 * len(self.bones), bool)
-        self._read(self._tracker, self.targets, *_frame_arguments(frame), self.measured, self.confidence)
+        arguments = *_frame_arguments(frame), self.measured, self.confidence
+        self._update_targets(self._measurement, self.targets, *arguments)
 
     def leave_out(self, rows: Bools) -> None:
         """Treat these rows (2S,) of the frame as not measured."""
@@ -114,28 +119,17 @@ class Residuals:
         self.confidence[rows] = self.targets.precision[rows] = 0.0
 
     def widen(self, factor: float) -> None:
-        """Let the Lorentzian reach `factor` times farther, until the next frame: for solving from far away."""
-        np.multiply(self._tracker.twice_scale_squared, factor * factor, out=self.targets.twice_scale_squared)
+        """Multiply the Lorentzian's scales by `factor` until the next frame is read, to solve from a distant start."""
+        np.multiply(self._measurement.twice_scale_squared, factor * factor, out=self.targets.twice_scale_squared)
 
     def evaluate(self, qpos: Floats) -> float:
         """The data cost of a configuration (55,), a negative log likelihood; updates `error` and `distance`."""
         self._qpos[:] = qpos
-        return self._place(self.tree, self.targets, self.state, self._qpos)
-
-    def normal_equations(self, hessian: Floats, bent: bool = False) -> Floats:
-        """Where `place` left the body: fills `hessian` (54, 54) with Gauss and Newton's, returns the descent (54,).
-
-        The descent, minus the cost's gradient, is exact; the matrix holds the Lorentzian's weights as they are. If it
-        is `bent`, it has what Gauss and Newton leave out as well.
-        """
-        found = np.empty(len(hessian))
-        descent.normal_equations(self.tree, self.state, hessian, found, bent)
-        hessian += np.tril(hessian, -1).T
-        return found
+        return self._evaluate(self.tree, self.targets, self.state, self._qpos)
 
 
 def _frame_arguments(frame: TrackerFrame) -> tuple[Floats, Floats, Bools, Bools, Floats, Bools]:
-    """What `descent.update_targets` is told of a frame."""
+    """The fields of a frame that `update_targets` takes, in its order."""
     valid = frame.position_valid, frame.orientation_valid
     return frame.position_m, frame.tracker_from_station, *valid, frame.quality, frame.suspect
 

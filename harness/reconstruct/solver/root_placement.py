@@ -1,6 +1,6 @@
-"""Where a posture stands: its root placed so that its stations come nearest to the readings.
+"""Placement of a posture in the world: the root transform that brings its stations nearest to the readings.
 
-The start of every solve that has no frame before it, and all that the null methods do with a frame.
+It gives the start of every solve that has no frame before it. The null methods do nothing else with a frame.
 """
 
 import numpy as np
@@ -10,59 +10,68 @@ from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 from harness.core.humanoid24 import pack, unpack
 from harness.core.skeleton import Skeleton
+from harness.reconstruct.solver.quaternion_algebra import (
+    as_tuple,
+    matrix_from_quaternion,
+    quaternion_from_matrix,
+    quaternion_product,
+)
 from harness.reconstruct.solver.residuals import Residuals
 
 _LEVER_M = 0.3
-"""An orientation that is off by an angle counts like a position that is off by the angle times this [m]."""
+"""An orientation error of an angle counts like a position error of the angle times this lever [m]."""
 
 
 def candidate_placements(residuals: Residuals, qpos: Floats) -> tuple[Floats, Floats]:
-    """The configuration (55,) moved as a whole to the readings: turned about the vertical only, and freely.
+    """Two rigid motions of a configuration (55,) to the readings: rotated about the vertical only, and freely.
 
-    Least squares over positions and orientations (Kabsch 1976), each counting as it is trusted. Without positions it
-    turns about its own root.
+    Least squares over positions and orientations (Kabsch 1976), weighted by their confidence. Without positions the
+    rotation is about the root.
     """
     count = len(residuals.bones)
     residuals.kinematics.set(qpos)
-    at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, residuals.bone_from_station)
-    positions, orientations = residuals.confidence[:count], residuals.confidence[count:]
-    middle_m, target_middle_m, moment = _cross_covariance(
-        *(at_m, turned, residuals.target_m, residuals.world_from_target, residuals.bone_from_station),
-        *(positions, orientations, qpos[:3]),
+    station_m, world_from_station = residuals.kinematics.station_poses(
+        residuals.bones, residuals.mount_m, residuals.bone_from_station
+    )
+    mean_m, target_mean_m, moment = _cross_covariance(
+        *(station_m, world_from_station),
+        *(residuals.target_m, residuals.world_from_target, residuals.bone_from_station),
+        *(residuals.confidence[:count], residuals.confidence[count:], qpos[:3]),
     )
     yaw_rad = np.arctan2(moment[1, 0] - moment[0, 1], moment[0, 0] + moment[1, 1])
     left, _, right = np.linalg.svd(moment)
-    flip = np.array([1.0, 1.0, np.linalg.det(left @ right)])
+    flip = np.array([1.0, 1.0, np.linalg.det(left @ right)])  # no reflection
     upright = np.array([np.cos(0.5 * yaw_rad), 0.0, 0.0, np.sin(0.5 * yaw_rad)])
-    tilted = _quaternion((left * flip) @ right)
-    return _transform(qpos, upright, middle_m, target_middle_m), _transform(qpos, tilted, middle_m, target_middle_m)
+    tilted = quaternion_from_matrix((left * flip) @ right)
+    return _transform(qpos, upright, mean_m, target_mean_m), _transform(qpos, tilted, mean_m, target_mean_m)
 
 
 def place_root(residuals: Residuals, qpos: Floats) -> Floats:
-    """The cheaper of the two; the upright one unless tilting pays."""
+    """The upright placement (55,) of a configuration, or the tilted one if that costs less than 0.9 of it."""
     upright, tilted = candidate_placements(residuals, qpos)
     return tilted if residuals.evaluate(tilted) < 0.9 * residuals.evaluate(upright) else upright
 
 
 def starting_postures(body: Body) -> tuple[Floats, ...]:
-    """Configurations (55,) from which a solver finds most poses: T-pose, arms hanging, forearms raised."""
+    """Configurations (55,) from which a solver reaches most poses: T-pose, arms hanging, forearms raised."""
     start = tpose(body.skeleton)
     return start, *(_with_arms(body.skeleton, start, *degrees) for degrees in ((75.0, 15.0), (60.0, 90.0)))
 
 
-def _with_arms(skeleton: Skeleton, qpos: Floats, lowered_deg: float, bent_deg: float) -> Floats:
-    root_m, turned, angles = unpack(qpos)
+def _with_arms(skeleton: Skeleton, qpos: Floats, shoulder_deg: float, elbow_deg: float) -> Floats:
+    """A T-pose with arms lowered by `shoulder_deg` and elbows bent by `elbow_deg`."""
+    root_m, world_from_root, angles = unpack(qpos)
     angles = np.array(angles)
     for side, sign in (("l", 1.0), ("r", -1.0)):
-        angles[skeleton.dof_names.index(f"{side}humerus.rz")] = np.deg2rad(sign * lowered_deg)
-        angles[skeleton.dof_names.index(f"{side}radius.rx")] = np.deg2rad(bent_deg)
-    return pack(root_m, turned, angles)
+        angles[skeleton.dof_names.index(f"{side}humerus.rz")] = np.deg2rad(sign * shoulder_deg)
+        angles[skeleton.dof_names.index(f"{side}radius.rx")] = np.deg2rad(elbow_deg)
+    return pack(root_m, world_from_root, angles)
 
 
 @compiled
 def _cross_covariance(
-    at_m: Floats,
-    turned: Floats,
+    station_m: Floats,
+    world_from_station: Floats,
     target_m: Floats,
     world_from_target: Floats,
     bone_from_station: Floats,
@@ -70,73 +79,32 @@ def _cross_covariance(
     orientations: Floats,
     root_m: Floats,
 ) -> tuple[Floats, Floats, Floats]:
-    """The middles (3,) of the stations and of the readings, as they are trusted, and the moment (3, 3) between them."""
-    middle_m, target_middle_m, moment = root_m.copy(), root_m.copy(), np.zeros((3, 3))
+    """Weighted means (3,) of stations and of readings, and the cross-covariance (3, 3) between them.
+
+    Weights are `positions` (S,) and `orientations` (S,). An orientation adds the rotation from modelled to measured.
+    """
+    mean_m, target_mean_m, moment = root_m.copy(), root_m.copy(), np.zeros((3, 3))
     total = positions.sum()
     if total > 0.0:
-        middle_m[:], target_middle_m[:] = 0.0, 0.0
+        mean_m[:], target_mean_m[:] = 0.0, 0.0
         for s in range(len(positions)):
-            middle_m += positions[s] / total * at_m[s]
-            target_middle_m += positions[s] / total * target_m[s]
+            mean_m += positions[s] / total * station_m[s]
+            target_mean_m += positions[s] / total * target_m[s]
         for s in range(len(positions)):
-            moment += np.outer(positions[s] * (target_m[s] - target_middle_m), at_m[s] - middle_m)
+            moment += np.outer(positions[s] * (target_m[s] - target_mean_m), station_m[s] - mean_m)
     for s in range(len(orientations)):
         if orientations[s] > 0.0:
-            target = _quaternion_product(world_from_target[s], bone_from_station[s])
-            turn = _quaternion_product(target, turned[s] * np.array([1.0, -1.0, -1.0, -1.0]))
-            moment += _LEVER_M**2 * orientations[s] * _matrix(turn)
-    return middle_m, target_middle_m, moment
+            target = quaternion_product(as_tuple(world_from_target[s]), *as_tuple(bone_from_station[s]))
+            w, x, y, z = as_tuple(world_from_station[s])
+            turn = np.array(quaternion_product(target, w, -x, -y, -z))
+            moment += _LEVER_M**2 * orientations[s] * matrix_from_quaternion(turn)
+    return mean_m, target_mean_m, moment
 
 
 @compiled
 def _transform(qpos: Floats, turn: Floats, from_m: Floats, to_m: Floats) -> Floats:
-    """The configuration (55,) turned about a point that goes elsewhere."""
+    """The configuration (55,) rotated by a quaternion (4,) about a point (3,) that is taken to another point (3,)."""
     out = qpos.copy()
-    out[:3] = to_m + _matrix(turn) @ (qpos[:3] - from_m)
-    out[3:7] = _quaternion_product(turn, qpos[3:7])
-    return out
-
-
-@compiled
-def _quaternion_product(p: Floats, q: Floats) -> Floats:
-    """Of two quaternions (4,)."""
-    return np.array(
-        [
-            p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-            p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-            p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-            p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
-        ]
-    )
-
-
-@compiled
-def _matrix(q: Floats) -> Floats:
-    """(3, 3) of a unit quaternion (4,)."""
-    w, x, y, z = q
-    return np.array(
-        [
-            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-            [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-            [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-        ]
-    )
-
-
-@compiled
-def _quaternion(r: Floats) -> Floats:
-    """(4,) of a rotation matrix (3, 3), by its largest component (Shepperd 1978)."""
-    trace = r[0, 0] + r[1, 1] + r[2, 2]
-    i = np.argmax(np.array([trace, r[0, 0], r[1, 1], r[2, 2]]))
-    if i == 0:
-        q = np.array([1.0 + trace, r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    else:
-        a = i - 1
-        b, c = (a + 1) % 3, (a + 2) % 3
-        q = np.empty(4)
-        q[0] = r[c, b] - r[b, c]
-        q[1 + a] = 1.0 + r[a, a] - r[b, b] - r[c, c]
-        q[1 + b] = r[b, a] + r[a, b]
-        q[1 + c] = r[c, a] + r[a, c]
-    out: Floats = q / np.sqrt(np.sum(q**2))
+    out[:3] = to_m + matrix_from_quaternion(turn) @ (qpos[:3] - from_m)
+    out[3], out[4], out[5], out[6] = quaternion_product(as_tuple(turn), *as_tuple(qpos[3:7]))
     return out

@@ -1,4 +1,4 @@
-"""Status of an estimate, from how many of the configured stations report (docs/methods.md E, "lost tracker")."""
+"""Status of an estimate, by the number of stations that report (docs/methods.md E, "lost tracker")."""
 
 import numpy as np
 
@@ -7,10 +7,11 @@ from harness.reconstruct.features.device_time import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 LOST_AFTER_S = 0.5
+"""Time with too few stations after which the status is LOST [s]."""
 
 
 class StatusMonitor:
-    """Watches one session's frames; a station reports when its position or its orientation is valid."""
+    """Monitor of one session's frames; a station reports when its position or its orientation is valid."""
 
     def __init__(self, lost_after_s: float = LOST_AFTER_S) -> None:
         self._lost_after_s = lost_after_s
@@ -19,7 +20,7 @@ class StatusMonitor:
     def update(self, frame: TrackerFrame) -> tuple[Status, bool]:
         """The status of this frame, and whether any station reports at all.
 
-        SOLVED with at least half of the stations, else HELD, else LOST once that has lasted too long.
+        SOLVED with at least half of the stations; otherwise HELD, and LOST after `lost_after_s`.
         """
         now_s = self._time.frame_time_s(frame)
         count = int(np.count_nonzero(frame.position_valid | frame.orientation_valid))
@@ -28,5 +29,5 @@ class StatusMonitor:
             return Status.SOLVED, True
         if self._enough_at_s == -np.inf:
             self._enough_at_s = now_s
-        long_ago = now_s - self._enough_at_s > self._lost_after_s
-        return Status.LOST if long_ago else Status.HELD, count > 0
+        lost = now_s - self._enough_at_s > self._lost_after_s
+        return Status.LOST if lost else Status.HELD, count > 0

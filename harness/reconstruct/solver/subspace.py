@@ -1,47 +1,49 @@
-"""The space of a local linear model: postures q = p + U w, and what leaving p costs (docs/methods.md C2).
+"""The subspace of a local linear model: postures q = p + U w, and the cost of leaving p (docs/methods.md C2).
 
-The cost is alpha/2 (q - p)^T Lambda^-1 (q - p) plus beta/2 |q - q'|^2, both quadratic in q. So many directions are
-kept that it is cheaper to name those that are not: q is sought among all postures, with a stiff spring across the
-space, and every step is projected onto it (`descent.descend_within`).
+The cost is alpha/2 (q - p)^T Lambda^-1 (q - p) plus beta/2 |q - q'|^2, both quadratic in q. Most directions are kept,
+so it is cheaper to store the normals, the directions that are not. The solver works with all of q: a stiff spring acts
+along the normals, and every step is projected onto the subspace (`subspace_minimiser`).
 """
 
 import numpy as np
 
 from harness.core.arrays import Floats, Singles
 from harness.core.compiled import compiled, specialise
-from harness.reconstruct.descent import Subspace, minimise_in_subspace
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
 from harness.reconstruct.solver.residuals import Residuals
+from harness.reconstruct.solver.subspace_minimiser import Subspace, minimise_in_subspace
 
 _VARIANCE_FLOOR = 1e-9
 """Added to all variances [m^2, rad^2]."""
 _SPRING_STIFFNESS = 1e9
-"""Of the spring across the space, far above what trackers say of a pose [1/m^2, 1/rad^2]."""
+"""Stiffness of the spring along the normals, far above the precision of trackers [1/m^2, 1/rad^2]."""
 _INVERSE_ITERATION_MAX, _INVERSE_ITERATION_ROUNDS = 16, 4
-"""Up to so many directions left out are found by so many rounds of inverse iteration, in an eighth of the time."""
+"""Up to this many normals are found by this many rounds of inverse iteration, in an eighth of the time of `eigh`."""
 
 
 class SubspaceSolver:
-    """Solves for whatever frame its residuals have read, among the postures of a space."""
+    """Solves for the frame that its residuals have read, among the postures of a subspace."""
 
     def __init__(self, residuals: Residuals, limits: HingeLimits, stopping: Stopping) -> None:
         self._residuals, self._limits = residuals, limits
         self._arrays = residuals.tree, residuals.targets, residuals.state
         self._stop = stopping.step, stopping.decrease, stopping.most_steps
-        any_space = fit_subspace(
-            np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, np.zeros(POSTURE_SIZE), 0.0
-        )
+        posture = np.zeros(POSTURE_SIZE)
+        example = fit_subspace(np.zeros((1, POSTURE_SIZE), np.float32), POSTURE_SIZE, 1.0, posture, 0.0)
         start = np.zeros(3 + POSTURE_SIZE)
-        self._descend = specialise(minimise_in_subspace, *self._arrays, any_space, self._stop, start)
+        self._minimise = specialise(minimise_in_subspace, *self._arrays, example, self._stop, start)
 
-    def solve(self, space: Subspace, ground: Floats, posture: Floats) -> IKSolution:
-        """From a ground frame (3,) and a posture (P,). What leaves the hinges' limits is clipped at the end."""
+    def solve(self, subspace: Subspace, ground: Floats, posture: Floats) -> IKSolution:
+        """The minimum from a start: ground frame (3,) and posture (P,). Hinges are clipped to their limits at the end.
+
+        ArithmeticError when a reading is not finite.
+        """
         start = np.concatenate([ground, posture])
-        qpos, cost, steps, converged = self._descend(*self._arrays, space, self._stop, start)
+        qpos, cost, steps, converged = self._minimise(*self._arrays, subspace, self._stop, start)
         if steps < 0:
-            raise ArithmeticError("normal equations are not positive definite: is a reading not finite?")
+            raise ArithmeticError("The normal equations are not positive definite: is a reading not finite?")
         qpos[7:] = self._limits.clip(qpos[7:])
         self._residuals.evaluate(qpos)
         return IKSolution(qpos, cost, steps, converged)
@@ -49,7 +51,7 @@ class SubspaceSolver:
 
 @compiled
 def fit_subspace(postures: Singles, components: int, alpha: float, expected: Floats, beta: float) -> Subspace:
-    """By the leading directions of K postures (K, P); `expected` (P,) is q'."""
+    """The subspace of the `components` leading principal directions of K postures (K, P); `expected` (P,) is q'."""
     count, size = postures.shape
     values = postures.astype(np.float64)
     mean = np.dot(np.full(count, 1.0 / count), values)
@@ -58,35 +60,42 @@ def fit_subspace(postures: Singles, components: int, alpha: float, expected: Flo
         for j in range(size):
             scatter[i, j] = scatter[i, j] / count - mean[i] * mean[j]
         scatter[i, i] += _VARIANCE_FLOOR
-    inverse, left_out = invert_positive_definite(scatter), max(size - components, 0)
-    if left_out <= _INVERSE_ITERATION_MAX:
-        across = least_variance_directions(inverse, left_out, _INVERSE_ITERATION_ROUNDS)
+    inverse, count_normals = invert_positive_definite(scatter), max(size - components, 0)
+    if count_normals <= _INVERSE_ITERATION_MAX:
+        normals = least_variance_directions(inverse, count_normals, _INVERSE_ITERATION_ROUNDS)
     else:
-        across = np.ascontiguousarray(np.linalg.eigh(scatter)[1][:, :left_out].T)
-    curvature = _constrained_curvature(inverse, across, alpha)
+        normals = np.ascontiguousarray(np.linalg.eigh(scatter)[1][:, :count_normals].T)
+    curvature = _constrained_curvature(inverse, normals, alpha)
     spring = np.zeros(size)
     for i in range(size):
         curvature[i, i] += beta
-        for k in range(left_out):
-            spring[i] += _SPRING_STIFFNESS * across[k, i] ** 2
-    return Subspace(mean, across, curvature, beta * (expected - mean), spring)
+        for k in range(count_normals):
+            spring[i] += _SPRING_STIFFNESS * normals[k, i] ** 2
+    return Subspace(mean, normals, curvature, beta * (expected - mean), spring)
 
 
 @compiled
-def _constrained_curvature(inverse: Floats, across: Floats, alpha: float) -> Floats:
-    """(P, P) alpha times the inverse within the space, and the spring across it."""
-    share = alpha * np.dot(across, inverse)
-    within = np.dot(share, across.T)
-    for k in range(len(across)):
+def _constrained_curvature(inverse: Floats, normals: Floats, alpha: float) -> Floats:
+    """(P, P) alpha times the inverse scatter within the subspace, and the spring along its normals N (D, P).
+
+    With S the inverse: P alpha S P + k N^T N, where P = I - N^T N is the projection.
+    """
+    share = alpha * np.dot(normals, inverse)
+    within = np.dot(share, normals.T)  # alpha N S N^T, then with the spring
+    for k in range(len(normals)):
         within[k, k] += _SPRING_STIFFNESS
-    half = np.dot(across.T, share - 0.5 * np.dot(within, across))
+    half = np.dot(normals.T, share - 0.5 * np.dot(within, normals))
     out: Floats = alpha * inverse - half - half.T
     return out
 
 
 @compiled
 def invert_positive_definite(matrix: Floats) -> Floats:
-    """The inverse of a positive definite matrix (N, N), by Gauss and Jordan's elimination of its lower triangle."""
+    """The inverse of a positive definite matrix (N, N), by Gauss-Jordan elimination of its lower triangle.
+
+    `out` starts as the matrix and ends as minus the inverse. Step k exchanges the roles of unknown and right-hand side
+    k; both forms are symmetric, so the lower triangle suffices.
+    """
     out, pivot, count = matrix.copy(), np.empty(len(matrix)), len(matrix)
     for k in range(count):
         pivot[: k + 1], pivot[k + 1 :] = out[k, : k + 1], out[k + 1 :, k]
@@ -111,14 +120,14 @@ def invert_positive_definite(matrix: Floats) -> Floats:
 def least_variance_directions(inverse: Floats, count: int, rounds: int) -> Floats:
     """(D, N) orthonormal rows: the D = `count` directions of least variance, from the inverse (N, N) of the scatter.
 
-    Inverse iteration of all at once, from the coordinates that the others leave the least room. Two directions whose
-    variances are alike may come out mixed, which matters as little as which of them is left out.
+    Inverse iteration of all directions at once. It starts from the coordinates with the least conditional variance.
+    Directions of nearly equal variance may come out mixed, which does no harm.
     """
     out = inverse[np.argsort(-np.diag(inverse))[:count]]
-    for turn in range(rounds + 1):
-        if 0 < turn < rounds:
+    for iteration in range(rounds + 1):
+        if 0 < iteration < rounds:
             out = np.dot(out, inverse)
-        for i in range(count):  # Gram and Schmidt's method, at the end twice
+        for i in range(count):  # Gram-Schmidt, twice at the end
             row = out[i]
             row /= np.sqrt(np.dot(row, row))
             shares = np.dot(out[i + 1 :], row)

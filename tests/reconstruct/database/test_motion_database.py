@@ -66,7 +66,7 @@ def test_a_turned_and_shifted_room_leaves_no_trace(
 
 
 def test_poses_come_back(takes: list[BodyMotion], database: MotionDatabase) -> None:
-    for run, take in zip(database.runs, takes, strict=True):
+    for run, take in zip(database.segments, takes, strict=True):
         back = database.qpos(slice(run.start, run.stop), ground_from_qpos(take.qpos))
         np.testing.assert_allclose(back[:, :3], take.qpos[:, :3], atol=1e-6)
         np.testing.assert_allclose(np.abs(np.vecdot(back[:, 3:7], take.qpos[:, 3:7])), 1.0, atol=1e-12)
@@ -74,13 +74,13 @@ def test_poses_come_back(takes: list[BodyMotion], database: MotionDatabase) -> N
 
 
 def test_steps_lead_through_the_take(takes: list[BodyMotion], database: MotionDatabase) -> None:
-    run, take = database.runs[0], takes[0]
+    run, take = database.segments[0], takes[0]
     ground = ground_from_qpos(take.qpos)
     at = ground[0]
     for frame in range(1, len(take)):
         at = step_grounds(at, database.step[run.start + frame].astype(float))
     np.testing.assert_allclose(relative_ground(ground[-1], at), 0.0, atol=1e-5)
-    np.testing.assert_array_equal(database.step[[r.start for r in database.runs]], 0.0)
+    np.testing.assert_array_equal(database.step[[r.start for r in database.segments]], 0.0)
 
 
 def test_any_posture_but_one_upside_down_stands_again(rng: np.random.Generator) -> None:
@@ -105,7 +105,7 @@ def test_a_query_is_the_window_of_its_own_poses(takes: list[BodyMotion], databas
     windows, limits = database.windows(length), HingeLimits(BODY)
     vectors = windows.gather(np.arange(len(windows)))
     assert vectors.dtype == np.float32
-    for run, take in zip(database.runs, takes, strict=True):
+    for run, take in zip(database.segments, takes, strict=True):
         qpos = np.concatenate([take.qpos[:, :7], limits.normalise_motion(take.qpos[:, 7:])], axis=1)
         for frame in (length - 1, length, len(take) - 1):
             row = int(np.searchsorted(windows.frames, run.start + frame))
@@ -116,21 +116,24 @@ def test_a_query_is_the_window_of_its_own_poses(takes: list[BodyMotion], databas
 
 def test_no_window_reaches_into_another_take(database: MotionDatabase) -> None:
     for length in (1, 3):
-        for followed in (False, True):
-            windows = database.windows(length, followed=followed)
-            assert len(windows) == sum(len(run) - length + 1 - followed for run in database.runs)
+        for with_successor in (False, True):
+            windows = database.windows(length, with_successor=with_successor)
+            assert len(windows) == sum(len(run) - length + 1 - with_successor for run in database.segments)
             for frame in windows.frames:
-                first, last = database.segment_of(int(frame) - length + 1), database.segment_of(int(frame) + followed)
+                first, last = (
+                    database.segment_of(int(frame) - length + 1),
+                    database.segment_of(int(frame) + with_successor),
+                )
                 assert first == last
-            ends = [run.stop - 1 - followed for run in database.runs]
+            ends = [run.stop - 1 - with_successor for run in database.segments]
             np.testing.assert_array_equal(windows.frames[~windows.consecutive], ends)
-    with pytest.raises(BadInput, match="Windows of 0"):
+    with pytest.raises(BadInput, match="window of 0"):
         database.windows(0)
     assert len(database.windows(10_000)) == 0
 
 
 def test_successors_are_the_frames_after(takes: list[BodyMotion], database: MotionDatabase) -> None:
-    windows, take = database.windows(2, followed=True), takes[0]
+    windows, take = database.windows(2, with_successor=True), takes[0]
     after = windows.successors(np.array([0, 5]))
     for row, frame in ((0, 2), (1, 7)):
         stood = qpos_from_postures(
@@ -159,32 +162,32 @@ def test_takes_agree_whatever_their_files_began_with(takes: list[BodyMotion], da
 
 
 def test_every_frame_says_where_it_is_from(takes: list[BodyMotion], database: MotionDatabase) -> None:
-    assert [run.take for run in database.runs] == [take.name for take in takes]
-    assert [len(run) for run in database.runs] == [len(take) for take in takes]
-    assert database.runs[1].behaviour == "boxing"
-    assert database.segment_of(database.runs[1].start) == database.runs[1]
-    assert database.segment_of(database.runs[1].stop - 1) == database.runs[1]
-    assert database.runs[-1].stop == len(database)
+    assert [run.take for run in database.segments] == [take.name for take in takes]
+    assert [len(run) for run in database.segments] == [len(take) for take in takes]
+    assert database.segments[1].behaviour == "boxing"
+    assert database.segment_of(database.segments[1].start) == database.segments[1]
+    assert database.segment_of(database.segments[1].stop - 1) == database.segments[1]
+    assert database.segments[-1].stop == len(database)
 
 
 def test_a_take_or_part_of_it_can_be_left_out(takes: list[BodyMotion], database: MotionDatabase) -> None:
-    name, middle = takes[1].name, database.runs[1]
+    name, middle = takes[1].name, database.segments[1]
     without = database.without(name)
-    assert name not in {run.take for run in without.runs}
+    assert name not in {run.take for run in without.segments}
     np.testing.assert_array_equal(without.posture[: middle.start], database.posture[: middle.start])
     np.testing.assert_array_equal(without.posture[middle.start :], database.posture[middle.stop :])
 
     part = database.without(name, range(30, 50))
-    before, after = (run for run in part.runs if run.take == name)
+    before, after = (run for run in part.segments if run.take == name)
     assert (len(before), before.first_frame) == (30, 0)
     assert (len(after), after.first_frame) == (len(takes[1]) - 50, 50)
     np.testing.assert_array_equal(
         part.posture[after.start : after.stop], database.posture[middle.start + 50 : middle.stop]
     )
     np.testing.assert_array_equal(part.step[after.start], 0.0)
-    again = part.without(name, range(45, 60)).runs[2]
+    again = part.without(name, range(45, 60)).segments[2]
     assert (again.first_frame, len(again)) == (60, len(takes[1]) - 60)
-    assert part.without(name, range(30, 50)).runs == part.runs
+    assert part.without(name, range(30, 50)).segments == part.segments
     with pytest.raises(BadInput, match="no frames but those of"):
         MotionDatabase.build(BODY, takes[:1]).without(takes[0].name)
 
@@ -195,7 +198,7 @@ def test_workers_make_the_same_database_in_the_same_order(takes: list[BodyMotion
     other = MotionDatabase.build(BODY, makers, workers=2, progress=lambda *done: said.append(done))
     np.testing.assert_array_equal(other.posture, database.posture)
     np.testing.assert_array_equal(other.step, database.step)
-    assert other.runs == database.runs
+    assert other.segments == database.segments
     assert said == [(take.name, done, 3) for done, take in enumerate(takes, start=1)]
 
 
@@ -208,7 +211,7 @@ def test_takes_are_read_one_at_a_time_into_a_folder(
     other = MotionDatabase.build(BODY, one_by_one(), folder=tmp_path / "database")
     assert isinstance(other.posture, np.memmap)
     np.testing.assert_array_equal(other.posture, database.posture)
-    assert other.runs == database.runs
+    assert other.segments == database.segments
 
 
 def test_nothing_to_learn_from_and_unequal_rates_are_refused(takes: list[BodyMotion], tmp_path: Path) -> None:
@@ -217,7 +220,7 @@ def test_nothing_to_learn_from_and_unequal_rates_are_refused(takes: list[BodyMot
     with pytest.raises(BadInput, match="nothing has no frames"):
         MotionDatabase.build(BODY, [takes[0], changed(takes[0], takes[0].qpos[:0], "nothing")])
     slow = BodyMotion("slow", "p1", "", "", 30.0, takes[0].qpos)
-    with pytest.raises(BadInput, match="slow has 30 frames a second, and walking_p2_01 40"):
+    with pytest.raises(BadInput, match="slow has 30 frames a second, walking_p2_01 40"):
         MotionDatabase.build(BODY, [takes[0], slow], folder=tmp_path / "database")
     assert list(tmp_path.iterdir()) == []
 
@@ -226,4 +229,4 @@ def test_a_database_of_one_frame_has_no_window_of_two(takes: list[BodyMotion]) -
     single = MotionDatabase.build(BODY, [changed(takes[0], takes[0].qpos[:1])])
     assert (len(single), len(single.windows(1)), len(single.windows(2))) == (1, 1, 0)
     assert single.windows(2).gather(np.zeros(0, np.int64)).shape == (0, 107)
-    assert single.runs == (TakeSegment(takes[0].name, "p2", synthetic.SOURCE, "walking", 0, 1),)
+    assert single.segments == (TakeSegment(takes[0].name, "p2", synthetic.SOURCE, "walking", 0, 1),)

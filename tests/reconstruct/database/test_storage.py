@@ -30,7 +30,7 @@ def test_it_comes_back_as_it_was_and_stays_on_disk(database: MotionDatabase, sav
     assert isinstance(other.posture, np.memmap)
     np.testing.assert_array_equal(other.posture, database.posture)
     np.testing.assert_array_equal(other.step, database.step)
-    assert (other.rate_hz, other.runs) == (40.0, database.runs)
+    assert (other.rate_hz, other.segments) == (40.0, database.segments)
     with pytest.raises(ValueError, match="read-only"):
         other.posture[0, 0] = 1.0
     assert sorted(path.name for path in saved.parent.iterdir()) == ["database"]
@@ -44,18 +44,18 @@ def test_the_same_database_gives_the_same_bytes(database: MotionDatabase, saved:
 
 def test_nothing_is_overwritten(database: MotionDatabase, saved: Path) -> None:
     before = {path: path.read_bytes() for path in saved.iterdir()}
-    with pytest.raises(BadFile, match="is there already"):
+    with pytest.raises(BadFile, match="exists already"):
         database.save(saved)
     assert {path: path.read_bytes() for path in saved.iterdir()} == before
     empty = saved.parent / "empty"
     empty.mkdir()
-    with pytest.raises(BadFile, match="is there already"):
+    with pytest.raises(BadFile, match="exists already"):
         database.save(empty)
 
 
 def test_a_write_that_fails_leaves_nothing(database: MotionDatabase, tmp_path: Path) -> None:
     unsaid: Any = None  # a run that cannot be written, after some that can
-    cut = MotionDatabase(40.0, database.posture, database.step, (*database.runs, unsaid))
+    cut = MotionDatabase(40.0, database.posture, database.step, (*database.segments, unsaid))
     with pytest.raises(AttributeError):
         cut.save(tmp_path / "database")
     assert list(tmp_path.iterdir()) == []
@@ -74,7 +74,7 @@ def run(**changes: Any) -> dict[str, Any]:
 @pytest.mark.parametrize(
     ("changes", "found"),
     [
-        ({"format": "a song"}, "of some other kind"),
+        ({"format": "a song"}, "not a motion database"),
         ({"version": 2}, "version 2; expected .* version 1"),
         ({"rate_hz": 0}, "a rate of 0"),
         ({"rate_hz": "forty"}, "a rate of 'forty'"),
@@ -84,8 +84,8 @@ def run(**changes: Any) -> dict[str, Any]:
         ({"runs": [run(start=1)]}, "run 0 has rows 1 to 50"),
         ({"runs": [run(stop=0)]}, "run 0 has rows 0 to 0"),
         ({"runs": [run(stop=30), run(start=31)]}, "run 1 has rows 31 to 50"),
-        ({"runs": [run(stop=True)]}, "fields of the wrong kind"),
-        ({"runs": [run(first_frame=-1)]}, "runs that join"),
+        ({"runs": [run(stop=True)]}, "fields of the wrong type"),
+        ({"runs": [run(first_frame=-1)]}, "runs that follow each other"),
         ({"runs": [run(stop=60)]}, "50 x 52 float32; expected an array of 60 x 52"),
     ],
 )

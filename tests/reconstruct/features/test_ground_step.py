@@ -5,12 +5,12 @@ import pytest
 
 from harness.body.kinematics import Kinematics
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import qpos_from_posture
 from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.station_features import StationFeatures
 from harness.reconstruct.solver.ground_frame import (
     ground_from_qpos,
     posture_from_qpos,
+    qpos_from_posture,
     qpos_from_postures,
     step_grounds,
 )
@@ -29,7 +29,7 @@ def test_standing_and_stepping(boxing: Scene, yaw_rad: float) -> None:
 
 def test_readings_of_an_example_are_its_controls(boxing: Scene) -> None:
     """What exact trackers read after a window is what the database says that they would have read."""
-    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, followed=True)
+    windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, with_successor=True)
     controls = StationFeatures(boxing.body, windows, boxing.calibration, 0.3)
     qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))
     for row in (0, 40):

@@ -5,21 +5,20 @@ import pytest
 
 from harness.core.arrays import Floats, Singles
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.descent import (
-    Subspace,
-    project_posture,
-    qpos_from_posture,
-    solve_damped,
-    subspace_cost,
-    to_subspace,
-)
 from harness.reconstruct.methods.local_pca import LocalPca
-from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos
+from harness.reconstruct.solver.ground_frame import ground_from_qpos, posture_from_qpos, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace, invert_positive_definite
-from tests.reconstruct.conftest import Scene
+from harness.reconstruct.solver.subspace_minimiser import (
+    Subspace,
+    project_posture,
+    solve_damped,
+    subspace_cost,
+    to_subspace,
+)
+from tests.reconstruct.conftest import Scene, normal_equations_of
 
 
 def postures_of(scene: Scene) -> Singles:
@@ -48,7 +47,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     def data_cost(z: Floats) -> float:
         return residuals.evaluate(qpos_from_posture(z[3:], z[:3]))
 
-    h, hessian = 1e-6, np.zeros((54, 54))
+    h = 1e-6
     steps = h * np.eye(55)
     slopes = [
         residuals.kinematics.difference(
@@ -60,7 +59,7 @@ def test_normal_equations_against_differences(walk: Scene, rng: np.random.Genera
     gradient = np.array([(data_cost(z + step) - data_cost(z - step)) / (2.0 * h) for step in steps])
     gradient[3:] += space.curvature @ (z[3:] - space.mean) - space.linear
     data_cost(z)
-    descent = residuals.normal_equations(hessian)
+    hessian, descent = normal_equations_of(residuals)
     expected = jacobian.T @ hessian @ jacobian
     expected[3:, 3:] += space.curvature
     normal, found = np.empty((55, 55)), np.empty(55)

@@ -8,9 +8,10 @@ import pytest
 from harness.errors import ShapeError
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
+from harness.reconstruct.solver.normal_equations import add_curvature, normal_rows
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations
-from tests.reconstruct.conftest import Scene
+from tests.reconstruct.conftest import Scene, normal_equations_of
 
 
 def noisy(walk: Scene, rng: np.random.Generator, loss: Loss, off_m: float) -> tuple[Residuals, np.ndarray]:
@@ -28,7 +29,7 @@ def noisy(walk: Scene, rng: np.random.Generator, loss: Loss, off_m: float) -> tu
 def test_descent_is_the_slope_of_the_cost(walk: Scene, rng: np.random.Generator, robust: bool, off_m: float) -> None:
     residuals, qpos = noisy(walk, rng, Loss(robust=robust), off_m)
     residuals.evaluate(qpos)
-    descent = residuals.normal_equations(np.zeros((54, 54)))
+    _, descent = normal_equations_of(residuals)
     h, slopes = 1e-6, np.zeros(54)
     for k, step in enumerate(h * np.eye(54)):
         ahead, behind = (residuals.evaluate(residuals.kinematics.integrate(qpos, s)) for s in (step, -step))
@@ -42,8 +43,7 @@ def test_slopes_of_every_residual_against_differences(walk: Scene) -> None:
     residuals, here = Residuals(walk.body, walk.calibration, loss), walk.take.qpos[30]
     residuals.read(walk.frames[30])
     residuals.evaluate(here)
-    hessian = np.zeros((54, 54))
-    residuals.normal_equations(hessian)
+    hessian, _ = normal_equations_of(residuals)
 
     def errors(step: np.ndarray) -> np.ndarray:
         residuals.evaluate(residuals.kinematics.integrate(here, step))
@@ -56,17 +56,20 @@ def test_slopes_of_every_residual_against_differences(walk: Scene) -> None:
 
 def test_curvature_completes_the_hessian(walk: Scene, rng: np.random.Generator) -> None:
     residuals, qpos = noisy(walk, rng, Loss(robust=False), 0.02)
-    hessian = np.zeros((54, 54))
     residuals.evaluate(qpos)
-    residuals.normal_equations(hessian)
-    gauss_newton = hessian.copy()
-    residuals.normal_equations(full := np.zeros((54, 54)), bent=True)
-    h, columns, scratch = 1e-5, [], np.zeros((54, 54))
+    gauss_newton, _ = normal_equations_of(residuals)
+    rows, full = np.empty(residuals.tree.ancestors.shape), np.zeros((54, 54))
+    normal_rows(residuals.tree, residuals.state, rows, np.empty(54))
+    add_curvature(residuals.tree, residuals.state, rows)
+    for i, ancestors in enumerate(residuals.tree.ancestors):
+        known = ancestors[: residuals.tree.depth[i] + 1]
+        full[i, known] = full[known, i] = rows[i, : len(known)]
+    h, columns = 1e-5, []
     for step in h * np.eye(54):
         slopes = []
         for s in (step, -step):
             residuals.evaluate(residuals.kinematics.integrate(qpos, s))
-            slopes.append(-residuals.normal_equations(scratch))
+            slopes.append(-normal_equations_of(residuals)[1])
         columns.append((slopes[0] - slopes[1]) / (2.0 * h))
     true = np.array(columns)[6:, 6:]
     true = 0.5 * (true + true.T)

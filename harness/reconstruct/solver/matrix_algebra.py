@@ -1,0 +1,97 @@
+"""Vectors and 3 x 3 matrices for compiled loops, where one call of a library routine costs more than the numbers."""
+
+import numpy as np
+
+from harness.core.arrays import Floats
+from harness.core.compiled import compiled
+
+
+@compiled
+def dot(a: Floats, b: Floats) -> float:
+    """The inner product of two vectors (N,), summed in order."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@compiled
+def dot3(a: Floats, b: Floats) -> float:
+    """The inner product of two vectors (3,)."""
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+@compiled
+def cross(a: Floats, b: Floats) -> Floats:
+    """The cross product (3,) of two vectors (3,)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+@compiled
+def multiply_vector(a: Floats, v: Floats) -> Floats:
+    """A v (3,) of a matrix (3, 3) and a vector (3,)."""
+    return np.array([dot3(a[0], v), dot3(a[1], v), dot3(a[2], v)])
+
+
+@compiled
+def multiply(a: Floats, b: Floats) -> Floats:
+    """A B (3, 3)."""
+    out = np.zeros((3, 3))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+    return out
+
+
+@compiled
+def multiply_transposed(a: Floats, b: Floats) -> Floats:
+    """A B^T (3, 3)."""
+    return multiply(a, np.ascontiguousarray(b.T))
+
+
+@compiled
+def transposed_multiply(a: Floats, b: Floats) -> Floats:
+    """A^T B (3, 3)."""
+    return multiply(np.ascontiguousarray(a.T), b)
+
+
+@compiled
+def axis_rotation(axis: Floats, angle: float) -> Floats:
+    """The rotation matrix (3, 3) about a unit axis (3,) by an angle [rad]; the identity for an axis of zeros."""
+    c, s = np.cos(angle), np.sin(angle)
+    x, y, z = axis[0], axis[1], axis[2]
+    if x * x + y * y + z * z == 0.0:
+        return np.eye(3)
+    u = 1.0 - c
+    return np.array(
+        [
+            [c + u * x * x, u * x * y - s * z, u * x * z + s * y],
+            [u * x * y + s * z, c + u * y * y, u * y * z - s * x],
+            [u * x * z - s * y, u * y * z + s * x, c + u * z * z],
+        ]
+    )
+
+
+@compiled
+def shortest_rotation(start: Floats, direction: Floats) -> Floats:
+    """The rotation matrix (3, 3) of the smallest turn that takes a vector (3,) into a unit direction (3,)."""
+    length = np.sqrt(dot3(start, start))
+    axis, cosine = cross(start, direction) / length, dot3(start, direction) / length
+    sine = np.sqrt(dot3(axis, axis))
+    if sine < 1e-12:
+        if cosine > 0.0:
+            return np.eye(3)
+        # Opposite: half a turn about any perpendicular axis; the smallest component gives the safest cross product.
+        least = np.zeros(3)
+        least[np.argmin(np.abs(direction))] = 1.0
+        axis = cross(direction, least)
+        return axis_rotation(axis / np.sqrt(dot3(axis, axis)), np.pi)
+    return axis_rotation(axis / sine, np.arctan2(sine, cosine))
+
+
+@compiled
+def angle_about(axis: Floats, rotation: Floats) -> float:
+    """The angle [rad] about a unit axis (3,) whose rotation is nearest to a matrix (3, 3): it maximises the trace."""
+    skew = np.array([rotation[2, 1] - rotation[1, 2], rotation[0, 2] - rotation[2, 0], rotation[1, 0] - rotation[0, 1]])
+    trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
+    return float(np.arctan2(dot3(axis, skew), trace - dot3(axis, multiply_vector(rotation, axis))))

@@ -1,0 +1,104 @@
+"""Machine code on disk is used again by the next process, and only as long as all that went into it is unchanged."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.core.arrays import Floats
+from harness.core.compiled import compiled, module_stamp, specialise
+
+_PACKAGE = {
+    "__init__.py": "",
+    "numbers_.py": "STEP = 1.0\n",
+    "inner.py": "from harness.core.compiled import compiled\n"
+    "from bench_package.numbers_ import STEP\n\n\n"
+    "@compiled\ndef add(x: float) -> float:\n    return x + STEP\n",
+    "middle.py": "from harness.core.compiled import compiled\n"
+    "from bench_package.inner import add\n\n\n"
+    "@compiled\ndef twice(x: float) -> float:\n    return 2.0 * add(x)\n",
+    "outer.py": "from typing import NamedTuple\n"
+    "from harness.core.compiled import compiled\n"
+    "from bench_package import middle\n\n\n"
+    "class Pair(NamedTuple):\n    first: float\n    second: float\n\n\n"
+    "@compiled\ndef total(pair: Pair) -> float:\n    return middle.twice(pair.first) + pair.second\n",
+}
+_SCRIPT = """
+from bench_package.outer import {record}, total
+print(total({record}(1.0, 10.0)), sum(total.stats.cache_hits.values()))
+"""
+
+
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    folder = tmp_path / "bench_package"
+    folder.mkdir()
+    for name, text in _PACKAGE.items():
+        (folder / name).write_text(text)
+    return folder
+
+
+def run_package(folder: Path, record: str = "Pair", **environment: str) -> tuple[float, int]:
+    """The result of the outermost function in a new process, and how often its machine code came from disk."""
+    path = os.pathsep.join([str(folder.parent), *filter(None, sys.path)])
+    result = subprocess.run(
+        [sys.executable, "-c", _SCRIPT.format(record=record)],
+        env={**os.environ, "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "1", **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    value, hits = result.stdout.split()
+    return float(value), int(hits)
+
+
+def edit(path: Path, old: str, new: str) -> None:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def test_a_change_of_an_imported_module_or_constant_compiles_its_callers_anew(package: Path) -> None:
+    assert run_package(package) == (14.0, 0)
+    edit(package / "inner.py", "x + STEP", "x - STEP")  # two imports away from the caller
+    assert run_package(package) == (10.0, 0)
+    edit(package / "numbers_.py", "1.0", "3.0")  # a module that has no compiled function
+    assert run_package(package) == (6.0, 0)
+    assert run_package(package) == (6.0, 1)
+
+
+def test_a_renamed_record_does_not_break_the_load(package: Path) -> None:
+    assert run_package(package) == (14.0, 0)
+    edit(package / "outer.py", "Pair", "Couple")
+    assert run_package(package, "Couple") == (14.0, 0)
+    assert run_package(package, "Couple") == (14.0, 1)
+
+
+def test_without_a_writable_folder_every_process_compiles(package: Path) -> None:
+    nowhere = {"NUMBA_CACHE_DIR": os.devnull + "/none", "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator"}
+    assert run_package(package, **nowhere) == (14.0, 0)
+    assert not list(package.rglob("*.nbi"))
+
+
+_FACTOR = 2.0
+
+
+@compiled
+def scale(values: Floats) -> Floats:
+    out: Floats = _FACTOR * values
+    return out
+
+
+def test_the_stamp_follows_the_constants(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = module_stamp(globals())
+    assert module_stamp(globals()) == before
+    monkeypatch.setitem(globals(), "_FACTOR", 3.0)
+    assert module_stamp(globals()) != before
+
+
+def test_a_specialised_function_gives_the_same_result() -> None:
+    values = np.arange(3.0)
+    np.testing.assert_array_equal(specialise(scale, values)(values), scale(values))
