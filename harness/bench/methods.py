@@ -167,8 +167,8 @@ def query_dimension(method: Method) -> int:
     stations = len(load_scenario(benchmark_clips.DEFAULT_SCENARIO).stations)
     if isinstance(method, LocalPca):
         return (POSTURE_SIZE + 3) * 2 - 3 + 9 * stations
-    if isinstance(method, DynamicMap) and method.like == "evidence":
-        return method.terms.directions
+    if isinstance(method, DynamicMap) and method.search == "features":
+        return method.regression.directions
     if isinstance(method, DynamicMap):
         return (POSTURE_SIZE + 3) * method.poses - 3
     return 10 * stations  # eq. 2 of Kim et al. 2012

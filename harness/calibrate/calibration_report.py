@@ -1,4 +1,4 @@
-"""What a calibration found, in words and numbers: for the file that keeps it, and for whoever reads a screen."""
+"""Reports of a calibration: a table for the calibration file and lines for the screen."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,50 +12,50 @@ from harness.core.number_format import format_fixed
 from harness.core.text_table import Table
 
 CalibrationReport = tuple[dict[str, Any], list[str]]
-"""For the file, and lines for the screen."""
+"""The `[diagnostics]` table of the file, and lines for the screen."""
 _MOUNT_FIELDS = ("mount_sd", "mount_bound", "residual")
 
 
-def report_pose_calibration(found: PoseCalibration) -> CalibrationReport:
-    """A row for each bone, one for each station, and what else there is to say."""
-    names, stations = found.skeleton.names, found.calibration.stations
+def report_pose_calibration(result: PoseCalibration) -> CalibrationReport:
+    """Report of an eight-pose calibration: a row for each bone and station, the quality of the fit, and hints."""
+    names, stations = result.skeleton.names, result.calibration.stations
     lengths = {
         name: {"length_m": length, "sd_m": sd, "mean_m": mean, "bound_m": bound, "known": known, "from_prior": prior}
         for name, length, sd, mean, bound, known, prior in zip(
             names,
-            found.skeleton.length_m.tolist(),
-            found.length_sd_m.tolist(),
-            found.mean_m.tolist(),
-            found.length_bound_m.tolist(),
-            found.known.tolist(),
-            found.from_prior.tolist(),
+            result.skeleton.length_m.tolist(),
+            result.length_sd_m.tolist(),
+            result.mean_m.tolist(),
+            result.length_bound_m.tolist(),
+            result.variance_reduction.tolist(),
+            result.from_prior.tolist(),
             strict=True,
         )
     }
-    deg = {name: np.rad2deg(getattr(found, f"{name}_rad")).tolist() for name in _MOUNT_FIELDS}
-    size_m = {name: getattr(found, f"{name}_m").tolist() for name in _MOUNT_FIELDS}
+    deg = {name: np.rad2deg(getattr(result, f"{name}_rad")).tolist() for name in _MOUNT_FIELDS}
+    size_m = {name: getattr(result, f"{name}_m").tolist() for name in _MOUNT_FIELDS}
     mounts = {
         station: {
             f"{name}_{unit}": of[name][row] for name in _MOUNT_FIELDS for unit, of in (("m", size_m), ("deg", deg))
         }
         for row, station in enumerate(stations)
     }
-    miss_deg = {pose.name: deg for pose, deg in zip(POSES, np.rad2deg(found.pose_miss_rad).tolist(), strict=True)}
-    told = {
-        "seconds": found.seconds,
-        "miss_deg": float(np.rad2deg(found.miss_rad)),
-        "beside": found.mount_spread,
-        "condition": found.condition,
-        "hints": list(found.hints),
+    miss_deg = {pose.name: deg for pose, deg in zip(POSES, np.rad2deg(result.pose_error_rad).tolist(), strict=True)}
+    diagnostics = {
+        "seconds": result.seconds,
+        "miss_deg": float(np.rad2deg(result.hinge_error_rad)),
+        "beside": result.mount_spread,
+        "condition": result.condition,
+        "hints": list(result.hints),
         "miss_deg_of_pose": miss_deg,
         "stations": {name: _finite(row) for name, row in mounts.items()},
         "bones": {name: _finite(row) for name, row in lengths.items()},
     }
-    return told, [*_bone_lines(lengths), "", *_mount_lines(mounts), "", *_fit_lines(found, miss_deg)]
+    return diagnostics, [*_bone_lines(lengths), "", *_mount_lines(mounts), "", *_fit_lines(result, miss_deg)]
 
 
 def _bone_lines(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    head = ["bone [mm]", "found", "sd", "mean skeleton", "bound alone", "told by trackers", ""]
+    head = ["bone [mm]", "estimate", "sd", "mean skeleton", "bound alone", "from trackers", ""]
     rows = [
         [
             *(name, f"{1e3 * one['length_m']:.1f}", f"{1e3 * one['sd_m']:.1f}", f"{1e3 * one['mean_m']:.1f}"),
@@ -78,30 +78,31 @@ def _mount_lines(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
     return Table(head, rows).lines()
 
 
-def _fit_lines(found: PoseCalibration, miss_deg: Mapping[str, float]) -> list[str]:
+def _fit_lines(result: PoseCalibration, miss_deg: Mapping[str, float]) -> list[str]:
     worst = max(miss_deg, key=lambda name: miss_deg[name])
     return [
-        "bound alone: the Cramér-Rao bound of whoever knows nothing of people's bones and of where trackers are worn",
-        f"hinges missed the poses by {np.rad2deg(found.miss_rad):.1f} deg, {worst!r} by {miss_deg[worst]:.1f} deg",
-        f"trackers sit {found.mount_spread:.1f} times as far from their nominal places as is usual",
-        f"condition number {found.condition:.3g}; poses held for {found.seconds:.1f} s all together",
-        *(f"hint: {hint}" for hint in found.hints),
+        "bound alone: the Cramér-Rao bound without a prior of people's bones and of the mounts",
+        f"hinges are off the poses by {np.rad2deg(result.hinge_error_rad):.1f} deg, "
+        f"{worst!r} by {miss_deg[worst]:.1f} deg",
+        f"trackers sit {result.mount_spread:.1f} times as far from their mounts as is usual",
+        f"condition number {result.condition:.3g}; poses held for {result.seconds:.1f} s in all",
+        *(f"hint: {hint}" for hint in result.hints),
     ]
 
 
-def report_tpose_calibration(found: TPoseCalibration) -> CalibrationReport:
-    names = found.calibration.stations
+def report_tpose_calibration(result: TPoseCalibration) -> CalibrationReport:
+    names = result.calibration.stations
     stations = {
         name: {"residual_m": residual_m, "moved_m": moved_m}
-        for name, residual_m, moved_m in zip(names, found.residual_m.tolist(), found.moved_m.tolist(), strict=True)
+        for name, residual_m, moved_m in zip(names, result.residual_m.tolist(), result.moved_m.tolist(), strict=True)
     }
     rows = [[name, _mm(one["residual_m"]), _mm(one["moved_m"])] for name, one in stations.items()]
-    heading_deg = float(np.rad2deg(found.heading_sd_rad))
+    heading_deg = float(np.rad2deg(result.heading_sd_rad))
     lines = [
         *Table(["station", "off the T-pose [mm]", "moved [mm]"], rows).lines(),
-        f"which way the performer faced is known to {heading_deg:.1f} deg; T-pose held for {found.seconds:.1f} s",
+        f"which way the performer faced is known to {heading_deg:.1f} deg; T-pose held for {result.seconds:.1f} s",
     ]
-    return {"seconds": found.seconds, "heading_sd_deg": heading_deg, "stations": stations}, lines
+    return {"seconds": result.seconds, "heading_sd_deg": heading_deg, "stations": stations}, lines
 
 
 def _mm(length_m: float) -> str:
@@ -109,5 +110,5 @@ def _mm(length_m: float) -> str:
 
 
 def _finite(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what has no bound: neither JSON nor a reader knows infinity."""
+    """The row without infinite values, which TOML readers and JSON do not share."""
     return {name: value for name, value in row.items() if np.isfinite(value)}

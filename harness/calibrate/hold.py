@@ -1,7 +1,7 @@
-"""What each station read of a performer who stood still, past echoes and gaps, and whether the performer did so.
+"""Median station poses over a hold (a few seconds in which the performer stands still), and the checks of a hold.
 
-Positions are medians, orientations rotation medians (Hartley, Aftab, Trumpf 2011, "L1 rotation averaging using the
-Weiszfeld algorithm"): up to half of the readings may be anywhere.
+Positions are medians. Orientations are geometric medians of rotations (Hartley, Aftab, Trumpf 2011, "L1 rotation
+averaging using the Weiszfeld algorithm"). Up to half of the readings may be outliers or missing.
 """
 
 from collections.abc import Sequence
@@ -15,48 +15,49 @@ from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
 
 LEAST_S, LEAST_FRAMES = 2.0, 10
-"""Errors that wander with a correlation time of 1 s (docs/is900.md 13.5) need this long to average out at all."""
+"""Shortest hold: device errors have a correlation time of 1 s (docs/is900.md 13.5) and must average out."""
 LEAST_SHARE = 0.5
-"""A median says nothing when more than half of the readings are missing or in doubt."""
+"""Least share of usable readings: a median breaks down when more than half are missing or suspect."""
 SWAY_M, SWAY_RAD = 0.03, float(np.deg2rad(5.0))
-"""The device itself is off by up to 3 cm for seconds (docs/is900.md 13.1, GIL), and nobody stands stiller than that
-with arms held out; 5 deg is 3 cm at a third of a metre [choice]."""
+"""Allowed sway [m, rad]: the device itself is off by up to 3 cm for seconds (docs/is900.md 13.1, GIL), and people with
+arms held out sway as much; 5 deg is 3 cm at a third of a metre [choice]."""
 NOISE_SDS = 5.0
-"""On top of it, so many standard deviations of a single reading, as this very stream shows them [choice]."""
+"""Allowance for noise on top of the sway, in standard deviations of a single reading in this stream [choice]."""
 _ROUNDS, _CONVERGED_RAD = 30, 1e-7
 
 
 class UnusableHold(BadInput):
-    """A few seconds that cannot be calibrated from; the performer can try again."""
+    """A hold that cannot be calibrated from; the message says what to do before the next try."""
 
 
 @dataclass(frozen=True, eq=False)
 class HoldReadings:
-    """Typical readings of S stations over some seconds."""
+    """Median readings of S stations over a hold."""
 
     seconds: float
+    """Length of the hold [s]."""
     position_m: Floats
-    """(S, 3) in the tracker's frame [m]."""
+    """(S, 3) median position in the tracker's frame [m]."""
     tracker_from_station: Floats
-    """(S, 4)"""
+    """(S, 4) median orientation, unit quaternions."""
     moved_m: Floats
-    """(S,) three quarters of the readings lie within this distance of the typical one [m]."""
+    """(S,) three quarters of the readings lie within this distance of the median [m]."""
     turned_rad: Floats
-    """(S,) likewise [rad]."""
+    """(S,) three quarters of the readings lie within this angle of the median [rad]."""
 
     def __post_init__(self) -> None:
         freeze(self, position_m=("S", 3), tracker_from_station=("S", 4), moved_m=("S",), turned_rad=("S",))
 
 
 def measure_hold(frames: Sequence[TrackerFrame], stations: Sequence[str], pose: str = "T-pose") -> HoldReadings:
-    """Typical readings; NotStanding when they are too few or somebody moved, BadInput for other stations.
+    """Median readings of the stations over some frames; `pose` is the pose's name in messages.
 
-    `pose` is what the performer is asked to hold.
+    UnusableHold when there are too few frames or readings, or a station moved. BadInput for other stations.
     """
     seconds = span_s(frames)
     if seconds < LEAST_S or len(frames) < LEAST_FRAMES:
         raise UnusableHold(
-            f"{len(frames)} frames within {seconds:.1f} s are too few to calibrate from.",
+            f"{len(frames)} frames in {seconds:.1f} s are too few to calibrate from.",
             f"Hold the pose ({pose}) for {LEAST_S:g} s or more while the tracker streams.",
         )
     if any(len(frame.quality) != len(stations) for frame in frames):
@@ -75,12 +76,12 @@ def measure_hold(frames: Sequence[TrackerFrame], stations: Sequence[str], pose: 
 
 
 def span_s(frames: Sequence[TrackerFrame]) -> float:
-    """From the first frame to the last, by the host's clock [s]."""
+    """Time from the first frame to the last, by the host's clock [s]; 0 without frames."""
     return frames[-1].received_s - frames[0].received_s if frames else 0.0
 
 
 def median_rotation(turn: Floats) -> Floats:
-    """The unit quaternion (4,) whose angles to the given ones (N, 4) have the least sum."""
+    """Geometric median (4,) of unit quaternions (N, 4): the rotation with the least sum of angles to them."""
     middle: Floats = turn[np.argmax(np.abs(turn @ turn.T).sum(axis=1))]
     for _ in range(_ROUNDS):
         off = rotations.log(rotations.multiply(rotations.inverse(middle), turn))
@@ -93,7 +94,7 @@ def median_rotation(turn: Floats) -> Floats:
 
 
 def _typical_reading(position_m: Floats, turn: Floats) -> tuple[Floats, Floats, float, float, float, float]:
-    """Typical position and orientation of one station's readings (N, 3), (N, 4), how far it strayed, how far it may."""
+    """Median position and orientation of one station's readings (N, 3), (N, 4), their spread, and its limits."""
     at_m, middle = np.median(position_m, axis=0), median_rotation(turn)
     off = rotations.log(rotations.multiply(rotations.inverse(middle), turn))
     moved_m, turned_rad = (float(np.quantile(np.linalg.norm(x, axis=1), 0.75)) for x in (position_m - at_m, off))
@@ -102,21 +103,23 @@ def _typical_reading(position_m: Floats, turn: Floats) -> tuple[Floats, Floats, 
 
 
 def _noise_sd(readings: Floats) -> float:
-    """Standard deviation of a single reading (N, 3) on an axis: from second differences, in which steady motion
-    cancels, by their median, which echoes leave alone."""
+    """Standard deviation of a single reading (N, 3) on an axis.
+
+    Second differences cancel steady motion; their median absolute value is robust against echoes.
+    """
     second = np.diff(readings, n=2, axis=0)
     return float(1.4826 * np.median(np.abs(second)) / np.sqrt(6.0))
 
 
 def _usable(frames: Sequence[TrackerFrame], position_m: Floats, turn: Floats) -> Bools:
-    """(F, S)"""
-    told = np.array([frame.position_valid & frame.orientation_valid & ~frame.suspect for frame in frames])
-    out: Bools = told & np.isfinite(position_m).all(axis=2) & np.isfinite(turn).all(axis=2)
+    """(F, S) whether a reading is complete, finite and not suspect."""
+    valid = np.array([frame.position_valid & frame.orientation_valid & ~frame.suspect for frame in frames])
+    out: Bools = valid & np.isfinite(position_m).all(axis=2) & np.isfinite(turn).all(axis=2)
     return out
 
 
 def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: Sequence[str], pose: str) -> None:
-    """NotStanding when too small a share (S,) of a station's readings is of use."""
+    """UnusableHold when too small a share (S,) of a station's readings is usable."""
     if share.min() >= LEAST_SHARE:
         return
     worst = int(np.argmin(share))
@@ -126,13 +129,13 @@ def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: S
     )
     why, advice = "was silent or lost", "Switch it on, and stand where the emitters see it."
     if placed >= LEAST_SHARE and turned < LEAST_SHARE:
-        why, advice = "told no orientation", "Ask the device for orientation (item 4 or 11) in its output list."
+        why, advice = "reported no orientation", "Ask the device for orientation (item 4 or 11) in its output list."
     elif turned >= LEAST_SHARE and placed < LEAST_SHARE:
-        why = "told no position"
+        why = "reported no position"
     elif suspect > 1.0 - LEAST_SHARE:
-        why, advice = "sent records in doubt", "Check the line, the output lists and which stations are on."
+        why, advice = "sent suspect records", "Check the line, the output lists and which stations are on."
     raise UnusableHold(
-        f"Station {stations[worst]!r} {why}: {share[worst]:.0%} of its readings are of use; {LEAST_SHARE:.0%} must be.",
+        f"Station {stations[worst]!r} {why}: {share[worst]:.0%} of its readings are usable, not {LEAST_SHARE:.0%}.",
         f"{advice} Then hold the pose again ({pose}).",
     )
 
@@ -140,12 +143,13 @@ def _require_readings(frames: Sequence[TrackerFrame], share: Floats, stations: S
 def _require_stillness(
     stations: Sequence[str], moved_m: Floats, limit_m: Floats, turned_rad: Floats, limit_rad: Floats, pose: str
 ) -> None:
+    """UnusableHold when a station moved farther than its limit."""
     worst = int(np.argmax(np.maximum(moved_m / limit_m, turned_rad / limit_rad)))
     if moved_m[worst] <= limit_m[worst] and turned_rad[worst] <= limit_rad[worst]:
         return
     raise UnusableHold(
-        f"Station {stations[worst]!r} moved: it strayed by {1e3 * moved_m[worst]:.0f} mm and "
-        f"{np.rad2deg(turned_rad[worst]):.0f} deg, where {1e3 * limit_m[worst]:.0f} mm and "
-        f"{np.rad2deg(limit_rad[worst]):.0f} deg are sway and noise.",
-        f"Stand still in the pose ({pose}), and see that the strap is tight.",
+        f"Station {stations[worst]!r} moved by {1e3 * moved_m[worst]:.0f} mm and "
+        f"{np.rad2deg(turned_rad[worst]):.0f} deg; sway and noise explain {1e3 * limit_m[worst]:.0f} mm and "
+        f"{np.rad2deg(limit_rad[worst]):.0f} deg.",
+        f"Stand still in the pose ({pose}), and check that the strap is tight.",
     )

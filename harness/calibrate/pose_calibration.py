@@ -1,8 +1,11 @@
 """Calibration of skeleton and mounts from eight poses (Liu et al. 2011, eq. 1; docs/methods.md A3, H15).
 
-What differs from eq. 1: residuals are weighed by how far device, mounts, bones and performers go astray, in place of
-alpha_1 and alpha_2; joint angles are not taken as known but estimated too, as misses of the poses shown; where the
-performer stands and faces in each pose is free; bones may point elsewhere than the mean skeleton's where people's do.
+Differences from eq. 1:
+
+- Residuals are weighted by the spread of device errors, mounts, bones and poses, in place of alpha_1 and alpha_2.
+- Joint angles are not taken as known. They are estimated, with the poses as shown as their prior.
+- The performer's position and heading are free in each pose.
+- Bones may point elsewhere than the mean skeleton's, as far as people's bones differ.
 """
 
 from collections.abc import Sequence
@@ -29,106 +32,108 @@ from harness.errors import BadInput
 from harness.stream.frame import TrackerFrame
 
 FLOOR_M, FLOOR_RAD = 5e-5, float(np.deg2rad(0.005))
-"""No typical reading is better than this [choice]; what the readings of each hold scatter comes on top."""
+"""Smallest standard deviation of a median reading [m, rad] [choice]; the scatter of each hold is added to it."""
 LEAST_VARIANCE_REDUCTION = 0.9
-"""A length is called "from the prior" unless the trackers take away this share of its variance among people."""
+"""A length is called "from the prior" unless the trackers reduce its variance among people by this share."""
 _SD_PER_QUARTILE = 1.0 / 2.027
 """Three quarters of normal readings lie within 2.027 standard deviations of an axis of their mean (chi, 3 degrees)."""
 
 
 @dataclass(frozen=True, eq=False)
 class PoseCalibration:
-    """What eight poses told; N bones, S stations."""
+    """Result of an eight-pose calibration; N bones, S stations, P poses."""
 
     calibration: Calibration
-    """Of kind `poses`."""
+    """Mounts and room, of kind `poses`."""
     skeleton: Skeleton
+    """The performer's skeleton, with the standard body's hinges."""
     mean_m: Floats
-    """(N,) bone lengths of the mean skeleton."""
+    """(N,) bone lengths of the mean skeleton [m]."""
     length_sd_m: Floats
-    """(N,) standard deviation of the lengths found: the Cramér-Rao bound with what is known of people's bones."""
+    """(N,) standard deviation of the lengths [m]: the Cramér-Rao bound with the prior of people's bones."""
     length_bound_m: Floats
-    """(N,) the bound without it, for whoever is unbiased; infinite where trackers do not tell."""
-    known: Floats
-    """(N,) share of the variance among people that the trackers take away; nominal mounts do not count."""
+    """(N,) the bound of unbiased estimators, without the prior [m]; infinite where the readings do not depend on it."""
+    variance_reduction: Floats
+    """(N,) share by which readings reduce the variance among people, with the prior of the mounts left out."""
     from_prior: Bools
-    """(N,) lengths of which they take away too little."""
+    """(N,) True where that share is below `LEAST_VARIANCE_REDUCTION`."""
     mount_sd_m: Floats
-    """(S,) standard deviation of the mounts found, all axes together."""
+    """(S,) standard deviation of the mounts' positions, all axes together [m]."""
     mount_sd_rad: Floats
-    """(S,)"""
+    """(S,) standard deviation of the mounts' orientations, all axes together [rad]."""
     mount_bound_m: Floats
-    """(S,) the bound without anything known of bones and mounts."""
+    """(S,) bound of the positions without priors of bones and mounts [m]."""
     mount_bound_rad: Floats
-    """(S,)"""
+    """(S,) bound of the orientations without these priors [rad]."""
     residual_m: Floats
-    """(S,) root mean square over the poses of what is left."""
+    """(S,) root mean square position residual over the poses [m]."""
     residual_rad: Floats
-    """(S,)"""
-    miss_rad: float
-    """How far the performer missed the poses, standard deviation of a hinge."""
-    pose_miss_rad: Floats
-    """(P,) likewise of each pose."""
+    """(S,) root mean square orientation residual over the poses [rad]."""
+    hinge_error_rad: float
+    """Error of the performer's poses, standard deviation of a hinge [rad]."""
+    pose_error_rad: Floats
+    """(P,) error of each pose, standard deviation of a hinge [rad]."""
     mount_spread: float
-    """How far trackers sit from their nominal mounts, in units of `unknowns.ALONG_M` and `ACROSS_M`."""
+    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_*_SD_M`."""
     condition: float
-    """Of the whitened normal matrix: the best known combination against the least known one."""
+    """Condition number of the whitened normal matrix."""
     hints: tuple[str, ...]
+    """Sentences about straps that are put on in an unusual orientation."""
     seconds: float
-    """How long poses were held, all together."""
+    """Total length of the holds [s]."""
 
     def __post_init__(self) -> None:
         bones, stations = self.skeleton.bone_count, len(self.calibration.stations)
-        freeze(self, mean_m=(bones,), length_sd_m=(bones,), length_bound_m=(bones,), known=(bones,))
+        freeze(self, mean_m=(bones,), length_sd_m=(bones,), length_bound_m=(bones,), variance_reduction=(bones,))
         freeze(self, np.bool_, from_prior=(bones,))
         freeze(self, mount_sd_m=(stations,), mount_sd_rad=(stations,), residual_m=(stations,), residual_rad=(stations,))
-        freeze(self, mount_bound_m=(stations,), mount_bound_rad=(stations,), pose_miss_rad=("P",))
+        freeze(self, mount_bound_m=(stations,), mount_bound_rad=(stations,), pose_error_rad=("P",))
 
 
 def calibrate_poses(
     held: Sequence[Sequence[TrackerFrame]], space: SkeletonPrior, mounts: Sequence[Mount]
 ) -> PoseCalibration:
-    """Skeleton, mounts and room from the frames of each of the eight holds, in the order of `poses.POSES`.
+    """Estimate skeleton, mounts and room from the frames of the eight holds, in the order of `poses.POSES`.
 
-    `mounts` are in the order of the stream's stations: about where trackers sit, in any orientation. NotStanding names
-    the pose and the station and says what to do; BadInput for a wrong number of poses or stations.
+    `mounts` are the nominal positions of the trackers, in the order of the stream's stations; orientations are free.
+    UnusableHold names the pose and the station and what to do. BadInput for a wrong number of poses or stations.
     """
     if len(held) != len(POSES):
         raise BadInput(
-            f"{len(held)} poses were held, and {len(POSES)} are asked for.",
+            f"{len(held)} poses were held; {len(POSES)} are needed.",
             f"Hold these, one after another: {', '.join(pose.name for pose in POSES)}.",
         )
     names = [mount.station for mount in mounts]
-    still = [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
+    holds = [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
     like = humanoid24.standard_skeleton()
-    asked_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
-    turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([one.tracker_from_station for one in still]))
-    place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([one.position_m for one in still]))
-    bundle = BundleAdjustment(SharedUnknowns(like, space, mounts), asked_rad, place_m, rotations.to_matrix(turn))
+    nominal_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
+    turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([hold.tracker_from_station for hold in holds]))
+    place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([hold.position_m for hold in holds]))
+    bundle = BundleAdjustment(SharedUnknowns(like, space, mounts), nominal_rad, place_m, rotations.to_matrix(turn))
     pose_checks.require_no_boresight(bundle)
-    found = fit_bundle(bundle, *_reading_sd(still))
-    pose_checks.require_poses_held(bundle, found)
-    return _assemble(bundle, found, estimate_uncertainty(bundle, found), sum(one.seconds for one in still))
+    fit = fit_bundle(bundle, *_reading_sd(holds))
+    pose_checks.require_poses_held(bundle, fit)
+    return _assemble(bundle, fit, estimate_uncertainty(bundle, fit), sum(hold.seconds for hold in holds))
 
 
-def _reading_sd(still: Sequence[HoldReadings]) -> tuple[float, float]:
+def _reading_sd(holds: Sequence[HoldReadings]) -> tuple[float, float]:
     """Standard deviations of typical places [m] and orientations [rad] on an axis, from how readings scatter in a hold.
 
     The device's errors wander over a second, so that a typical reading of a few is hardly better than any one.
     """
-    moved_m = float(np.median([one.moved_m for one in still])) * _SD_PER_QUARTILE
-    turned_rad = float(np.median([one.turned_rad for one in still])) * _SD_PER_QUARTILE
+    moved_m = float(np.median([hold.moved_m for hold in holds])) * _SD_PER_QUARTILE
+    turned_rad = float(np.median([hold.turned_rad for hold in holds])) * _SD_PER_QUARTILE
     return float(np.hypot(FLOOR_M, moved_m)), float(np.hypot(FLOOR_RAD, turned_rad))
 
 
 def _assemble(
-    bundle: BundleAdjustment, found: BundleFit, known: CalibrationUncertainty, seconds: float
+    bundle: BundleAdjustment, fit: BundleFit, uncertainty: CalibrationUncertainty, seconds: float
 ) -> PoseCalibration:
-    at, mounts = found.solution, bundle.shared.mounts
+    at, mounts = fit.solution, bundle.shared.mounts
     skeleton = bundle.shared.template.with_bones(at.bone_m)
     bone_from_station = rotations.from_matrix(at.bone_from_station)
-    world_from_level, shift_m = _world_from_level(skeleton, found)
-    off_m, off_rad = bundle.residuals(bundle.reach(at))
+    world_from_level, shift_m = _world_from_level(skeleton, fit)
+    off_m, off_rad = bundle.residuals(bundle.forward_kinematics(at))
     return PoseCalibration(
         calibration=Calibration(
             kind="poses",
@@ -141,29 +146,31 @@ def _assemble(
         ),
         skeleton=skeleton,
         mean_m=bundle.shared.space.mean_m,
-        length_sd_m=known.length_sd_m,
-        length_bound_m=known.length_bound_m,
-        known=known.variance_reduction,
-        from_prior=known.variance_reduction < LEAST_VARIANCE_REDUCTION,
-        mount_sd_m=known.mount_sd_m,
-        mount_sd_rad=known.mount_sd_rad,
-        mount_bound_m=known.mount_bound_m,
-        mount_bound_rad=known.mount_bound_rad,
+        length_sd_m=uncertainty.length_sd_m,
+        length_bound_m=uncertainty.length_bound_m,
+        variance_reduction=uncertainty.variance_reduction,
+        from_prior=uncertainty.variance_reduction < LEAST_VARIANCE_REDUCTION,
+        mount_sd_m=uncertainty.mount_sd_m,
+        mount_sd_rad=uncertainty.mount_sd_rad,
+        mount_bound_m=uncertainty.mount_bound_m,
+        mount_bound_rad=uncertainty.mount_bound_rad,
         residual_m=np.sqrt(np.mean(np.sum(off_m**2, axis=2), axis=0)),
         residual_rad=np.sqrt(np.mean(np.sum(off_rad**2, axis=2), axis=0)),
-        miss_rad=found.scales.pose_error_rad,
-        pose_miss_rad=found.pose_miss_rad,
-        mount_spread=found.scales.mount_spread,
-        condition=known.condition,
+        hinge_error_rad=fit.scales.pose_error_rad,
+        pose_error_rad=fit.pose_error_rad,
+        mount_spread=fit.scales.mount_spread,
+        condition=uncertainty.condition,
         hints=station_orientation.strap_hints(skeleton, mounts, bone_from_station),
         seconds=seconds,
     )
 
 
-def _world_from_level(skeleton: Skeleton, found: BundleFit) -> tuple[Floats, Floats]:
-    """World from level axes: turn (4,) and shift (3,) by which the first pose stands at the origin and faces x. Every
-    pose has its lower sole on the floor; the floor is where half of them stand higher."""
-    at = found.solution
+def _world_from_level(skeleton: Skeleton, fit: BundleFit) -> tuple[Floats, Floats]:
+    """World from level axes: rotation (4,) and translation (3,) [m].
+
+    The first pose stands at the origin and faces x. The floor is the median height of the lower sole over the poses.
+    """
+    at = fit.solution
     root = rotations.from_matrix(at.world_from_root)
     qpos = humanoid24.pack(at.root_m, root, at.angles_rad)
     soles_m = np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos)), axis=1)

@@ -1,10 +1,9 @@
-"""The eight calibration poses of Liu et al. 2011 (docs/methods.md A3, E, H15): T-pose, arms forward, down and bent,
-either leg up, a squat, and a bow with a twist.
+"""The eight calibration poses (Liu et al. 2011; docs/methods.md A3, E, H15).
 
-The paper does not list its poses. Each of these also turns, bends or leans the trunk and the head, so that every joint
-of the spine and neck is seen bent about each of its axes; pelvis and standing feet stay where they are, so that whoever
-shows the pose need not walk. Angles are ours: every one is within the model's limits and easily held, and the trunk
-leans so that the weight is over the feet [choice].
+T-pose, arms forward, arms down, arms bent, left leg up, right leg up, squat, and a bow with a twist. The paper shows
+no list of its poses; the angles are ours [choice]. Each pose also rotates, bends or leans the trunk and the head, so
+that every joint of the spine and neck is bent about each of its axes. Pelvis and standing feet stay in place. Every
+angle is within the model's limits and easy to hold; the trunk leans so that the weight is over the feet.
 """
 
 from collections.abc import Mapping
@@ -21,29 +20,29 @@ from harness.core.skeleton import Skeleton
 
 @dataclass(frozen=True)
 class CalibrationPose:
-    """What a performer imitates."""
+    """A pose that the performer imitates."""
 
     name: str
     instruction: str
     """One sentence to the performer."""
     angles_deg: Mapping[str, float]
-    """Hinge, such as "lhumerus.rz", to its angle; the others are 0."""
+    """Hinge name, such as "lhumerus.rz", to its angle [deg]; all other hinges are 0."""
 
 
 def pose_angles_rad(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
-    """(48,) hinges in the skeleton's order."""
+    """(48,) hinge angles of a pose, in the skeleton's order [rad]."""
     return np.deg2rad([pose.angles_deg.get(name, 0.0) for name in skeleton.dof_names])
 
 
 def configuration(pose: CalibrationPose, skeleton: Skeleton) -> Floats:
-    """(55,) of this body in the pose: upright at the world's origin, facing x, its lower sole on the floor."""
+    """(55,) configuration of a body in the pose: upright at the origin, facing x, its lower sole on the floor."""
     qpos = humanoid24.pack(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), pose_angles_rad(pose, skeleton))
     qpos[2] = -float(np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos[None]))))
     return qpos
 
 
 _LEGS = {"lfemur.rz": -20.0, "rfemur.rz": 20.0}
-"""Upright; the rest pose has them 20 deg apart."""
+"""Hinges that bring the thighs upright; in the rest pose each is 20 deg off."""
 _ARMS_DOWN = {
     **{"lhumerus.rx": -29.0, "lhumerus.ry": 17.0, "lhumerus.rz": 58.0},
     **{"rhumerus.rx": -29.0, "rhumerus.ry": -17.0, "rhumerus.rz": -58.0},
@@ -129,4 +128,4 @@ POSES: tuple[CalibrationPose, ...] = (
         },
     ),
 )
-"""The first is the T-pose, whose place is the origin of the calibrated world."""
+"""The eight poses in order. The first, the T-pose, defines the origin of the calibrated world."""

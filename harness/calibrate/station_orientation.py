@@ -1,8 +1,8 @@
-"""How stations are turned: on their straps, which calibration takes as they are, and in the room, which it cannot.
+"""Detects unusual station orientations: on their straps (accepted) and in the room (refused).
 
-A strap put on another way round turns a station on its bone, the same in every pose. A station with a boresight or an
-alignment of its own left on (docs/is900.md 4.1, `B` and `A`) reports every orientation turned in the room: no mount
-explains that, and it shows because poses turn the bone.
+A strap put on another way rotates a station on its bone by the same rotation in every pose; calibration estimates it.
+A boresight or an alignment left on in the device (docs/is900.md 4.1, `B` and `A`) rotates every reported orientation
+in the room. No mount explains that, and it shows because the poses rotate the bone.
 """
 
 from collections.abc import Sequence
@@ -16,30 +16,35 @@ from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 
 LEAST_ROTATION_RAD = float(np.deg2rad(30.0))
-"""Less than this is how straps sit [choice]."""
+"""Smaller rotations than this are normal for straps [rad] [choice]."""
 MOST_RESIDUAL_SHARE = 0.3
-"""A turn in the room is believed when it leaves no more of the squared angles than this [choice]: of 240 stations of
-performers who missed the poses by 5 deg and had none, the least that was left is 0.33."""
+"""A rotation in the room is reported if it leaves at most this share of the squared angles [choice]. For 240 stations
+without one, of performers with 5 deg of pose error, the smallest share was 0.33."""
 _POSE_ERROR_RAD = float(np.deg2rad(8.0))
-"""Angles off a mount, on each axis, that a good performer's misses make of themselves [choice]."""
+"""Angle off a mount, on each axis, that the pose errors of a good performer explain [rad] [choice]."""
 _NEAR_AXIS = float(np.cos(np.deg2rad(20.0)))
 _ROUNDS = 20
 
 
 def strap_hints(skeleton: Skeleton, mounts: Sequence[Mount], bone_from_station: Floats) -> tuple[str, ...]:
-    """Words for each station (S, 4) that sits far turned from its nominal mount."""
-    told = []
+    """Sentences about stations (S, 4) whose orientation is far from that of their nominal mounts."""
+    hints = []
     for number, (mount, turn) in enumerate(zip(mounts, bone_from_station, strict=True), 1):
         off = rotations.log(rotations.multiply(rotations.inverse(locate_mount(skeleton, mount)[1]), turn))
         if np.linalg.norm(off) > LEAST_ROTATION_RAD:
-            how = f"station {number} ({mount.station}) looks turned {rotation_text(off)} on its strap, in its own axes"
-            told.append(f"{how}: taken as it is")
-    return tuple(told)
+            rotation = f"{rotation_text(off)} on its strap, in its own axes"
+            hints.append(
+                f"station {number} ({mount.station}) is rotated by {rotation}; the calibration accounts for it"
+            )
+    return tuple(hints)
 
 
 def estimate_boresight_rad(world_from_bone: Floats, world_from_station: Floats) -> Floats:
-    """(S, 3) rotation vector by which each station's orientations (P, S, 3, 3) look turned in the room, given how its
-    bone (P, S, 3, 3) was about turned in each pose; 0 where a mount explains them as well [rad]."""
+    """(S, 3) rotation vector in the room that a boresight adds to each station's orientations [rad].
+
+    Arguments are approximate bone orientations and reported station orientations, both (P, S, 3, 3). The result is 0
+    where a mount explains the readings as well.
+    """
     plain = _squared_residual(np.eye(3)[None, None], world_from_bone, world_from_station)
     if np.all(plain < 3.0 * len(world_from_bone) * _POSE_ERROR_RAD**2):
         return np.zeros((len(plain), 3))
@@ -59,7 +64,7 @@ def estimate_boresight_rad(world_from_bone: Floats, world_from_station: Floats) 
 
 
 def rotation_text(turn_rad: Floats) -> str:
-    """Words for a rotation vector (3,): "90 deg about z"."""
+    """Text of a rotation vector (3,), such as "90 deg about z"."""
     angle = float(np.linalg.norm(turn_rad))
     axis = turn_rad / angle
     most = int(np.argmax(np.abs(axis)))
@@ -72,7 +77,7 @@ _INITIAL_ROTATIONS_RAD = 0.5 * np.pi * np.concatenate([np.eye(3), -np.eye(3), 2.
 
 
 def _squared_residual(room: Floats, world_from_bone: Floats, world_from_station: Floats) -> Floats:
-    """(S,) squared angles that are left when stations are turned so in the room and mounted as fits best."""
+    """(S,) squared residual angles for a rotation in the room, with the mounts that fit best [rad^2]."""
     turned = room @ world_from_bone
     mounted = mean_rotations(np.swapaxes(turned, -1, -2) @ world_from_station)
     off = rotations.log(rotations.from_matrix(np.swapaxes(turned @ mounted, -1, -2) @ world_from_station))

@@ -1,8 +1,8 @@
-"""T-pose calibration (Kim et al. 2012, eq. 1; docs/methods.md B2, H13): the first seconds of a stream, in which the
-performer stands in T-pose, give the room's frame and how each tracker is strapped on.
+"""T-pose calibration (Kim et al. 2012, eq. 1; docs/methods.md B2, H13).
 
-Gravity is the tracker's z axis (docs/is900.md 5.3); where the performer stands and faces then is the pose's place in
-the virtual world: by default its origin, facing x. Straps may be put on in any orientation.
+While the performer stands in T-pose for some seconds, the readings give the room's frame and the mount of each
+tracker. Gravity is the tracker's z axis (docs/is900.md 5.3). The performer's position and heading in the pose define
+the world's frame: by default its origin, facing x. Straps may be put on in any orientation.
 """
 
 from collections import deque
@@ -25,30 +25,31 @@ from harness.stream.frame import TrackerFrame
 
 TPOSE_S = 3.0
 LEVEL_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
-"""World from tracker but for the heading: x forward, y right, z down are half a turn about x from the world's axes."""
+"""World from tracker without the heading: x forward, y right, z down is half a turn about x from the world's axes."""
 CONFIDENCE = 0.99
-"""A performer who misses the T-pose as `stance` says is refused once in a hundred times [choice]."""
+"""Probability that a T-pose with the errors of `held_pose_model` is accepted [choice]."""
 EXCHANGE_ODDS = 100.0
-"""Stations are called exchanged when their places are a T-pose that way, and so much more likely [choice]."""
+"""Stations are reported as exchanged if exchanging them gives a T-pose that is this many times likelier [choice]."""
 HEADING_SD_RAD = float(np.deg2rad(20.0))
-"""Stations that tell the heading less well than this do not tell it [choice]."""
+"""Largest standard deviation of the heading that is accepted [rad] [choice]."""
 _STATURE_M = 1.755
-"""Of the standard body (harness/body/anatomy.py)."""
+"""Stature of the standard body (harness/body/anatomy.py) [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class TPoseCalibration:
-    """What a T-pose told; S stations."""
+    """Result of a T-pose calibration of S stations."""
 
     calibration: Calibration
-    """Of kind `tpose`."""
+    """Mounts and room, of kind `tpose`."""
     residual_m: Floats
-    """(S,) from where the T-pose has each station to where it was [m]: stance, proportions and mounts."""
+    """(S,) distance of each station from its nominal position [m]: pose error, proportions and mounts."""
     moved_m: Floats
-    """(S,) three quarters of its readings lay within this distance of the typical one [m]."""
+    """(S,) three quarters of its readings lie within this distance of the median [m]."""
     seconds: float
+    """Length of the hold [s]."""
     heading_sd_rad: float
-    """How well the stations tell which way the performer faced, standard deviation [rad]."""
+    """Standard deviation of the performer's heading [rad]."""
 
     def __post_init__(self) -> None:
         freeze(self, residual_m=("S",), moved_m=("S",))
@@ -57,72 +58,72 @@ class TPoseCalibration:
 def calibrate_tpose(
     frames: Sequence[TrackerFrame], body: Body, mounts: Sequence[Mount], pose: Floats | None = None
 ) -> TPoseCalibration:
-    """Calibration from frames of a performer in T-pose; trackers sit near their nominal mounts, in any orientation.
+    """Calibrate from frames of a performer in T-pose, with trackers near their nominal mounts in any orientation.
 
-    `mounts` are in the order of the stream's stations. `pose` (55,) is what the performer holds, where and facing
-    which way, if not T-pose at the world's origin. NotStanding names what is wrong with the readings and what to do;
+    `mounts` are in the order of the stream's stations. `pose` (55,) is the configuration that the performer holds;
+    the default is the T-pose at the world's origin. UnusableHold says what is wrong with the readings and what to do.
     BadInput for stations that are not the stream's.
     """
     names = [mount.station for mount in mounts]
-    still = measure_hold(frames, names)
-    stance = HeldPoseModel(body, mounts, tpose(body.skeleton) if pose is None else pose)
-    level_m = rotations.rotate(LEVEL_FROM_TRACKER, still.position_m)
-    fit = stance.fit(level_m)
-    if stance.heading_sd_rad > HEADING_SD_RAD:
+    hold = measure_hold(frames, names)
+    model = HeldPoseModel(body, mounts, tpose(body.skeleton) if pose is None else pose)
+    level_m = rotations.rotate(LEVEL_FROM_TRACKER, hold.position_m)
+    fit = model.fit(level_m)
+    if model.heading_sd_rad > HEADING_SD_RAD:
         raise UnusableHold(
-            f"Stations {', '.join(names)} do not tell which way the performer faces in T-pose.",
+            f"Stations {', '.join(names)} do not determine which way the performer faces in T-pose.",
             "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
         )
-    _require_no_exchange(stance, level_m, fit, mounts)
+    _require_no_exchange(model, level_m, fit, mounts)
     _require_pose(fit, names, body)
-    beside_m, turned = stance.decompose_residual(fit.residual_m)
+    beside_m, turned = model.decompose_residual(fit.residual_m)
     world_from_tracker = rotations.multiply(rotations.about_z(fit.heading_rad), LEVEL_FROM_TRACKER)
-    bone_from_world = rotations.inverse(rotations.multiply(rotations.exp(turned), stance.world_from_bone))
-    world_from_station = rotations.multiply(world_from_tracker, still.tracker_from_station)
+    bone_from_world = rotations.inverse(rotations.multiply(rotations.exp(turned), model.world_from_bone))
+    world_from_station = rotations.multiply(world_from_tracker, hold.tracker_from_station)
     calibration = Calibration(
         kind="tpose",
         stations=tuple(names),
         bones=tuple(mount.bone for mount in mounts),
-        mount_m=stance.mount_m + rotations.rotate(bone_from_world, beside_m),
+        mount_m=model.mount_m + rotations.rotate(bone_from_world, beside_m),
         bone_from_station=rotations.multiply(bone_from_world, world_from_station),
         world_from_tracker=world_from_tracker,
         tracker_origin_m=fit.origin_m,
     )
     residual_m = np.linalg.norm(fit.residual_m, axis=1)
-    return TPoseCalibration(calibration, residual_m, still.moved_m, still.seconds, stance.heading_sd_rad)
+    return TPoseCalibration(calibration, residual_m, hold.moved_m, hold.seconds, model.heading_sd_rad)
 
 
 class TPoseCollector:
-    """Keeps the last seconds of a stream; when they are no T-pose, more frames may follow."""
+    """Keeps the last seconds of a stream. If they are not a T-pose, more frames may be added."""
 
     def __init__(self, seconds: float = TPOSE_S) -> None:
         self.seconds = seconds
         self.frames: deque[TrackerFrame] = deque()
 
     def add(self, frame: TrackerFrame) -> bool:
-        """True when there are enough to calibrate from."""
+        """Add a frame; True when there are enough to calibrate from."""
         self.frames.append(frame)
         while len(self.frames) > 2 and frame.received_s - self.frames[1].received_s >= self.seconds:
             self.frames.popleft()
         return span_s(self.frames) >= self.seconds
 
 
-def _require_no_exchange(stance: HeldPoseModel, level_m: Floats, fit: HeldPoseFit, mounts: Sequence[Mount]) -> None:
-    """NotStanding when two stations, or all left and right ones, exchanged make a far likelier T-pose."""
-    everyone = list(range(len(mounts)))
-    exchanges = [[pair] for pair in combinations(everyone, 2)] + [_left_right_pairs(mounts)]
+def _require_no_exchange(model: HeldPoseModel, level_m: Floats, fit: HeldPoseFit, mounts: Sequence[Mount]) -> None:
+    """UnusableHold when exchanging two stations, or all left and right ones, makes a far likelier T-pose."""
+    rows_as_worn = list(range(len(mounts)))
+    exchanges = [[pair] for pair in combinations(rows_as_worn, 2)] + [_left_right_pairs(mounts)]
     best, which = fit.chi_square, exchanges[-1]
     for exchange in exchanges:
-        rows = list(everyone)
+        rows = list(rows_as_worn)
         for a, b in exchange:
             rows[a], rows[b] = b, a
-        if (cost := stance.fit(level_m[rows]).chi_square) < best:
+        if (cost := model.fit(level_m[rows]).chi_square) < best:
             best, which = cost, exchange
     if best > _chi_square_limit(len(mounts)) or fit.chi_square - best < 2.0 * np.log(EXCHANGE_ODDS):
         return
-    told = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
+    pairs = " and ".join(f"{mounts[a].station!r} with {mounts[b].station!r}" for a, b in which)
     raise UnusableHold(
-        f"Stations look exchanged: {told}.",
+        f"Stations look exchanged: {pairs}.",
         "Check which tracker is worn where, or name the stations the other way round; then hold the T-pose again.",
     )
 
@@ -138,13 +139,13 @@ def _left_right_pairs(mounts: Sequence[Mount]) -> list[tuple[int, int]]:
 
 
 def _require_pose(fit: HeldPoseFit, names: Sequence[str], body: Body) -> None:
-    """NotStanding when nobody who tries to stand in T-pose with this body would have stations there."""
+    """UnusableHold when the stations are too far from a T-pose of this body."""
     if fit.chi_square <= _chi_square_limit(len(names)):
         return
     residual_m = np.linalg.norm(fit.residual_m, axis=1)
     rms_m, worst = float(np.sqrt(np.mean(residual_m**2))), int(np.argmax(residual_m))
     raise UnusableHold(
-        f"The stance is no T-pose of this body: stations are {1e3 * rms_m:.0f} mm from their places (root mean square, "
+        f"This is not a T-pose of the body: stations are {1e3 * rms_m:.0f} mm from their places (root mean square, "
         f"{rms_m / (_STATURE_M * body_scale(body.skeleton)):.1%} of the stature), {names[worst]!r} most with "
         f"{1e3 * residual_m[worst]:.0f} mm.",
         "Stand upright, arms straight out to the sides, palms down, feet below the hips; or give the performer's body.",
@@ -152,6 +153,6 @@ def _require_pose(fit: HeldPoseFit, names: Sequence[str], body: Body) -> None:
 
 
 def _chi_square_limit(stations: int) -> float:
-    """The squared residual, in units of the model's spread, that a T-pose stays within."""
+    """Largest squared Mahalanobis residual that is accepted as a T-pose."""
     degrees = max(3 * stations - len(FREE_DOFS), 1)
     return float(2.0 * gammaincinv(0.5 * degrees, CONFIDENCE))  # chi2.ppf without scipy.stats, which loads for a second

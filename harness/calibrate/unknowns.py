@@ -1,5 +1,6 @@
-"""What eight poses are to tell: bones, mode weights and mounts, which all poses share, and each pose's own root and
-hinges; and what is expected of the shared ones beforehand (Liu et al. 2011, eq. 1, its last term; docs/methods.md H15).
+"""The unknowns of the eight-pose calibration and their prior (Liu et al. 2011, eq. 1, its last term).
+
+All poses share bones, mode weights and mounts; each pose has a root and hinges of its own (docs/methods.md H15).
 """
 
 from collections.abc import Sequence
@@ -14,79 +15,90 @@ from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
 
 MOUNT_ALONG_SD_M, MOUNT_ACROSS_SD_M = 0.03, 0.015
-"""How far trackers sit from their nominal mounts, standard deviation along the bone and on the two axes across it, as
-`stance` has it; here the spread of the very trackers that are worn is estimated in units of it."""
+"""Distance of trackers from their nominal mounts, standard deviation along the bone and on the two axes across it [m].
+
+The values are those of `held_pose_model`; the fit estimates the actual spread in units of them (`mount_spread`)."""
 _LEAST_ACROSS_M = 1e-6
-"""Bones that point so much alike in all people point the same."""
+"""Directions with a smaller standard deviation than this are taken as fixed [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationSolution:
-    """Values of everything that is sought; N bones, B modes, S stations, P poses, D hinges."""
+    """Values of all unknowns; N bones, B modes, S stations, P poses, D hinges."""
 
     bone_m: Floats
     """(N, 3) bone vectors in the rest pose."""
     weights_m: Floats
-    """(B,) of the modes: lambda of eq. 1."""
+    """(B,) weights of the modes: lambda of eq. 1 [m]."""
     mount_m: Floats
-    """(S, 3) p of eq. 1."""
+    """(S, 3) mounts in their bones' frames: p of eq. 1 [m]."""
     bone_from_station: Floats
-    """(S, 3, 3) o of eq. 1."""
+    """(S, 3, 3) orientation of each station on its bone: o of eq. 1."""
     root_m: Floats
-    """(P, 3)"""
+    """(P, 3) root position in each pose [m]."""
     world_from_root: Floats
-    """(P, 3, 3)"""
+    """(P, 3, 3) root orientation in each pose."""
     angles_rad: Floats
-    """(P, D)"""
+    """(P, D) hinge angles in each pose [rad]."""
 
     @property
     def length_m(self) -> Floats:
-        """(N,)"""
+        """(N,) bone lengths [m]."""
         out: Floats = np.sqrt(np.sum(self.bone_m**2, axis=1))
         return out
 
 
 class SharedUnknowns:
-    """The X unknowns that all poses share: G bone coordinates (along each bone's mean direction, and across it where
-    people differ), B mode weights, then S mounts and S small turns of stations in their own axes."""
+    """The X unknowns that all poses share.
+
+    In order: G bone coordinates (along each bone's mean direction, and across it where people differ), B mode weights,
+    S mounts, and S small rotations of stations in their own axes.
+    """
 
     def __init__(self, like: Skeleton, space: SkeletonPrior, mounts: Sequence[Mount]) -> None:
         self.template, self.space, self.mounts = like, space, tuple(mounts)
         self.carriers: Ints = np.array([like.index(mount.bone) for mount in mounts], dtype=np.int64)
         vectors = np.concatenate([space.direction[:, None], space.across], axis=1)
-        spread_m = np.concatenate([np.full((like.bone_count, 1), np.inf), space.across_m], axis=1)
-        kept = spread_m > _LEAST_ACROSS_M
+        sd_m = np.concatenate([np.full((like.bone_count, 1), np.inf), space.across_m], axis=1)
+        kept = sd_m > _LEAST_ACROSS_M
         self.bone_of: Ints = np.nonzero(kept)[0]
         self.vector: Floats = vectors[kept]
-        """(G,) and (G, 3): the bone that a bone coordinate adds to, and along what."""
-        self._coordinate_m: Floats = spread_m[kept]
-        """(G,) its standard deviation; infinite along a bone, of which the modes know."""
+        """(G,) and (G, 3): the bone that a bone coordinate belongs to, and its direction."""
+        self._coordinate_m: Floats = sd_m[kept]
+        """(G,) its standard deviation; infinite along a bone, since the modes hold the prior of the length."""
         self._along = np.array([mount.along for mount in mounts])
         sizes = np.cumsum([len(self.vector), len(space.modes), 3 * len(mounts), 3 * len(mounts)])
         self.bones, self.weights, self.mount, self.turn = map(slice, (0, *sizes[:-1]), sizes)
         self.count = int(sizes[-1])
 
-    def flesh_m(self, bone_m: Floats) -> Floats:
-        """(S, 3) from the bones (N, 3) to the nominal mounts on the skin: of a body with these bones."""
+    def skin_offset_m(self, bone_m: Floats) -> Floats:
+        """(S, 3) offset of the nominal mounts on the skin from bones (N, 3), for a body with these bones [m]."""
         skeleton = self.template.with_bones(bone_m)
         nominal_m = np.array([locate_mount(skeleton, mount)[0] for mount in self.mounts])
         return nominal_m - self._along[:, None] * bone_m[self.carriers]
 
-    def nominal_m(self, bone_m: Floats, flesh_m: Floats) -> Floats:
-        """(S, 3) nominal mounts."""
-        out: Floats = self._along[:, None] * bone_m[self.carriers] + flesh_m
+    def nominal_m(self, bone_m: Floats, skin_offset_m: Floats) -> Floats:
+        """(S, 3) nominal mounts in their bones' frames, given bones (N, 3) and skin offsets (S, 3) [m]."""
+        out: Floats = self._along[:, None] * bone_m[self.carriers] + skin_offset_m
         return out
 
-    def prior_residuals(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
+    def prior_residuals(
+        self, at: CalibrationSolution, mount_spread: float, skin_offset_m: Floats
+    ) -> tuple[Floats, Floats]:
         """Residuals (R,) in units of what is expected beforehand, and slopes (R, X).
 
-        `beside` is the trackers' spread about the nominal mounts in units of ALONG_M and ACROSS_M.
+        `mount_spread` is the trackers' spread about the nominal mounts in units of ALONG_M and ACROSS_M.
         """
-        parts = self._lengths(at), self._weights(at), self._across(at), self.mount_prior_residuals(at, beside, flesh_m)
+        parts = (
+            self._lengths(at),
+            self._weights(at),
+            self._across(at),
+            self.mount_prior_residuals(at, mount_spread, skin_offset_m),
+        )
         residuals, slopes = zip(*parts, strict=True)
         return np.concatenate(residuals), np.concatenate(slopes)
 
-    def length_slope(self, at: CalibrationSolution) -> Floats:
+    def length_jacobian(self, at: CalibrationSolution) -> Floats:
         """(N, X) how bone lengths change."""
         out = np.zeros((len(at.bone_m), self.count))
         along = (at.bone_m / at.length_m[:, None])[self.bone_of]
@@ -95,43 +107,49 @@ class SharedUnknowns:
 
     def _lengths(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
         """What the modes leave of the lengths."""
-        slope = self.length_slope(at)
+        slope = self.length_jacobian(at)
         slope[:, self.weights] = -self.space.modes.T
         left_m = at.length_m - self.space.mean_m - at.weights_m @ self.space.modes
-        return left_m / self.space.rest_m, slope / self.space.rest_m[:, None]
+        return left_m / self.space.residual_sd_m, slope / self.space.residual_sd_m[:, None]
 
     def _weights(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
         slope = np.zeros((len(at.weights_m), self.count))
-        slope[:, self.weights] = np.diag(1.0 / self.space.spread_m)
-        return at.weights_m / self.space.spread_m, slope
+        slope[:, self.weights] = np.diag(1.0 / self.space.mode_sd_m)
+        return at.weights_m / self.space.mode_sd_m, slope
 
     def _across(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
-        """How far bones point from the mean direction."""
+        """Deviation of the bones from their mean direction, in standard deviations, and its Jacobian."""
         slope = np.zeros((len(self.vector), self.count))
         slope[:, self.bones] = np.diag(1.0 / self._coordinate_m)
         return np.sum(at.bone_m[self.bone_of] * self.vector, axis=1) / self._coordinate_m, slope
 
-    def mount_prior_residuals(self, at: CalibrationSolution, beside: float, flesh_m: Floats) -> tuple[Floats, Floats]:
-        """How far trackers sit from their nominal mounts on these bones, along bones as they point on average, and
-        across."""
+    def mount_prior_residuals(
+        self, at: CalibrationSolution, mount_spread: float, skin_offset_m: Floats
+    ) -> tuple[Floats, Floats]:
+        """Distance of mounts from nominal ones, in units of the spread `mount_spread`, and its Jacobian.
+
+        The spread differs along and across the bones' mean directions.
+        """
         along = self.space.direction[self.carriers]
         onto = along[:, :, None] * along[:, None]
-        root = (np.eye(3) / MOUNT_ACROSS_SD_M + (1.0 / MOUNT_ALONG_SD_M - 1.0 / MOUNT_ACROSS_SD_M) * onto) / beside
+        root = (
+            np.eye(3) / MOUNT_ACROSS_SD_M + (1.0 / MOUNT_ALONG_SD_M - 1.0 / MOUNT_ACROSS_SD_M) * onto
+        ) / mount_spread
         slope = np.zeros((len(self.mounts), 3, self.count))
         for j, bone in enumerate(self.carriers):
             own = np.flatnonzero(self.bone_of == bone)
             slope[j][:, own] = -self._along[j] * self.vector[own].T
             slope[j][:, self.mount][:, 3 * j : 3 * j + 3] = np.eye(3)
-        off_m = at.mount_m - self.nominal_m(at.bone_m, flesh_m)
+        off_m = at.mount_m - self.nominal_m(at.bone_m, skin_offset_m)
         return (root @ off_m[..., None]).ravel(), (root @ slope).reshape(-1, self.count)
 
 
 def apply_step(
-    at: CalibrationSolution, shared: SharedUnknowns, step: Floats, own: Floats, hinges: Ints
+    at: CalibrationSolution, shared: SharedUnknowns, step: Floats, pose_step: Floats, hinges: Ints
 ) -> CalibrationSolution:
-    """One step of what is shared (X,) and of each pose's root and these hinges (P, 6 + H) from a solution."""
+    """A solution plus one step of the shared unknowns (X,) and of each pose's root and hinges (P, 6 + H)."""
     angles_rad = np.array(at.angles_rad)
-    angles_rad[:, hinges] += own[:, 6:]
+    angles_rad[:, hinges] += pose_step[:, 6:]
     bone_m = np.array(at.bone_m)
     np.add.at(bone_m, shared.bone_of, step[shared.bones, None] * shared.vector)
     return CalibrationSolution(
@@ -139,8 +157,8 @@ def apply_step(
         weights_m=at.weights_m + step[shared.weights],
         mount_m=at.mount_m + step[shared.mount].reshape(-1, 3),
         bone_from_station=at.bone_from_station @ _rotation_matrices(step[shared.turn].reshape(-1, 3)),
-        root_m=at.root_m + own[:, :3],
-        world_from_root=_rotation_matrices(own[:, 3:6]) @ at.world_from_root,
+        root_m=at.root_m + pose_step[:, :3],
+        world_from_root=_rotation_matrices(pose_step[:, 3:6]) @ at.world_from_root,
         angles_rad=angles_rad,
     )
 

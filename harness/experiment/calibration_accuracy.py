@@ -253,7 +253,7 @@ def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> Cali
         mount_sd_m=found.mount_sd_m,
         turn_rad=rotations.angle_between_rad(known.bone_from_station, true.bone_from_station),
         turn_sd_rad=found.mount_sd_rad,
-        miss_rad=found.miss_rad,
+        miss_rad=found.hinge_error_rad,
     )
 
 

@@ -96,8 +96,8 @@ class CalibrationSession:
         watch: Notifier = lambda text: None,
     ) -> PoseCollector:
         """Lead the performer through the poses; NotStanding when the stream ends before the last."""
-        likeness = PoseClassifier(self.body, self.mounts, self.pose_qpos)
-        collector = PoseCollector(self.stations, len(self.poses), likeness)
+        classifier = PoseClassifier(self.body, self.mounts, self.pose_qpos)
+        collector = PoseCollector(self.stations, len(self.poses), classifier)
         PoseGuide(collector, self.poses, self.pose_qpos, show).run(frames, say, watch)
         return collector
 

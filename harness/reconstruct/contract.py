@@ -1,4 +1,4 @@
-"""What a reconstructor is: a configured method, trained once, then one causal session per take."""
+"""Interfaces of a reconstructor: a configured method is trained once, then makes one causal session per take."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
@@ -16,50 +16,54 @@ if TYPE_CHECKING:
 
 
 class Session(Protocol):
-    """One performer, one take. Causal: an estimate may rest on this frame and those before it."""
+    """Reconstruction of one take of one performer."""
 
-    def step(self, frame: TrackerFrame) -> Estimate: ...
+    def step(self, frame: TrackerFrame) -> Estimate:
+        """Estimate of the body at a frame; causal, from this frame and earlier ones only."""
+        ...
 
 
 class Reconstructor(Protocol):
-    """Trained and immutable; shared between sessions and processes."""
+    """A trained method; immutable, and shared between sessions and processes."""
 
-    def begin(self, calibration: Calibration) -> Session: ...
+    def begin(self, calibration: Calibration) -> Session:
+        """Start a session for stations with the mounts of a calibration."""
+        ...
 
 
 class Method(Protocol):
-    """A configured algorithm; its `repr` tells its options, as that of a dataclass does.
+    """A configured algorithm. Its `repr` must show its options, as that of a dataclass does.
 
-    It may also have `source`, where it comes from, which `harness list` prints.
+    It may also have an attribute `source`, the paper it comes from, which `harness list` prints.
     """
 
     @property
     def name(self) -> str:
-        """As it stands in tables, such as "ik"."""
+        """Name in tables, such as "ik"."""
         ...
 
     @property
     def summary(self) -> str:
-        """What it does, in one line."""
+        """Description in one line."""
         ...
 
     @property
     def needs_examples(self) -> bool:
-        """Whether `fit` learns from other takes; without it the result's split is "none"."""
+        """Whether `fit` learns from other takes. If not, the split of its results is "none"."""
         ...
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Reconstructor:
-        """Learn from takes at the tracker's rate, retargeted to `body`; never from the take under test."""
+        """Learn from motions at the tracker's rate, retargeted to `body`; never from the take under test."""
         ...
 
 
 @runtime_checkable
 class DatabaseMethod(Method, Protocol):
-    """A method that can also learn from a database on disk, for which takes would not fit into memory.
+    """A method that can also learn from a database on disk, which may be larger than memory.
 
     `fit(body, examples, rng)` of such a method is `fit_database(body, MotionDatabase.build(body, examples), rng)`.
     """
 
     def fit_database(self, body: Body, database: "MotionDatabase", rng: np.random.Generator) -> Reconstructor:
-        """Learn from poses on `body` at the tracker's rate; they may be memory-mapped: copy none that need not be."""
+        """Learn from poses on `body` at the tracker's rate; they may be memory-mapped, so avoid copies."""
         ...

@@ -1,7 +1,7 @@
-"""Methods by name: the built-in ones, those of installed packages, and anyone's own as `module:Class`.
+"""Registry of methods by name: built-in ones, those of installed packages, and any class as `module:Class`.
 
-A package adds its own through the entry-point group `harness.methods`: name -> a callable that makes the method.
-`+ik` after a name adds the final clean-up of `clean_up`. Options follow in brackets (`harness.core.options`).
+A package registers methods in the entry-point group `harness.methods`: name -> a callable that makes the method.
+`+ik` after a name adds final inverse kinematics (`clean_up`). Options follow in brackets (`harness.core.options`).
 """
 
 import ast
@@ -19,7 +19,7 @@ from typing import Any, cast
 
 from harness.core.fields import replace_fields
 from harness.core.options import parse_name, split_outside_brackets
-from harness.errors import BadInput, HarnessError, UnknownName
+from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
 from harness.reconstruct.methods import dynamic_map, ik
 from harness.reconstruct.methods.best_match import BestMatch
@@ -31,12 +31,13 @@ from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.reconstruct.methods.weighted_blend import WeightedBlend
 
 GROUP = "harness.methods"
+"""Entry-point group of installed packages."""
 _REQUIRED_ATTRIBUTES = ("name", "summary", "needs_examples", "fit")
-"""What everything that is a method has; none of it is an option."""
+"""Attributes that every method has; none of them is an option."""
 
 
 def methods() -> dict[str, Callable[[], Method]]:
-    """Everything that can be named, but for `module:Class` and `+ik`; packages may not take a built-in name."""
+    """Name -> factory of all registered methods. Installed packages cannot replace a built-in name."""
     known: dict[str, Callable[[], Method]] = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
     return known | {
         "ik": ik.Ik,
@@ -67,12 +68,12 @@ _ORIGINS = {
 
 
 def origin(name: str) -> str:
-    """Where a method comes from: its field `source`, which is optional; of presets that of the method they preset."""
+    """Source of a method: its optional attribute `source`, else that of the built-in method that it presets."""
     return str(getattr(resolve(name), "source", "") or _ORIGINS.get(name.partition(":")[0], ""))
 
 
 def resolve(name: str) -> Method:
-    """The method of that name, with options as in `best_match[matching=tree]+ik`; UnknownName, BadInput."""
+    """The method of a name with options, such as `local_pca[neighbours=100]+ik`; UnknownName, RenamedKey, BadInput."""
     base, *suffixes = split_outside_brackets(name, "+")
     plain, options = parse_name(base)
     method = with_options(_base_method(plain), options, base)
@@ -85,19 +86,25 @@ def resolve(name: str) -> Method:
 
 
 def without_options(name: str) -> str:
-    """`best_match[matching=tree]+ik` as `best_match+ik`."""
+    """The name without options: `local_pca[neighbours=100]+ik` becomes `local_pca+ik`."""
     return "+".join(parse_name(part)[0] for part in split_outside_brackets(name, "+"))
 
 
 def with_options(method: Method, options: Mapping[str, Any], name: str) -> Method:
-    """A copy of that name with other options, the fields of its dataclass; UnknownName, BadInput."""
+    """A copy of a method with this name and other options, the fields of its dataclass.
+
+    UnknownName for an option that does not exist, RenamedKey for an old name, BadInput for a bad value.
+    """
     if not options:
         return method
     if not dataclasses.is_dataclass(method) or isinstance(method, type):
-        raise BadInput(f"{method.name} takes no options.", "Those of a method are the fields of its dataclass.")
+        raise BadInput(f"{method.name} takes no options.", "Options are the fields of a method's dataclass.")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
     known = [field for field in fields if field not in _REQUIRED_ATTRIBUTES]
+    renamed: Mapping[str, str] = getattr(method, "RENAMED_KEYS", {})
     for option in options:
+        if option in renamed:
+            raise RenamedKey(f"option of {method.name}", option, renamed[option])
         if option not in known:
             raise UnknownName(f"option of {method.name}", option, known)
     try:
@@ -105,11 +112,12 @@ def with_options(method: Method, options: Mapping[str, Any], name: str) -> Metho
         return cast(Method, dataclasses.replace(copy, name=name) if "name" in fields else copy)
     except HarnessError:
         raise
-    except Exception as error:  # anyone's own code may raise anything
+    except Exception as error:  # code from outside may raise anything
         raise BadInput(f"{error}.", f"Options of {method.name}: {', '.join(known)}.") from error
 
 
 def _base_method(name: str) -> Method:
+    """The method of a name without options or suffix; UnknownName, BadInput."""
     known = methods()
     if name in known:
         return known[name]()
@@ -117,15 +125,15 @@ def _base_method(name: str) -> Method:
     if not colon or not attribute or module in known or not _module_exists(module):
         raise UnknownName("method", name, known)
     try:
-        found = getattr(importlib.import_module(module), attribute, None)
-        if found is None:
+        factory = getattr(importlib.import_module(module), attribute, None)
+        if factory is None:
             raise UnknownName(f"method in {module}", attribute, _public_classes(module))
-        method: Method = found()
+        method: Method = factory()
     except HarnessError:
         raise
-    except (Exception, SystemExit) as error:  # anyone's own code may raise anything
+    except (Exception, SystemExit) as error:  # code from outside may raise anything
         raise BadInput(
-            f"{name} cannot be made: {type(error).__name__}: {error}.", "Does it import, and need no arguments?"
+            f"{name} cannot be made: {type(error).__name__}: {error}.", "It must import, and need no arguments."
         ) from error
     missing = [m for m in _REQUIRED_ATTRIBUTES if not hasattr(method, m)]
     if missing:
@@ -137,12 +145,12 @@ def _base_method(name: str) -> Method:
 
 
 def summary(name: str) -> str:
-    """The method's line in lists."""
+    """Description of a method in one line."""
     return resolve(name).summary
 
 
 def source_hash(method: Method) -> str:
-    """A digest of the files that define the method and what it wraps; BadInput when there are none to read."""
+    """Digest of the source files of a method and of the methods it wraps; BadInput when a file cannot be read."""
     digest = hashlib.blake2b(digest_size=16)
     inner: object = method
     while inner is not None:
@@ -160,25 +168,25 @@ def source_hash(method: Method) -> str:
 
 @cache
 def _package_hash(folders: tuple[str, ...]) -> bytes:
-    """Of all of a method's package, read once: hundreds of files."""
-    return _hash_of(part for folder in folders for part in Path(folder).rglob("*.py"))
+    """Digest of all source files of a package; cached."""
+    return _hash_files(part for folder in folders for part in Path(folder).rglob("*.py"))
 
 
 def _file_hash(file: Path) -> bytes:
-    """Of a method's file and what it imports from its folder."""
-    found, waiting = set(), [file]
+    """Digest of a method's file and of the modules in its folder that it imports, recursively."""
+    files, waiting = set(), [file]
     while waiting:
-        if (part := waiting.pop()) not in found:
-            found.add(part)
+        if (part := waiting.pop()) not in files:
+            files.add(part)
             nodes = list(ast.walk(ast.parse(part.read_bytes())))
             names = [a.name for node in nodes if isinstance(node, ast.Import) for a in node.names]
             names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
             beside = [part.parent / f"{name.partition('.')[0]}.py" for name in names]
             waiting += [other for other in beside if other.is_file()]
-    return _hash_of(found)
+    return _hash_files(files)
 
 
-def _hash_of(files: Iterable[Path]) -> bytes:
+def _hash_files(files: Iterable[Path]) -> bytes:
     digest = hashlib.blake2b(digest_size=16)
     for file in sorted(files):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())

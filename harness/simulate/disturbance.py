@@ -1,7 +1,7 @@
-"""Faults that a reconstructor must get over, by name: what happens, for how long, and back to normal.
+"""Disturbances: named faults of limited duration from which a reconstructor must recover.
 
-Two runs that differ in nothing but their disturbance share every other draw (`core.seeds`), so that the one shows what
-the other's error would have been; `results.recovery` compares them.
+Two runs that differ only in their disturbance share every other random draw (`core.seeds`). So the undisturbed run
+shows the error without the fault; `results.recovery` compares the two.
 """
 
 from dataclasses import asdict, dataclass, replace
@@ -22,40 +22,46 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 
 @dataclass(frozen=True)
 class Disturbance:
-    """One named fault that ends; sizes and length are those of docs/methods.md H ("recovery")."""
+    """A fault of limited duration; sizes and lengths are those of docs/methods.md H ("recovery")."""
 
     kind: Kind = "none"
-    """One station or all lost, one off its place, all orientations turned, or everything elsewhere at the start."""
+    """Kind of fault.
+
+    `one_lost`, `all_lost`: one station or all are lost. `one_off`: one station has a constant position error.
+    `all_turned`: all orientations are rotated. `start_off`: all positions are offset at the start.
+    """
     station: str = ""
-    """The one; "" is the first."""
+    """Station of `one_lost` and `one_off`; "" is the first."""
     from_s: float = 3.0
     """When it begins [s]; `start_off` begins with the take."""
     lasts_s: float = 2.0
+    """Duration [s]."""
     off_m: float = 0.3
-    """How far the one station is off [m]."""
+    """Position error of `one_off` [m]."""
     turn_deg: float = 30.0
-    """About the vertical [deg]."""
+    """Angle of `all_turned` about the vertical [deg]."""
     start_off_m: float = 1.0
-    """How far from its place everything is at the start [m]."""
+    """Position error of `start_off` [m]."""
 
     def __post_init__(self) -> None:
         require_ranges(self, from_s=(0.0, 1e6), lasts_s=(0.0, 1e6))
 
     @property
     def begins_s(self) -> float:
+        """First time of the fault [s]."""
         return 0.0 if self.kind == "start_off" else self.from_s
 
     @property
     def ends_s(self) -> float:
-        """The first moment after it [s]."""
+        """First time after the fault [s]."""
         return self.begins_s + self.lasts_s
 
     def as_dict(self) -> dict[str, Any]:
-        """With the time of its beginning and end, so that a reader need not know how they are found."""
+        """Fields as a dictionary, with the computed beginning and end."""
         return {**asdict(self), "begins_s": self.begins_s, "ends_s": self.ends_s}
 
     def add_to(self, noise: Noise, stations: tuple[str, ...]) -> Noise:
-        """The noise and this on top of it; UnknownName when nobody wears the one station."""
+        """The noise with this fault added; UnknownName for a station that is not worn."""
         if self.station and self.station not in stations:
             raise UnknownName("station", self.station, stations)
         within = {"from_s": self.begins_s, "to_s": self.ends_s}
@@ -64,8 +70,8 @@ class Disturbance:
             case "none":
                 return noise
             case "one_lost" | "all_lost":
-                gone = one if self.kind == "one_lost" else stations
-                return replace(noise, lost=(*noise.lost, *(LostStation(s, fade_s=0.0, **within) for s in gone)))
+                lost = one if self.kind == "one_lost" else stations
+                return replace(noise, lost=(*noise.lost, *(LostStation(s, fade_s=0.0, **within) for s in lost)))
             case "one_off":
                 return replace(
                     noise,
@@ -83,5 +89,5 @@ class Disturbance:
 
 
 def forward_offset_m(by_m: float) -> tuple[float, float, float]:
-    """Forward in the tracker's frame."""
+    """An offset forward in the tracker's frame [m]."""
     return by_m, 0.0, 0.0

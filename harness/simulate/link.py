@@ -1,4 +1,4 @@
-"""The tracker as a device on a line: when it samples each station, and when the records arrive."""
+"""Timing of the tracker and its serial line: when stations are sampled and when records arrive."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -12,42 +12,42 @@ from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 
 @dataclass(frozen=True)
 class TrackerConfig:
-    """An IS-900 at work."""
+    """Rates, latency, line and output list of a simulated IS-900."""
 
     rate_hz: float = 40.0
     """Records per second of each station (Liu et al. 2011)."""
     latency_s: float = 0.004
-    """From the sample to the first bit on the line, when the line is free (docs/is900.md 13.1, unverified)."""
+    """Delay from the sample to the first bit on a free line [s] (docs/is900.md 13.1, unverified)."""
     baud: int = 115200
     """Bits per second of the line (docs/is900.md 2)."""
     slot_s: float | None = None
-    """Stations are sampled in turn, this much apart [s]; by default as fast as the line takes their records."""
+    """Time between the samples of one station and the next [s]; by default as fast as the line takes records."""
     items: tuple[int, ...] = STANDARD_LIST
-    """Output list of every station."""
+    """Output list (item numbers) of every station."""
     queue_records: int = 12
-    """Records that wait for the line before the oldest is dropped (docs/is900.md 14; the size is a choice)."""
+    """Length of the send queue; when it is full the oldest record is dropped (docs/is900.md 14) [choice]."""
     origin_m: tuple[float, float, float] = (0.0, 0.0, 2.5)
-    """Origin of the tracker's frame in the world [m]: a constellation under the ceiling."""
+    """Origin of the tracker's frame in the world [m]; the default is under the ceiling."""
 
     def __post_init__(self) -> None:
-        for key, good, wanted in (
+        for key, valid, wanted in (
             ("rate_hz", 0.0 < self.rate_hz < 1e5, "a number above 0 and below 100000"),
             ("latency_s", 0.0 <= self.latency_s < 60.0, "a number from 0, below 60"),
             ("baud", self.baud >= 1, "a number from 1"),
             ("queue_records", self.queue_records >= 1, "a number from 1"),
         ):
-            if not good:
-                raise BadInput(f"A tracker's {key} = {getattr(self, key):g}.", f"Give {wanted}.")
+            if not valid:
+                raise BadInput(f"The tracker's {key} = {getattr(self, key):g}.", f"Give {wanted}.")
         if 21 not in self.items:
             raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")
 
     @property
     def record_s(self) -> float:
-        """Time that one record takes on the line [s]."""
+        """Transmission time of one record [s]."""
         return record_size(self.items) * BITS_PER_BYTE / self.baud
 
     def station_slot_s(self, stations: int) -> float:
-        """Time between the samples of one station and the next [s]."""
+        """Time between the samples of one station and the next [s]; BadInput if they do not fit into a period."""
         if self.slot_s is None:
             return min(self.record_s, 1.0 / (self.rate_hz * stations))
         if not 0.0 <= self.slot_s * stations <= (1.0 + 1e-9) / self.rate_hz:
@@ -60,19 +60,20 @@ class TrackerConfig:
 
 
 def transmit(ready_s: Floats, tracker: TrackerConfig) -> tuple[Bools, Floats]:
-    """Which of N records that are ready at these times, in this order, get through, and when each has arrived [s].
+    """Transmit N records that are ready at these times, in order: which get through, and their arrival times [s].
 
-    One record at a time is on the line. A record that finds the queue full displaces the oldest one that waits.
+    One record at a time is on the line. A record that finds the queue full displaces the oldest waiting one.
     """
     busy_s = tracker.record_s
     at: Floats = busy_s * np.arange(len(ready_s), dtype=float)
     start_s: Floats = at + np.maximum.accumulate(ready_s - at)
     if np.all(start_s - ready_s <= (tracker.queue_records - 1) * busy_s):
         return np.ones(len(ready_s), bool), start_s + busy_s
-    return _overloaded(ready_s, tracker)
+    return _transmit_overloaded(ready_s, tracker)
 
 
-def _overloaded(ready_s: Floats, tracker: TrackerConfig) -> tuple[Bools, Floats]:
+def _transmit_overloaded(ready_s: Floats, tracker: TrackerConfig) -> tuple[Bools, Floats]:
+    """`transmit` for a line that cannot keep up, record by record."""
     sent, arrived_s = np.zeros(len(ready_s), bool), np.full(len(ready_s), np.nan)
     waiting: deque[int] = deque()
     free_s = 0.0

@@ -1,7 +1,7 @@
-"""A take without an end: what the trackers say during it, on the way back to its beginning, and so on.
+"""Simulated readings of a take that repeats without end: the take, then a motion back to its beginning.
 
-The take itself is sensed as `simulate` does, reading by reading. The way back blends the configuration from the last
-pose to the first (Flash & Hogan 1985: a minimum-jerk course, at rest at both ends) with noise of its own.
+The take's readings are those of `simulate_readings`. The return motion is a minimum-jerk motion from the last
+configuration to the first (Flash & Hogan 1985), with noise of its own.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from harness.simulate.trajectory import Trajectory
 from harness.stream.codec.samples import DeviceSamples
 
 SHORTEST_RETURN_S, WALK_M_S, TURN_RAD_S = 1.0, 1.2, 2.0
-"""The way back takes a second, or as long as walking there and turning round does at an easy pace."""
+"""Shortest duration of the return [s], and the walking speed and turning rate that may lengthen it."""
 _BLEND_HZ = 120.0
 
 
@@ -34,20 +34,20 @@ def simulate_loop(
     seed: int,
     session: str = "",
 ) -> DeviceSamples:
-    """The readings of a take and of the way back; BadInput when the take is shorter than one period.
+    """Readings of a take and of the return to its beginning; BadInput when the take is shorter than one period.
 
-    `session` is as in `simulate`.
+    `session` has the meaning that it has in `simulate_tracker`.
     """
-    there = Trajectory(body, take)
-    time_s = sampling_times_s(there.duration_s, tracker, len(mounts))
+    trajectory = Trajectory(body, take)
+    time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     first = len(time_s)
-    ends = there.qpos(np.array([time_s[-1, 0], 0.0]))
+    ends = trajectory.qpos(np.array([time_s[-1, 0], 0.0]))
     periods = int(np.ceil(_return_duration_s(ends[0], ends[1]) * tracker.rate_hz)) + 1
-    turns_s = time_s[0]
-    back = _return_motion(take, ends[0], ends[1], periods / tracker.rate_hz + float(turns_s[-1]))
-    back_s = np.arange(1, periods)[:, None] / tracker.rate_hz + turns_s
-    seen = [
-        simulate_readings(there, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session),
+    slots_s = time_s[0]
+    back = _return_motion(take, ends[0], ends[1], periods / tracker.rate_hz + float(slots_s[-1]))
+    back_s = np.arange(1, periods)[:, None] / tracker.rate_hz + slots_s
+    parts = [
+        simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session),
         simulate_readings(
             Trajectory(body, back),
             mounts,
@@ -61,27 +61,27 @@ def simulate_loop(
         ),
     ]
     return DeviceSamples(
-        stations=seen[0].stations,
+        stations=parts[0].stations,
         rate_hz=tracker.rate_hz,
         take_frames=first,
-        taken_s=np.concatenate([sensed.time_s for sensed in seen]),
+        taken_s=np.concatenate([part.time_s for part in parts]),
         ready_s=tracker.latency_s,
-        device_s=np.concatenate([sensed.device_s for sensed in seen]),
-        position_m=np.concatenate([sensed.position_m for sensed in seen]),
-        tracker_from_station=np.concatenate([sensed.turn for sensed in seen]),
-        quality=np.concatenate([sensed.quality for sensed in seen]),
+        device_s=np.concatenate([part.device_s for part in parts]),
+        position_m=np.concatenate([part.position_m for part in parts]),
+        tracker_from_station=np.concatenate([part.turn for part in parts]),
+        quality=np.concatenate([part.quality for part in parts]),
     )
 
 
 def _return_duration_s(last: Floats, first: Floats) -> float:
-    """How long it takes from one configuration (55,) to the other [s]."""
+    """Duration of the return from one configuration (55,) to another [s]."""
     walk_s = float(np.linalg.norm(first[:2] - last[:2])) / WALK_M_S
     turn_s = float(rotations.angle_between_rad(first[3:7], last[3:7])) / TURN_RAD_S
     return max(SHORTEST_RETURN_S, walk_s, turn_s)
 
 
 def _return_motion(take: BodyMotion, last: Floats, first: Floats, duration_s: float) -> BodyMotion:
-    """From the last configuration to the first, where it stays for what is left of the time."""
+    """Motion from the last configuration to the first, where it stays for the rest of the time."""
     rate_hz = max(_BLEND_HZ, take.rate_hz)
     time_s = np.arange(int(np.ceil(duration_s * rate_hz)) + 1) / rate_hz
     qpos = minimum_jerk(last, first, np.clip(time_s / duration_s, 0.0, 1.0))

@@ -1,4 +1,4 @@
-"""Trackers as they were really strapped on: near their nominal mounts, in whatever orientation."""
+"""Random mounts: trackers as they are really strapped on, near their nominal mounts."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,10 +10,10 @@ from harness.core.seeds import generator
 def perturb_mounts(
     mounts: Sequence[Mount], *, beside_m: float, turned_rad: float, seed: int, session: str
 ) -> tuple[Mount, ...]:
-    """The mounts with each tracker off its place by N(0, `beside_m`) along each of its axes and turned by
-    N(0, `turned_rad`) about each; of half a turn, hardly anything is left of the nominal orientation.
+    """Mounts with normal errors: `beside_m` along each axis [m], and `turned_rad` about each axis [rad].
 
-    Each station of each session draws for itself.
+    Both are standard deviations; half a turn makes the orientation practically uniform. Each station of each session
+    has its own random draws.
     """
     return tuple(_perturb_mount(mount, beside_m, turned_rad, seed, session) for mount in mounts)
 

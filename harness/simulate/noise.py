@@ -1,4 +1,4 @@
-"""How an IS-900 errs: components put together, and the named levels of docs/is900.md 13.5."""
+"""Error model of an IS-900: error components, and the noise presets of docs/is900.md 13.5."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,11 +22,12 @@ from harness.simulate.components.white_noise import WhiteNoise
 from harness.simulate.readings import SimulatedReadings
 
 NOISE_PRESETS = ("clean", "noise", "default")
+"""Names of the presets that `noise_preset` makes."""
 
 
 @dataclass(frozen=True)
 class Noise:
-    """What goes wrong; None or () for what does not. Each component draws for itself, whatever else there is."""
+    """A set of error components; None or () leaves one out. Each has its own independent random draws."""
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
         "wobble": "soft_tissue",
@@ -53,8 +54,8 @@ class Noise:
     lost: tuple[LostStation, ...] = ()
     clock: Clock | None = None
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        """Let every component do its work, in the order of the fields: from the body outwards to the device."""
+    def apply(self, readings: SimulatedReadings) -> None:
+        """Apply every component in place, in the order of the fields: from the body outwards to the device."""
         for component in (
             self.soft_tissue,
             self.mount,
@@ -73,11 +74,11 @@ class Noise:
             self.clock,
         ):
             if component is not None:
-                component.apply(sensed)
+                component.apply(readings)
 
 
 def noise_preset(name: str) -> Noise:
-    """`clean` (nothing), `noise` (white, slow, session, clock) or `default` (all of 13.5). UnknownName."""
+    """Preset `clean` (no errors), `noise` (white, drift, session, clock) or `default` (all of 13.5); UnknownName."""
     match name:
         case "clean":
             return Noise()
@@ -94,4 +95,4 @@ def noise_preset(name: str) -> Noise:
                 speed=SpeedError(),
                 clock=Clock(),
             )
-    raise UnknownName("noise level", name, NOISE_PRESETS)
+    raise UnknownName("noise preset", name, NOISE_PRESETS)

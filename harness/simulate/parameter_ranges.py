@@ -1,4 +1,4 @@
-"""What the parameters of an error component may be, so that a slip in a scenario is refused in words."""
+"""Range checks of the parameters of error components, with messages for the author of a scenario."""
 
 import math
 
@@ -6,7 +6,7 @@ from harness.errors import BadInput
 
 
 def require_ranges(component: object, **ranges: tuple[float, float]) -> None:
-    """Each named field lies between these two, bounds included; of a pair both, in ascending order. Else BadInput."""
+    """BadInput unless each named field lies within its range, bounds included; a pair must also be ascending."""
     for name, (low, high) in ranges.items():
         value = getattr(component, name)
         pair, kind = (value, "two ascending numbers") if isinstance(value, tuple) else ((value, value), "a number")

@@ -1,4 +1,4 @@
-"""What the tracker believes, before it is written to the wire: the truth, spoilt by one component after another."""
+"""Simulated readings before they are encoded: true station poses to which error components are applied."""
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
@@ -19,44 +19,43 @@ class SimulatedReadings:
 
     seed: int
     take: str
-    """Name of the take: noise differs from one to the next."""
+    """Name of the take; part of the key of its random draws."""
     stations: tuple[str, ...]
     time_s: Floats
     """(N, S) true time of each sample [s]."""
     rate_hz: float
     velocity_m_s: Floats
-    """(N, S, 3) true velocity."""
+    """(N, S, 3) true velocity in the tracker's axes [m/s]."""
     radius_m: Floats
-    """(S,) from the axis of the bone to the station; the station's z points away from that axis, its x along it."""
-    flesh_m: Floats
-    """(S,) soft tissue between the bone and the skin that the station sits on."""
+    """(S,) distance of the station from the axis of its bone [m]; the station's z points away from it, x along it."""
+    tissue_m: Floats
+    """(S,) thickness of the soft tissue between bone and skin at the station [m]."""
     force_m_s2: Floats
-    """(N, S, 3) what a unit mass at the station bears beyond what it bears at rest in the rest pose: acceleration and
-    the pull of the Earth, along the station's own axes."""
+    """(N, S, 3) specific force at the station minus that at rest in the rest pose, in the station's axes [m/s^2]."""
     position_m: Floats
-    """(N, S, 3)"""
+    """(N, S, 3) reported position in the tracker's frame [m]."""
     turn: Floats
-    """(N, S, 4) `tracker_from_station`."""
+    """(N, S, 4) reported orientation, `tracker_from_station`."""
     quality: Floats
     """(N, S) 0 lost to 1 best."""
     device_s: Floats
-    """(N, S) what the device's clock says [s]."""
+    """(N, S) time stamp of the device's clock [s]."""
     affected: dict[str, Bools] = field(default_factory=dict)
-    """(N, S) readings that a component of this name was at work on, for the record."""
+    """Component name -> (N, S) readings that it changed; for the health record of a run."""
     session: str = ""
-    """Name of the session, which may have more takes than this one: what lasts for a session is the same in all of
-    them. Without one the take is its own session."""
+    """Name of the session. Takes of one session share the errors that are constant for a session. With "" the take is
+    a session of its own."""
 
     def take_rng(self, component: str, station: str) -> np.random.Generator:
-        """The generator of one component at one station in one take, independent of all others."""
+        """Random generator of one component at one station in this take, independent of all others."""
         return generator(self.seed, "noise", self.take, component, station)
 
     def session_rng(self, component: str, station: str) -> np.random.Generator:
-        """The generator of what a component does to a station for a whole session."""
+        """Random generator of one component at one station for the whole session."""
         return generator(self.seed, "noise", self.session or self.take, component, station)
 
-    def during(self, stations: Collection[str], from_s: float, to_s: float) -> Bools:
-        """(N, S) readings of these stations, () for all of them, within a stretch of time; UnknownName."""
+    def mask(self, stations: Collection[str], from_s: float, to_s: float) -> Bools:
+        """(N, S) mask of the readings of these stations, () for all, with from_s <= time < to_s; UnknownName."""
         for station in stations:
             if station not in self.stations:
                 raise UnknownName("station", station, self.stations)
@@ -65,17 +64,17 @@ class SimulatedReadings:
         return out
 
     def move(self, offset_m: Floats) -> None:
-        """Shift positions by (..., 3) in the tracker's axes."""
+        """Add offsets (..., 3) in the tracker's axes to the positions [m]."""
         self.position_m = self.position_m + offset_m
 
     def rotate(self, rotation_vector_rad: Floats) -> None:
-        """Turn orientations by (..., 3) about the tracker's axes."""
+        """Rotate orientations by rotation vectors (..., 3) in the tracker's axes [rad]."""
         self.turn = rotations.multiply(rotations.exp(rotation_vector_rad), self.turn)
 
     def lose(self, lost: Bools) -> None:
-        """Quality 0 for these readings (N, S); each repeats what its station said last."""
+        """Set quality 0 for these readings (N, S); each repeats the last valid reading of its station."""
         self.quality[lost] = 0.0
-        known = np.where(lost, 0, np.arange(len(lost))[:, None])
-        last, row = np.maximum.accumulate(known, axis=0), np.arange(len(self.stations))
+        valid_row = np.where(lost, 0, np.arange(len(lost))[:, None])
+        last, row = np.maximum.accumulate(valid_row, axis=0), np.arange(len(self.stations))
         self.position_m, self.turn = self.position_m[last, row], self.turn[last, row]
         self.affected["lost"] = self.affected.get("lost", np.zeros_like(lost)) | lost

@@ -1,4 +1,4 @@
-"""Truth into what a receiver would have got: the bytes of an IS-900, decoded as a driver decodes them."""
+"""Simulation of an IS-900: from true motion to device bytes, decoded as the driver decodes them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,22 +30,23 @@ WORLD_FROM_TRACKER: Floats = np.array([0.0, 1.0, 0.0, 0.0])
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A take as the tracker saw it, and the truth beside it. Frames carry nothing of the truth."""
+    """A take as the tracker reports it, and the truth next to it. Frames carry no truth."""
 
     wire_format: WireFormat
     wire: ByteCapture
-    """What came over the line, record by record."""
+    """Received bytes, record by record."""
     frames: tuple[TrackerFrame, ...]
     """(F,) decoded from `wire`."""
     frame_index: Ints
-    """(F,) for each of these, which of the E sampled frames it is."""
+    """(F,) index of each decoded frame among the E sampled frames."""
     truth_s: Floats
     """(E,) reference time of each sampled frame: the mean of its stations' true sampling times [s]."""
     truth_qpos: Floats
     """(E, 55) true configuration at that time."""
     calibration: Calibration
+    """Exact mounts and tracker frame."""
     health: dict[str, float]
-    """Counts and times of the stream, for the report."""
+    """Counts, shares and latencies of the stream, for the report."""
 
     def __post_init__(self) -> None:
         freeze(self, np.int64, frame_index=(len(self.frames),))
@@ -58,7 +59,7 @@ class Simulation:
 
     @property
     def expected(self) -> int:
-        """Frames that were sampled, E."""
+        """Number of sampled frames, E."""
         return len(self.truth_s)
 
 
@@ -72,17 +73,18 @@ def simulate_tracker(
     seed: int,
     session: str = "",
 ) -> Simulation:
-    """Wear trackers through a take. The calibration is `exact`: the mounts as they are and the tracker's true frame.
+    """Simulate the trackers of a take, from true motion to decoded frames.
 
-    Takes of one `session` share the errors that last for one; without a name the take is its own session. BadInput when
-    the take is shorter than one period.
+    The result's calibration is `exact`: true mounts and the tracker's true frame. Takes of one `session` share the
+    errors that are constant for a session; with "" the take is a session of its own. BadInput when the take is shorter
+    than one sampling period.
     """
     wire_format = WireFormat(tuple(mount.station for mount in mounts), tracker.rate_hz, tracker.items)
     trajectory = Trajectory(body, take)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     calibration = exact_calibration(body, mounts, tracker)
-    sensed = simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
-    sent, wire = _transmitted(sensed, wire_format, tracker)
+    readings = simulate_readings(trajectory, mounts, tracker, noise, time_s, seed=seed, take=take.name, session=session)
+    sent, wire = _transmit(readings, wire_format, tracker)
     reader = FrameReader(wire_format)
     frames = (*reader.feed_all(wire), *reader.finish())
     truth_s = time_s.mean(axis=1)
@@ -90,32 +92,32 @@ def simulate_tracker(
         wire_format=wire_format,
         wire=wire,
         frames=frames,
-        frame_index=_match_frames(frames, sensed.device_s),
+        frame_index=_match_frames(frames, readings.device_s),
         truth_s=truth_s,
         truth_qpos=trajectory.qpos(truth_s),
         calibration=calibration,
-        health=_health(sensed, sent, wire, frames),
+        health=_health(readings, sent, wire, frames),
     )
 
 
 def sampling_times_s(duration_s: float, tracker: TrackerConfig, stations: int) -> Floats:
-    """(E, S) when each station is sampled for each frame, within a take of this length [s]."""
-    turns_s = tracker.station_slot_s(stations) * np.arange(stations)
-    count = int(np.floor((duration_s - turns_s[-1]) * tracker.rate_hz + 1e-9)) + 1
+    """(E, S) sampling times of each station in each frame of a take of this length [s]; BadInput if it has none."""
+    slots_s = tracker.station_slot_s(stations) * np.arange(stations)
+    count = int(np.floor((duration_s - slots_s[-1]) * tracker.rate_hz + 1e-9)) + 1
     if count < 1:
-        raise BadInput(f"A take of {duration_s:.3f} s is shorter than one frame.", "Take a longer one, or more of it.")
-    return np.arange(count)[:, None] / tracker.rate_hz + turns_s
+        raise BadInput(f"A take of {duration_s:.3f} s is shorter than one frame.", "Choose a longer one.")
+    return np.arange(count)[:, None] / tracker.rate_hz + slots_s
 
 
 def exact_calibration(body: Body, mounts: Sequence[Mount], tracker: TrackerConfig) -> Calibration:
-    """The mounts as they are and the true frame of the tracker."""
-    places = [locate_mount(body.skeleton, mount) for mount in mounts]
+    """Calibration of kind `exact`: the true mounts and the tracker's true frame."""
+    mounts_on_bones = [locate_mount(body.skeleton, mount) for mount in mounts]
     return Calibration(
         kind="exact",
         stations=tuple(mount.station for mount in mounts),
         bones=tuple(mount.bone for mount in mounts),
-        mount_m=np.array([mount_m for mount_m, _ in places]),
-        bone_from_station=np.array([bone_from_station for _, bone_from_station in places]),
+        mount_m=np.array([mount_m for mount_m, _ in mounts_on_bones]),
+        bone_from_station=np.array([bone_from_station for _, bone_from_station in mounts_on_bones]),
         world_from_tracker=WORLD_FROM_TRACKER,
         tracker_origin_m=np.array(tracker.origin_m),
     )
@@ -133,16 +135,17 @@ def simulate_readings(
     begins_s: float = 0.0,
     session: str = "",
 ) -> SimulatedReadings:
-    """What the tracker believes at the moments `time_s` (E, S) of a trajectory, before it goes over the line.
+    """Readings at sampling times (E, S) of a trajectory, with noise applied, before they are encoded.
 
-    `begins_s` is the time of the trajectory's beginning, for the device's clock and for errors that have a moment.
+    `begins_s` is added to the times: the trajectory's beginning by the device's clock and by the times of faults [s].
+    `take` and `session` are names that key the random draws.
     """
     calibration = exact_calibration(trajectory.body, mounts, tracker)
     motion = trajectory.station_motion(calibration, time_s)
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
     skeleton = trajectory.body.skeleton
     along_m = [mount.along * skeleton.bone_m[skeleton.index(mount.bone)] for mount in mounts]
-    sensed = SimulatedReadings(
+    readings = SimulatedReadings(
         seed=seed,
         take=take,
         stations=calibration.stations,
@@ -150,7 +153,7 @@ def simulate_readings(
         rate_hz=tracker.rate_hz,
         velocity_m_s=rotations.rotate(tracker_from_world, motion.velocity_m_s),
         radius_m=np.linalg.norm(calibration.mount_m - along_m, axis=1),
-        flesh_m=np.array([tissue_thickness_m(mount.bone, mount.along) for mount in mounts]),
+        tissue_m=np.array([tissue_thickness_m(mount.bone, mount.along) for mount in mounts]),
         force_m_s2=_force_m_s2(motion, calibration),
         position_m=rotations.rotate(tracker_from_world, motion.position_m - calibration.tracker_origin_m),
         turn=rotations.multiply(tracker_from_world, motion.world_from_station),
@@ -158,49 +161,52 @@ def simulate_readings(
         device_s=time_s + begins_s,
         session=session,
     )
-    noise.apply(sensed)
-    return sensed
+    noise.apply(readings)
+    return readings
 
 
 def _force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
-    """(E, S, 3) what a unit mass at each station bears, along its axes, beyond what it does in the rest pose."""
+    """(E, S, 3) specific force at each station minus that in the rest pose, in the station's axes [m/s^2]."""
     up = np.array([0.0, 0.0, GRAVITY_M_S2])
-    borne = rotations.rotate(rotations.inverse(motion.world_from_station), motion.acceleration_m_s2 + up)
-    out: Floats = borne - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
+    specific_force = rotations.rotate(rotations.inverse(motion.world_from_station), motion.acceleration_m_s2 + up)
+    out: Floats = specific_force - rotations.rotate(rotations.inverse(calibration.bone_from_station), up)
     return out
 
 
-def _transmitted(
-    sensed: SimulatedReadings, wire_format: WireFormat, tracker: TrackerConfig
+def _transmit(
+    readings: SimulatedReadings, wire_format: WireFormat, tracker: TrackerConfig
 ) -> tuple[Bools, ByteCapture]:
-    """Which records (E*S,) got through the line, in the order of sampling, and what came out at its end."""
-    characters = np.tile(np.frombuffer(wire_format.characters, np.uint8), len(sensed.time_s))
-    said = RecordValues(
-        sensed.device_s.ravel(), sensed.position_m.reshape(-1, 3), sensed.turn.reshape(-1, 4), sensed.quality.ravel()
+    """Which records (E*S,), in sampling order, got through the line, and the received bytes."""
+    characters = np.tile(np.frombuffer(wire_format.characters, np.uint8), len(readings.time_s))
+    values = RecordValues(
+        readings.device_s.ravel(),
+        readings.position_m.reshape(-1, 3),
+        readings.turn.reshape(-1, 4),
+        readings.quality.ravel(),
     )
-    table = encode_records(wire_format.items, characters, said, wire_format.settings)
-    sent, arrived_s = transmit(sensed.time_s.ravel() + tracker.latency_s, tracker)
+    table = encode_records(wire_format.items, characters, values, wire_format.settings)
+    sent, arrived_s = transmit(readings.time_s.ravel() + tracker.latency_s, tracker)
     ends = table.itemsize * np.arange(1, int(sent.sum()) + 1)
     return sent, ByteCapture(table[sent].tobytes(), ends, arrived_s[sent])
 
 
 def _match_frames(frames: Sequence[TrackerFrame], device_s: Floats) -> Ints:
-    """The sampled frame (F,) that each decoded frame is, by what the device's clock (E, S) said then."""
-    began_s, pace_s = device_s[0], np.diff(device_s[:2, 0])
+    """(F,) index of each decoded frame among the sampled ones, by the device's time stamps (E, S)."""
+    first_s, period_s = device_s[0], np.diff(device_s[:2, 0])
     stamps_s = np.array([frame.measured_s for frame in frames]).reshape(-1, device_s.shape[1])
-    if len(pace_s) == 0:
+    if len(period_s) == 0:
         return np.zeros(len(frames), dtype=np.int64)
-    frames_since: Floats = np.nanmean((stamps_s - began_s) / pace_s, axis=1)
-    return np.round(frames_since).astype(np.int64)
+    frame_number: Floats = np.nanmean((stamps_s - first_s) / period_s, axis=1)
+    return np.round(frame_number).astype(np.int64)
 
 
 def _health(
-    sensed: SimulatedReadings, sent: Bools, wire: ByteCapture, frames: Sequence[TrackerFrame]
+    readings: SimulatedReadings, sent: Bools, wire: ByteCapture, frames: Sequence[TrackerFrame]
 ) -> dict[str, float]:
-    delay_s = wire.received_s - sensed.time_s.ravel()[sent]
-    counts = {f"{name}_share": float(np.mean(hit)) for name, hit in sensed.affected.items()}
+    delay_s = wire.received_s - readings.time_s.ravel()[sent]
+    counts = {f"{name}_share": float(np.mean(hit)) for name, hit in readings.affected.items()}
     return {
-        "frames_sampled": float(len(sensed.time_s)),
+        "frames_sampled": float(len(readings.time_s)),
         "frames_received": float(len(frames)),
         "records_sent": float(sent.sum()),
         "records_dropped": float(len(sent) - sent.sum()),

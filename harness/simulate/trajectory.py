@@ -1,4 +1,4 @@
-"""One smooth motion for pose, velocity and acceleration alike, and where the trackers on it are at any moment."""
+"""A smooth trajectory with consistent pose, velocity and acceleration, and the motion of stations on it."""
 
 from dataclasses import dataclass
 
@@ -17,20 +17,20 @@ from harness.errors import BadInput
 
 @dataclass(frozen=True, eq=False)
 class StationMotion:
-    """How S stations truly move, each at its own N moments; world axes."""
+    """True motion of S stations, each at its own N times; world axes."""
 
     time_s: Floats
-    """(N, S) [s]"""
+    """(N, S) times [s]."""
     position_m: Floats
-    """(N, S, 3) [m]"""
+    """(N, S, 3) positions [m]."""
     world_from_station: Floats
     """(N, S, 4) unit quaternions, signs continuous in time."""
     velocity_m_s: Floats
-    """(N, S, 3)"""
+    """(N, S, 3) velocities [m/s]."""
     acceleration_m_s2: Floats
-    """(N, S, 3)"""
+    """(N, S, 3) accelerations [m/s^2]."""
     turn_rad_s: Floats
-    """(N, S, 3) angular velocity [rad/s]."""
+    """(N, S, 3) angular velocities [rad/s]."""
 
     def __post_init__(self) -> None:
         freeze(self, time_s=("N", "S"), world_from_station=("N", "S", 4))
@@ -39,15 +39,15 @@ class StationMotion:
 
 
 class Trajectory:
-    """A take between its frames: twice continuously differentiable, through every frame.
+    """Cubic spline through the frames of a take, twice continuously differentiable.
 
-    A cubic spline of the configuration; the root's quaternion is splined with continuous sign and brought to unit
-    length afterwards, which keeps two continuous derivatives. Time runs from 0 to `duration_s`; BadInput outside.
+    The root's quaternion is interpolated with continuous sign and then normalised, which keeps two continuous
+    derivatives. Time runs from 0 to `duration_s` [s]; BadInput outside.
     """
 
     def __init__(self, body: Body, take: BodyMotion) -> None:
         if len(take) < 2:
-            raise BadInput(f"{take.name} has {len(take)} frame(s).", "A trajectory needs two at least.")
+            raise BadInput(f"{take.name} has {len(take)} frame(s).", "A trajectory needs at least two.")
         self.body = body
         self.duration_s = (len(take) - 1) / take.rate_hz
         knots = np.array(take.qpos)
@@ -55,34 +55,34 @@ class Trajectory:
         self._spline = CubicSpline(np.arange(len(take)) / take.rate_hz, knots)
 
     def qpos(self, time_s: Floats) -> Floats:
-        """Configurations (N, 55) at N moments [s]."""
+        """Configurations (N, 55) at N times [s]."""
         return self._derivatives(time_s, 0)[0]
 
     def qvel(self, time_s: Floats) -> Floats:
-        """(N, 54) as MuJoCo has it: root velocity in the world, root turn in the root's own axes, hinges."""
+        """(N, 54) MuJoCo velocities: root velocity in world axes, root angular velocity in root axes, hinges."""
         return self._derivatives(time_s, 1)[1]
 
     def qacc(self, time_s: Floats) -> Floats:
-        """(N, 54), the time derivative of `qvel`."""
+        """(N, 54) time derivative of `qvel`."""
         return self._derivatives(time_s, 2)[2]
 
-    def station_motion(self, worn: Calibration, time_s: Floats) -> StationMotion:
-        """True motion of S stations that are worn like this, station s at the N moments `time_s[:, s]` (N, S)."""
-        rows = [self._of_station(worn, s, time_s[:, s]) for s in range(len(worn.stations))]
-        at_m, turned, speed, thrust, omega = (np.stack(column, axis=1) for column in zip(*rows, strict=True))
-        return StationMotion(time_s, at_m, rotations.continuous(turned), speed, thrust, omega)
+    def station_motion(self, calibration: Calibration, time_s: Floats) -> StationMotion:
+        """True motion of S stations with the mounts of a calibration, station s at the N times `time_s[:, s]` [s]."""
+        rows = [self._station_row(calibration, s, time_s[:, s]) for s in range(len(calibration.stations))]
+        at_m, turned, speed, acceleration, omega = (np.stack(column, axis=1) for column in zip(*rows, strict=True))
+        return StationMotion(time_s, at_m, rotations.continuous(turned), speed, acceleration, omega)
 
     def _derivatives(self, time_s: Floats, order: int) -> list[Floats]:
-        """`qpos`, `qvel` and `qacc`, as far as the order of the derivative asked for."""
+        """`qpos`, `qvel` and `qacc`, up to the given order."""
         t = np.asarray(time_s, dtype=float)
         if t.size and not (t.min() >= -1e-9 and t.max() <= self.duration_s + 1e-9):
             raise BadInput(
-                f"A moment between {t.min():.3f} and {t.max():.3f} s lies outside the take.",
+                f"A time between {t.min():.3f} and {t.max():.3f} s lies outside the take.",
                 f"It runs from 0 to {self.duration_s:.3f} s.",
             )
         splined: list[Floats] = [self._spline(t, k) for k in range(order + 1)]
-        # Let p be the splined quaternion, n its length, q = p/n. What q' and q'' have along q is of no effect on the
-        # turn 2 conj(q) q' and its derivative 2 conj(q) q'': conj(q) q and conj(q') q' are pure scalars.
+        # Let p be the splined quaternion, n its length, q = p/n. Components of q' and q'' along q do not change the
+        # angular velocity 2 conj(q) q' and its derivative 2 conj(q) q'': conj(q) q and conj(q') q' are scalars.
         p = splined[0][:, 3:7]
         n = np.sqrt(np.sum(p**2, axis=1, keepdims=True))
         q = p / n
@@ -95,39 +95,39 @@ class Trajectory:
             out.append(np.concatenate([at[:, :3], turn, at[:, 7:]], axis=1))
         return out
 
-    def _of_station(self, worn: Calibration, row: int, time_s: Floats) -> tuple[Floats, ...]:
-        """Position, orientation, velocity, acceleration and angular velocity, passed on from bone to bone."""
+    def _station_row(self, calibration: Calibration, row: int, time_s: Floats) -> tuple[Floats, ...]:
+        """Position, orientation, velocity, acceleration and angular velocity of a station, from bone to bone."""
         skeleton = self.body.skeleton
         q, v, a = self._derivatives(time_s, 2)
         at, turned, angle = unpack(q)
-        rate, surge = v[:, 6:][:, QPOS_OF_DOF], a[:, 6:][:, QPOS_OF_DOF]
+        rate, hinge_acceleration = v[:, 6:][:, QPOS_OF_DOF], a[:, 6:][:, QPOS_OF_DOF]
         point = _PointMotion(at, v[:, :3], a[:, :3])
         omega, alpha = rotations.rotate(turned, v[:, 3:6]), rotations.rotate(turned, a[:, 3:6])
-        chain = _chain(skeleton, worn.bones[row])
+        chain = _chain(skeleton, calibration.bones[row])
         for bone in chain:
             hinges = skeleton.dof_of_bone[bone]
             for d in range(hinges.stop - 1, hinges.start - 1, -1):
                 axis = rotations.rotate(turned, skeleton.axes[d])
-                alpha = alpha + surge[:, d, None] * axis + rate[:, d, None] * _cross(omega, axis)
+                alpha = alpha + hinge_acceleration[:, d, None] * axis + rate[:, d, None] * _cross(omega, axis)
                 omega = omega + rate[:, d, None] * axis
                 turned = rotations.multiply(turned, rotations.exp(angle[:, d, None] * skeleton.axes[d]))
             if bone != chain[-1]:
-                point = point.carried(rotations.rotate(turned, skeleton.bone_m[bone]), omega, alpha)
-        point = point.carried(rotations.rotate(turned, worn.mount_m[row]), omega, alpha)
-        station = rotations.multiply(turned, worn.bone_from_station[row])
+                point = point.at_offset(rotations.rotate(turned, skeleton.bone_m[bone]), omega, alpha)
+        point = point.at_offset(rotations.rotate(turned, calibration.mount_m[row]), omega, alpha)
+        station = rotations.multiply(turned, calibration.bone_from_station[row])
         return point.at_m, station, point.velocity, point.acceleration, omega
 
 
 @dataclass(frozen=True, eq=False)
 class _PointMotion:
-    """Of a point on a rigid bone: place, velocity and acceleration, (N, 3) each."""
+    """Position, velocity and acceleration of a point on a rigid bone, (N, 3) each."""
 
     at_m: Floats
     velocity: Floats
     acceleration: Floats
 
-    def carried(self, reach_m: Floats, omega: Floats, alpha: Floats) -> "_PointMotion":
-        """The same of the point `reach_m` (N, 3) away on the same bone, which turns by `omega` and `alpha`."""
+    def at_offset(self, reach_m: Floats, omega: Floats, alpha: Floats) -> "_PointMotion":
+        """Motion of the point `reach_m` (N, 3) away on the same bone, with angular velocity and acceleration given."""
         swing = _cross(omega, reach_m)
         return _PointMotion(
             self.at_m + reach_m,
@@ -137,7 +137,7 @@ class _PointMotion:
 
 
 def _chain(skeleton: Skeleton, bone: str) -> list[int]:
-    """The bones from the root to `bone`."""
+    """Indices of the bones from the root to `bone`."""
     chain = [skeleton.index(bone)]
     while (parent := skeleton.parents[chain[0]]) >= 0:
         chain.insert(0, parent)
@@ -145,7 +145,7 @@ def _chain(skeleton: Skeleton, bone: str) -> list[int]:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """Cross products (N, 3); numpy's own is slow on short rows."""
+    """Cross products (N, 3); `np.cross` is slow on short rows."""
     out: Floats = a[:, _NEXT] * b[:, _AFTER] - a[:, _AFTER] * b[:, _NEXT]
     return out
 

@@ -29,11 +29,11 @@ def setting(rng: np.random.Generator) -> tuple[BundleAdjustment, CalibrationSolu
     bundle = BundleAdjustment(shared, asked, rng.normal(size=(8, 6, 3)), np.tile(np.eye(3), (8, 6, 1, 1)))
     at = bundle.start()
     own = 0.1 * rng.normal(size=(8, 6 + len(bundle.hinges)))
-    at = bundle.moved(at, (0.01 * rng.normal(size=shared.count), own))
-    reached = bundle.reach(at)
+    at = bundle.apply_step(at, (0.01 * rng.normal(size=shared.count), own))
+    reached = bundle.forward_kinematics(at)
     bundle.place_m = reached.place_m + 1e-7 * rng.normal(size=(8, 6, 3))
     bundle.turn = reached.world_from_station @ _small_turns(1e-7, rng)
-    return bundle, at, ResidualScales(0.04, 0.8, shared.flesh_m(at.bone_m), 0.002, 0.01)
+    return bundle, at, ResidualScales(0.04, 0.8, shared.skin_offset_m(at.bone_m), 0.002, 0.01)
 
 
 def _small_turns(size_rad: float, rng: np.random.Generator) -> Floats:
@@ -42,35 +42,37 @@ def _small_turns(size_rad: float, rng: np.random.Generator) -> Floats:
 
 def test_the_slope_of_the_cost(rng: np.random.Generator) -> None:
     """Half its gradient, for every shared unknown and every unknown of a pose."""
-    bundle, at, given = setting(rng)
+    bundle, at, scales = setting(rng)
     weight = rng.uniform(0.2, 1.0, size=(8, 6, 2))
-    normal = bundle.normal(at, given, weight)
-    none = np.zeros(bundle.shared.count), np.zeros(normal.own_slope.shape)
+    normal = bundle.normal_equations(at, scales, weight)
+    none = np.zeros(bundle.shared.count), np.zeros(normal.pose_gradient.shape)
 
     def slope(which: int, index: tuple[int, ...]) -> float:
         costs = []
         for sign in (STEP, -STEP):
             step = [np.array(part) for part in none]
             step[which][index] = sign
-            costs.append(bundle.cost(bundle.moved(at, (step[0], step[1])), given, weight))
+            costs.append(bundle.cost(bundle.apply_step(at, (step[0], step[1])), scales, weight))
         return -(costs[0] - costs[1]) / (4.0 * STEP)
 
     shared = np.array([slope(0, (k,)) for k in range(bundle.shared.count)])
-    np.testing.assert_allclose(normal.shared_slope, shared, atol=1e-3 * np.abs(shared).max())
+    np.testing.assert_allclose(normal.shared_gradient, shared, atol=1e-3 * np.abs(shared).max())
     pose = 6  # the squat bends legs and arms
-    own = np.array([slope(1, (pose, k)) for k in range(normal.own_slope.shape[1])])
-    np.testing.assert_allclose(normal.own_slope[pose], own, atol=1e-3 * np.abs(own).max())
+    own = np.array([slope(1, (pose, k)) for k in range(normal.pose_gradient.shape[1])])
+    np.testing.assert_allclose(normal.pose_gradient[pose], own, atol=1e-3 * np.abs(own).max())
 
 
 def test_expectations_against_differences(rng: np.random.Generator) -> None:
-    bundle, at, given = setting(rng)
+    bundle, at, scales = setting(rng)
     shared = bundle.shared
-    _, slope = shared.prior_residuals(at, given.mount_spread, given.flesh_m)
+    _, slope = shared.prior_residuals(at, scales.mount_spread, scales.skin_offset_m)
     own = np.zeros((8, 6 + len(bundle.hinges)))
     for k in range(shared.count):
         step = STEP * np.eye(shared.count)[k]
         ahead, behind = (
-            shared.prior_residuals(bundle.moved(at, (sign * step, own)), given.mount_spread, given.flesh_m)[0]
+            shared.prior_residuals(
+                bundle.apply_step(at, (sign * step, own)), scales.mount_spread, scales.skin_offset_m
+            )[0]
             for sign in (1.0, -1.0)
         )
         np.testing.assert_allclose(slope[:, k], (ahead - behind) / (2.0 * STEP), atol=1e-4 * np.abs(slope).max())
@@ -85,13 +87,13 @@ def whole(normal: NormalEquations) -> tuple[Floats, Floats]:
         rows = slice(shared + p * own, shared + (p + 1) * own)
         matrix[rows, rows], matrix[rows, :shared] = normal.own[p], normal.across[p]
         matrix[:shared, rows] = normal.across[p].T
-    return matrix, np.concatenate([normal.shared_slope, normal.own_slope.ravel()])
+    return matrix, np.concatenate([normal.shared_gradient, normal.pose_gradient.ravel()])
 
 
 @pytest.mark.parametrize("damping", [0.0, 1e-3, 10.0])
 def test_poses_are_eliminated_rightly(damping: float, rng: np.random.Generator) -> None:
-    bundle, at, given = setting(rng)
-    normal = bundle.normal(at, given, np.ones((8, 6, 2)))
+    bundle, at, scales = setting(rng)
+    normal = bundle.normal_equations(at, scales, np.ones((8, 6, 2)))
     matrix, right = whole(normal)
     expected = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
     shared, own = normal.step(damping)
@@ -99,8 +101,8 @@ def test_poses_are_eliminated_rightly(damping: float, rng: np.random.Generator) 
 
 
 def test_variances_are_those_of_everything_at_once(rng: np.random.Generator) -> None:
-    bundle, at, given = setting(rng)
-    normal = bundle.normal(at, given, np.ones((8, 6, 2)))
+    bundle, at, scales = setting(rng)
+    normal = bundle.normal_equations(at, scales, np.ones((8, 6, 2)))
     everything = np.linalg.inv(whole(normal)[0])
     covariance, own = normal.variances()
     count = bundle.shared.count

@@ -17,7 +17,9 @@ from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.errors import BadFile, BadInput
 
 
-def kept(rng: np.random.Generator, stations: tuple[str, ...] = ("head", "left wrist"), **told: Any) -> CalibrationFile:
+def kept(
+    rng: np.random.Generator, stations: tuple[str, ...] = ("head", "left wrist"), **diagnostics: Any
+) -> CalibrationFile:
     turn = rng.normal(size=(len(stations) + 1, 4))
     turn /= np.linalg.norm(turn, axis=1, keepdims=True)
     calibration = Calibration(
@@ -30,7 +32,9 @@ def kept(rng: np.random.Generator, stations: tuple[str, ...] = ("head", "left wr
         tracker_origin_m=3.0 * rng.normal(size=3),
     )
     standard = standard_skeleton()
-    return CalibrationFile(calibration, standard.with_bones(standard.bone_m * rng.uniform(0.8, 1.2, (24, 3))), told)
+    return CalibrationFile(
+        calibration, standard.with_bones(standard.bone_m * rng.uniform(0.8, 1.2, (24, 3))), diagnostics
+    )
 
 
 def same(one: CalibrationFile, other: CalibrationFile) -> bool:
@@ -67,12 +71,12 @@ tables = st.recursive(
 
 
 @settings(max_examples=50, deadline=None)
-@given(stations=st.lists(words, min_size=1, max_size=3, unique=True), told=tables)
+@given(stations=st.lists(words, min_size=1, max_size=3, unique=True), diagnostics=tables)
 def test_any_words_come_back(
-    tmp_path_factory: pytest.TempPathFactory, stations: list[str], told: dict[str, Any]
+    tmp_path_factory: pytest.TempPathFactory, stations: list[str], diagnostics: dict[str, Any]
 ) -> None:
     path = tmp_path_factory.mktemp("words") / "a.toml"
-    one = kept(np.random.default_rng(1), tuple(stations), **{f"_{key}": value for key, value in told.items()})
+    one = kept(np.random.default_rng(1), tuple(stations), **{f"_{key}": value for key, value in diagnostics.items()})
     write_calibration(path, one)
     assert same(read_calibration(path), one)
 
@@ -109,9 +113,9 @@ def test_what_a_link_points_to_is_replaced(tmp_path: Path, rng: np.random.Genera
 
 
 def test_no_place_for_it(tmp_path: Path, rng: np.random.Generator) -> None:
-    with pytest.raises(BadFile, match="it is no file"):
+    with pytest.raises(BadFile, match="it is not a file"):
         write_calibration(tmp_path, kept(rng), force=True)
-    with pytest.raises(BadFile, match="no such folder"):
+    with pytest.raises(BadFile, match="folder does not exist"):
         write_calibration(tmp_path / "there" / "a.toml", kept(rng))
     with pytest.raises(BadFile, match="cannot be read"):
         read_calibration(tmp_path / "b.toml")
@@ -142,18 +146,19 @@ def line(key: str, value: str) -> Callable[[str], str]:
         (lambda text: text.replace("mount_m", "mont_m"), "Did you mean 'mount_m'"),
         (lambda text: text.replace("[room]", "[rom]"), "Did you mean 'room'"),
         (without("bone_from_station"), "missing bone_from_station"),
+        (lambda text: text.replace("[diagnostics]", "[told]"), "the key 'told' is now called 'diagnostics'"),
         (line("mount_m", "[0.1, 0.2]"), "mount_m: expected 3 values, found 2"),
         (line("mount_m", "[0.1, 0.2, nan]"), "mount_m[2]: expected a finite number"),
         (line("mount_m", "[0.1, 0.2, 30.0]"), "mount_m is more than 1 m from its bone"),
         (line("mount_m", '[0.1, 0.2, "0"]'), "mount_m[2]: expected float"),
-        (line("bone_from_station", "[1.0, 0.1, 0.0, 0.0]"), "no unit quaternion: its length is 1.00499"),
-        (line("world_from_tracker", "[0.0, 0.0, 0.0, 0.0]"), "room.world_from_tracker is no unit quaternion"),
-        (line("bone", '"nose"'), "'nose' is no bone"),
+        (line("bone_from_station", "[1.0, 0.1, 0.0, 0.0]"), "not a unit quaternion: its length is 1.00499"),
+        (line("world_from_tracker", "[0.0, 0.0, 0.0, 0.0]"), "room.world_from_tracker is not a unit quaternion"),
+        (line("bone", '"nose"'), "'nose' is not one of the bones"),
         (line("kind", "1"), "kind: expected str"),
         (line("ltibia", "[0.0, 0.0, -40.0]"), "bone_m.ltibia is 40 m long"),
         (line("ltibia", "[0.0, 0.0, 0.0]"), "bone_m.ltibia is 0 m long"),
         (without("ltibia"), "ltibia: missing"),
-        (lambda text: text.replace("ltibia", "ltail"), "ltail, ltibia: missing, or no bone"),
+        (lambda text: text.replace("ltibia", "ltail"), "ltail, ltibia: missing, or not one of"),
         (lambda text: text[: text.index("[station")] + "[station]\n", "no stations"),
         (lambda text: "\x00" + text, "not TOML"),
     ],

@@ -65,7 +65,7 @@ def test_clean_poses_give_the_truth(number: int, own_directions: bool) -> None:
     assert np.linalg.norm(origin_m[:2]) < 0.003
     assert abs(origin_m[2]) < 0.06  # how far soles are below the trackers is of the prior
     assert found.residual_m.max() < 1e-3
-    assert np.rad2deg(found.miss_rad) < 0.05
+    assert np.rad2deg(found.hinge_error_rad) < 0.05
     assert found.calibration.kind == "poses"
 
 
@@ -83,7 +83,7 @@ def test_poses_that_are_missed(miss_deg: float, mount_mm: float, mount_deg: floa
         mean.append(found.mean_m - model.skeleton.length_m)
         mounts.append(elbow_off_m(found, model))
         turns.append(turned_deg(found, model))
-        misses.append(found.miss_rad)
+        misses.append(found.hinge_error_rad)
     assert np.rad2deg(np.mean(misses)) == pytest.approx(miss_deg, rel=0.2)
     assert 1e3 * rms(np.array(mounts)) < mount_mm
     assert rms(np.array(turns)) < mount_deg
@@ -98,7 +98,7 @@ def test_where_the_room_lies_and_how_straps_sit_does_not_matter() -> None:
     np.testing.assert_allclose(first.skeleton.bone_m, second.skeleton.bone_m, atol=1e-4)
     np.testing.assert_allclose(first.calibration.mount_m, second.calibration.mount_m, atol=1e-4)
     np.testing.assert_allclose(turned_deg(first, one), turned_deg(second, other), atol=0.05)
-    assert second.miss_rad == pytest.approx(first.miss_rad, rel=1e-2)
+    assert second.hinge_error_rad == pytest.approx(first.hinge_error_rad, rel=1e-2)
     for found, model in ((first, one), (second, other)):
         origin_m = found.calibration.tracker_origin_m - model.truth.tracker_origin_m
         assert np.linalg.norm(origin_m) < 0.25  # a few degrees of heading at nine metres
@@ -136,7 +136,7 @@ def test_uncertainty_is_told() -> None:
     assert np.all(found.length_sd_m <= prior + 1e-9)
     assert np.all(found.length_sd_m <= found.length_bound_m + 1e-9)
     assert np.all(found.mount_sd_m <= found.mount_bound_m + 1e-9)
-    assert np.all((found.known >= -1e-6) & (found.known <= 1.0))
+    assert np.all((found.variance_reduction >= -1e-6) & (found.variance_reduction <= 1.0))
     assert np.all(np.isinf(found.length_bound_m[[found.skeleton.index(bone) for bone in ("lhand", "rfoot", "head")]]))
     assert np.all(np.isfinite(found.length_bound_m[[found.skeleton.index(bone) for bone in ("lhumerus", "rhumerus")]]))
     assert np.isfinite(found.condition)
@@ -164,7 +164,7 @@ def test_a_strap_put_on_the_other_way_round_is_told_of() -> None:
     ]
     found = calibrate_poses(held, space(), model.mounts)
     assert len(found.hints) == 1
-    assert "station 3 (left_ankle) looks turned 90 deg about z on its strap" in found.hints[0]
+    assert "station 3 (left_ankle) is rotated by 90 deg about z on its strap" in found.hints[0]
     assert turned_deg(found, model)[[0, 1, 3, 4, 5]].max() < 0.1
 
 
@@ -222,21 +222,21 @@ def test_someone_who_moved_is_told_in_which_pose() -> None:
 def test_stations_that_do_not_tell_the_heading_are_refused() -> None:
     """As a fit says that is not sure which way the performer faced."""
     model = Model(somebody(11), ("torso", "head"))
-    asked_rad = np.array([pose_angles_rad(pose, standard_skeleton()) for pose in POSES])
+    nominal_rad = np.array([pose_angles_rad(pose, standard_skeleton()) for pose in POSES])
     still = [rows[0] for rows in model.held()]
     place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([frame.position_m for frame in still]))
     turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([frame.tracker_from_station for frame in still]))
     shared = SharedUnknowns(standard_skeleton(), space(), model.mounts)
-    bundle = BundleAdjustment(shared, asked_rad, place_m, rotations.to_matrix(turn))
+    bundle = BundleAdjustment(shared, nominal_rad, place_m, rotations.to_matrix(turn))
     found = fit_bundle(bundle, 0.001, 0.005)
     pose_checks.require_poses_held(bundle, found)
-    with pytest.raises(UnusableHold, match="torso, head do not tell which way the performer faces"):
+    with pytest.raises(UnusableHold, match="torso, head do not determine which way the performer faces"):
         pose_checks.require_poses_held(bundle, replace(found, heading_sd_rad=0.4))
 
 
 def test_other_numbers_of_poses_or_stations_are_refused() -> None:
     model = Model(somebody(12))
-    with pytest.raises(BadInput, match="7 poses were held, and 8 are asked for"):
+    with pytest.raises(BadInput, match="7 poses were held; 8 are needed"):
         calibrate_poses(model.held()[:7], space(), model.mounts)
     with pytest.raises(BadInput, match="Frames of 6 stations, but 4 are worn"):
         calibrate_poses(model.held(), space(), model.mounts[:4])

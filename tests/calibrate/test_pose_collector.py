@@ -71,7 +71,7 @@ def eight(noise: str = "default") -> tuple[TrackerFrame, ...]:
 
 
 @cache
-def likeness(stations: tuple[str, ...] = SIX) -> PoseClassifier:
+def classifier(stations: tuple[str, ...] = SIX) -> PoseClassifier:
     return PoseClassifier(body(), [DEFAULT_MOUNTS[name] for name in stations], [pose(n) for n in range(8)])
 
 
@@ -79,7 +79,7 @@ def collected(
     frames: Sequence[TrackerFrame], stations: tuple[str, ...] = SIX, *, blind: bool = False
 ) -> tuple[PoseCollector, list[int]]:
     """The collector after all frames, and what it said when."""
-    collector = PoseCollector(stations, 8, None if blind else likeness(stations))
+    collector = PoseCollector(stations, 8, None if blind else classifier(stations))
     said = [collector.add(frame) for frame in frames]
     return collector, [number for number in said if number is not None]
 
@@ -120,7 +120,7 @@ def test_a_rest_is_no_pose(place: int) -> None:
     (passed,) = collector.rejected
     assert passed.began_s == pytest.approx(4.5 * place, abs=0.6)
     stills = [measure_hold(held, SIX) for held in collector.holds]
-    assert [likeness().nearest(still, stills[0]) for still in stills] == list(range(8))
+    assert [classifier().nearest(still, stills[0]) for still in stills] == list(range(8))
     wanted = "all 8 poses were taken before" if place == 8 else f"pose {place + 1} is wanted"
     assert wanted in passed.why
 
@@ -143,13 +143,13 @@ def test_another_number_of_holds(count: int) -> None:
     assert len(collector.rejected) == count - len(collector.holds)
     if count == 9:
         assert collector.rejected[0].began_s == pytest.approx(36.0, abs=0.6)
-        assert str(collector.rejected[0]).endswith("s on: all 8 poses were taken before")
+        assert str(collector.rejected[0]).endswith("s on not taken: all 8 poses were taken before")
 
 
 def test_whoever_stops_early_is_told_what_there_was() -> None:
     frames = eight()[: round(12.0 * RATE_HZ)]
     told: list[str] = []
-    leading = PoseGuide(PoseCollector(SIX, 8, likeness()), POSES)
+    leading = PoseGuide(PoseCollector(SIX, 8, classifier()), POSES)
     with pytest.raises(Exception, match="3 of 8 poses were held") as caught:
         leading.run(frames, told.append)
     assert repr(POSES[3].name) in str(caught.value)
@@ -177,7 +177,7 @@ def test_a_station_that_is_not_seen_is_named_and_waited_for() -> None:
     lost = between(frames, 4.5, 7.5)
     silent = {"position_valid": False, "orientation_valid": False, "position_m": np.nan}
     frames[lost[0] : lost[-1] + 1] = changed(frames[lost[0] : lost[-1] + 1], 2, **silent)
-    collector, told = PoseCollector(SIX, 8, likeness()), set()
+    collector, told = PoseCollector(SIX, 8, classifier()), set()
     for frame in frames:
         collector.add(frame)
         told.add(collector.message)

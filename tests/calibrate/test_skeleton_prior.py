@@ -28,9 +28,9 @@ def test_modes_and_rest_make_up_the_spread(modes: int) -> None:
     lengths = np.array([skeleton.length_m for skeleton in PEOPLE])
     pooled = np.concatenate([lengths, lengths])  # built-in performers are mirror images of themselves
     whole = np.sum((pooled - pooled.mean(axis=0)) ** 2, axis=0) / (2 * (len(PEOPLE) - 1))
-    kept = np.diag((found.modes.T * found.spread_m**2) @ found.modes)
+    kept = np.diag((found.modes.T * found.mode_sd_m**2) @ found.modes)
     expected = np.maximum((whole - kept) * len(PEOPLE) / (len(PEOPLE) - modes), LEAST_RESIDUAL_SD_M**2)
-    np.testing.assert_allclose(found.rest_m**2, expected, atol=1e-12)
+    np.testing.assert_allclose(found.residual_sd_m**2, expected, atol=1e-12)
     np.testing.assert_allclose(found.modes @ found.modes.T, np.eye(modes), atol=1e-12)
     assert 0.0 <= found.explained_variance() <= 1.0
 
@@ -76,7 +76,7 @@ def test_modes_help_to_guess_an_arm_of_somebody_else() -> None:
 
 
 def test_too_few_people_are_refused() -> None:
-    with pytest.raises(BadInput, match="6 skeletons do not give 5 modes"):
+    with pytest.raises(BadInput, match="6 skeletons are too few for 5 modes"):
         fit_skeleton_prior(PEOPLE[:6])
     with pytest.raises(BadInput, match="different bones"):
         fit_skeleton_prior([*PEOPLE[:8], PEOPLE[0].subset(PEOPLE[0].names[:6])[0]])

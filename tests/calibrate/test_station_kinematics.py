@@ -46,7 +46,7 @@ CHAIN = StationKinematics(SKELETON, CARRIERS)
 
 def reach(state: State) -> StationPoses:
     root, stations = rotations.to_matrix(state.root), rotations.to_matrix(state.stations)
-    return CHAIN.reach(state.bone_m, state.root_m, root, state.angles_rad, state.mount_m, stations)
+    return CHAIN.forward_kinematics(state.bone_m, state.root_m, root, state.angles_rad, state.mount_m, stations)
 
 
 def slopes(change: Callable[[float], State]) -> tuple[Floats, Floats]:
@@ -79,7 +79,7 @@ def test_hinges(dof: int, rng: np.random.Generator) -> None:
 
     np.testing.assert_allclose(place, slopes(change)[0], atol=1e-8)
     np.testing.assert_allclose(turn, slopes(change)[1], atol=1e-8)
-    assert np.any(turn != 0.0) == CHAIN.turns[:, dof].any()
+    assert np.any(turn != 0.0) == CHAIN.hinge_turns_station[:, dof].any()
 
 
 @pytest.mark.parametrize("axis", range(6))

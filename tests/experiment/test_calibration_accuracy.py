@@ -51,7 +51,7 @@ def test_who_is_refused_is_named() -> None:
 
 
 def test_what_there_is_not() -> None:
-    with pytest.raises(UnknownName, match="noise level"):
+    with pytest.raises(UnknownName, match="noise preset"):
         measure_calibration_accuracy(1, noise="loud")
     with pytest.raises(BadInput):
         measure_calibration_accuracy(1, folder=Path(__file__).parent)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.errors import BadInput, UnknownName
+from harness.errors import BadInput, RenamedKey, UnknownName
 from harness.reconstruct import registry
 from harness.reconstruct.methods.clean_up import CleanUp
 from harness.reconstruct.methods.ik import GAUSSIAN, Ik
@@ -47,6 +47,20 @@ def test_unknown_names_are_refused_with_the_choices(name: str) -> None:
     with pytest.raises(UnknownName) as caught:
         registry.resolve(name)
     assert "mean_pose" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "new"),
+    [
+        ("dynamic_map[terms.lever_m=0.2]", "regression"),
+        ("dynamic_map[like=window]", "search"),
+        ("dynamic_map:literal[kept=0.9]", "variance_kept"),
+        ("kernel_cca[held=false]", "regularise_projection"),
+    ],
+)
+def test_an_old_option_is_refused_with_its_new_name(name: str, new: str) -> None:
+    with pytest.raises(RenamedKey, match=f"is now called {new!r}"):
+        registry.resolve(name)
 
 
 def test_a_near_miss_gets_a_suggestion() -> None:

@@ -36,7 +36,7 @@ def still() -> Still:
             rate_hz=40.0,
             velocity_m_s=np.zeros((*time_s.shape, 3)),
             radius_m=np.full(stations, 0.05),
-            flesh_m=np.full(stations, 0.02),
+            tissue_m=np.full(stations, 0.02),
             force_m_s2=np.zeros((*time_s.shape, 3)),
             position_m=np.tile(places_m, (len(time_s), 1, 1)),
             turn=np.tile(turns, (len(time_s), 1, 1)),

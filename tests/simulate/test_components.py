@@ -365,8 +365,8 @@ def test_clock(still: Still) -> None:
 def test_more_stations_leave_the_draws_of_the_others_alone(still: Still) -> None:
     few, many = still(60.0, 2), still(60.0, 5)
     many.position_m[:, :2], many.turn[:, :2] = few.position_m, few.turn
-    for sensed in (few, many):
-        noise_preset("default").apply(sensed)
+    for readings in (few, many):
+        noise_preset("default").apply(readings)
     for name in ("position_m", "turn", "quality", "device_s"):
         np.testing.assert_array_equal(getattr(few, name), getattr(many, name)[:, :2])
 
@@ -392,8 +392,8 @@ def test_one_component_less_leaves_the_draws_of_the_others_alone(still: Still, l
 def test_noise_differs_by_seed_take_and_station(still: Still) -> None:
     one, other, next_take = still(1.0), still(1.0, seed=2), still(1.0)
     next_take.take = "another"
-    for sensed in (one, other, next_take):
-        WhiteNoise().apply(sensed)
+    for readings in (one, other, next_take):
+        WhiteNoise().apply(readings)
     shifts = [s.position_m - still(1.0).position_m for s in (one, other, next_take)]
     assert len({float(x) for shift in shifts for x in shift[0].ravel()}) == 3 * 4 * 3
 

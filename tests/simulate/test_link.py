@@ -65,7 +65,7 @@ def test_the_quick_way_and_the_simulation_of_the_queue_agree(gaps_s: list[float]
     """Where nothing is dropped; and what gets through keeps its order and never shares the line."""
     ready_s, tracker = np.cumsum(gaps_s), TrackerConfig(queue_records=queue)
     sent, arrived_s = transmit(ready_s, tracker)
-    slow_sent, slow_s = link._overloaded(ready_s, tracker)
+    slow_sent, slow_s = link._transmit_overloaded(ready_s, tracker)
     np.testing.assert_array_equal(sent, slow_sent)
     np.testing.assert_allclose(arrived_s, slow_s, atol=1e-12)
     assert np.all(np.diff(arrived_s[sent]) >= RECORD_S - 1e-12)

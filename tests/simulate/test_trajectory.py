@@ -117,5 +117,5 @@ def test_moments_outside_the_take_are_refused(trajectory: Trajectory, moment_s: 
 
 def test_one_frame_is_no_motion(boxer: tuple[Body, BodyMotion]) -> None:
     body, take = boxer
-    with pytest.raises(BadInput, match="two at least"):
+    with pytest.raises(BadInput, match="at least two"):
         Trajectory(body, BodyMotion("short", "p1", "test", "", 120.0, take.qpos[:1]))

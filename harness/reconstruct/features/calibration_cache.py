@@ -1,4 +1,4 @@
-"""What methods work out of their examples for trackers worn in one way, which takes seconds, is kept."""
+"""Cache of what a method computes for a calibration, such as the features of its examples, which takes seconds."""
 
 from collections.abc import Callable
 from typing import Generic, TypeVar
@@ -9,16 +9,19 @@ T = TypeVar("T")
 
 
 class CalibrationCache(Generic[T]):
-    """Something made for the last calibration: sessions of one performer share it."""
+    """Holds a value for the last calibration, so that sessions of one performer share it."""
 
     def __init__(self) -> None:
-        self._kept: tuple[tuple[tuple[str, ...], bytes], T] | None = None
+        self._entry: tuple[tuple[tuple[str, ...], bytes], T] | None = None
 
-    def get(self, worn: Calibration, make: Callable[[], T]) -> T:
-        """What `make` made when trackers were last worn otherwise; the one before is given up first."""
-        key = tuple(worn.bones), worn.mount_m.tobytes()
-        kept = self._kept
-        if kept is None or kept[0] != key:
-            kept = self._kept = None
-            kept = self._kept = (key, make())
-        return kept[1]
+    def get(self, calibration: Calibration, make: Callable[[], T]) -> T:
+        """The value for a calibration's bones and mounts; `make` is called when they changed.
+
+        The old value is released first, since both may not fit into memory.
+        """
+        key = tuple(calibration.bones), calibration.mount_m.tobytes()
+        entry = self._entry
+        if entry is None or entry[0] != key:
+            entry = self._entry = None
+            entry = self._entry = (key, make())
+        return entry[1]

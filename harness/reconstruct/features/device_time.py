@@ -1,24 +1,25 @@
-"""When a frame was measured: a busy host takes frames late and in bursts, which must not look like motion.
+"""Time of measurement of each frame, by the device's clock.
 
-So methods go by the device's clock, and a stream replayed, recorded or read from a port gives the same answers, bit
-by bit. Time begins with the first frame, and goes on by what the stamp of any one station went on.
+A busy host receives frames late and in bursts, which must not look like motion. So methods use the device's clock, and
+a stream that is simulated, recorded or read from a port gives the same results bit for bit. Time starts at 0 with the
+first frame, and advances by the difference of the time stamps of any one station.
 """
 
 from harness.stream.frame import TrackerFrame
 
 
 class DeviceTime:
-    """Watches the frames of one session."""
+    """Clock of one session, driven by the time stamps of its frames."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[float, float]] = {}
-        """Row of a station -> its last stamp, and the time of the frame that brought it [s]."""
+        self._last_stamps: dict[int, tuple[float, float]] = {}
+        """Row of a station -> its last time stamp and the time of that frame [s]."""
         self._host: tuple[float, float] | None = None
-        """Time and reception of the first frame, or of the last that had a stamp to go by [s]."""
+        """Time and host time of the first frame, or of the last frame with a usable time stamp [s]."""
         self._now_s = 0.0
 
     def frame_time_s(self, frame: TrackerFrame) -> float:
-        """The time of the next frame since the first [s]; by the host's clock where no stamp can be used."""
+        """Time of the next frame since the first [s]; by the host's clock when no time stamp is usable."""
         stamps = [
             (row, stamp_s)
             for row, (stamp_s, suspect) in enumerate(
@@ -26,15 +27,15 @@ class DeviceTime:
             )
             if stamp_s == stamp_s and not suspect
         ]
-        known = next(((row, stamp_s) for row, stamp_s in stamps if row in self._known), None)
-        if known is not None:
-            before_s, at_s = self._known[known[0]]
-            self._now_s = max(at_s + known[1] - before_s, self._now_s)
+        match = next(((row, stamp_s) for row, stamp_s in stamps if row in self._last_stamps), None)
+        if match is not None:
+            before_s, at_s = self._last_stamps[match[0]]
+            self._now_s = max(at_s + match[1] - before_s, self._now_s)
             self._host = self._now_s, frame.received_s
         elif self._host is not None:
             self._now_s = max(self._host[0] + frame.received_s - self._host[1], self._now_s)
         else:
             self._host = self._now_s, frame.received_s
         for row, stamp_s in stamps:
-            self._known[row] = stamp_s, self._now_s
+            self._last_stamps[row] = stamp_s, self._now_s
         return self._now_s

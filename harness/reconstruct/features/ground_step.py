@@ -1,4 +1,7 @@
-"""Ground frames of one pose at a time, compiled: what a session does in every frame (`database.ground` for many)."""
+"""Ground frames and station features of a single pose, compiled for use in every frame.
+
+A ground frame is x, y [m] and heading [rad]; `solver.ground_frame` has the functions for many poses.
+"""
 
 import numpy as np
 
@@ -8,7 +11,7 @@ from harness.core.compiled import compiled
 
 @compiled
 def step_ground(ground: Floats, step: Floats) -> Floats:
-    """The ground frame (3,) a step (3,) away from another."""
+    """Ground frame (3,) after a step (3,): forward, left [m] and rotation [rad]."""
     cosine, sine = np.cos(ground[2]), np.sin(ground[2])
     forward, left, turn = step[0], step[1], step[2]
     x, y = ground[0] + cosine * forward - sine * left, ground[1] + sine * forward + cosine * left
@@ -17,13 +20,13 @@ def step_ground(ground: Floats, step: Floats) -> Floats:
 
 @compiled
 def ground_after_step(qpos: Floats, step: Floats) -> Floats:
-    """The ground frame (3,) a step (3,) away from that of a configuration (55,)."""
+    """Ground frame (3,) after a step (3,) from that of a configuration (55,)."""
     return step_ground(np.array([qpos[0], qpos[1], 2.0 * np.arctan2(qpos[6], qpos[3])]), step)
 
 
 @compiled
 def features_from_readings(position_m: Floats, turned: Floats, ground: Floats, lever_m: float) -> Singles:
-    """(9 S,) the columns of `controls` for positions (S, 3) and orientations (S, 4), from a ground frame (3,)."""
+    """(9 S,) `station_features` of positions (S, 3) and orientations (S, 4), relative to a ground frame (3,)."""
     cosine, sine = np.cos(ground[2]), np.sin(ground[2])
     out = np.empty((len(position_m), 9), np.float32)
     for k in range(len(position_m)):

@@ -1,7 +1,7 @@
-"""Which frames of the database are like this one: by the last answers alone, or by the readings as well.
+"""Neighbour searches of `dynamic_map`: by the last estimates alone, or by the readings as well.
 
-Both answer a `DynamicMapSession`: which windows, how far (squared), and the windows minus the query, from which the
-local model regresses.
+Both return the windows' rows, their squared distances, and the windows minus the query, on which the local model
+regresses.
 """
 
 from typing import Protocol
@@ -18,19 +18,19 @@ from harness.reconstruct.solver.residuals import Residuals
 
 
 class NeighbourSearch(Protocol):
-    """A session's search."""
+    """Neighbour search of one session."""
 
     def nearest(self, past: Floats, count: int) -> Neighbours:
-        """For the last answers (m, 55), newest first, and the readings at hand."""
+        """The `count` nearest windows for the last estimates (m, 55), newest first, and the current readings."""
         ...
 
     def record(self) -> None:
-        """A frame was answered; its readings are still at hand."""
+        """Note which readings the current frame had, after its estimate is made."""
         ...
 
 
 class PoseHistorySearch:
-    """Liu et al. 2011: the windows nearest to the last m answers, D_w = 1."""
+    """Search by the last m estimates, D_w = 1 (Liu et al. 2011)."""
 
     def __init__(self, windows: Windows, index: Index) -> None:
         self._windows, self._index = windows, index
@@ -38,45 +38,55 @@ class PoseHistorySearch:
     def nearest(self, past: Floats, count: int) -> Neighbours:
         query = self._windows.query(past)
         rows, squared = self._index.nearest(query, count)
-        away = self._windows.gather(rows)
-        away -= query
-        return Neighbours(rows, squared, away)
+        offsets = self._windows.gather(rows)
+        offsets -= query
+        return Neighbours(rows, squared, offsets)
 
     def record(self) -> None:
         pass
 
 
 class FeatureSearch:
-    """The windows and readings that lead to expect a posture like this one (`expectation`)."""
+    """Search by the features of a `ReducedRankRegression`, from the last estimates and the readings."""
 
-    def __init__(self, windows: Windows, evidence: ReducedRankRegression, residuals: Residuals, index: str) -> None:
-        self._windows, self._evidence, self._residuals, self._kind = windows, evidence, residuals, index
-        self._ever: Bools = np.zeros(2 * evidence.count, bool)
-        """Rows of readings that this session has had; a station that comes later only takes part in the solving."""
-        self._expectation: ReducedRankSearch | None = None
-        self._no_turn = np.tile(rotations.IDENTITY, (evidence.count, 1))
+    def __init__(self, windows: Windows, regression: ReducedRankRegression, residuals: Residuals, index: str) -> None:
+        self._windows, self._regression, self._residuals, self._index_name = windows, regression, residuals, index
+        self._measured_before: Bools = np.zeros(2 * regression.count, bool)
+        """(2 S,) readings that this session has had. A station that appears later only takes part in the solver."""
+        self._search: ReducedRankSearch | None = None
+        self._identity = np.tile(rotations.IDENTITY, (regression.count, 1))
 
     def nearest(self, past: Floats, count: int) -> Neighbours:
         residuals = self._residuals
-        if self._expectation is None:
-            usual = self._ever | residuals.measured
-            self._evidence = self._evidence.with_usual_heading(usual)
-            self._expectation = self._evidence.search(self._evidence.columns(usual), self._kind, count)
+        if self._search is None:
+            usual = self._measured_before | residuals.measured
+            self._regression = self._regression.with_usual_heading(usual)
+            self._search = self._regression.search(self._regression.columns(usual), self._index_name, count)
         window = self._windows.query(past)
-        known = self._evidence.predictors(window, residuals.target_m, residuals.world_from_target, self._view(past[0]))
-        return self._expectation.nearest(known, residuals.measured, count)
+        predictors = self._regression.predictors(
+            window, residuals.target_m, residuals.world_from_target, self._anchor_frame(past[0])
+        )
+        return self._search.nearest(predictors, residuals.measured, count)
 
     def record(self) -> None:
-        self._ever |= self._residuals.measured
+        self._measured_before |= self._residuals.measured
 
-    def _view(self, last: Floats) -> AnchorFrame:
-        """From above the anchor, along its heading or the positions'; the last answer (55,) lends what was not read."""
-        residuals, anchor, bearing = self._residuals, self._evidence.anchor, self._evidence.bearing
-        here, facing = residuals.measured[: len(residuals.bones)], residuals.measured[len(residuals.bones) + anchor]
+    def _anchor_frame(self, last: Floats) -> AnchorFrame:
+        """Anchor frame of the readings; the last estimate (55,) supplies what was not measured."""
+        residuals, anchor, heading = self._residuals, self._regression.anchor, self._regression.heading
+        has_position, has_orientation = (
+            residuals.measured[: len(residuals.bones)],
+            residuals.measured[len(residuals.bones) + anchor],
+        )
         at_m, turned = residuals.target_m, residuals.world_from_target[anchor]
-        if not (here[anchor] and facing if bearing is None else here[bearing.stations].all()):
+        if not (has_position[anchor] and has_orientation if heading is None else has_position[heading.stations].all()):
             residuals.kinematics.set(last)
-            lent_m, lent = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
-            at_m, turned = np.where(here[:, None], at_m, lent_m), (turned if facing else lent[anchor])
-        yaw = twist_rad(turned) if bearing is None else bearing.heading_rad(at_m)
+            last_m, last_orientation = residuals.kinematics.station_poses(
+                residuals.bones, residuals.mount_m, self._identity
+            )
+            at_m, turned = (
+                np.where(has_position[:, None], at_m, last_m),
+                (turned if has_orientation else last_orientation[anchor]),
+            )
+        yaw = twist_rad(turned) if heading is None else heading.heading_rad(at_m)
         return AnchorFrame(float(at_m[anchor, 0]), float(at_m[anchor, 1]), float(yaw))

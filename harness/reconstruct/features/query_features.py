@@ -1,7 +1,8 @@
-"""How a session looks at a frame: from where, at which features, and how far it trusts each of them.
+"""Features of a frame's readings, as `ExampleFeatures` has them for examples, and the confidence in each.
 
-The anchor's own orientation gives the heading. Where that was not measured, the last answer is stood where the
-readings are and lends whatever is missing; the missing columns only help to propose neighbours (`index.masked`).
+The anchor's own orientation gives the heading. Where it was not measured, the root of the last estimate is fitted to
+the readings and the missing values are taken from it. Their confidence is 0, so they only propose candidates in the
+search (`index.partial_search`).
 """
 
 import math
@@ -20,48 +21,48 @@ from harness.stream.frame import TrackerFrame
 
 
 class QueryFeatures:
-    """On one performer through one session."""
+    """Computes the features of each frame of a session."""
 
     def __init__(
-        self, residuals: Residuals, worn: Calibration, examples: ExampleFeatures, longest_gap_s: float
+        self, residuals: Residuals, calibration: Calibration, examples: ExampleFeatures, longest_gap_s: float
     ) -> None:
-        count = len(worn.stations)
+        count = len(calibration.stations)
         self._residuals, self._examples, self._longest_gap_s = residuals, examples, longest_gap_s
-        self._no_turn = np.tile(rotations.IDENTITY, (count, 1))
+        self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
 
-    def compute(self, frame: TrackerFrame, answer: Floats) -> tuple[AnchorFrame, Floats, Floats]:
-        """The view, the features (10 S,) and their trust (10 S,), 0 where not measured to 1.
+    def compute(self, frame: TrackerFrame, last_qpos: Floats) -> tuple[AnchorFrame, Floats, Floats]:
+        """The anchor frame, the features (10 S,) and their confidences (10 S,), from 0 (not measured) to 1.
 
-        `answer` (55,) is the last one.
+        `last_qpos` (55,) is the last estimate, which supplies missing values.
         """
         residuals, examples = self._residuals, self._examples
         velocity_m_s, moving = np.empty_like(self._before_m), np.empty_like(self._before_valid)
-        whole = _estimate_velocities(
+        complete = _estimate_velocities(
             *(residuals.target_m, frame.measured_s, residuals.measured),
             *(self._before_m, self._before_s, self._before_valid),
             *(self._longest_gap_s, velocity_m_s, moving),
         )
         position_m, turned = residuals.target_m, residuals.world_from_target
         facing = turned[examples.anchor]
-        if not whole:
-            position_m, turned, facing = self._filled(answer)
+        if not complete:
+            position_m, turned, facing = self._completed_readings(last_qpos)
         w, _, _, z = facing.tolist()
         x_m, y_m, _ = position_m[examples.anchor].tolist()
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
-        query, trust = _compute_features(
+        query, confidence = _compute_features(
             *(position_m, turned, velocity_m_s, x_m, y_m, view.yaw_rad, examples.hemisphere, examples.scale),
             *(residuals.confidence, moving),
         )
-        return view, query, trust
+        return view, query, confidence
 
-    def _filled(self, answer: Floats) -> tuple[Floats, Floats, Floats]:
-        """Positions (S, 3), orientations (S, 4), and the anchor's (4,), from the last answer where nothing was read."""
+    def _completed_readings(self, last_qpos: Floats) -> tuple[Floats, Floats, Floats]:
+        """Positions (S, 3), orientations (S, 4) and the anchor's (4,); missing ones are those of the last estimate."""
         residuals, count = self._residuals, self._examples.count
         here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        residuals.kinematics.set(place_root(residuals, answer))
-        at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._no_turn)
+        residuals.kinematics.set(place_root(residuals, last_qpos))
+        at_m, turned = residuals.kinematics.station_poses(residuals.bones, residuals.mount_m, self._identity)
         turned = np.where(facing, residuals.world_from_target, turned)
         return np.where(here, residuals.target_m, at_m), turned, turned[self._examples.anchor]
 
@@ -78,9 +79,9 @@ def _estimate_velocities(
     velocity_m_s: Floats,
     known: Bools,
 ) -> bool:
-    """Velocities (S, 3) since the frame before [m/s], 0 where not known; where they are (S,); whether all was measured.
+    """Compute velocities (S, 3) since the last frame [m/s], 0 where unknown, and where they are known (S,), in place.
 
-    This frame then takes the place of the one before.
+    Returns whether everything was measured. The frame is then stored as the last one (`before_*`).
     """
     for s in range(len(target_m)):
         gap_s = measured_s[s] - before_s[s]
@@ -102,30 +103,30 @@ def _compute_features(
     yaw_rad: float,
     hemisphere: Floats,
     scale: Floats,
-    trusted: Floats,
+    reading_confidence: Floats,
     moving: Bools,
 ) -> tuple[Floats, Floats]:
-    """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3), and their trust.
+    """The features (10 S,) of positions (S, 3), bone orientations (S, 4) and velocities (S, 3), and their confidence.
 
-    Readings (2S,) are trusted as said, velocities only where something is moving (S,).
+    `reading_confidence` (2 S,) is that of positions, then orientations; velocities also need `moving` (S,).
     """
     count = len(position_m)
-    out, trust = np.empty(10 * count), np.empty(10 * count)
+    out, confidence = np.empty(10 * count), np.empty(10 * count)
     cosine, sine = np.cos(yaw_rad), np.sin(yaw_rad)
     c, s = np.cos(0.5 * yaw_rad), np.sin(0.5 * yaw_rad)
     for k in range(count):
-        at, turn, gone = 3 * k, 3 * count + 4 * k, 7 * count + 3 * k
+        at, turn, rate = 3 * k, 3 * count + 4 * k, 7 * count + 3 * k
         x, y = position_m[k, 0] - x_m, position_m[k, 1] - y_m
         out[at], out[at + 1], out[at + 2] = cosine * x + sine * y, cosine * y - sine * x, position_m[k, 2]
         x, y = velocity_m_s[k, 0], velocity_m_s[k, 1]
-        out[gone], out[gone + 1], out[gone + 2] = cosine * x + sine * y, cosine * y - sine * x, velocity_m_s[k, 2]
-        q, like = turned[k], 0.0
+        out[rate], out[rate + 1], out[rate + 2] = cosine * x + sine * y, cosine * y - sine * x, velocity_m_s[k, 2]
+        q, sign = turned[k], 0.0
         out[turn], out[turn + 1] = c * q[0] + s * q[3], c * q[1] + s * q[2]  # about_z(-yaw) q
         out[turn + 2], out[turn + 3] = c * q[2] - s * q[1], c * q[3] - s * q[0]
         for i in range(4):
-            like += out[turn + i] * hemisphere[k, i]
+            sign += out[turn + i] * hemisphere[k, i]
         for i in range(4):
-            out[turn + i] *= np.copysign(1.0, like)
-        trust[at : at + 3], trust[turn : turn + 4] = trusted[k], trusted[count + k]
-        trust[gone : gone + 3] = trusted[k] * moving[k]
-    return out * scale, trust
+            out[turn + i] *= np.copysign(1.0, sign)
+        confidence[at : at + 3], confidence[turn : turn + 4] = reading_confidence[k], reading_confidence[count + k]
+        confidence[rate : rate + 3] = reading_confidence[k] * moving[k]
+    return out * scale, confidence

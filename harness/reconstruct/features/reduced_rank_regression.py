@@ -1,14 +1,14 @@
-"""What posture to expect: one linear map of everything that is known, and in its terms a search and a local model.
+"""Reduced-rank regression of postures on history and readings; its leading directions are search features.
 
-Known at a frame are the window of the last m answers (Liu et al. 2011, eq. 6 and 8) and the readings of the trackers
-(docs/methods.md G3). A ridge regression over the whole database turns both into the posture that goes with them; its
-leading directions are the coordinates z in which neighbours are sought and from which local models regress. So eq. 6's
-D_w is learnt rather than the identity: what says nothing about the posture does not count, and 40 numbers do.
+Predictors of a frame are the window of the last m estimates (Liu et al. 2011, eq. 6 and 8) and the readings of the
+trackers (docs/methods.md G3). A ridge regression over the whole database maps them to the posture of the frame. The
+leading directions of its predictions are the features z, in which neighbours are searched and on which local models
+regress. So D_w of eq. 6 is learnt instead of the identity: what does not predict the posture does not count.
 
-Readings are seen from above the station on the trunk, along its heading or, where its orientation is not measured,
-along one that the positions themselves define: a heading lent by the last answer feeds its error back. What was not
-read is replaced by what the rest of the evidence leads to expect of it, which for a linear map is the same as learning
-it without.
+Readings are relative to the anchor frame: along the heading of the station on the trunk or, where its orientation is
+not measured, along a heading that is estimated from the positions. (A heading taken from the last estimate would feed
+its error back.) Missing readings are replaced by their regression on the other predictors. For a linear map this equals
+training without them.
 """
 
 from collections.abc import Iterator
@@ -29,104 +29,111 @@ from harness.reconstruct.index import Index, Neighbours, make_index
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 _CHUNK = 256
-"""Windows worked on at a time."""
+"""Number of windows that are processed at a time."""
 _ORIGIN: Floats = np.zeros(3)
-"""A ground frame to stand on."""
+"""Ground frame at the origin, heading along x."""
 _CACHED_MAPS = 64
-"""Combinations of silent stations whose maps are kept."""
+"""Largest number of combinations of missing readings whose maps are cached."""
 _TRAINING_WINDOWS = 20_000
-"""Windows, evenly spread, that the map is learnt from."""
+"""Largest number of windows in the training set; more are thinned evenly."""
 _MIN_HEADING_EXPLAINED = 0.8
-"""Share of the heading that positions must tell to be asked for it: six stations told 0.94 or more, two below 0.78."""
+"""Least explained share of the heading for its estimate from positions: six stations reach 0.94, two below 0.78."""
 
 
 @dataclass(frozen=True)
 class ReducedRankOptions:
-    """In which terms postures are expected."""
+    """Options of the reduced-rank regression."""
 
     window_weight: float = 0.3
-    """What a window's numbers are multiplied by, beside readings in metres."""
+    """Factor of the window's columns [rad, m] against readings in metres."""
     lever_m: float = 0.3
-    """A turn by one radian counts like so many metres."""
+    """Displacement that counts as much as a rotation of one radian [m]."""
     directions: int = 40
-    """Coordinates that are kept."""
+    """Number of features z."""
     ridge: float = 1e-5
-    """Of the map, as a share of the evidence's variance."""
+    """Ridge of the regression, as a share of the predictors' total variance."""
 
 
 class ReducedRankRegression:
-    """What is known before each frame of a database, for stations worn as a calibration says.
+    """Linear regression of the posture of each frame of a database on its predictors, for given mounts.
 
-    A row is the window before the frame (D), then each station's place (3) and two axes of its bone (6).
+    Predictors are the window before the frame (D), then each station's position (3) and two axes of its bone (6).
     """
 
     def __init__(
         self,
         body: Body,
         windows: Windows,
-        worn: Calibration,
-        terms: ReducedRankOptions,
-        bearing: HeadingEstimator | None = None,
+        calibration: Calibration,
+        options: ReducedRankOptions,
+        heading: HeadingEstimator | None = None,
     ) -> None:
-        """Seen along a `bearing`; None for along the anchor's own heading."""
-        self.terms, self.count, self.anchor, self.bearing = terms, len(worn.stations), anchor_of(worn.bones), bearing
-        self.windows, self._trackers = windows, VirtualTrackers(body, worn)
+        """Train on the windows; `heading` estimates the heading, None takes it from the anchor's orientation."""
+        self.options, self.heading = options, heading
+        self.count, self.anchor = len(calibration.stations), anchor_of(calibration.bones)
+        self.windows, self._trackers = windows, VirtualTrackers(body, calibration)
         self.size = windows.size + 9 * self.count
-        self._body, self._worn, self._by_positions = body, worn, dict[bytes, ReducedRankRegression]()
-        self._expectations: dict[bytes, ReducedRankSearch] = {}
-        rows = self._learnt_from()
+        self._body, self._calibration, self._by_readings = body, calibration, dict[bytes, ReducedRankRegression]()
+        self._searches: dict[bytes, ReducedRankSearch] = {}
+        rows = self._training_rows()
         self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE_SIZE)
         for known, after in self.training_data(windows, rows):
             self.mean += known.sum(axis=0) / len(rows)
             self._mean_after += after.sum(axis=0) / len(rows)
         self.scatter: Floats = np.zeros((self.size, self.size))
-        """(D + 9 S, D + 9 S) covariance of the evidence."""
-        self._shared = np.zeros((self.size, POSTURE_SIZE))
+        """(D + 9 S, D + 9 S) covariance of the predictors."""
+        self._cross_covariance = np.zeros((self.size, POSTURE_SIZE))
         for known, after in self.training_data(windows, rows):
-            away = known - self.mean
-            self.scatter += away.T @ away / len(rows)
-            self._shared += away.T @ (after - self._mean_after) / len(rows)
+            centred = known - self.mean
+            self.scatter += centred.T @ centred / len(rows)
+            self._cross_covariance += centred.T @ (after - self._mean_after) / len(rows)
         windows.database.release_memory()
-        self.least = terms.ridge * float(np.trace(self.scatter)) + 1e-12
+        self.ridge = options.ridge * float(np.trace(self.scatter)) + 1e-12
 
-    def _learnt_from(self) -> Ints:
-        every = np.arange(len(self.windows))
-        return (
-            every
-            if len(every) <= _TRAINING_WINDOWS
-            else np.linspace(0, len(every) - 1, _TRAINING_WINDOWS).astype(np.int64)
-        )
+    def _training_rows(self) -> Ints:
+        """Rows of the training windows: all, or an evenly spaced selection."""
+        count = len(self.windows)
+        if count <= _TRAINING_WINDOWS:
+            return np.arange(count)
+        return np.linspace(0, count - 1, _TRAINING_WINDOWS).astype(np.int64)
 
     def with_usual_heading(self, usual: Bools) -> "ReducedRankRegression":
-        """The same seen as a session sees it that has the `usual` readings (2 S,) of positions, then orientations."""
+        """The regression for sessions with these `usual` readings (2 S,) of positions, then orientations.
+
+        If the anchor has positions but no orientations, its heading is estimated from the positions, if they suffice.
+        """
         places = usual[: self.count]
         if usual[self.count + self.anchor] or not places[self.anchor]:
             return self
-        key = places.tobytes()
-        if key not in self._by_positions:
-            at_m = [at_m for _, at_m, _ in self._station_poses(self.windows, self._learnt_from())]
-            bearing = HeadingEstimator.fit(np.concatenate(at_m), self.anchor, places)
-            told = bearing.explained > _MIN_HEADING_EXPLAINED
-            seen = ReducedRankRegression(self._body, self.windows, self._worn, self.terms, bearing) if told else self
-            self._by_positions[key] = seen
-        return self._by_positions[key]
+        mask = places.tobytes()
+        if mask not in self._by_readings:
+            at_m = [at_m for _, at_m, _ in self._station_poses(self.windows, self._training_rows())]
+            heading = HeadingEstimator.fit(np.concatenate(at_m), self.anchor, places)
+            usable = heading.explained > _MIN_HEADING_EXPLAINED
+            regression = (
+                ReducedRankRegression(self._body, self.windows, self._calibration, self.options, heading)
+                if usable
+                else self
+            )
+            self._by_readings[mask] = regression
+        return self._by_readings[mask]
 
-    def search(self, usual: Bools, index: str, wanted: int) -> "ReducedRankSearch":
-        """The search for sessions that know the `usual` columns; made once."""
-        key = usual.tobytes()
-        if key not in self._expectations:
-            self._expectations[key] = ReducedRankSearch(self, usual, index, wanted)
-        return self._expectations[key]
+    def search(self, usual: Bools, index: str, neighbours: int) -> "ReducedRankSearch":
+        """The search for sessions that usually know these columns (D + 9 S,); cached."""
+        mask = usual.tobytes()
+        if mask not in self._searches:
+            self._searches[mask] = ReducedRankSearch(self, usual, index, neighbours)
+        return self._searches[mask]
 
     def training_data(self, windows: Windows, rows: Ints) -> Iterator[tuple[Floats, Floats]]:
-        """The evidence (K, D + 9 S) of some windows and the postures (K, 52) that came of it, chunk by chunk."""
-        for some, at_m, turned in self._station_poses(windows, rows):
+        """Predictors (K, D + 9 S) of some windows and the postures (K, 52) that follow, chunk by chunk."""
+        for some, at_m, orientation in self._station_poses(windows, rows):
             after = windows.successors(some)[:, :POSTURE_SIZE].astype(float)
-            facing = twist_rad(turned[:, self.anchor]) if self.bearing is None else self.bearing.heading_rad(at_m)
-            level = rotations.about_z(-facing)[:, None]
-            place = rotations.rotate(level, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
-            axes = self.terms.lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
-            window = self.terms.window_weight * windows.gather(some)
+            facing = twist_rad(orientation[:, self.anchor]) if self.heading is None else self.heading.heading_rad(at_m)
+            to_anchor = rotations.about_z(-facing)[:, None]
+            place = rotations.rotate(to_anchor, at_m - at_m[:, self.anchor, None] * [1.0, 1.0, 0.0])
+            axes = self.options.lever_m * rotations.to_matrix(rotations.multiply(to_anchor, orientation))[..., :2]
+            window = self.options.window_weight * windows.gather(some)
             read = np.concatenate([place, axes.reshape(*place.shape[:2], 6)], axis=2)
             yield np.concatenate([window, read.reshape(len(some), -1)], axis=1), after
 
@@ -136,44 +143,44 @@ class ReducedRankRegression:
             some = rows[start : start + _CHUNK]
             yield some, *self._trackers.station_poses(windows.database.qpos(windows.frames[some] + 1, _ORIGIN))
 
-    def predictors(self, window: Singles, position_m: Floats, turned: Floats, view: AnchorFrame) -> Floats:
-        """The row (D + 9 S,) of a window's vector (D,) and readings (S, 3), (S, 4) in the world."""
-        read = features_from_readings(position_m, turned, np.array(view), self.terms.lever_m)
-        return np.concatenate([self.terms.window_weight * window, read])
+    def predictors(self, window: Singles, position_m: Floats, orientation: Floats, view: AnchorFrame) -> Floats:
+        """Predictors (D + 9 S,) of a window (D,) and of readings (S, 3), (S, 4) in the world, in an anchor frame."""
+        read = features_from_readings(position_m, orientation, np.array(view), self.options.lever_m)
+        return np.concatenate([self.options.window_weight * window, read])
 
     def columns(self, measured: Bools) -> Bools:
-        """(D + 9 S,) which columns are known when these rows (2 S,) of positions, then orientations, are."""
+        """(D + 9 S,) columns that are known when these readings (2 S,) of positions, then orientations, are."""
         window = np.ones(self.windows.size, bool)
         places, turns = measured[: self.count], measured[self.count :]
         return np.concatenate([window, np.repeat(np.stack([places, turns], axis=1), [3, 6], axis=1).reshape(-1)])
 
     def directions(self, columns: Bools) -> Floats:
-        """(C, 40) from the known columns C to the leading directions of the posture that they lead to expect."""
+        """(C, 40) map from C known columns to the leading directions of the predicted posture."""
         scatter = self.scatter[np.ix_(columns, columns)]
-        damped = scatter + self.least * np.eye(len(scatter))
-        to_posture = solve(damped, self._shared[columns], assume_a="pos")
+        damped = scatter + self.ridge * np.eye(len(scatter))
+        to_posture = solve(damped, self._cross_covariance[columns], assume_a="pos")
         _, vector = np.linalg.eigh(to_posture.T @ scatter @ to_posture)
-        out: Floats = to_posture @ vector[:, ::-1][:, : self.terms.directions]
+        out: Floats = to_posture @ vector[:, ::-1][:, : self.options.directions]
         return out
 
-    def imputation_map(self, columns: Bools, wanted: Bools) -> Floats:
-        """(C, W) from known columns to the wanted ones: themselves, or what the known ones lead to expect."""
-        damped = self.scatter[np.ix_(columns, columns)] + self.least * np.eye(int(columns.sum()))
-        out: Floats = solve(damped, self.scatter[np.ix_(columns, wanted)], assume_a="pos")
-        out[:, columns[wanted]] = np.eye(len(out))[:, wanted[columns]]
+    def imputation_map(self, columns: Bools, targets: Bools) -> Floats:
+        """(C, W) map from C known columns to W target columns: the column itself, or its regression."""
+        damped = self.scatter[np.ix_(columns, columns)] + self.ridge * np.eye(int(columns.sum()))
+        out: Floats = solve(damped, self.scatter[np.ix_(columns, targets)], assume_a="pos")
+        out[:, columns[targets]] = np.eye(len(out))[:, targets[columns]]
         return out
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedRankVectors:
-    """`Vectors`: z of windows, worked out anew whenever it is asked for."""
+    """Search `Vectors`: features z of windows, computed on demand."""
 
-    evidence: ReducedRankRegression
+    regression: ReducedRankRegression
     windows: Windows
     usual: Bools
-    """(D + 9 S,) columns of the evidence that are known."""
+    """(D + 9 S,) predictors that are usually known."""
     directions: Floats
-    """(C, 40) from them to z."""
+    """(C, 40) map from them to z."""
 
     def __len__(self) -> int:
         return len(self.windows)
@@ -183,41 +190,41 @@ class ReducedRankVectors:
         return int(self.directions.shape[1])
 
     def gather(self, rows: Ints | slice) -> Singles:
-        wanted, start = np.arange(len(self))[rows], 0
-        out: Singles = np.empty((len(wanted), self.size), np.float32)
-        for known, _ in self.evidence.training_data(self.windows, wanted):
-            out[start : start + len(known)] = (known - self.evidence.mean)[:, self.usual] @ self.directions
+        selected, start = np.arange(len(self))[rows], 0
+        out: Singles = np.empty((len(selected), self.size), np.float32)
+        for known, _ in self.regression.training_data(self.windows, selected):
+            out[start : start + len(known)] = (known - self.regression.mean)[:, self.usual] @ self.directions
             start += len(known)
         self.windows.database.release_memory()
         return out
 
 
 class ReducedRankSearch:
-    """The search among N windows, in terms of the postures that certain readings lead to expect."""
+    """Search among N windows in the features z."""
 
-    def __init__(self, evidence: ReducedRankRegression, usual: Bools, index: str, wanted: int) -> None:
-        """For sessions that know the `usual` columns (D + 9 S,) as a rule and ask for so many neighbours."""
-        self.vectors = ReducedRankVectors(evidence, evidence.windows, usual, evidence.directions(usual))
-        self.index: Index = make_index(index, self.vectors, wanted)
+    def __init__(self, regression: ReducedRankRegression, usual: Bools, index: str, neighbours: int) -> None:
+        """For sessions that usually know these columns (D + 9 S,) and search this number of neighbours."""
+        self.vectors = ReducedRankVectors(regression, regression.windows, usual, regression.directions(usual))
+        self.index: Index = make_index(index, self.vectors, neighbours)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
 
     def nearest(self, known: Floats, measured: Bools, count: int) -> Neighbours:
-        """Windows whose z is nearest to that of evidence (D + 9 S,), of which only some readings (2 S,) were measured.
+        """Windows whose z is nearest to that of predictors (D + 9 S,), of which `measured` readings (2 S,) are known.
 
-        What they differ by are z, or as much of it along other axes.
+        The offsets are those of z, possibly along other orthonormal axes.
         """
-        key = measured.tobytes()
-        found = self._maps.get(key)
-        if found is None:
+        mask = measured.tobytes()
+        entry = self._maps.get(mask)
+        if entry is None:
             if len(self._maps) >= _CACHED_MAPS:
                 self._maps.clear()
-            found = self._maps[key] = self._map(self.vectors.evidence.columns(measured))
-        to_z, mean = found
+            entry = self._maps[mask] = self._map(self.vectors.regression.columns(measured))
+        to_z, mean = entry
         return self.index.nearest_with_offsets((known @ to_z - mean).astype(np.float32), count)
 
     def _map(self, columns: Bools) -> tuple[Floats, Floats]:
-        """(D + 9 S, 40) from evidence to z when some columns are known, the others count nothing; (40,) of the mean."""
-        vectors, evidence = self.vectors, self.vectors.evidence
-        to_z = np.zeros((evidence.size, vectors.size))
-        to_z[columns] = evidence.imputation_map(columns, vectors.usual) @ vectors.directions
-        return to_z, evidence.mean @ to_z
+        """(D + 9 S, 40) map from predictors to z that uses the known columns only, and (40,) the mean's image."""
+        vectors, regression = self.vectors, self.vectors.regression
+        to_z = np.zeros((regression.size, vectors.size))
+        to_z[columns] = regression.imputation_map(columns, vectors.usual) @ vectors.directions
+        return to_z, regression.mean @ to_z

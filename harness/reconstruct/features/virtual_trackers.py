@@ -1,4 +1,4 @@
-"""What the trackers would have read had they been worn in the examples."""
+"""Virtual trackers: the readings that trackers with given mounts would have had in the examples."""
 
 import numpy as np
 
@@ -10,20 +10,21 @@ from harness.core.motion import BodyMotion
 from harness.reconstruct.solver.kinematic_tree import build_tree, forward_kinematics_batch, new_state
 
 
-def station_poses(body: Body, take: BodyMotion, worn: Calibration) -> tuple[Floats, Floats]:
-    """Positions (T, S, 3) [m] of the stations, and orientations (T, S, 4) of the bones that carry them.
+def station_poses(body: Body, take: BodyMotion, calibration: Calibration) -> tuple[Floats, Floats]:
+    """Station positions (T, S, 3) [m] and orientations of their bones (T, S, 4), for a body motion.
 
-    Signs of the quaternions are continuous in time.
+    The quaternions' signs are continuous in time.
     """
-    at_m, turned = VirtualTrackers(body, worn).station_poses(take.qpos)
+    at_m, turned = VirtualTrackers(body, calibration).station_poses(take.qpos)
     return at_m, rotations.continuous(turned)
 
 
 class VirtualTrackers:
-    """Trackers on a body."""
+    """Stations of a calibration on a body."""
 
-    def __init__(self, body: Body, worn: Calibration) -> None:
-        self._chain = build_tree(body, [body.skeleton.index(bone) for bone in worn.bones], worn.mount_m)
+    def __init__(self, body: Body, calibration: Calibration) -> None:
+        bones = [body.skeleton.index(bone) for bone in calibration.bones]
+        self._chain = build_tree(body, bones, calibration.mount_m)
         self._placed = new_state(self._chain)
 
     def station_poses(self, qpos: Floats) -> tuple[Floats, Floats]:

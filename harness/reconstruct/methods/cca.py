@@ -1,12 +1,13 @@
-"""Kernel canonical correlation analysis on a handful of pairs, as a regression: Kim et al. 2012, eq. 3 to 5.
+"""Kernel canonical correlation analysis of a few pairs, as a regression: Kim et al. 2012, eq. 3 to 5.
 
-Of m pairs only Gram matrices are needed: H of the inputs, F of the outputs, and the kernel between a new input and
-those m. The answer is linear in the outputs, so what comes out is one weight for each of them; weights sum to 1.
+Of m pairs only Gram matrices are needed: H of the inputs, F of the outputs, and the kernel between a new input and the
+m inputs. The prediction is linear in the outputs, so the result is a weight for each of them. Weights sum to 1.
 
-With full rank eq. 3 is 1 in every direction. So Gram matrices are centred, and regularised as docs/methods.md E says:
-(H + kH I)^-1 F (F + kF I)^-1 H x = rho^2 x, with kH = kappa times H's mean eigenvalue. Centring is done by an
-orthonormal basis of what sums to 0, which leaves m - 1 dimensions and nothing singular. Eq. 4 may be held
-back by the same ridge, x^T H (H + kH I) x in place of x^T H^2 x: as it is written, the last bases follow noise.
+With full rank, eq. 3 has correlation 1 in every direction. So Gram matrices are centred and regularised
+(docs/methods.md E): (H + kH I)^-1 F (F + kF I)^-1 H x = rho^2 x, with kH = kappa times H's mean eigenvalue. Centring
+uses an orthonormal basis of the vectors of sum 0, which leaves m - 1 dimensions and no singular matrix. The same ridge
+can regularise the projection of eq. 4, by x^T H (H + kH I) x in place of x^T H^2 x: as printed, the last bases follow
+noise.
 """
 
 import numpy as np
@@ -15,14 +16,15 @@ from harness.core.arrays import Floats
 from harness.core.compiled import compiled
 
 _EIGENVALUE_FLOOR = 1e-12
-"""Added to eigenvalues from 0 to 1, so that outputs may lie in fewer dimensions."""
+"""Added to eigenvalues between 0 and 1, so that outputs may have a lower rank."""
 _ROUNDING = 1e-15
+"""Relative size below which an off-diagonal element counts as 0."""
 _UNDERFLOW = 1e-290
-"""A square so small is rounding, and would underflow."""
+"""Squared length below which a Householder vector is skipped."""
 
 
 def canonical_correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
-    """The largest canonical correlations (l,) of two Gram matrices (m, m), falling."""
+    """The largest canonical correlations (l,) of two Gram matrices (m, m), in descending order."""
     squared, _, _ = _canonical_bases(_centre(inputs), _centre(outputs), bases, kappa)
     out: Floats = np.sqrt(np.maximum(squared[::-1], 0.0))
     return out
@@ -30,12 +32,12 @@ def canonical_correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa
 
 @compiled
 def regression_weights(
-    inputs: Floats, query: Floats, outputs: Floats, width: float, bases: int, kappa: float, held: bool
+    inputs: Floats, query: Floats, outputs: Floats, width: float, bases: int, kappa: float, regularise_projection: bool
 ) -> Floats:
-    """`weights_from_kernels` (m,) with Gaussian kernels, of inputs (m, n), a query (n,) and outputs (m, d).
+    """(m,) weights of outputs (m, d) for inputs (m, n) and a query (n,), with Gaussian kernels.
 
-    Kernels are `width` root mean square distances of two examples wide. When inputs or outputs are all the same, they
-    count the same.
+    The kernels' standard deviation is `width` RMS distances of two examples. Weights are equal when all inputs or all
+    outputs are the same.
     """
     between, across = squared_distances(inputs), squared_distances(outputs)
     if between.sum() <= 0.0 or across.sum() <= 0.0:
@@ -51,12 +53,12 @@ def regression_weights(
         _gaussian_kernel(between, sharpness),
         _gaussian_kernel(across, _kernel_precision(across, width)),
     )
-    return weights_from_kernels(kernel_x, kernel_y, near, bases, kappa, held)
+    return weights_from_kernels(kernel_x, kernel_y, near, bases, kappa, regularise_projection)
 
 
 @compiled
 def squared_distances(points: Floats) -> Floats:
-    """(m, m) between points (m, n), exactly 0 between equal ones when all are."""
+    """(m, m) squared distances of points (m, n); exactly 0 when all points are equal."""
     away = points - points[0]
     gram = away @ away.T
     out: Floats = np.zeros_like(gram)
@@ -75,7 +77,7 @@ def _kernel_precision(squared: Floats, width: float) -> float:
 
 @compiled
 def _gaussian_kernel(squared: Floats, sharpness: float) -> Floats:
-    """(m, m) from squared distances (m, m)."""
+    """(m, m) Gaussian kernel of squared distances (m, m)."""
     out: Floats = np.ones_like(squared)
     for i in range(len(out)):
         for j in range(i):
@@ -85,32 +87,32 @@ def _gaussian_kernel(squared: Floats, sharpness: float) -> Floats:
 
 @compiled
 def weights_from_kernels(
-    inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, held: bool
+    inputs: Floats, outputs: Floats, query: Floats, bases: int, kappa: float, regularise_projection: bool
 ) -> Floats:
-    """(m,) what each of m >= 2 outputs counts, from Gram matrices (m, m) of both sides and the query's kernel (m,).
+    """(m,) weights of m >= 2 outputs, from Gram matrices (m, m) of both sides and the query's kernel (m,).
 
-    With `held` the ridge of eq. 3 holds eq. 4 back as well. ArithmeticError when all inputs or outputs are the same.
+    `regularise_projection` applies the ridge of eq. 3 to eq. 4. ArithmeticError when all inputs or outputs are equal.
     """
     count = len(query)
     squared, y, root = _canonical_bases(_centre(inputs), _centre(outputs), bases, kappa)
     new = _helmert_contrasts((query - inputs.sum(axis=1) / count).reshape(-1, 1)).reshape(-1)
-    if held:  # H (H + kH I) and F y make the same diagonal of squares: eq. 4 and 5 project onto the F y
-        found = _project(root.T @ (root @ new), y)
+    if regularise_projection:  # with this ridge, eq. 4 and 5 are a projection onto the rows F y
+        contrasts = _project(root.T @ (root @ new), y)
     else:
         seen = y @ root.T
         x = y - _ridge(_centre(inputs), kappa) * (seen @ root)
         reduced = squared * np.linalg.solve(x @ x.T, seen @ (root @ new))  # eq. 4
-        found = y.T @ np.linalg.solve(y @ y.T, reduced)  # eq. 5
-    return _from_helmert_contrasts(found) + 1.0 / count
+        contrasts = y.T @ np.linalg.solve(y @ y.T, reduced)  # eq. 5
+    return _from_helmert_contrasts(contrasts) + 1.0 / count
 
 
 @compiled
 def _canonical_bases(inputs: Floats, outputs: Floats, bases: int, kappa: float) -> tuple[Floats, Floats, Floats]:
-    """The l best pairs of bases of centred Gram matrices of n = m - 1 dimensions.
+    """The l pairs of bases of highest correlation, for centred Gram matrices of n = m - 1 dimensions.
 
     With R = H (H + kH I)^-1 and the Cholesky factor L of F (F + kF I)^-1, the matrix L^T R L is symmetric, and its
-    eigenvectors w give  F y = L w  and, up to length,  x = (H + kH I)^-1 L w. Returned are squared correlations (l,),
-    rising, the examples' reduced outputs F y (l, n), and a root W (n, n) of (H + kH I)^-1 = W^T W.
+    eigenvectors w give  F y = L w  and, up to length,  x = (H + kH I)^-1 L w. Returns squared correlations (l,) in
+    ascending order, the examples' reduced outputs F y (l, n), and a root W (n, n) of (H + kH I)^-1 = W^T W.
     """
     count = len(inputs)
     ridge_x, ridge_y = _ridge(inputs, kappa), _ridge(outputs, kappa)
@@ -129,7 +131,7 @@ def _canonical_bases(inputs: Floats, outputs: Floats, bases: int, kappa: float) 
 
 @compiled
 def _cholesky(gram: Floats) -> None:
-    """A positive definite matrix (n, n) becomes the upper triangle U of U^T U."""
+    """Cholesky factorisation in place: a positive definite matrix (n, n) becomes the upper factor U of U^T U."""
     for k in range(len(gram)):
         share = 1.0 / np.sqrt(gram[k, k])
         for j in range(len(gram)):
@@ -140,7 +142,7 @@ def _cholesky(gram: Floats) -> None:
 
 @compiled
 def _inverse_root(gram: Floats, ridge: float) -> Floats:
-    """(n, n) W of (G + ridge I)^-1 = W^T W."""
+    """(n, n) root W of (G + ridge I)^-1 = W^T W."""
     upper, out = gram.copy(), np.eye(len(gram))
     for i in range(len(gram)):
         upper[i, i] += ridge
@@ -154,62 +156,62 @@ def _inverse_root(gram: Floats, ridge: float) -> Floats:
 
 @compiled
 def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues (n,) and eigenvectors, in rows (n, n), of a symmetric matrix, which is spoilt; in no order.
+    """Eigenvalues (n,) and eigenvectors (n, n), in rows and in no order, of a symmetric matrix, which is overwritten.
 
-    Householder's reflections to a tridiagonal one, then QL steps with implicit shifts (Golub & Van Loan 1996, 8.3). On
-    so few numbers LAPACK takes twice as long.
+    Householder reflections to tridiagonal form, then QL steps with implicit shifts (Golub & Van Loan 1996, 8.3). For a
+    dozen rows LAPACK takes twice as long.
     """
     size = len(matrix)
-    rows, beside = np.eye(size), np.zeros(size)
-    mirror, along, turned = np.zeros(size), np.zeros(size), np.zeros(size)
+    rows, off_diagonal = np.eye(size), np.zeros(size)
+    reflector, along, turned = np.zeros(size), np.zeros(size), np.zeros(size)
     for k in range(size - 1):
-        mirror[:] = matrix[k]
-        mirror[: k + 1] = 0.0
-        squared = _dot(mirror, mirror)
+        reflector[:] = matrix[k]
+        reflector[: k + 1] = 0.0
+        squared = _dot(reflector, reflector)
         if squared < _UNDERFLOW:
             continue
-        beside[k] = -np.copysign(np.sqrt(squared), mirror[k + 1])
-        mirror[k + 1] -= beside[k]
-        share = np.sqrt(0.5 * _dot(mirror, mirror))
+        off_diagonal[k] = -np.copysign(np.sqrt(squared), reflector[k + 1])
+        reflector[k + 1] -= off_diagonal[k]
+        share = np.sqrt(0.5 * _dot(reflector, reflector))
         for i in range(k + 1, size):
-            mirror[i] /= share  # I - v v^T is the reflection
+            reflector[i] /= share  # I - v v^T is the reflection
         along[:], turned[:] = 0.0, 0.0
         for i in range(k + 1, size):
-            row, other, share = matrix[i], rows[i], mirror[i]
+            row, other, share = matrix[i], rows[i], reflector[i]
             for j in range(size):
                 along[j] += share * row[j]
                 turned[j] += share * other[j]
-        _add_scaled(along, -0.5 * _dot(along, mirror), mirror)
+        _add_scaled(along, -0.5 * _dot(along, reflector), reflector)
         for i in range(k + 1, size):
-            row, other, share, more = matrix[i], rows[i], mirror[i], along[i]
+            row, other, share, more = matrix[i], rows[i], reflector[i], along[i]
             for j in range(size):
-                row[j] -= share * along[j] + more * mirror[j]
+                row[j] -= share * along[j] + more * reflector[j]
                 other[j] -= share * turned[j]
     values = np.diag(matrix).copy()
     for low in range(size):
         while True:
             high = low
-            while high < size - 1 and abs(beside[high]) > _ROUNDING * (abs(values[high]) + abs(values[high + 1])):
+            while high < size - 1 and abs(off_diagonal[high]) > _ROUNDING * (abs(values[high]) + abs(values[high + 1])):
                 high += 1
             if high == low:
                 break
-            _ql_step(values, beside, rows, low, high)
+            _ql_step(values, off_diagonal, rows, low, high)
     return values, rows
 
 
 @compiled
-def _ql_step(values: Floats, beside: Floats, rows: Floats, low: int, high: int) -> None:
-    """One on the block from low to high of a tridiagonal matrix, whose eigenvectors are in terms of `rows`."""
-    shift = (values[low + 1] - values[low]) / (2.0 * beside[low])
-    shift = values[low] - beside[low] / (shift + np.copysign(np.sqrt(shift * shift + 1.0), shift))
+def _ql_step(values: Floats, off_diagonal: Floats, rows: Floats, low: int, high: int) -> None:
+    """A QL step on the block from `low` to `high` of a tridiagonal matrix; `rows` accumulate the rotations."""
+    shift = (values[low + 1] - values[low]) / (2.0 * off_diagonal[low])
+    shift = values[low] - off_diagonal[low] / (shift + np.copysign(np.sqrt(shift * shift + 1.0), shift))
     g, c, s, p = values[high] - shift, 1.0, 1.0, 0.0
     for i in range(high - 1, low - 1, -1):
-        f, b = s * beside[i], c * beside[i]
+        f, b = s * off_diagonal[i], c * off_diagonal[i]
         r = np.sqrt(f * f + g * g)
-        beside[i + 1] = r
+        off_diagonal[i + 1] = r
         if r == 0.0:
             values[i + 1] -= p
-            beside[high] = 0.0
+            off_diagonal[high] = 0.0
             return
         share = 1.0 / r
         s, c = share * f, share * g
@@ -218,16 +220,16 @@ def _ql_step(values: Floats, beside: Floats, rows: Floats, low: int, high: int) 
         p = s * r
         values[i + 1] = g + p
         g = c * r - b
-        one, other = rows[i], rows[i + 1]
+        row, below = rows[i], rows[i + 1]
         for k in range(len(values)):
-            one[k], other[k] = c * one[k] - s * other[k], s * one[k] + c * other[k]
+            row[k], below[k] = c * row[k] - s * below[k], s * row[k] + c * below[k]
     values[low] -= p
-    beside[low], beside[high] = g, 0.0
+    off_diagonal[low], off_diagonal[high] = g, 0.0
 
 
 @compiled
 def _project(vector: Floats, across: Floats) -> Floats:
-    """Of a vector (n,), what lies in the span of l others (l, n), which become orthonormal."""
+    """Projection (n,) of a vector onto the span of l others (l, n), which are orthonormalised in place."""
     out = np.zeros_like(vector)
     for i in range(len(across)):
         for j in range(i):
@@ -239,16 +241,17 @@ def _project(vector: Floats, across: Floats) -> Floats:
 
 @compiled
 def _add_scaled(to: Floats, share: float, other: Floats) -> None:
-    """To a vector (n,) a share of another."""
+    """Add a multiple of another vector (n,) in place."""
     for k in range(len(to)):
         to[k] += share * other[k]
 
 
 @compiled
-def _dot(one: Floats, other: Floats) -> float:
+def _dot(a: Floats, b: Floats) -> float:
+    """Dot product of two vectors (n,); faster than `@` on short ones."""
     total = 0.0
-    for k in range(len(one)):
-        total += one[k] * other[k]
+    for k in range(len(a)):
+        total += a[k] * b[k]
     return total
 
 
@@ -259,13 +262,13 @@ def _ridge(gram: Floats, kappa: float) -> float:
 
 @compiled
 def _centre(gram: Floats) -> Floats:
-    """(n, n) Gram matrix (m, m) about the mean of its m vectors."""
+    """(n, n) centred Gram matrix, from (m, m), n = m - 1, in Helmert's basis."""
     return _helmert_contrasts(np.ascontiguousarray(_helmert_contrasts(gram).T))
 
 
 @compiled
 def _helmert_contrasts(values: Floats) -> Floats:
-    """(m - 1, k) of values (m, k), in Helmert's orthonormal basis of what sums to 0."""
+    """(m - 1, k) coordinates of values (m, k) in Helmert's orthonormal basis of the vectors of sum 0."""
     out, total = np.empty((len(values) - 1, values.shape[1])), values[0].copy()
     for rank in range(1, len(values)):
         share = 1.0 / np.sqrt(rank * (rank + 1.0))
@@ -277,7 +280,7 @@ def _helmert_contrasts(values: Floats) -> Floats:
 
 @compiled
 def _from_helmert_contrasts(values: Floats) -> Floats:
-    """(m,) of sum 0 whose contrasts these are (m - 1,)."""
+    """(m,) vector of sum 0 with these Helmert coordinates (m - 1,)."""
     out = np.zeros(len(values) + 1)
     for rank in range(1, len(out)):
         share = values[rank - 1] / np.sqrt(rank * (rank + 1.0))

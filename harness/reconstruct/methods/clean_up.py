@@ -1,6 +1,12 @@
-"""Any method with its answer pulled onto the trackers: the final inverse kinematics of Kim et al. 2012 (B5).
+"""Final inverse kinematics (`+ik`): corrects the estimates of any other method so that they fit the trackers.
 
-Levenberg-Marquardt from the method's pose, which is also the prior's mean; `+ik` after the method's name.
+For every frame, Levenberg-Marquardt starts from the other method's pose, which is also the mean of the prior of the
+hinges. The root has no prior. The other method never sees the correction.
+
+Source: the last step of Kim et al. 2012 (docs/methods.md B5).
+
+Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `CleanUp`): `prior_sigma_rad` 30 deg, the
+loss of the residuals and the convergence criteria.
 """
 
 import math
@@ -21,17 +27,21 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 SUFFIX = "+ik"
+"""What follows the other method's name."""
 
 
 @dataclass(frozen=True)
 class CleanUp:
-    """A `Method` around another."""
+    """Options of the final inverse kinematics, a `Method` around another."""
 
     method: Method
+    """The other method."""
     loss: Loss = field(default_factory=Loss)
+    """Scales and robust loss of the residuals."""
     stopping: Stopping = field(default_factory=Stopping)
+    """Convergence criteria of the solver."""
     prior_sigma_rad: float = math.radians(30.0)
-    """How freely each hinge may leave the method's pose [rad]; the root may at will."""
+    """Standard deviation of each hinge about the other method's pose [rad]."""
 
     @property
     def name(self) -> str:
@@ -51,7 +61,7 @@ class CleanUp:
 
 @dataclass(frozen=True, eq=False)
 class FittedCleanUp:
-    """The other method, fitted."""
+    """The trained other method, with options and body."""
 
     options: CleanUp
     body: Body
@@ -62,7 +72,7 @@ class FittedCleanUp:
 
 
 class CleanUpSession:
-    """Corrects what the inner session answers and never talks back to it."""
+    """Corrects each estimate of the inner session, without feedback to it."""
 
     def __init__(self, fitted: FittedCleanUp, calibration: Calibration, inner: Session) -> None:
         self._inner = inner
@@ -74,11 +84,11 @@ class CleanUpSession:
         self._precision[6:] = fitted.options.prior_sigma_rad**-2
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        guess = self._inner.step(frame)
+        estimate = self._inner.step(frame)
         if not (frame.position_valid.any() or frame.orientation_valid.any()):
-            return guess
+            return estimate
         self._gate.read(frame, self._residuals)
-        start = np.concatenate([guess.qpos[:7], self._limits.clip(self._limits.principal(guess.qpos[7:]))])
+        start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
         self._gate.update(self._residuals, qpos)
-        return Estimate(qpos, guess.status)
+        return Estimate(qpos, estimate.status)

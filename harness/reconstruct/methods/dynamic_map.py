@@ -1,16 +1,27 @@
-"""Maximum a posteriori poses under a local dynamic model: Liu et al. 2011, eq. 2 to 14 (docs/methods.md A4, A5, E).
+"""Local dynamic model (`dynamic_map`): maximum a posteriori poses (docs/methods.md A4, A5, E, G3).
 
-At every frame the windows of the database that are most like the present are found, what followed them is regressed
-on them, and the pose is solved that is likely both as what follows and by what the trackers read. Like the present are,
-in the paper, windows near the last m answers (`dynamic_map:window`; `dynamic_map:literal` is without repairs). Left
-to itself such a prediction drifts with its own errors; so by default the readings take part in it, in the search and in
-the regression (docs/methods.md G3), in terms of the postures that they lead to expect (`expectation`).
+For every frame:
+
+1. Search the K example windows that are most like the present.
+2. Regress the posture and step that follow them on the windows (`local_dynamic_model`): a Gaussian prediction.
+3. Solve for the pose that maximises prediction times likelihood of the readings, by Levenberg-Marquardt.
+
+Source: Liu et al. 2011, eq. 2 to 14. Three variants:
+
+- `dynamic_map:literal`: the paper as printed. Windows are compared by the last m estimates.
+- `dynamic_map:window`: the same search, with a ridge in place of cut-off components, wider weights and sigmas.
+- `dynamic_map` (ours): readings take part in the search and in the regression, by features from a reduced-rank
+  regression (`reduced_rank_regression`). A prediction from its own estimates alone drifts with its errors.
+
+Options are the fields of `DynamicMap`; scenarios/tune_dynamic_map.toml chose the defaults: `search` "features", 3
+poses, 800 neighbours, `width` 0.2, `ridge` 1e-3, `spread` 8, and floors of the prediction's standard deviations: 5 deg
+(hinges), 30 deg (tilt), 0.3 m (height), 3 m and 60 deg (step). `regression` holds the options of the features.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -37,77 +48,81 @@ from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.stream.frame import TrackerFrame
 
 _MIN_WEIGHT_VARIANCE = 1e-6
-"""Smallest variance of the examples' weights; a performer who repeats an example exactly has distances of 0."""
+"""Smallest variance of the neighbours' weights, for a performer who repeats an example exactly."""
 
 
 @dataclass(frozen=True)
 class DynamicMap:
-    """A `Method`; defaults were chosen on validation clips, see scenarios/tune_dynamic_map.toml."""
+    """Options of the local dynamic model, a `Method`; scenarios/tune_dynamic_map.toml chose the defaults."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"terms": "regression", "like": "search", "kept": "variance_kept"}
 
     name: str = "dynamic_map"
     summary: str = (
         "the pose that is likely by the readings and by a local model of examples, learnt from answers and readings"
     )
     needs_examples: bool = True
-    like: Literal["evidence", "window"] = "evidence"
-    """What examples must be like: the last answers and the readings, or the last answers alone as in the paper."""
-    terms: ReducedRankOptions = field(default_factory=ReducedRankOptions)
-    """Of that evidence."""
+    search: Literal["features", "history"] = "features"
+    """What neighbours are compared by: the last estimates and the readings, or the last estimates alone (the paper)."""
+    regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)
+    """Options of the reduced-rank regression that makes the features; used when `search` is "features"."""
     poses: int = 3
-    """m, answers that the next is predicted from."""
+    """m: number of past estimates from which the next pose is predicted."""
     neighbours: int = 800
-    """K, examples of the local model."""
+    """K: number of examples in the local model."""
     width: float = 0.2
-    """Variance of the weights in squared distances of the K/2-th neighbour; 0 for eq. 6 as printed, D_w = 1."""
-    kept: float = 1.0
-    """Share of the windows' variance that the regression uses: eq. 5 cuts off the rest, 1 leaves it to the ridge."""
+    """Variance of the weights over the K/2-th neighbour's squared distance; 0 is eq. 6 as printed, D_w = 1."""
+    variance_kept: float = 1.0
+    """Share of the windows' variance that the regression uses (eq. 5); 1 keeps all and relies on the ridge."""
     ridge: float = 1e-3
-    """Added to that variance's eigenvalues, as a share of it."""
+    """Ridge added to the eigenvalues of the windows' covariance, as a share of its trace."""
     spread: float = 8.0
-    """Times the examples' standard deviations about the regression: how much worse it may be for another performer.
+    """Factor on the standard deviations of the prediction, which allows for another performer than the examples'.
 
-    Their ratios say which hinges to believe; at 1 the prior is a wall that pulls the body off exact trackers."""
+    At 1 the prior is so narrow that it pulls the body off exact trackers."""
     novelty: float = 0.0
-    """Times the root mean square distance of the nearest example per number that neighbours are told apart by, added to
-    every sigma."""
+    """Factor on the nearest example's RMS distance per column, which is added to every sigma in quadrature."""
     least_sigma_rad: float = math.radians(5.0)
     """Floor of every hinge's standard deviation [rad]."""
     tilt_sigma_rad: float = math.radians(30.0)
-    """Of the root's tilt [rad]."""
+    """Floor of the root's tilt, standard deviation [rad]."""
     height_sigma_m: float = 0.3
-    """Of the root's height [m]."""
+    """Floor of the root's height, standard deviation [m]."""
     step_sigma_m: float = 3.0
-    """Of the root's step over the ground from the estimated frame before [m]: loose, or one slip is for ever."""
+    """Floor of the root's step over the ground, standard deviation [m]; a small one makes a slip permanent."""
     turn_sigma_rad: float = math.radians(60.0)
-    """Of its turn about the vertical [rad]."""
+    """Floor of the root's rotation about the vertical per frame, standard deviation [rad]."""
     start: Literal["prediction", "closest"] = "prediction"
-    """Of the solver; the other one, and the closest example is the paper's, takes its place when it costs less."""
+    """Start of the solver; the paper's is "closest". The other start is tried if the first fails or leaves outliers."""
     index: str = "auto"
-    """How neighbours are searched (`index.choose`)."""
+    """Search index: "auto" or a name of `index.selection`."""
     loss: Loss = field(default_factory=Loss)
+    """Scales and robust loss of the residuals."""
     jump_m: float = 0.1
-    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
+    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     lost_after_s: float = LOST_AFTER_S
+    """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
+    """Convergence criteria of the solver."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedDynamicMap":
-        """BadInput without examples that are long enough."""
+        """Build the database; BadInput without examples of more than `poses` frames."""
         if not any(len(take) > self.poses for take in examples):
-            found = f"A dynamic map is learnt from examples of more than {self.poses} frames, and there are none."
-            raise BadInput(found, "Name some in the scenario.")
+            message = f"A dynamic map needs examples of more than {self.poses} frames, and there are none."
+            raise BadInput(message, "Name some in the scenario.")
         return self.fit_database(body, MotionDatabase.build(body, examples), rng)
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedDynamicMap":
-        """From a database that may lie on disk."""
+        """Learn from a database, which may lie on disk."""
         windows = database.windows(self.poses, with_successor=True)
-        index = make_index(self.index, windows, self.neighbours) if self.like == "window" else None
+        index = make_index(self.index, windows, self.neighbours) if self.search == "history" else None
         return FittedDynamicMap(self, body, windows, index, mean_posture(body, database))
 
 
 WINDOW = DynamicMap(
     "dynamic_map:window",
     "the same with a local model of the last answers alone, as in Liu et al. 2011, its known traps mended",
-    like="window",
+    search="history",
     poses=2,
     neighbours=100,
     width=1.0,
@@ -122,11 +137,11 @@ WINDOW = DynamicMap(
 LITERAL = DynamicMap(
     "dynamic_map:literal",
     "Liu et al. 2011 to the letter: 99 % of the variance, weights and sigma as printed, start at the closest",
-    like="window",
+    search="history",
     poses=2,
     neighbours=40,
     width=0.0,
-    kept=0.99,
+    variance_kept=0.99,
     ridge=0.0,
     spread=1.0,
     least_sigma_rad=math.radians(0.01),
@@ -138,26 +153,26 @@ LITERAL = DynamicMap(
     loss=Loss(position_scale_m=0.003, orientation_scale_rad=math.radians(0.5), quality=False, suspect_weight=1.0),
     jump_m=math.inf,
 )
-"""The floors only keep a standard deviation of 0 from dividing; sigma of eq. 12 is that of the trackers."""
+"""The paper as printed. The floors only avoid a division by 0; sigma of eq. 12 is that of the trackers."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedDynamicMap:
-    """The windows of the examples and an index of them."""
+    """The windows of the examples and their search index."""
 
     options: DynamicMap
     body: Body
     windows: Windows
     index: Index | None
-    """Of the windows, where they are searched."""
+    """Index of the windows; None when `search` is "features"."""
     mean_qpos: Floats
-    """(55,) for starts without a past."""
-    _evidence: CalibrationCache[ReducedRankRegression] = field(default_factory=CalibrationCache)
+    """(55,) mean posture, the prior of frames without a history."""
+    _regression_cache: CalibrationCache[ReducedRankRegression] = field(default_factory=CalibrationCache)
 
-    def regression(self, worn: Calibration) -> ReducedRankRegression:
-        """Of the database, for stations worn like this; made once."""
-        return self._evidence.get(
-            worn, lambda: ReducedRankRegression(self.body, self.windows, worn, self.options.terms)
+    def regression(self, calibration: Calibration) -> ReducedRankRegression:
+        """The reduced-rank regression for the mounts of a calibration; cached."""
+        return self._regression_cache.get(
+            calibration, lambda: ReducedRankRegression(self.body, self.windows, calibration, self.options.regression)
         )
 
     def begin(self, calibration: Calibration) -> "DynamicMapSession":
@@ -165,20 +180,22 @@ class FittedDynamicMap:
 
 
 class DynamicMapSession(HistorySession):
-    """Makes a model for every frame and throws it away."""
+    """Follows one performer; fits a local model to every frame."""
 
     def __init__(self, fitted: FittedDynamicMap, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
-        manner = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
-        leaning = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
-        super().__init__(fitted.body, calibration, manner, leaning, options.poses, windows.database.rate_hz)
+        solver_options = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
+        super().__init__(
+            fitted.body, calibration, solver_options, posture_prior, options.poses, windows.database.rate_hz
+        )
         self._options, self._windows = options, windows
-        self._precedents: NeighbourSearch
+        self._neighbours: NeighbourSearch
         if fitted.index is None:
-            evidence = fitted.regression(calibration)
-            self._precedents = FeatureSearch(windows, evidence, self.residuals, options.index)
+            regression = fitted.regression(calibration)
+            self._neighbours = FeatureSearch(windows, regression, self.residuals, options.index)
         else:
-            self._precedents = PoseHistorySearch(windows, fitted.index)
+            self._neighbours = PoseHistorySearch(windows, fitted.index)
         sigma = np.zeros(POSTURE_SIZE + 3)
         sigma[HINGES], sigma[TILT], sigma[HEIGHT] = (
             options.least_sigma_rad,
@@ -190,19 +207,19 @@ class DynamicMapSession(HistorySession):
         self._closest: Floats = np.zeros(POSTURE_SIZE + 3)
 
     def solve_next(self) -> IKSolution:
-        """Eq. 9 and 10: the most likely pose of the frame, by the readings and by what went before."""
+        """Eq. 9 and 10: the maximum a posteriori pose of the frame."""
         prior = self.predict()
-        forward = self._options.start == "prediction"
-        found = self.solver.solve(prior.qpos if forward else self._configuration(self._closest), prior)
-        if found.converged and self.outlier_share() == 0.0:
-            return found
-        again = self.solver.solve(self._configuration(self._closest) if forward else prior.qpos, prior)
-        best = again if again.cost < found.cost else found
+        from_prediction = self._options.start == "prediction"
+        solution = self.solver.solve(prior.qpos if from_prediction else self._configuration(self._closest), prior)
+        if solution.converged and self.outlier_share() == 0.0:
+            return solution
+        second = self.solver.solve(self._configuration(self._closest) if from_prediction else prior.qpos, prior)
+        best = second if second.cost < solution.cost else solution
         self.residuals.evaluate(best.qpos)
         return best
 
     def _configuration(self, following: Floats) -> Floats:
-        """The configuration (55,) of a posture and of the step to it (55,)."""
+        """Configuration (55,) of a posture (52) after a step (3) from the last estimate's ground frame."""
         out: Floats = qpos_from_posture(
             following[:POSTURE_SIZE], ground_after_step(self.past[0], following[POSTURE_SIZE:])
         )
@@ -210,24 +227,24 @@ class DynamicMapSession(HistorySession):
 
     def record(self, frame: TrackerFrame, anew: bool) -> None:
         super().record(frame, anew)
-        self._precedents.record()
+        self._neighbours.record()
 
     def predict_gap(self) -> Floats:
         return self.predict().qpos
 
     def predict(self) -> Prior:
-        """Eq. 8 for what follows `past`, on the ground and in the solver's tangent space."""
+        """Eq. 8: Gaussian prediction from `past`, in world axes and in the solver's tangent space."""
         options, windows = self._options, self._windows
-        rows, squared, away = self._precedents.nearest(self.past, options.neighbours)
+        rows, squared, offsets = self._neighbours.nearest(self.past, options.neighbours)
         variance = 1.0 if options.width == 0.0 else options.width * float(squared[len(squared) // 2])
         weight = neighbour_weights(squared, max(variance, _MIN_WEIGHT_VARIANCE))
         after = windows.successors(rows)
-        next_mean, left = forecast(away, after, weight, options.kept, options.ridge)
+        next_mean, left = forecast(offsets, after, weight, options.variance_kept, options.ridge)
         self._closest = after[0].astype(float)
         mean = self._configuration(next_mean)
         mean[7:] = self.limits.clip(mean[7:])
         variance_of = options.spread**2 * left + self._least_variance
-        variance_of += options.novelty**2 * float(squared[0]) / away.shape[1]
+        variance_of += options.novelty**2 * float(squared[0]) / offsets.shape[1]
         precision = 1.0 / variance_of[_TANGENT_INDICES]
         precision[:2] = precision[:2].min()  # forward and left are not the world's x and y
         return Prior(mean, precision)
@@ -236,4 +253,4 @@ class DynamicMapSession(HistorySession):
 _TANGENT_INDICES = np.array(
     [POSTURE_SIZE, POSTURE_SIZE + 1, HEIGHT, 1, 2, POSTURE_SIZE + 2, *range(HINGES.start, HINGES.stop)]
 )
-"""(54,) which number of posture and step each direction of the solver is; tilts are small, so turns are the root's."""
+"""(54,) index in posture and step of each direction of the solver; tilts are small, so rotations are the root's."""

@@ -1,8 +1,20 @@
-"""Inverse kinematics: the whole body fitted to the trackers, frame by frame (docs/methods.md C1).
+"""Inverse kinematics (`ik`): the whole body is fitted to the trackers, frame by frame (docs/methods.md C1).
 
-The prior only settles what the trackers leave open: a wide Gaussian of the hinges about the previous pose, about the
-mean posture of examples, or about a pose in between; as wide for every hinge, or in proportion to how far the examples
-move it. The root has none. `scenarios/tune_ik.toml` is the search that chose `ik`; the others show what it is worth.
+Each frame is a robust least-squares problem in the 54 degrees of freedom, solved by Levenberg-Marquardt from the last
+estimate, within the hinges' limits. A weak Gaussian prior of the hinges settles what the trackers leave open. The root
+has no prior. A position that jumps is left out by the outlier gate.
+
+Source: the field's standard method; papers use it as a baseline and as the last step of other methods.
+
+Options, with units and defaults, are the fields of `Ik`. Three groups matter:
+
+- The prior: its mean lies between the last estimate (`towards_mean` 0) and the examples' mean posture (1); default 0.1.
+  Its standard deviation is 30 deg (RMS over hinges), in proportion to each hinge's spread over the examples (`spread`).
+- Robustness: `loss` (scales of the robust residuals) and `jump_m` (outlier gate).
+- `limits` and `stopping` (convergence).
+
+Presets: `ik:previous` (prior about the last estimate, learns nothing), `ik:mean` (prior about the mean posture),
+`ik:gaussian` (squared residuals, no gate). `scenarios/tune_ik.toml` is the search that chose the defaults.
 """
 
 import math
@@ -24,38 +36,42 @@ from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 
 _MIN_SPREAD_RAD = math.radians(2.0)
+"""Smallest spread of a hinge over the examples that scales the prior."""
 
 
 @dataclass(frozen=True)
 class Ik:
-    """Options of inverse kinematics; a `Method`."""
+    """Options of inverse kinematics, a `Method`."""
 
     name: str = "ik"
     summary: str = "whole-body Levenberg-Marquardt on the trackers, robust, pulled weakly to the examples' mean posture"
     loss: Loss = field(default_factory=Loss)
+    """Scales and robust loss of the residuals."""
     towards_mean: float = 0.1
-    """Where the prior's mean lies between the previous pose, 0, and the examples' mean posture, 1."""
+    """Mean of the prior: 0 is the last estimate, 1 the examples' mean posture."""
     prior_sigma_rad: float = math.radians(30.0)
     """Root mean square of the hinges' standard deviations [rad]; inf for no prior."""
     spread: bool = True
-    """Whether each hinge's own follows its spread over the examples; else all have the same."""
+    """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
     limits: bool = True
     """Keep hinges within the body's limits."""
     jump_m: float = JUMP_M
-    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
+    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     lost_after_s: float = LOST_AFTER_S
+    """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
+    """Convergence criteria of the solver."""
 
     @property
     def needs_examples(self) -> bool:
         return self.towards_mean > 0.0 or self.spread
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedIk":
-        """BadInput when the prior needs examples and there are none."""
+        """Learn the prior from examples; BadInput when it needs some and there are none."""
         return self._fitted(body, examples)
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedIk":
-        """From a database that may lie on disk."""
+        """Learn the prior from a database, which may lie on disk."""
         return self._fitted(body, database)
 
     def _fitted(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> "FittedIk":
@@ -64,8 +80,8 @@ class Ik:
             return FittedIk(self, body, None, sigma_rad)
         mean_qpos = mean_posture(body, examples)
         if self.spread:
-            own = np.maximum(spread_rad(body, examples, mean_qpos), _MIN_SPREAD_RAD)
-            sigma_rad *= own / np.sqrt(np.mean(own**2))
+            hinge_spread_rad = np.maximum(spread_rad(body, examples, mean_qpos), _MIN_SPREAD_RAD)
+            sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
         return FittedIk(self, body, mean_qpos, sigma_rad)
 
 
@@ -88,18 +104,20 @@ GAUSSIAN = Ik(
 
 @dataclass(frozen=True, eq=False)
 class FittedIk:
-    """Options, body and prior."""
+    """Inverse kinematics with its body and prior."""
 
     options: Ik
     body: Body
     mean_qpos: Floats | None
-    """(55,) T-pose root, mean hinges; None when there is nothing to learn it from."""
+    """(55,) T-pose root and mean hinge angles; None without examples."""
     sigma_rad: Floats
-    """(48,) the prior's standard deviations."""
+    """(48,) standard deviations of the prior [rad]."""
 
     def begin(self, calibration: Calibration) -> IKSession:
         options = self.options
-        manner = SolverOptions(options.loss, options.limits, options.jump_m, options.lost_after_s, options.stopping)
+        solver_options = SolverOptions(
+            options.loss, options.limits, options.jump_m, options.lost_after_s, options.stopping
+        )
         return IKSession(
-            self.body, calibration, manner, PosturePrior(self.mean_qpos, self.sigma_rad, options.towards_mean)
+            self.body, calibration, solver_options, PosturePrior(self.mean_qpos, self.sigma_rad, options.towards_mean)
         )

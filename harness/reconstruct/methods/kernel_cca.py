@@ -1,6 +1,18 @@
-"""Kernel CCA on the neighbours: the method of Kim, Seol and Lee 2012 (docs/methods.md B)."""
+"""Kernel CCA (`kernel_cca`): regression by kernel canonical correlation analysis (docs/methods.md B).
 
+For every frame the neighbours are the m training pairs of a kernel CCA between features and postures (`cca`). It gives
+a weight for each neighbour. All other steps are those of `local_regression`: neighbours, smoothing, inverse kinematics.
+
+Source: Kim, Seol and Lee 2012, eq. 2 to 6. Ours: centred Gram matrices and the ridge of eq. 3 (docs/methods.md E),
+which also regularises eq. 4 unless `regularise_projection` is false.
+
+Options: `neighbours` 12, `bases` 12, `kappa` 0.3, `width` 1, and those of `LocalRegression`;
+scenarios/tune_kernel_cca.toml chose them.
+"""
+
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from harness.core.arrays import Floats
 from harness.reconstruct.methods import cca
@@ -9,19 +21,24 @@ from harness.reconstruct.methods.local_regression import LocalRegression
 
 @dataclass(frozen=True)
 class KernelCca(LocalRegression):
-    """A `Method`."""
+    """Options of kernel CCA, a `Method`; scenarios/tune_kernel_cca.toml chose the defaults."""
+
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"held": "regularise_projection"}
 
     name: str = "kernel_cca"
     summary: str = "kernel canonical correlation regression on the nearest examples, smoothed, then fitted"
     neighbours: int = 12
+    """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     bases: int = 12
-    """l of eq. 4, and at most m - 1."""
+    """l of eq. 4: number of canonical bases, at most m - 1."""
     kappa: float = 0.3
-    """How strongly eq. 3 is regularised."""
-    held: bool = True
-    """Whether eq. 4 is, too."""
+    """Ridge of eq. 3, as a share of each Gram matrix's mean eigenvalue."""
+    regularise_projection: bool = True
+    """Whether the ridge of eq. 3 regularises the projection of eq. 4 too; false is eq. 4 as printed."""
     width: float = 1.0
-    """sigma of the kernels, in root mean square distances of two examples."""
+    """Standard deviation of the Gaussian kernels, in RMS distances of two examples."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        return cca.regression_weights(inputs, query, outputs, self.width, self.bases, self.kappa, self.held)
+        return cca.regression_weights(
+            inputs, query, outputs, self.width, self.bases, self.kappa, self.regularise_projection
+        )

@@ -1,8 +1,19 @@
-"""Poses within a local linear model: Chai and Hodgins 2005, the baseline of Liu et al. 2011 (docs/methods.md C2).
+"""Local PCA (`local_pca`): the pose within a local linear model of similar examples (docs/methods.md C2).
 
-At every frame the examples are found that read like the trackers and follow poses like the last two answers. Their
-mean and a few principal directions span the poses that are possible: q = p + U w. The ground frame is free, for the
-examples know neither place nor heading. No dynamics beyond a pull to constant velocity.
+For every frame:
+
+1. Search the K example windows that are nearest to the last two estimates and to the readings.
+2. Fit the mean p and the leading principal directions U of the postures that follow them: q = p + U w.
+3. Solve for w and the ground frame by Levenberg-Marquardt: robust residuals of the trackers, plus `prior_weight` times
+   the Mahalanobis distance from p, plus `smooth_weight` times the change of velocity.
+
+The ground frame is free, because examples know neither place nor heading. There are no dynamics beyond step 3.
+
+Source: Chai and Hodgins 2005, in the form in which Liu et al. 2011 compare with it. Ours: postures relative to the
+ground frame, distances in SI units, the treatment of missing readings, and the outlier gate.
+
+Options are the fields of `LocalPca`; scenarios/tune_local_pca.toml chose the defaults: 300 neighbours, 40 directions,
+`prior_weight` 0.3, `smooth_weight` 0.2 with 0.1 rad, `control_weight` 1 m^-2, `lever_m` 0.3 m.
 """
 
 from collections.abc import Sequence
@@ -31,12 +42,12 @@ from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 
 _HISTORY = 2
-"""Poses of the query, C2."""
+"""Number of past estimates in the query (C2)."""
 
 
 @dataclass(frozen=True)
 class LocalPca:
-    """A `Method`; defaults were chosen on validation clips, see scenarios/tune_local_pca.toml."""
+    """Options of local PCA, a `Method`; scenarios/tune_local_pca.toml chose the defaults on validation clips."""
 
     name: str = "local_pca"
     summary: str = "the pose within a few principal directions of similar examples that fits the readings best"
@@ -44,111 +55,114 @@ class LocalPca:
     neighbours: int = 300
     """K, examples of the local model."""
     components: int = 40
-    """Directions in which a pose may leave their mean."""
+    """Number of principal directions."""
     prior_weight: float = 0.3
-    """alpha, of the distance from the mean in the examples' own standard deviations."""
+    """alpha: weight of the squared distance from the mean, in the examples' standard deviations."""
     smooth_weight: float = 0.2
-    """beta, of a change of velocity, in units of `smooth_sigma_rad`."""
+    """beta: weight of the squared change of velocity, in units of `smooth_sigma_rad`."""
     smooth_sigma_rad: float = 0.1
-    """What a hinge's velocity changes by from frame to frame [rad; m for the height]."""
+    """Typical change of a hinge's step from one frame to the next [rad; m for the height]."""
     control_weight: float = 1.0
-    """Of the readings in the query, squared distances in m^2 against rad^2 of the poses."""
+    """Weight of the readings in the query: m^2 of the readings against rad^2 of the postures."""
     lever_m: float = 0.3
-    """In the query, an orientation that is off by an angle counts like a position off by the angle times this [m]."""
+    """Displacement that counts as much as a rotation of one radian in the query [m]."""
     index: str = "auto"
-    """How neighbours are searched (`index.choose`)."""
+    """Search index: "auto" or a name of `index.selection`."""
     loss: Loss = field(default_factory=Loss)
+    """Scales and robust loss of the residuals."""
     jump_m: float = JUMP_M
-    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
+    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     lost_after_s: float = LOST_AFTER_S
+    """Time without readings after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=lambda: Stopping(decrease=1e-2))
-    """Sooner than for a pose without a model: on validation clips errors stay the same to 0.001 deg."""
+    """Convergence criteria. They are looser than those of `ik`; on validation clips errors differ by 0.001 deg."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalPca":
-        """BadInput without examples that are long enough."""
+        """Build the database; BadInput without examples of three frames or more."""
         if not any(len(take) > _HISTORY for take in examples):
-            found = f"Local PCA is learnt from examples of more than {_HISTORY} frames, and there are none."
-            raise BadInput(found, "Name some in the scenario.")
+            message = f"Local PCA needs examples of more than {_HISTORY} frames, and there are none."
+            raise BadInput(message, "Name some in the scenario.")
         return self.fit_database(body, MotionDatabase.build(body, examples), rng)
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalPca":
-        """From a database that may lie on disk."""
+        """Learn from a database, which may lie on disk."""
         return FittedLocalPca(self, body, database.windows(_HISTORY, with_successor=True), mean_posture(body, database))
 
 
 @dataclass(frozen=True, eq=False)
 class FittedLocalPca:
-    """The examples; what trackers would have read in them depends on where they are worn."""
+    """The windows of the examples. Their station features depend on the mounts and are cached per calibration."""
 
     options: LocalPca
     body: Body
     windows: Windows
     mean_qpos: Floats
-    """(55,) for starts without a past."""
-
+    """(55,) mean posture, the prior of frames without a history."""
     cache: "CalibrationCache[tuple[StationFeatures, Vectors, Index]]" = field(
         default_factory=CalibrationCache, repr=False
     )
-    """What the last calibration has the trackers read, and the search in it: sessions of one performer share it."""
+    """Station features and search index of the last calibration, shared by sessions of one performer."""
 
     def begin(self, calibration: Calibration) -> "LocalPcaSession":
         return LocalPcaSession(self, calibration)
 
     def station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
-        """What trackers worn so would have read after every window; both together, and an index of them."""
-        return self.cache.get(calibration, lambda: self._seen_through(calibration))
+        """Station features after every window for these mounts, the search vectors, and their index; cached."""
+        return self.cache.get(calibration, lambda: self._compute_station_features(calibration))
 
-    def _seen_through(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
-        controls = StationFeatures(self.body, self.windows, calibration, self.options.lever_m)
-        examples = _WindowsWithFeatures(self.windows, controls.values, np.sqrt(self.options.control_weight))
-        return controls, examples, make_index(self.options.index, examples, self.options.neighbours)
+    def _compute_station_features(self, calibration: Calibration) -> "tuple[StationFeatures, Vectors, Index]":
+        features = StationFeatures(self.body, self.windows, calibration, self.options.lever_m)
+        examples = _WindowsWithFeatures(self.windows, features.values, np.sqrt(self.options.control_weight))
+        return features, examples, make_index(self.options.index, examples, self.options.neighbours)
 
 
 class LocalPcaSession(HistorySession):
-    """Makes a model for every frame and throws it away."""
+    """Follows one performer; fits a local model to every frame."""
 
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
-        manner = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
-        leaning = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
-        super().__init__(fitted.body, calibration, manner, leaning, _HISTORY, windows.database.rate_hz)
+        solver_options = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
+        super().__init__(fitted.body, calibration, solver_options, posture_prior, _HISTORY, windows.database.rate_hz)
         self._options, self._windows = options, windows
-        self._confined = SubspaceSolver(self.residuals, self.limits, options.stopping)
-        self._controls, self._examples, self._index = fitted.station_features(calibration)
+        self._subspace_solver = SubspaceSolver(self.residuals, self.limits, options.stopping)
+        self._features, self._examples, self._index = fitted.station_features(calibration)
 
     def solve_next(self) -> IKSolution:
         options = self._options
-        before = self._windows.query(self.past)
-        rows = self._nearest(before)
+        history = self._windows.query(self.past)
+        rows = self._nearest(history)
         poses = self._windows.successors(rows)
         postures, closest = poses[:, :POSTURE_SIZE], poses[0].astype(float)
-        steady = 2.0 * before[:POSTURE_SIZE].astype(float) - before[-POSTURE_SIZE:]
+        constant_velocity = 2.0 * history[:POSTURE_SIZE].astype(float) - history[-POSTURE_SIZE:]
         beta = options.smooth_weight / options.smooth_sigma_rad**2
-        space = fit_subspace(postures, options.components, options.prior_weight, steady, beta)
-        return self._confined.solve(
+        space = fit_subspace(postures, options.components, options.prior_weight, constant_velocity, beta)
+        return self._subspace_solver.solve(
             space, ground_after_step(self.past[0], closest[POSTURE_SIZE:]), closest[:POSTURE_SIZE]
         )
 
     def predict_gap(self) -> Floats:
-        """Nothing was read, and there are no dynamics: as it was."""
-        held: Floats = self.past[0]
-        return held
+        """The last estimate, since the model has no dynamics."""
+        last: Floats = self.past[0]
+        return last
 
     def _nearest(self, past: Singles) -> Ints:
-        """Rows (K,) of the examples nearest to the readings and the past; what was not read follows the past."""
-        residuals, controls, options = self.residuals, self._controls, self._options
+        """Rows (K,) of the nearest examples by readings and history; missing readings count nothing."""
+        residuals, features, options = self.residuals, self._features, self._options
         scale = np.float32(np.sqrt(options.control_weight))
         position_m, turned = residuals.target_m, residuals.world_from_target
         ground = ground_after_step(self.past[0], np.zeros(3))
         if residuals.measured.all():
-            query = np.concatenate([past, scale * controls.query(position_m, turned, ground)])
+            query = np.concatenate([past, scale * features.query(position_m, turned, ground)])
             rows, _ = self._index.nearest(query, options.neighbours)
             return rows
         count = len(position_m)
-        here, facing = residuals.measured[:count, None], residuals.measured[count:, None]
-        at_m, at_turned = controls.station_poses(residuals.kinematics, self.past[0])
-        control = controls.query(np.where(here, position_m, at_m), np.where(facing, turned, at_turned), ground)
-        weight = np.concatenate([np.ones(len(past)), controls.columns(residuals.measured)])
+        has_position, has_orientation = residuals.measured[:count, None], residuals.measured[count:, None]
+        at_m, at_orientation = features.station_poses(residuals.kinematics, self.past[0])
+        control = features.query(
+            np.where(has_position, position_m, at_m), np.where(has_orientation, turned, at_orientation), ground
+        )
+        weight = np.concatenate([np.ones(len(past)), features.columns(residuals.measured)])
         query = np.concatenate([past, scale * control])
         rows, _ = nearest_partial(self._index, self._examples, query, weight, options.neighbours)
         return rows
@@ -156,10 +170,10 @@ class LocalPcaSession(HistorySession):
 
 @dataclass(frozen=True, eq=False)
 class _WindowsWithFeatures:
-    """`Vectors`: two poses, and what trackers would have read in the frame after them."""
+    """Search `Vectors`: two postures, and the station features of the frame after them."""
 
     windows: Windows
-    controls: Singles
+    features: Singles
     scale: float
 
     def __len__(self) -> int:
@@ -167,7 +181,7 @@ class _WindowsWithFeatures:
 
     @property
     def size(self) -> int:
-        return self.windows.size + int(self.controls.shape[1])
+        return self.windows.size + int(self.features.shape[1])
 
     def gather(self, rows: Ints | slice) -> Singles:
-        return np.concatenate([self.windows.gather(rows), np.float32(self.scale) * self.controls[rows]], axis=1)
+        return np.concatenate([self.windows.gather(rows), np.float32(self.scale) * self.features[rows]], axis=1)

@@ -1,8 +1,18 @@
-"""What the two methods of Kim et al. 2012 have in common: all but how neighbours become a pose (docs/methods.md B).
+"""Local regression: the steps that `kernel_cca` and `weighted_blend` have in common (docs/methods.md B).
 
-At every frame: the k examples in which the trackers read most like now (eq. 2), together with those of the frame
-before; one weight for each of them, which is where the methods differ; the weighted pose; the blend of three frames
-(eq. 6); and inverse kinematics onto the trackers.
+For every frame (Kim et al. 2012):
+
+1. Compute the features of the readings: positions, velocities and orientations relative to one station on the trunk.
+2. Find the k examples of the nearest features (eq. 2), and add those of the frame before.
+3. Compute a weight for each neighbour (`weigh`): the only step in which the two methods differ.
+4. Blend the neighbours' postures and root placements by these weights.
+5. Smooth over three frames (eq. 6).
+6. Fit the pose to the trackers by inverse kinematics.
+
+Ours: features relative to an anchor station instead of the room, weights by the readings' confidence, the outlier gate,
+and whole-body inverse kinematics with a prior about the regressed pose (`solve` "limbs" is closed-form limb IK).
+
+The options are the fields of `LocalRegression`; each method adds its own.
 """
 
 import math
@@ -37,85 +47,88 @@ from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
 
 _MIN_SPREAD_RAD = math.radians(1.0)
-"""A hinge that rests in all examples may still give way a little."""
+"""Smallest spread of a hinge over the examples that scales its prior."""
 _JUMP_WITHOUT_IK_M = 0.3
-"""The gate without inverse kinematics, as for the best match: a learnt pose is never as near as a fitted one."""
+"""Outlier gate without inverse kinematics [m], as for the best match: the pose is farther from the readings."""
 
 _NO_ROWS: Ints = np.zeros(0, np.int64)
 
 
 @dataclass(frozen=True)
 class LocalRegression(ABC):
-    """Options that both methods share; each adds its own, and `weigh`."""
+    """Options that both methods share. A method adds its own options and `weigh`."""
 
     name: str
     summary: str
     needs_examples: bool = True
     neighbours: int = 8
-    """k of eq. 2, for this frame; those of the frame before are kept as well."""
+    """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     weights: FeatureWeights = field(default_factory=FeatureWeights)
-    """Of eq. 2."""
+    """Weights of positions, velocities and orientations in eq. 2."""
     index: str = "auto"
-    """What neighbours are sought in (`index.choose`)."""
+    """Search index: "auto" or a name of `index.selection`."""
     longest_gap_s: float = 0.2
-    """A velocity is taken between readings, or examples, no farther apart [s]."""
+    """Longest time between two readings or examples from which a velocity is computed [s]."""
     jump_m: float = JUMP_M
-    """A position that jumps farther than this from where the body carries it is left out for a while; inf never [m]."""
+    """Outlier gate: a position this far from its prediction is left out for a while [m]; inf disables the gate."""
     alpha: float = 0.3
+    """alpha of eq. 6: share of the frame before last in the blend of the last two."""
     beta: float = 0.4
-    """Of eq. 6; beta = 0 blends nothing."""
+    """beta of eq. 6: share of the last two frames; 0 disables smoothing."""
     final_ik: bool = True
-    """Off, the pose is only stood where the trackers are."""
+    """Whether inverse kinematics follows; without it only the root is fitted to the trackers."""
     solve: Literal["body", "limbs"] = "body"
-    """Inverse kinematics: a few steps on the whole body, from and towards what was regressed, or in closed form."""
+    """Inverse kinematics: "body" takes a few Levenberg-Marquardt steps, "limbs" solves limbs in closed form."""
     root_sigma_m: float = 0.1
+    """Standard deviation of the root's position about the regressed one [m]."""
     root_sigma_rad: float = math.radians(10.0)
+    """Standard deviation of the root's orientation about the regressed one [rad]."""
     hinge_sigma_rad: float = math.radians(30.0)
-    """How freely inverse kinematics may leave what was regressed [m, rad]; of the hinges it is the root mean square."""
+    """RMS of the hinges' standard deviations about the regressed pose [rad]."""
     spread: bool = True
-    """Whether each hinge's own follows its spread over the examples, as for `ik`; else all have the same."""
+    """Whether each hinge's standard deviation is proportional to its spread over the examples; else all are equal."""
     most_steps: int = 4
-    """Of that on the whole body."""
+    """Largest number of Levenberg-Marquardt steps."""
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedLocalRegression":
-        """BadInput without examples."""
+        """Build the database; BadInput without examples."""
         if not any(len(take) for take in examples):
             raise BadInput("A local regression learns from examples, and there are none.", "Name some in the scenario.")
         return self.fit_database(body, MotionDatabase.build(body, examples), rng)
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalRegression":
-        """From a database that may lie on disk."""
+        """Learn from a database, which may lie on disk."""
         sigma_rad = np.full(48, self.hinge_sigma_rad)
         if self.spread:
-            own = np.maximum(spread_rad(body, database, mean_posture(body, database)), _MIN_SPREAD_RAD)
-            sigma_rad *= own / np.sqrt(np.mean(own**2))
+            hinge_spread_rad = np.maximum(spread_rad(body, database, mean_posture(body, database)), _MIN_SPREAD_RAD)
+            sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
         return FittedLocalRegression(self, body, database, sigma_rad)
 
     @abstractmethod
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        """(m,) weights, of sum 1, of m >= 2 outputs (m, 55), for inputs (m, n) and a query (n,)."""
+        """(m,) weights of sum 1 for m >= 2 neighbours: outputs (m, 55), inputs (m, n) and the query (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
 class FittedLocalRegression:
-    """The examples."""
+    """The examples; their features depend on the mounts and are cached per calibration."""
 
     options: LocalRegression
     body: Body
     database: MotionDatabase
     hinge_sigma_rad: Floats
-    """(48,)"""
+    """(48,) standard deviations of the prior [rad]."""
     cache: CalibrationCache[ExampleFeatures] = field(default_factory=CalibrationCache, repr=False)
 
     def begin(self, calibration: Calibration) -> "LocalRegressionSession":
-        self.database.release_memory()  # what the sessions before have read
+        self.database.release_memory()  # pages that earlier sessions read
         return LocalRegressionSession(self, calibration)
 
     def example_features(self, calibration: Calibration) -> ExampleFeatures:
-        """What trackers worn so would have read in the examples."""
+        """Features of the examples for the mounts of a calibration; cached."""
         options, weights = self.options, self.options.weights
         if self.database.rate_hz * options.longest_gap_s < 1.0:
-            weights = replace(weights, velocity=0.0)  # no example has a frame near enough before it
+            weights = replace(weights, velocity=0.0)  # no example has a frame that shortly before it
         return self.cache.get(
             calibration,
             lambda: ExampleFeatures(self.body, self.database, calibration, weights, options.index, options.neighbours),
@@ -129,56 +142,57 @@ class LocalRegressionSession:
         options = self._options = fitted.options
         self._residuals = Residuals(fitted.body, calibration, Loss())
         jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
-        self._coverage, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
+        self._monitor, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
         self._examples = fitted.example_features(calibration)
-        self._outlook = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
+        self._features = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
         self._solver = IKSolver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
         self._limbs = LimbSolver(fitted.body, calibration.bones, self._residuals, self._limits)
         self._precision = np.repeat([options.root_sigma_m**-2, options.root_sigma_rad**-2], 3)
         self._precision = np.concatenate([self._precision, fitted.hinge_sigma_rad**-2])
-        self._answer = fitted.database.qpos(np.array([0]), np.zeros(3))[0]
-        self._rows_before = _NO_ROWS
-        self._poses_before: list[Floats] = []
+        self._estimate = fitted.database.qpos(np.array([0]), np.zeros(3))[0]
+        self._last_rows = _NO_ROWS
+        self._last_poses: list[Floats] = []
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.update(frame)
-        if not any_seen:
-            self._rows_before, self._poses_before = _NO_ROWS, []
-            return Estimate(self._answer, status)
+        status, any_valid = self._monitor.update(frame)
+        if not any_valid:
+            self._last_rows, self._last_poses = _NO_ROWS, []
+            return Estimate(self._estimate, status)
         self._gate.read(frame, self._residuals)
         if not np.count_nonzero(self._residuals.measured):
-            return Estimate(self._answer, status)
-        view, query, trust = self._outlook.compute(frame, self._answer)
-        pose = self._smoothed(self._regressed(query, trust))
-        self._answer = self._fitted_to_trackers(
+            return Estimate(self._estimate, status)
+        view, query, confidence = self._features.compute(frame, self._estimate)
+        pose = self._smooth(self._regress(query, confidence))
+        self._estimate = self._fit_to_trackers(
             qpos_from_posture(pose[:POSTURE_SIZE], step_ground(np.array(view), pose[POSTURE_SIZE:]))
         )
-        self._gate.update(self._residuals, self._answer)
-        return Estimate(self._answer, status)
+        self._gate.update(self._residuals, self._estimate)
+        return Estimate(self._estimate, status)
 
-    def _regressed(self, query: Floats, trust: Floats) -> Floats:
-        """(55,) what is learnt (`ExampleFeatures.pairs`), from the neighbours of this frame and the last."""
-        rows = self._examples.nearest(query, trust, self._options.neighbours)
-        inputs, asked, outputs = self._examples.regression_data(rows, self._rows_before, query, trust)
-        self._rows_before = rows
+    def _regress(self, query: Floats, confidence: Floats) -> Floats:
+        """(55,) posture and root placement, regressed on the neighbours of this frame and the last."""
+        rows = self._examples.nearest(query, confidence, self._options.neighbours)
+        inputs, regression_query, outputs = self._examples.regression_data(rows, self._last_rows, query, confidence)
+        self._last_rows = rows
         if len(outputs) == 1:
             return outputs.reshape(-1)
-        pose: Floats = np.matmul(self._options.weigh(inputs, asked, outputs), outputs)
+        pose: Floats = np.matmul(self._options.weigh(inputs, regression_query, outputs), outputs)
         return pose
 
-    def _smoothed(self, pose: Floats) -> Floats:
-        """Eq. 6, on hinge angles and on the root as seen from the anchor, so that walking itself is not delayed."""
-        if len(self._poses_before) == 2:
-            earlier, before = self._poses_before
-            pose = smooth(pose, before, earlier, self._options.alpha, self._options.beta)
-        self._poses_before = [*self._poses_before[-1:], pose]
+    def _smooth(self, pose: Floats) -> Floats:
+        """Eq. 6 on hinge angles and on the root relative to the anchor, so that walking is not delayed."""
+        if len(self._last_poses) == 2:
+            second_last, last = self._last_poses
+            pose = smooth(pose, last, second_last, self._options.alpha, self._options.beta)
+        self._last_poses = [*self._last_poses[-1:], pose]
         return pose
 
-    def _fitted_to_trackers(self, qpos: Floats) -> Floats:
+    def _fit_to_trackers(self, qpos: Floats) -> Floats:
+        """(55,) the configuration after inverse kinematics, or with the root fitted when `final_ik` is off."""
         qpos[7:] = self._limits.clip(qpos[7:])
         if not np.count_nonzero(self._residuals.measured[: self._examples.count]):
-            qpos[:2] = self._answer[:2]  # orientations alone do not say where: stay
+            qpos[:2] = self._estimate[:2]  # orientations alone give no position: keep the last one
         if self._options.final_ik and self._options.solve == "limbs":
             return self._limbs.solve(qpos)
         if self._options.final_ik:

@@ -1,4 +1,10 @@
-"""The mean posture of the examples, stood where the trackers are: what any method that learns has to beat."""
+"""Mean pose (`mean_pose`): the examples' mean posture, placed where the trackers are.
+
+A baseline: what any method that learns from examples has to beat. Hinge angles are the circular mean over all examples
+and never change; in each frame only the root is fitted to the trackers (`root_placement`).
+
+Source: ours. It has no options.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -21,9 +27,9 @@ from harness.stream.frame import TrackerFrame
 
 
 def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Floats:
-    """(55,) the mean of the examples' hinge angles, rooted like the T-pose; BadInput without examples.
+    """(55,) circular mean of the examples' hinge angles [rad], with the root of the T-pose; BadInput without examples.
 
-    The mean of directions, in principal form and within the limits.
+    Angles are averaged as directions, in principal form and within the limits.
     """
     limits, total, count = HingeLimits(body), np.zeros((2, 48)), 0
     for angles in _principal_angles(limits, examples):
@@ -36,18 +42,18 @@ def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) ->
     return out
 
 
-def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, about: Floats) -> Floats:
-    """(48,) root mean square of the examples' hinge angles about those of a configuration (55,)."""
+def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, centre: Floats) -> Floats:
+    """(48,) RMS deviation of the examples' hinge angles from those of a configuration (55,) [rad]."""
     limits, total, count = HingeLimits(body), np.zeros(48), 0
     for angles in _principal_angles(limits, examples):
-        away = np.remainder(angles - about[7:] + np.pi, 2.0 * np.pi) - np.pi
+        away = np.remainder(angles - centre[7:] + np.pi, 2.0 * np.pi) - np.pi
         total += np.sum(away**2, axis=0)
         count += len(angles)
     return np.sqrt(total / count)
 
 
 def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
-    """Principal hinge angles (T, 48), some at a time, for a database may be larger than memory."""
+    """Principal hinge angles (T, 48) [rad], take by take, since a database may be larger than memory."""
     if isinstance(examples, MotionDatabase):
         for run in examples.segments:
             yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
@@ -59,7 +65,7 @@ def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | Moti
 
 @dataclass(frozen=True)
 class MeanPose:
-    """A `Method`."""
+    """The mean pose, a `Method`; it has no options."""
 
     name: str = "mean_pose"
     summary: str = "the examples' mean posture, stood where the trackers are: the null that learns"
@@ -72,26 +78,26 @@ class MeanPose:
 
 @dataclass(frozen=True, eq=False)
 class FittedMeanPose:
-    """The body and its mean posture."""
+    """The body and the mean posture of the examples."""
 
     body: Body
     qpos: Floats
-    """(55,)"""
+    """(55,) T-pose root and mean hinge angles."""
 
     def begin(self, calibration: Calibration) -> "MeanPoseSession":
         return MeanPoseSession(self, calibration)
 
 
 class MeanPoseSession:
-    """Moves the posture as a whole."""
+    """Fits the root of the mean posture to each frame."""
 
     def __init__(self, fitted: FittedMeanPose, calibration: Calibration) -> None:
         self._residuals = Residuals(fitted.body, calibration, Loss())
-        self._coverage = StatusMonitor()
+        self._monitor = StatusMonitor()
         self._qpos = fitted.qpos
 
     def step(self, frame: TrackerFrame) -> Estimate:
-        status, any_seen = self._coverage.update(frame)
+        status, any_seen = self._monitor.update(frame)
         if any_seen:
             self._residuals.read(frame)
             self._qpos = place_root(self._residuals, self._qpos)

@@ -1,4 +1,12 @@
-"""The weighted blend of the neighbours: the baseline of Kim, Seol and Lee 2012 (docs/methods.md C3)."""
+"""Weighted blend (`weighted_blend`): neighbours weighted by their closeness (docs/methods.md C3).
+
+Weights fall with a power of the distance in feature space. All other steps are those of `local_regression`: neighbours,
+smoothing and inverse kinematics.
+
+Source: the baseline of Kim, Seol and Lee 2012, which prints no weights; the power is ours.
+
+Options: `neighbours` 16, `power` 4, and those of `LocalRegression`; scenarios/tune_weighted_blend.toml chose them.
+"""
 
 from dataclasses import dataclass
 
@@ -11,13 +19,14 @@ from harness.reconstruct.methods.local_regression import LocalRegression
 
 @dataclass(frozen=True)
 class WeightedBlend(LocalRegression):
-    """A `Method`."""
+    """Options of the weighted blend, a `Method`."""
 
     name: str = "weighted_blend"
     summary: str = "the nearest examples blended by their closeness, smoothed, then fitted to the trackers"
     neighbours: int = 16
+    """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     power: float = 4.0
-    """Weights fall with this power of the distance."""
+    """Exponent of the weights, distance^-power."""
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
         return _inverse_distance_weights(inputs, query, self.power)
@@ -25,7 +34,7 @@ class WeightedBlend(LocalRegression):
 
 @compiled
 def _inverse_distance_weights(inputs: Floats, query: Floats, power: float) -> Floats:
-    """`WeightedBlend.weigh`."""
+    """(m,) weights distance^-power of inputs (m, n) for a query (n,), of sum 1."""
     out: Floats = np.empty(len(inputs))
     for i in range(len(inputs)):
         squared = 0.0

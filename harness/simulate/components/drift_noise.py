@@ -1,4 +1,4 @@
-"""Slowly wandering errors."""
+"""Slow drift of position and orientation."""
 
 from dataclasses import dataclass
 
@@ -11,11 +11,11 @@ from harness.simulate.readings import SimulatedReadings
 
 @dataclass(frozen=True)
 class DriftNoise:
-    """First-order Gauss-Markov on each axis, stationary from the start.
+    """First-order Gauss-Markov error on each axis, stationary from the start.
 
-    1.5 mm is what Gilson et al. 2006 measured at rest; the angles are the maker's, unverified; a correlation time
-    of 0.2 to 2 s is inferred from ranges correcting inertia (docs/is900.md 13.1, 13.2 and 13.5). Gravity holds pitch
-    and roll better than ranges hold yaw.
+    The 1.5 mm were measured at rest by Gilson et al. 2006. The angles are the manufacturer's, unverified. A correlation
+    time of 0.2 to 2 s is inferred from how ranges correct the inertial solution (docs/is900.md 13.1, 13.2 and 13.5).
+    Gravity constrains pitch and roll better than ranges constrain yaw.
     """
 
     position_m: float = 0.0015
@@ -32,15 +32,15 @@ class DriftNoise:
             self, position_m=(0.0, 1.0), pitch_roll_rad=(0.0, 1.0), yaw_rad=(0.0, 1.0), correlation_s=(1e-3, 1e6)
         )
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        draws = [sensed.take_rng("slow", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
-        wander = gauss_markov(np.stack(draws, axis=1), float(np.exp(-1.0 / (sensed.rate_hz * self.correlation_s))))
-        sensed.move(self.position_m * wander[..., :3])
-        sensed.rotate(np.array([self.pitch_roll_rad, self.pitch_roll_rad, self.yaw_rad]) * wander[..., 3:])
+    def apply(self, readings: SimulatedReadings) -> None:
+        draws = [readings.take_rng("slow", s).normal(size=(len(readings.time_s), 6)) for s in readings.stations]
+        wander = gauss_markov(np.stack(draws, axis=1), float(np.exp(-1.0 / (readings.rate_hz * self.correlation_s))))
+        readings.move(self.position_m * wander[..., :3])
+        readings.rotate(np.array([self.pitch_roll_rad, self.pitch_roll_rad, self.yaw_rad]) * wander[..., 3:])
 
 
 def gauss_markov(white: Floats, correlation: float) -> Floats:
-    """Sequences (N, ...) of unit variance and this correlation between neighbours, from white ones."""
+    """Gauss-Markov sequences (N, ...) of unit variance and the given lag-1 correlation, from white noise."""
     out: Floats = white * np.sqrt(1.0 - correlation**2)
     out[:1] = white[:1]
     for k in range(1, len(out)):

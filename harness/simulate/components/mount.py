@@ -1,4 +1,4 @@
-"""Trackers that are not where the calibration says: put on badly, or slipping on their straps."""
+"""Mount errors: trackers that are put on beside their nominal mounts, or that slip on their straps."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from harness.simulate.readings import SimulatedReadings
 
 @dataclass(frozen=True)
 class MountOffset:
-    """Each tracker is fixed a little beside its nominal place, for the whole session. Normal, not in any level."""
+    """Constant normal offset of each tracker from its nominal mount, for a whole session. In no noise preset."""
 
     position_m: float = 0.0
     """Standard deviation along each axis of the station [m]."""
@@ -23,42 +23,42 @@ class MountOffset:
     def __post_init__(self) -> None:
         require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, math.pi))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        for row, station in enumerate(sensed.stations):
-            draw = sensed.session_rng("mount", station).normal(size=6)
-            sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], self.position_m * draw[:3])
+    def apply(self, readings: SimulatedReadings) -> None:
+        for row, station in enumerate(readings.stations):
+            draw = readings.session_rng("mount", station).normal(size=6)
+            readings.position_m[:, row] += rotations.rotate(readings.turn[:, row], self.position_m * draw[:3])
             turn = rotations.exp(self.orientation_rad * draw[3:])
-            sensed.turn[:, row] = rotations.multiply(sensed.turn[:, row], turn)
+            readings.turn[:, row] = rotations.multiply(readings.turn[:, row], turn)
 
 
 @dataclass(frozen=True)
 class MountSlip:
-    """A strap that slips: the tracker goes round its bone and along it, at once or slowly, and stays there."""
+    """A slip of one strap: the tracker moves around and along its bone, at once or slowly, and stays there."""
 
     station: str
     from_s: float = 0.0
     """Beginning of the slip [s]."""
     over_s: float = 0.0
-    """How long it takes [s]; 0 is a step."""
+    """Duration of the slip [s]; 0 is a step."""
     around_rad: float = 0.0
-    """Angle about the bone that it ends with, by the right-hand rule about the bone's direction [rad]."""
+    """Final angle about the bone, by the right-hand rule about the bone's direction [rad]."""
     along_m: float = 0.0
-    """Distance along the bone, towards its far end, that it ends with [m]."""
+    """Final distance along the bone, towards its far end [m]."""
 
     def __post_init__(self) -> None:
         require_ranges(self, over_s=(0.0, math.inf))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        if self.station not in sensed.stations:
-            raise UnknownName("station", self.station, sensed.stations)
-        row = sensed.stations.index(self.station)
-        since_s = sensed.time_s[:, row] - self.from_s
+    def apply(self, readings: SimulatedReadings) -> None:
+        if self.station not in readings.stations:
+            raise UnknownName("station", self.station, readings.stations)
+        row = readings.stations.index(self.station)
+        since_s = readings.time_s[:, row] - self.from_s
         share = np.where(since_s < 0.0, 0.0, np.minimum(since_s / max(self.over_s, 1e-9), 1.0))
         share = np.where((since_s >= 0.0) & (self.over_s == 0.0), 1.0, share)
         # In the station's axes the bone runs along x, `radius_m` below the origin.
         angle = self.around_rad * share
-        below = sensed.radius_m[row] * np.stack([np.zeros_like(angle), -np.sin(angle), np.cos(angle) - 1.0], axis=1)
+        below = readings.radius_m[row] * np.stack([np.zeros_like(angle), -np.sin(angle), np.cos(angle) - 1.0], axis=1)
         below[:, 0] = self.along_m * share
-        sensed.position_m[:, row] += rotations.rotate(sensed.turn[:, row], below)
+        readings.position_m[:, row] += rotations.rotate(readings.turn[:, row], below)
         around = rotations.exp(angle[:, None] * np.array([1.0, 0.0, 0.0]))
-        sensed.turn[:, row] = rotations.multiply(sensed.turn[:, row], around)
+        readings.turn[:, row] = rotations.multiply(readings.turn[:, row], around)

@@ -1,4 +1,4 @@
-"""Stations whose orientation is off by a constant angle for a while: iron near the magnetometers."""
+"""Constant heading error of stations for a period, such as iron near the magnetometers causes."""
 
 import math
 from dataclasses import dataclass
@@ -11,22 +11,24 @@ from harness.simulate.readings import SimulatedReadings
 
 @dataclass(frozen=True)
 class OrientationOffset:
-    """Orientations turned about the vertical from one moment to another, positions as they are. A fault.
+    """Orientations rotated about the vertical from `from_s` to `to_s`; positions are correct. A fault.
 
-    All stations turned alike agree with each other and contradict every position: the hard case.
+    The hard case rotates all stations alike: they agree with each other and contradict every position.
     """
 
     stations: tuple[str, ...] = ()
-    """Which; () is every one."""
+    """Affected stations; () is all of them."""
     from_s: float = 0.0
+    """Beginning [s]."""
     to_s: float = math.inf
+    """End [s]."""
     angle_rad: float = 0.0
-    """About the tracker's z axis [rad]."""
+    """Angle about the tracker's z axis [rad]."""
 
     def __post_init__(self) -> None:
         require_ranges(self, to_s=(self.from_s, math.inf))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        hit = sensed.during(self.stations, self.from_s, self.to_s)
-        sensed.rotate(hit[:, :, None] * np.array([0.0, 0.0, self.angle_rad]))
-        sensed.affected["orientation_offset"] = hit | sensed.affected.get("orientation_offset", False)
+    def apply(self, readings: SimulatedReadings) -> None:
+        hit = readings.mask(self.stations, self.from_s, self.to_s)
+        readings.rotate(hit[:, :, None] * np.array([0.0, 0.0, self.angle_rad]))
+        readings.affected["orientation_offset"] = hit | readings.affected.get("orientation_offset", False)

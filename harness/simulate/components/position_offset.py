@@ -1,4 +1,4 @@
-"""Stations that read a constant distance off for a while: a receiver that took another for itself, a bad start."""
+"""Constant position error of stations for a period, such as a confused receiver or a bad start causes."""
 
 import math
 from dataclasses import dataclass
@@ -9,19 +9,21 @@ from harness.simulate.readings import SimulatedReadings
 
 @dataclass(frozen=True)
 class PositionOffset:
-    """Positions off by one and the same vector from one moment to another; quality tells nothing of it. A fault."""
+    """Positions off by a constant vector from `from_s` to `to_s`; the quality does not show it. A fault."""
 
     stations: tuple[str, ...] = ()
-    """Which; () is every one, as if the performer stood elsewhere."""
+    """Affected stations; () is all of them, as if the performer stood elsewhere."""
     from_s: float = 0.0
+    """Beginning [s]."""
     to_s: float = math.inf
+    """End [s]."""
     offset_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Along the tracker's axes [m]."""
+    """Offset in the tracker's axes [m]."""
 
     def __post_init__(self) -> None:
         require_ranges(self, to_s=(self.from_s, math.inf))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        hit = sensed.during(self.stations, self.from_s, self.to_s)
-        sensed.position_m = sensed.position_m + hit[:, :, None] * self.offset_m
-        sensed.affected["position_offset"] = hit | sensed.affected.get("position_offset", False)
+    def apply(self, readings: SimulatedReadings) -> None:
+        hit = readings.mask(self.stations, self.from_s, self.to_s)
+        readings.position_m = readings.position_m + hit[:, :, None] * self.offset_m
+        readings.affected["position_offset"] = hit | readings.affected.get("position_offset", False)

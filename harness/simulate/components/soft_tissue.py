@@ -1,7 +1,7 @@
-"""Flesh that gives way: a tracker sits on skin, and skin lags behind the bone and swings after it.
+"""Soft tissue artefact: a tracker sits on skin, which lags behind the bone and oscillates.
 
-Soft tissue artefact is the largest error of skin-mounted trackers, largest at the thigh, and as slow as the motion
-itself (Leardini et al. 2005); its numbers and what this model leaves out: docs/is900.md 13.6.
+It is the largest error of skin-mounted trackers, largest at the thigh, and as slow as the motion itself (Leardini et
+al. 2005). docs/is900.md 13.6 has its numbers and the limits of this model.
 """
 
 import math
@@ -15,47 +15,49 @@ from harness.simulate.parameter_ranges import require_ranges
 from harness.simulate.readings import SimulatedReadings
 
 _FASTER_INWARD = 2.0
-"""How much higher the frequency is square to the skin than along it: higher, by Wakeling & Nigg 2001 [choice]."""
+"""Ratio of the natural frequency normal to the skin to that along it: above 1 by Wakeling & Nigg 2001 [choice]."""
 
 
 @dataclass(frozen=True)
 class SoftTissueArtefact:
-    """A damped oscillator for each axis of a station, driven by what its place on the bone is accelerated by.
+    """A damped oscillator on each axis of a station, driven by the acceleration of its place on the bone.
 
-    Flesh of thickness h is a layer in shear: its stiffness goes with 1/h, so that a tracker gives way in proportion to
-    h, and swings at `frequency_hz` times the root of `reference_tissue_m`/h; yet it never gives way by more than h. What slides
-    around the bone turns about it as well. In the rest pose it hangs where it was strapped on; other poses pull it
-    elsewhere. No draws: the same motion gives the same wobble.
+    Soft tissue of thickness h is a layer in shear whose stiffness is proportional to 1/h. So the displacement is
+    proportional to h, and the natural frequency is `frequency_hz` times the root of `reference_tissue_m`/h. The
+    displacement is limited to h. A shift around the bone also rotates the station about it. The rest pose is the
+    equilibrium; in other poses gravity displaces the station. The model is deterministic and draws nothing.
     """
 
     frequency_hz: float = 5.0
-    """Natural frequency along the skin over `reference_tissue_m` of flesh [Hz]."""
+    """Natural frequency along the skin for a tissue thickness of `reference_tissue_m` [Hz]."""
     damping: float = 0.3
-    """Share of the critical damping."""
+    """Damping ratio; 1 is critical damping."""
     reference_tissue_m: float = 0.04
-    """The thickness that `frequency_hz` is of [m]."""
+    """Tissue thickness to which `frequency_hz` refers [m]."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), of_flesh_m=(1e-3, 0.5))
+        require_ranges(self, frequency_hz=(0.1, 100.0), damping=(0.01, 10.0), reference_tissue_m=(1e-3, 0.5))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / sensed.flesh_m)
+    def apply(self, readings: SimulatedReadings) -> None:
+        frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / readings.tissue_m)
         pace = 2.0 * math.pi * frequency_hz[:, None] * np.array([1.0, 1.0, _FASTER_INWARD])
-        linear_m = simulate_oscillators(-sensed.force_m_s2, pace, self.damping, 1.0 / sensed.rate_hz)
-        shift_m = soft_limit(linear_m, sensed.flesh_m[:, None])
-        sensed.position_m = sensed.position_m + rotations.rotate(sensed.turn, shift_m)
-        # The bone runs along x, `radius_m` below: what goes by y to the left of it turns about x by -y/radius.
-        roll_rad = -shift_m[..., 1] / sensed.radius_m
-        sensed.turn = rotations.multiply(sensed.turn, rotations.exp(roll_rad[..., None] * np.array([1.0, 0.0, 0.0])))
+        linear_m = simulate_oscillators(-readings.force_m_s2, pace, self.damping, 1.0 / readings.rate_hz)
+        shift_m = soft_limit(linear_m, readings.tissue_m[:, None])
+        readings.position_m = readings.position_m + rotations.rotate(readings.turn, shift_m)
+        # The bone runs along x, `radius_m` below: a shift of y around it rotates the station about x by -y/radius.
+        roll_rad = -shift_m[..., 1] / readings.radius_m
+        readings.turn = rotations.multiply(
+            readings.turn, rotations.exp(roll_rad[..., None] * np.array([1.0, 0.0, 0.0]))
+        )
 
 
 def simulate_oscillators(push: Floats, pace: Floats, damping: float, step_s: float) -> Floats:
-    """Where oscillators x'' + 2 d w x' + w^2 x = push are, (N, ...) [m], under pushes (N, ...) [m/s^2].
+    """Solution (N, ...) of x'' + 2 d w x' + w^2 x = push [m] for sampled pushes (N, ...) [m/s^2].
 
-    `pace` w (...) [rad/s]. Pushes are straight lines between samples, for which each step is exact however stiff the
-    oscillator; it begins where the first push holds it.
+    `pace` w (...) [rad/s] is the natural frequency, `damping` d the damping ratio. Pushes are linear between samples,
+    for which each step is exact, however stiff the oscillator. It starts at rest at the first push's equilibrium.
     """
-    # With a push of u + r t the motion is c + s t + e(t): c, s and the free part e are matched at each sample.
+    # A push u + r t has the solution c + s t + e(t); c, s and the free response e are matched at each sample.
     step = _free_response(pace, damping, step_s)
     place, speed = push[0] / pace**2, np.zeros_like(push[0])
     out = np.empty_like(push)
@@ -71,14 +73,14 @@ def simulate_oscillators(push: Floats, pace: Floats, damping: float, step_s: flo
 
 
 def soft_limit(shift_m: Floats, most_m: Floats) -> Floats:
-    """Vectors (..., 3) that come ever nearer to a length of `most_m` (..., 1), the short ones as they are."""
+    """Vectors (..., 3) with their length limited smoothly (tanh) to `most_m` (..., 1) [m]."""
     length_m = np.maximum(np.sqrt(np.sum(shift_m**2, axis=-1, keepdims=True)), 1e-12)
     out: Floats = shift_m * (most_m * np.tanh(length_m / most_m) / length_m)
     return out
 
 
 def _free_response(pace: Floats, damping: float, step_s: float) -> Floats:
-    """(2, 2, ...) what a step makes of place and speed without a push."""
+    """(2, 2, ...) state transition of position and velocity over a step without a push."""
     root = np.sqrt(complex(damping**2 - 1.0))
     root = root if abs(root) > 1e-6 else 1e-6  # critical damping is the limit of both sides
     one, two = pace * (-damping + root), pace * (-damping - root)

@@ -1,4 +1,4 @@
-"""Error that grows with speed."""
+"""Position error that is proportional to velocity."""
 
 from dataclasses import dataclass
 
@@ -8,16 +8,16 @@ from harness.simulate.readings import SimulatedReadings
 
 @dataclass(frozen=True)
 class SpeedError:
-    """Ranges are measured at another moment than the record's: an error along the velocity.
+    """A timing error: ranges are measured at another moment than the record states.
 
     Gilson et al. 2006 found errors that grow with speed; the size is inferred (docs/is900.md 13.3 and 13.5).
     """
 
     ahead_s: float = 0.002
-    """Motion that is added [s]; negative lags behind."""
+    """Time by which positions run ahead of the record's time stamp [s]; negative lags."""
 
     def __post_init__(self) -> None:
         require_ranges(self, ahead_s=(-1.0, 1.0))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        sensed.move(self.ahead_s * sensed.velocity_m_s)
+    def apply(self, readings: SimulatedReadings) -> None:
+        readings.move(self.ahead_s * readings.velocity_m_s)

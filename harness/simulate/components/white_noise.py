@@ -11,7 +11,7 @@ from harness.simulate.readings import SimulatedReadings
 
 @dataclass(frozen=True)
 class WhiteNoise:
-    """Independent from record to record, normal on each axis: the resolution floor (docs/is900.md 13.5, unverified)."""
+    """Normal noise, independent for each record and axis: the resolution floor (docs/is900.md 13.5, unverified)."""
 
     position_m: float = 0.00075
     """Standard deviation on each axis [m]."""
@@ -21,8 +21,8 @@ class WhiteNoise:
     def __post_init__(self) -> None:
         require_ranges(self, position_m=(0.0, 1.0), orientation_rad=(0.0, 1.0))
 
-    def apply(self, sensed: SimulatedReadings) -> None:
-        draws = [sensed.take_rng("white", s).normal(size=(len(sensed.time_s), 6)) for s in sensed.stations]
+    def apply(self, readings: SimulatedReadings) -> None:
+        draws = [readings.take_rng("white", s).normal(size=(len(readings.time_s), 6)) for s in readings.stations]
         noise: Floats = np.stack(draws, axis=1)
-        sensed.move(self.position_m * noise[..., :3])
-        sensed.rotate(self.orientation_rad * noise[..., 3:])
+        readings.move(self.position_m * noise[..., :3])
+        readings.rotate(self.orientation_rad * noise[..., 3:])

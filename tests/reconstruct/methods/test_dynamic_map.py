@@ -100,7 +100,7 @@ def test_frames_that_are_missing_or_early(walk: Scene, method: Method) -> None:
 
 
 def test_the_literal_preset_is_literal() -> None:
-    assert (LITERAL.kept, LITERAL.ridge, LITERAL.width, LITERAL.spread) == (0.99, 0.0, 0.0, 1.0)
+    assert (LITERAL.variance_kept, LITERAL.ridge, LITERAL.width, LITERAL.spread) == (0.99, 0.0, 0.0, 1.0)
     assert LITERAL.loss.position_scale_m == LITERAL.loss.position_sigma_m
     assert LITERAL.start == "closest"
 
@@ -132,16 +132,16 @@ def test_with_positions_alone_the_heading_of_the_last_answers_does_not_matter(wa
 
 
 def test_positions_are_asked_for_the_heading_only_where_no_orientation_and_enough_of_them_tell_it(walk: Scene) -> None:
-    evidence = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).regression(walk.calibration)
+    regression = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).regression(walk.calibration)
     torso, count = walk.calibration.stations.index("torso"), len(walk.calibration.stations)
     positions = np.repeat([True, False], count)
-    assert evidence.with_usual_heading(positions).bearing is not None
-    assert evidence.with_usual_heading(positions) is evidence.with_usual_heading(positions)
+    assert regression.with_usual_heading(positions).heading is not None
+    assert regression.with_usual_heading(positions) is regression.with_usual_heading(positions)
     with_torso, without_torso, lone = np.array(positions), np.array(positions), np.zeros(2 * count, bool)
     with_torso[count + torso], without_torso[torso] = True, False
     lone[torso] = True
     for usual in (with_torso, without_torso, lone):
-        assert evidence.with_usual_heading(usual) is evidence
+        assert regression.with_usual_heading(usual) is regression
 
 
 def test_the_room_does_not_matter_with_positions_alone(walk: Scene) -> None:

@@ -40,7 +40,7 @@ def test_a_silent_station_is_read_off_the_last_answer(walk: Scene) -> None:
 
 def test_thinning_is_a_matter_of_the_generator_alone(walk: Scene) -> None:
     few = KernelRidge(most_frames=40)
-    one, two = (few.fit(walk.body, [walk.take], np.random.default_rng(3)).kept for _ in range(2))
+    one, two = (few.fit(walk.body, [walk.take], np.random.default_rng(3)).frames for _ in range(2))
     np.testing.assert_array_equal(one, two)
     assert len(one) == 40
     assert (np.diff(one) > 0).all()

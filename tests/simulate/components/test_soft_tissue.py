@@ -109,7 +109,7 @@ def test_a_lasting_force_pulls_it_aside_in_proportion_to_the_flesh(still: Still)
     """Sag: force over the square of the pace, against the force; stiffer square to the skin."""
     true, seen = still(1.0, 2), still(1.0, 2)
     seen.force_m_s2[:] = [0.3, 0.0, 0.3]
-    seen.flesh_m = np.array([0.04, 0.01])
+    seen.tissue_m = np.array([0.04, 0.01])
     SoftTissueArtefact(frequency_hz=5.0).apply(seen)
     sag_m = 0.3 / (2.0 * np.pi * 5.0) ** 2
     expected = np.array([[-sag_m, 0.0, -sag_m / 4.0], [-sag_m / 4.0, 0.0, -sag_m / 16.0]])
@@ -225,7 +225,7 @@ def test_loose_straps_slip_as_often_and_as_far_as_said(still: Still) -> None:
 def test_a_strap_slips_alike_whatever_else_is_worn(still: Still) -> None:
     few, many = still(2.0, 2), still(2.0, 5)
     many.position_m[:, :2], many.turn[:, :2] = few.position_m, few.turn
-    for sensed in (few, many):
-        StrapSlip(share=0.7).apply(sensed)
+    for readings in (few, many):
+        StrapSlip(share=0.7).apply(readings)
     np.testing.assert_array_equal(few.position_m, many.position_m[:, :2])
     np.testing.assert_array_equal(few.turn, many.turn[:, :2])
