@@ -83,7 +83,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     if not (args.unpaced or args.overload):
         check_capacity(len(scenario.stations), tracker.rate_hz, args.items or tracker.items, config.baud)
     samples = playback.samples  # before the port opens: clients expect an open port to answer
-    port = open_port(args.pty, args.tcp, anywhere=args.anywhere, say=print_status)
+    port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
     with closing(port), sigterm_as_interrupt():
         names = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"

@@ -102,7 +102,7 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
-        record_port(args.port, config, writer, seconds=args.seconds, say=print_status, progress=show_progress)
+        record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
     return _print_recording(args, writer.counts)
 
 

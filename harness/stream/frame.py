@@ -1,7 +1,7 @@
-"""The one interface: what a tracker reports, wherever the report comes from.
+"""The one interface: what a tracker reports, whatever the source.
 
-Simulator, recording and serial port all yield these frames; the methods see nothing else.
-SI units; quaternions (w, x, y, z); `a_from_b` takes b into a.
+Simulator, recording and serial port all yield these frames, and methods see nothing else. Units are SI. Quaternions are
+(w, x, y, z). `a_from_b` maps coordinates of b to a.
 """
 
 from collections.abc import Iterator
@@ -13,24 +13,24 @@ from harness.core.arrays import Bools, Floats, freeze
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackerFrame:
-    """One instant as the receiver saw it, S stations; ShapeError if the arrays disagree about S."""
+    """One round of S stations as the receiver saw it. Raises ShapeError if the arrays disagree about S."""
 
     received_s: float
     """Host monotonic clock when the frame was complete [s]."""
     measured_s: Floats
-    """(S,) device time of each station's measurement, unwrapped [s]; NaN where no record came."""
+    """(S,) device time of each station's measurement, unwrapped [s]; NaN where no record arrived."""
     position_m: Floats
     """(S, 3) station origin in the tracker frame [m]; NaN where not valid."""
     tracker_from_station: Floats
     """(S, 4) unit quaternion; NaN where not valid."""
     position_valid: Bools
-    """(S,) False where no usable position came (lost, or a station that reports orientation only)."""
+    """(S,) False where no usable position arrived: the station is lost or reports orientation only."""
     orientation_valid: Bools
-    """(S,) likewise for orientation."""
+    """(S,) False where no usable orientation arrived."""
     quality: Floats
-    """(S,) 0 lost to 1 best, from item 40."""
+    """(S,) tracking quality, 0 (lost) to 1 (best), from item 40."""
     suspect: Bools
-    """(S,) True where station order, time or plausibility cast doubt on the record."""
+    """(S,) True where station order, time or plausibility suggests a damaged record."""
 
     def __post_init__(self) -> None:
         stations = len(self.measured_s)
@@ -40,11 +40,11 @@ class TrackerFrame:
 
 
 class TrackerStream(Protocol):
-    """Frames from anywhere.
+    """Interface of a source of frames.
 
-    Times strictly increase; stations and their order never change; a silent station is an
-    invalid row, never a repeated one; a frame closes when the station number does not increase, or
-    after 1.5 periods; closing ends the iteration quietly.
+    Times strictly increase. Stations and their order never change. A silent station is an invalid row, never a repeated
+    one. A frame closes when the station number does not increase, or after 1.5 periods. Closing the stream ends the
+    iteration without an exception.
     """
 
     @property

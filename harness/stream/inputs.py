@@ -16,24 +16,24 @@ INPUT_COMBINATIONS = {
     "ori": "orientation of every station",
     "mixed": "position of torso and both ankles, orientation of torso, head and both hands (or wrists)",
 }
-"""Names as they stand in tables, and what they mean."""
+"""Description of each input combination, by the name used in tables."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inputs:
-    """Per station, whether its position and its orientation are used."""
+    """Whether the position and the orientation of each of S stations are used."""
 
     name: str
     position: Bools
-    """(S,)"""
+    """(S,) True where the position is used."""
     orientation: Bools
-    """(S,)"""
+    """(S,) True where the orientation is used."""
 
     def __post_init__(self) -> None:
         freeze(self, bool, position=("S",), orientation=("S",))
 
     def mask(self, frame: TrackerFrame) -> TrackerFrame:
-        """The frame with everything else marked invalid and set to NaN."""
+        """Return the frame with all other readings marked invalid and set to NaN."""
         if self.position.all() and self.orientation.all():
             return frame
         return replace(
@@ -46,16 +46,18 @@ class Inputs:
 
 
 def make_inputs(name: str, stations: Sequence[str]) -> Inputs:
-    """The named combination for these stations; BadInput when a station that it is about is not worn."""
-    every, none = np.ones(len(stations), bool), np.zeros(len(stations), bool)
+    """Build the named combination for these stations. Raises BadInput when it needs a station that is not worn, and
+    UnknownName for an unknown combination.
+    """
+    all_stations, no_station = np.ones(len(stations), bool), np.zeros(len(stations), bool)
     if name == "pos+ori":
-        return Inputs(name, every, every)
+        return Inputs(name, all_stations, all_stations)
     if name == "pos":
-        return Inputs(name, every, none)
+        return Inputs(name, all_stations, no_station)
     if name == "ori":
-        return Inputs(name, none, every)
+        return Inputs(name, no_station, all_stations)
     if name == "pos+torso_ori":
-        return Inputs(name, every, _station_mask(name, stations, "torso"))
+        return Inputs(name, all_stations, _station_mask(name, stations, "torso"))
     if name == "mixed":
         legs_and_torso = _station_mask(name, stations, "torso", "left_ankle", "right_ankle")
         upper = _station_mask(name, stations, "torso", "head", *_hand_stations(stations))
@@ -67,11 +69,11 @@ def _hand_stations(stations: Sequence[str]) -> tuple[str, str]:
     return ("left_wrist", "right_wrist") if "left_wrist" in stations else ("left_hand", "right_hand")
 
 
-def _station_mask(combination_name: str, stations: Sequence[str], *wanted: str) -> Bools:
-    missing = [w for w in wanted if w not in stations]
+def _station_mask(combination_name: str, stations: Sequence[str], *required: str) -> Bools:
+    missing = [w for w in required if w not in stations]
     if missing:
         raise BadInput(
             f"inputs {combination_name!r} need a station called {' and one called '.join(missing)}.",
-            f"Worn are: {', '.join(stations)}.",
+            f"Stations worn: {', '.join(stations)}.",
         )
-    return np.array([s in wanted for s in stations])
+    return np.array([s in required for s in stations])

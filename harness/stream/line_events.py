@@ -1,4 +1,6 @@
-"""What happened on the line, and who else is told."""
+"""Events on the line to a device, and the interface of an observer that sees them. The driver and the recording share
+it.
+"""
 
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -8,45 +10,47 @@ from harness.stream.codec.reader import WireFormat
 LineEventKind = Literal[
     "connected",  # streaming, for the first time or again
     "unplugged",  # the port or the connection is gone
-    "stalled",  # nothing came for a moment, or the device's clock stands still
-    "silent",  # nothing comes and nothing answers
-    "reset",  # the device has forgotten what it was told
-    "wrong list",  # the records are not those that were asked for
-    "garbage",  # bytes that belong to nothing
-    "missing",  # a station that was there is not
-    "refused",  # what came back cannot be used as it is
+    "stalled",  # nothing arrived for a moment, or the device's clock stands still
+    "silent",  # nothing arrives and the device does not answer
+    "reset",  # the device has lost its configuration
+    "wrong list",  # the records are not of the configured output list
+    "garbage",  # bytes that belong to no record and no reply
+    "missing",  # a station that was present is no longer present
+    "refused",  # the device that came back cannot be used as it is
 ]
 
 
 @dataclass(frozen=True)
 class LineEvent:
-    """Something a person at the device wants to know; each trouble is told once, however long it lasts."""
+    """An event that a person at the device should know. Each trouble is reported once, however long it lasts."""
 
     kind: LineEventKind
     monotonic_s: float
-    """Host's monotonic clock [s], that of `TrackerFrame.received_s`."""
+    """Time on the host's monotonic clock [s], the clock of `TrackerFrame.received_s`."""
     wall_s: float
-    """Seconds since 1970."""
+    """Time on the host's wall clock, since 1970 [s]."""
     text: str
 
 
 class LineObserver(Protocol):
-    """Sees all that goes over the line, in order; a recording is one."""
+    """Interface of an observer of the line: it sees all bytes and events in order. `RecordingWriter` is one."""
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
-        """What was read; b"" where nothing was there and a frame was given up waiting for."""
+        """Take bytes read from the device; b"" where nothing arrived and an overdue frame was closed."""
         ...
 
     def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...
     def on_configured(self, wire: WireFormat) -> None:
-        """After each successful set-up, before `C`: what follows is in this format, and the clock starts anew."""
+        """Take the format of the bytes that follow. It is called after each configuration, before the command `C`; the
+        device's clock starts at zero there.
+        """
         ...
 
     def on_event(self, event: LineEvent) -> None: ...
 
 
 class NullLineObserver:
-    """Nobody looks on."""
+    """Observer that ignores everything."""
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...
     def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...

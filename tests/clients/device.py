@@ -1,7 +1,7 @@
-"""An emulator in a process of its own, behind a pty, for clients that know nothing of it.
+"""An emulator in its own process, behind a pty, for clients that know nothing of it.
 
-Each station goes round a circle and turns as it goes, so that every record can be judged by itself: the heading is the
-angle at which it stands on its circle. Run as a module it serves until its standard input ends, then says what it sent.
+Each station moves on a circle and turns as it moves, so that every record can be checked by itself: the heading is the
+station's angle on the circle. Run as a module it serves until its standard input ends, then prints what it sent.
 """
 
 import argparse
@@ -24,26 +24,26 @@ from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.faults import Fault
 from harness.stream.emulator.server import serve_emulator
 
-RADIUS_M, LAP_S, QUALITY = 0.3, 5.0, 214
+RADIUS_M, LOOP_S, QUALITY = 0.3, 5.0, 214
 ROOT = Path(__file__).parents[2]
 
 
 def centre_m(station: int) -> tuple[float, float, float]:
-    """Of the circle of a station, from 1."""
+    """Return the centre of the circle of a station, counted from 1 [m]."""
     return 0.5 * station - 1.5, -0.25 * station, 1.0 + 0.1 * station
 
 
 def tilt_deg(station: int) -> tuple[float, float]:
-    """Pitch and roll of a station, always."""
+    """Return the constant pitch and roll of a station [deg]."""
     return 4.0 * station, -7.0 * station
 
 
-def circling(stations: int, rate_hz: float) -> DeviceSamples:
-    """A lap of so many stations, sampled one after another."""
-    instants = round(LAP_S * rate_hz)
+def make_samples(stations: int, rate_hz: float) -> DeviceSamples:
+    """One loop of this many stations, sampled one after another."""
+    instants = round(LOOP_S * rate_hz)
     number = np.arange(1, stations + 1)
     taken_s = np.arange(instants)[:, None] / rate_hz + (number - 1) / (rate_hz * stations)
-    angle = 2.0 * np.pi * taken_s / LAP_S
+    angle = 2.0 * np.pi * taken_s / LOOP_S
     circle = np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=-1)
     tilts = np.broadcast_to(np.array([tilt_deg(int(k)) for k in number]), (instants, stations, 2))
     angles_deg = np.concatenate([np.rad2deg(angle)[:, :, None], tilts], axis=-1)
@@ -60,21 +60,23 @@ def circling(stations: int, rate_hz: float) -> DeviceSamples:
     )
 
 
-def judge(
-    station: int, position_m: tuple[float, ...], angles_deg: tuple[float, ...], slack_m: float, slack_deg: float
+def check_pose(
+    station: int, position_m: tuple[float, ...], angles_deg: tuple[float, ...], tolerance_m: float, tolerance_deg: float
 ) -> None:
-    """Fails unless such a record can be one of this station."""
-    x, y, z = (value - middle for value, middle in zip(position_m, centre_m(station), strict=True))
-    assert abs(z) < slack_m
-    assert abs(math.hypot(x, y) - RADIUS_M) < slack_m
+    """Check that a record with this pose can be one of this station."""
+    x, y, z = (value - centre for value, centre in zip(position_m, centre_m(station), strict=True))
+    assert abs(z) < tolerance_m
+    assert abs(math.hypot(x, y) - RADIUS_M) < tolerance_m
     heading_deg = math.degrees(math.atan2(y, x))
-    assert abs((angles_deg[0] - heading_deg + 180.0) % 360.0 - 180.0) < slack_deg + math.degrees(slack_m / RADIUS_M)
-    assert all(abs(a - b) < slack_deg for a, b in zip(angles_deg[1:], tilt_deg(station), strict=True))
+    assert abs((angles_deg[0] - heading_deg + 180.0) % 360.0 - 180.0) < tolerance_deg + math.degrees(
+        tolerance_m / RADIUS_M
+    )
+    assert all(abs(a - b) < tolerance_deg for a, b in zip(angles_deg[1:], tilt_deg(station), strict=True))
 
 
-def angles_of(turn_wxyz: tuple[float, ...]) -> tuple[float, float, float]:
-    """Yaw, pitch and roll [deg] of a unit quaternion."""
-    w, x, y, z = turn_wxyz
+def yaw_pitch_roll_deg(quaternion_wxyz: tuple[float, ...]) -> tuple[float, float, float]:
+    """Return yaw, pitch and roll of a unit quaternion [deg]."""
+    w, x, y, z = quaternion_wxyz
     assert abs(math.hypot(w, x, y, z) - 1.0) < 1e-4
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
@@ -83,18 +85,18 @@ def angles_of(turn_wxyz: tuple[float, ...]) -> tuple[float, float, float]:
 
 
 @dataclass
-class Running:
-    """A device that is switched on."""
+class RunningDevice:
+    """An emulated device that is switched on."""
 
     port: str
     summary: dict[str, float] = field(default_factory=dict)
-    """What it counted, once it is off."""
+    """The emulator's counts, once it is off."""
 
 
 @contextmanager
-def device(folder: Path, stations: int = 4, rate_hz: float = 75.0, **config: Any) -> Iterator[Running]:
-    """On while the block runs; fails when the emulator did not end in good order. `faults` are tables."""
-    running = Running(str(folder / "tracker"))
+def run_device(folder: Path, stations: int = 4, rate_hz: float = 75.0, **config: Any) -> Iterator[RunningDevice]:
+    """Run a device while the block runs; fail when the emulator did not end cleanly. `faults` are tables."""
+    running = RunningDevice(str(folder / "tracker"))
     command = [sys.executable, "-m", "tests.clients.device", running.port, str(stations), str(rate_hz)]
     process = subprocess.Popen(
         [*command, json.dumps(config)], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -126,7 +128,7 @@ def main() -> None:
     args = parser.parse_args()
     faults = tuple(Fault(**fault) for fault in args.config.pop("faults", ()))
     config = EmulatorConfig(faults=faults, **args.config)
-    with serve_emulator(circling(args.stations, args.rate_hz), config, pty=args.link) as server:
+    with serve_emulator(make_samples(args.stations, args.rate_hz), config, pty=args.link) as server:
         print("on", flush=True)
         sys.stdin.read()
         summary = server.summary()

@@ -1,6 +1,6 @@
-"""VRPN's Fastrak tracker with its IS-900 options, re-enacted from `vrpn_Tracker_Fastrak.C`, `vrpn_Serial.C` and
-`vrpn_Tracker.C` of version 07.38 (docs/is900.md 11.1): what it sends, how long it waits, what it takes for a record,
-what it does in trouble.
+"""VRPN's Fastrak tracker with its IS-900 options: what it sends, how long it waits, what it accepts, how it recovers.
+
+It follows `vrpn_Tracker_Fastrak.C`, `vrpn_Serial.C` and `vrpn_Tracker.C` of version 07.38 (docs/is900.md 11.1).
 """
 
 import struct
@@ -9,32 +9,35 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.clients.tty import Tty, raw
+from tests.clients.tty import Tty, raw_mode
 
 INCH_M = 0.0254
 WATCHDOG_S = 2.0
-"""Without a report for so long, the port is opened anew."""
+"""The port is reopened after this long without a report [s]."""
 RESETTING, SYNCING, AWAITING_STATION, PARTIAL, FAIL = "resetting", "syncing", "awaiting station", "partial", "fail"
 
 
 @dataclass(frozen=True)
 class Report:
-    """What a server of VRPN would send on."""
+    """A report that a VRPN server would send to its clients."""
 
     sensor: int
-    """From 0."""
+    """Number of the sensor, from 0."""
     time_s: float
-    """Host clock as VRPN believes [s]."""
+    """Host clock as VRPN computes it [s]."""
     read_s: float
-    """When it was complete, in truth [s]."""
+    """Host clock when the report was complete [s]."""
     position_m: tuple[float, ...]
-    turn_xyzw: tuple[float, ...]
+    quaternion_xyzw: tuple[float, ...]
     buttons: int | None = None
     stick: tuple[float, float] | None = None
 
 
-class Vrpn:
-    """`mainloop` as often as possible. `scale` shortens the waits of a reset; `answer_s` is the one after `S`."""
+class VrpnClient:
+    """Call `mainloop` as often as possible.
+
+    `scale` shortens the waits of a reset; `answer_s` is the wait after `S` [s].
+    """
 
     def __init__(
         self,
@@ -48,24 +51,24 @@ class Vrpn:
         scale: float = 0.05,
         answer_s: float = 1.0,
     ) -> None:
-        self._port, self._timed, self._extra, self._scale = port, is900_time, extra, scale
+        self._port, self._has_time, self._extra, self._scale = port, is900_time, extra, scale
         self._answer_s = answer_s
         self._stations = min(stations, 4)
         self._buttons: set[int] = set()
         self._sticks: set[int] = set()
         self.reports: list[Report] = []
-        self.said: list[str] = []
+        self.log: list[str] = []
         """What it prints, shortened."""
         self.resets = 0
-        """Attempts since the last that succeeded."""
+        """Attempts since the last successful one."""
         self.tty: Tty | None = self._open()
         self.sent, self.received = bytearray(), bytearray()
-        """Of ports that were closed since."""
+        """Bytes of the ports that have been closed."""
         self._zero_s = 0.0
         self._buffer = b""
         self._sensor = 0
         self.status = RESETTING
-        self._report_s = time.time()
+        self._last_report_s = time.time()
         for sensor in (*styluses, *wands):
             self._buttons.add(sensor)
             self._set_list(sensor)
@@ -75,9 +78,9 @@ class Vrpn:
 
     def _open(self) -> Tty | None:
         try:
-            return Tty(self._port, raw(termios.IGNBRK | termios.IGNPAR))
+            return Tty(self._port, raw_mode(termios.IGNBRK | termios.IGNPAR))
         except OSError:
-            self.said.append("cannot open serial port")
+            self.log.append("cannot open serial port")
             return None
 
     def close(self) -> None:
@@ -93,11 +96,11 @@ class Vrpn:
 
     @property
     def resyncs(self) -> list[str]:
-        """What it complained about while it read records."""
-        return [line for line in self.said if "sync" in line]
+        """Complaints while it read records."""
+        return [line for line in self.log if "sync" in line]
 
     def serve(self, until: Callable[[], bool], limit_s: float) -> bool:
-        """A server's loop, until something came true or the time is over; says which."""
+        """Run a server's loop until a condition holds or the time is over; return whether it holds."""
         end_s = time.monotonic() + limit_s
         while not until():
             if time.monotonic() > end_s:
@@ -110,16 +113,16 @@ class Vrpn:
         if self.status == RESETTING:
             self._reset()
         elif self.status == FAIL:
-            self.said.append("tracker failed, trying to reset")
+            self.log.append("tracker failed, trying to reset")
             self.close()
             self.tty = self._open()
             self.status = RESETTING
         else:
             while self._get_report():
                 pass
-            elapsed_us = (int((time.time() - self._report_s) * 1e6) + 2**31) % 2**32 - 2**31  # an int, as in C
+            elapsed_us = (int((time.time() - self._last_report_s) * 1e6) + 2**31) % 2**32 - 2**31  # an int32 of C
             if self.status != FAIL and elapsed_us > WATCHDOG_S * 1e6:
-                self.said.append("tracker failed to read")
+                self.log.append("tracker failed to read")
                 self.status = FAIL
 
     def _write(self, data: bytes) -> bool:
@@ -128,7 +131,7 @@ class Vrpn:
                 raise OSError("closed")
             self.tty.write(data)
         except OSError:
-            self.said.append("write failed")
+            self.log.append("write failed")
             self.status = FAIL
             return False
         return True
@@ -137,40 +140,40 @@ class Vrpn:
         time.sleep(seconds * self._scale)
 
     def _set_list(self, sensor: int) -> bool:
-        """Position, quaternion and what the sensor's devices need; a space last."""
-        timed = ",21" if self._timed else ""
+        """Set position, quaternion and the items of the sensor's devices; a space is last."""
+        time_item = ",21" if self._has_time else ""
         button = ",22" if sensor in self._buttons else ""
         stick = ",23" if sensor in self._sticks else ""
-        written = self._write(f"O{sensor + 1},2,11{timed}{button}{stick},0\r".encode())
+        written = self._write(f"O{sensor + 1},2,11{time_item}{button}{stick},0\r".encode())
         time.sleep(0.05)
         return written
 
     def _length(self, sensor: int) -> int:
-        return 32 + 4 * self._timed + (sensor in self._buttons) + 2 * (sensor in self._sticks)
+        return 32 + 4 * self._has_time + (sensor in self._buttons) + 2 * (sensor in self._sticks)
 
     def _reset(self) -> None:
         self.resets += 1
-        ladder = [(1, b"\r"), (5, b"Y"), (4, b"t"), (2, b"\x19"), (0, b"c")]
-        self.said.append(f"resetting, attempt {self.resets}")
-        for character in [bytes_ for after, bytes_ in ladder if self.resets > after]:
+        steps = [(1, b"\r"), (5, b"Y"), (4, b"t"), (2, b"\x19"), (0, b"c")]
+        self.log.append(f"resetting, attempt {self.resets}")
+        for character in [bytes_ for after, bytes_ in steps if self.resets > after]:
             if not self._write(character):
                 return
             self._pause(2.0)
         if self.resets > 2:
             self._pause(20.0)
-        assert self.tty is not None  # written to a moment ago
+        assert self.tty is not None  # it was just written to
         self.tty.flush_input()
         self._pause(2.0)
-        if scrap := self.tty.read_available(80):
-            self.said.append(f"got >= {len(scrap)} characters after reset")
+        if leftover := self.tty.read_available(80):
+            self.log.append(f"got >= {len(leftover)} characters after reset")
             self.tty.flush_input()
         if not self._write(b"S"):
             return
         status = self._status()
         if not (status[:1] == b"2" and status[-1:] == b"\n"):
-            self.said.append(f"bad status {status!r}")
+            self.log.append(f"bad status {status!r}")
             return
-        self.said.append("gives status")
+        self.log.append("gives status")
         self.resets = 0
         if not all(self._set_list(sensor) for sensor in range(self._stations)):
             return
@@ -179,27 +182,27 @@ class Vrpn:
                 return
             self._pause(1.0)
         if self._extra:
-            for line_ in filter(None, self._extra.split("\r")):
-                if line_.startswith("*"):
-                    self._pause(float(line_[1:]))
-                elif not self._write(f"{line_}\r".encode()):
+            for command in filter(None, self._extra.split("\r")):
+                if command.startswith("*"):
+                    self._pause(float(command[1:]))
+                elif not self._write(f"{command}\r".encode()):
                     return
             self._pause(2.0)
             self.tty.flush_input()
         if not (self._write(b"f") and self._write(b"C")):
             return
-        if self._timed:
+        if self._has_time:
             self.tty.drain()
             if not self._write(b"MT\rMZ\r"):
                 return
             self.tty.drain()
             self._zero_s = time.time()
-        self._report_s = time.time()
-        self.said.append("reset completed")
+        self._last_report_s = time.time()
+        self.log.append("reset completed")
         self.status = SYNCING
 
     def _status(self) -> bytes:
-        """What is there a second after `S`; where waits are shortened, a moment after it seems to be all there."""
+        """Return what is available `answer_s` after `S`; with shortened waits, soon after it seems complete."""
         assert self.tty is not None
         end_s = time.monotonic() + self._answer_s
         while time.monotonic() < end_s:
@@ -209,16 +212,16 @@ class Vrpn:
             time.sleep(0.005)
         return self.tty.read_available(55)
 
-    def _read(self, most: int) -> bytes | None:
+    def _read(self, max_bytes: int) -> bytes | None:
         try:
             assert self.tty is not None
-            return self.tty.read_available(most)
+            return self.tty.read_available(max_bytes)
         except OSError:
             return None
 
     def _resync(self, complaint: str) -> bool:
         assert self.tty is not None
-        self.said.append(f"{complaint}, re-syncing")
+        self.log.append(f"{complaint}, re-syncing")
         self.status, self._buffer = SYNCING, b""
         self.tty.flush_input()
         return False
@@ -229,7 +232,7 @@ class Vrpn:
                 return False
             if first != b"0":
                 return self._resync(f"while syncing (looking for '0', got {first!r})")
-            self._buffer, self._report_s, self.status = first, time.time(), AWAITING_STATION
+            self._buffer, self._last_report_s, self.status = first, time.time(), AWAITING_STATION
         if self.status == AWAITING_STATION:
             if not (station := self._read(1)):
                 return False
@@ -237,32 +240,34 @@ class Vrpn:
             if not 0 <= self._sensor < self._stations:
                 return self._resync(f"bad sensor # ({self._sensor})")
             self._buffer, self.status = self._buffer + station, PARTIAL
-        more = self._read(self._length(self._sensor) - len(self._buffer))
-        if more is None:
-            self.said.append("error reading report")
+        new_bytes = self._read(self._length(self._sensor) - len(self._buffer))
+        if new_bytes is None:
+            self.log.append("error reading report")
             self.status = FAIL
             return False
-        self._buffer += more
+        self._buffer += new_bytes
         if len(self._buffer) < self._length(self._sensor):
             return False
         if self._buffer[2:3] != b" " and not self._buffer[2:3].isalpha():
             return self._resync("bad 3rd char")
         if self._buffer[-1:] != b" ":
             return self._resync("no space at end of report")
-        self._take()
+        self._parse_report()
         self.status, self._buffer = SYNCING, b""
         return True
 
-    def _take(self) -> None:
+    def _parse_report(self) -> None:
         x, y, z, w, i, j, k = struct.unpack_from("<7f", self._buffer, 3)
-        at = 31
-        if self._timed:
-            self._report_s = self._zero_s + struct.unpack_from("<f", self._buffer, at)[0] / 1000.0
-            at += 4
+        position_m = (x * INCH_M, y * INCH_M, z * INCH_M)
+        offset = 31
+        if self._has_time:
+            self._last_report_s = self._zero_s + struct.unpack_from("<f", self._buffer, offset)[0] / 1000.0
+            offset += 4
         buttons, stick = None, None
         if self._sensor in self._buttons:
-            buttons, at = self._buffer[at], at + 1
+            buttons, offset = self._buffer[offset], offset + 1
         if self._sensor in self._sticks:
-            stick = (self._buffer[at] - 127) / 128.0, (self._buffer[at + 1] - 127) / 128.0
-        place = (x * INCH_M, y * INCH_M, z * INCH_M)
-        self.reports.append(Report(self._sensor, self._report_s, time.time(), place, (i, j, k, w), buttons, stick))
+            stick = (self._buffer[offset] - 127) / 128.0, (self._buffer[offset + 1] - 127) / 128.0
+        self.reports.append(
+            Report(self._sensor, self._last_report_s, time.time(), position_m, (i, j, k, w), buttons, stick)
+        )

@@ -1,16 +1,17 @@
-"""Vrui's device daemon, re-enacted from `VRDevices/InterSense.cpp` (docs/is900.md 11.3): binary records that it
-finds by the CR LF of the one before.
+"""Vrui's device daemon: binary records, which it finds by the CR LF of the previous record.
+
+It follows `VRDevices/InterSense.cpp` (docs/is900.md 11.3).
 """
 
 import struct
 import time
 from dataclasses import dataclass
 
-from tests.clients.tty import Tty, raw
+from tests.clients.tty import Tty, raw_mode
 
 
 class Timeout(Exception):
-    """The original would wait for ever."""
+    """Raised where the original would wait for ever."""
 
 
 @dataclass(frozen=True)
@@ -24,16 +25,16 @@ class Pose:
     stick: tuple[int, int]
 
 
-class Vrui:
+class VruiClient:
     def __init__(self, port: str, scale: float = 0.2) -> None:
-        self.tty = Tty(port, raw(vmin=1))
+        self.tty = Tty(port, raw_mode(vmin=1))
         self._scale = scale
         self._buffer = bytearray()
         self.poses: list[Pose] = []
         self.lost_syncs = 0
         self.emitters: list[tuple[float, ...]] = []
-        self.enabled: list[int] = []
-        """Stations that were on when it came."""
+        self.active_stations: list[int] = []
+        """Stations that were active when the client started."""
 
     def open(
         self,
@@ -42,7 +43,7 @@ class Vrui:
         probe: bool = False,
         upload: tuple[tuple[float, ...], ...] = (),
     ) -> bool:
-        """The set-up; False when the device does not respond."""
+        """Configure the device; return False when it does not respond."""
         if reset:
             self._restart()
         else:
@@ -58,8 +59,8 @@ class Vrui:
         flags = self._line(time.monotonic() + 1.0)
         if not flags.startswith("21l"):
             return False
-        self.enabled = [number for number in range(1, 33) if flags[2 + number] == "1"]
-        for number in self.enabled:
+        self.active_stations = [number for number in range(1, 33) if flags[2 + number] == "1"]
+        for number in self.active_stations:
             self._command(f"l{number},0")
         if probe:
             self._command("MCF")
@@ -68,12 +69,14 @@ class Vrui:
         if upload:
             self._command("MCC")
             for k, values in enumerate(upload):
-                place, normal = (", ".join(f"{v:{width}f}" for v in values[at : at + 3]) for at, width in _WIDTHS)
-                self._command(f"MCF{k + 1}, {place}, {normal}, {5001 + k}")
+                position, normal = (
+                    ", ".join(f"{v:{width}f}" for v in values[offset : offset + 3]) for offset, width in _WIDTHS
+                )
+                self._command(f"MCF{k + 1}, {position}, {normal}, {5001 + k}")
             self._command("MCe")
         for number in stations:
-            tip = ",".join(f"{0.0:8.4f}" for _ in range(3))
-            for command in (f"l{number},1", f"R{number}", f"b{number}", f"N{number},{tip}"):
+            tip_offset = ",".join(f"{0.0:8.4f}" for _ in range(3))
+            for command in (f"l{number},1", f"R{number}", f"b{number}", f"N{number},{tip_offset}"):
                 self._command(command)
             for command in (f"O{number},2,4,22,23,1", f"Mp{number},0", f"MF{number},2", f"MQ{number},3"):
                 self._command(command)
@@ -93,7 +96,7 @@ class Vrui:
         self.tty.close()
 
     def process(self, count: int, limit_s: float) -> None:
-        """So many records; Timeout when they do not come."""
+        """Read `count` records; raise Timeout when they do not arrive."""
         end_s = time.monotonic() + limit_s
         for _ in range(count):
             self._record(end_s)
@@ -120,7 +123,10 @@ class Vrui:
         return chr(self._buffer.pop(0))
 
     def _line(self, end_s: float) -> str:
-        """Up to CR LF, or what came in time; a CR alone is skipped with what follows it."""
+        """Return a line up to CR LF, or what arrived in time.
+
+        A CR alone is skipped together with its next character.
+        """
         out, after_cr = "", False
         try:
             while True:
@@ -134,11 +140,11 @@ class Vrui:
             return out
 
     def _status(self) -> bool:
-        """Whatever comes before a `2`, a station from 1 to 4 and `S`, then a line."""
-        end_s, seen = time.monotonic() + 10.0, ""
+        """Skip everything before a `2`, a station from 1 to 4 and `S`, then read a line."""
+        end_s, head = time.monotonic() + 10.0, ""
         try:
-            while not (len(seen) == 3 and seen[0] == "2" and seen[1] in "1234" and seen[2] == "S"):
-                seen = (seen + self._character(end_s))[-3:]
+            while not (len(head) == 3 and head[0] == "2" and head[1] in "1234" and head[2] == "S"):
+                head = (head + self._character(end_s))[-3:]
         except Timeout:
             return False
         self._line(end_s)
@@ -156,9 +162,9 @@ class Vrui:
 
 
 _WIDTHS = ((0, "8.4"), (3, "6.3"))
-"""Where place and normal of an emitter begin, and how their numbers are printed."""
+"""Where position and normal of an emitter begin, and how their numbers are printed."""
 
 
-def _is_head(five: str) -> bool:
-    """CR LF of the record before, `0`, a station, a blank or letter."""
-    return five[:3] == "\r\n0" and five[3].isalnum() and (five[4] == " " or five[4].isalpha())
+def _is_head(text: str) -> bool:
+    """Whether the text is CR LF of the previous record, `0`, a station, and a blank or letter."""
+    return text[:3] == "\r\n0" and text[3].isalnum() and (text[4] == " " or text[4].isalpha())

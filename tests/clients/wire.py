@@ -1,4 +1,4 @@
-"""All that came over the line, cut into records and replies by their documented sizes alone (docs/is900.md 5.5, 6)."""
+"""Splitting of received bytes into records and replies by their documented sizes alone (docs/is900.md 5.5, 6)."""
 
 import re
 from collections.abc import Mapping
@@ -18,34 +18,34 @@ REPLY_SIZES = {
     rb"31F": (70,),
     rb"2 E\*ERROR\*": tuple(range(40, 125)),
 }
-"""How a reply begins, and how long it may be with its CR LF."""
+"""Possible lengths of a reply, CR LF included, by its beginning."""
 
 
-def cut(data: bytes, sizes: Mapping[bytes, int]) -> tuple[list[bytes], list[bytes]]:
-    """Records and replies, each in order; fails where anything stands between them or is not whole.
+def split_records_and_replies(data: bytes, sizes: Mapping[bytes, int]) -> tuple[list[bytes], list[bytes]]:
+    """Split bytes into records and replies; fail where other bytes stand between them or one is incomplete.
 
-    `sizes` are those of records, by station. The last one may be unfinished.
+    `sizes` are the lengths of records, by station. The last record or reply may be unfinished.
     """
     records, replies = [], []
-    at = 0
-    while at < len(data):
-        if data[at : at + 1] == b"0":
-            size = sizes[data[at + 1 : at + 2]] if at + 1 < len(data) else 2
-            record = data[at : at + size]
+    offset = 0
+    while offset < len(data):
+        if data[offset : offset + 1] == b"0":
+            size = sizes[data[offset + 1 : offset + 2]] if offset + 1 < len(data) else 2
+            record = data[offset : offset + size]
             if len(record) == size:
                 assert record[2:3] == b" ", record
-                assert record[-1:] in (b" ", b"\n"), (record, data[at + size : at + size + 60])
+                assert record[-1:] in (b" ", b"\n"), (record, data[offset + size : offset + size + 60])
                 records.append(record)
         else:
-            end = data.find(b"\r\n", at)
+            end = data.find(b"\r\n", offset)
             if end < 0:
-                assert len(data) - at < 125, data[at:]
+                assert len(data) - offset < 125, data[offset:]
                 break
-            reply = data[at : end + 2]
-            allowed = [lengths for pattern, lengths in REPLY_SIZES.items() if re.match(pattern, reply)]
-            assert allowed, (reply, data[max(at - 60, 0) : at])
-            assert len(reply) in allowed[0], reply
+            reply = data[offset : end + 2]
+            allowed_sizes = [lengths for pattern, lengths in REPLY_SIZES.items() if re.match(pattern, reply)]
+            assert allowed_sizes, (reply, data[max(offset - 60, 0) : offset])
+            assert len(reply) in allowed_sizes[0], reply
             replies.append(reply)
             size = len(reply)
-        at += size
+        offset += size
     return records, replies

@@ -23,8 +23,8 @@ from harness.stream.recording.frame_table import FRAME_COLUMNS
 from harness.stream.recording.recording import RecordingWriter, read_recording
 from harness.stream.recording.replay import RecordingStream
 from tests.interrupts import heeding_interrupts
-from tests.stream.recording.test_recording import newer
-from tests.stream.wire import same
+from tests.stream.recording.test_recording import newer_file
+from tests.stream.wire import frames_equal
 
 HARNESS = [sys.executable, "-m", "harness.cli"]
 CLIP = "boxing_p1_01"
@@ -117,12 +117,12 @@ def test_damage_is_named_and_the_rest_is_played(
     assert main(["replay", str(cut)]) == 0
     said = capsys.readouterr()
     assert said.out.startswith("60 frames")
-    assert said.err.startswith("lost: the last 67 bytes are no whole block: cut off")
+    assert said.err.startswith("lost: the last 67 bytes are cut off")
 
 
 def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     new, text, empty, bare = (tmp_path / name for name in ("new.rec", "a.txt", "empty.rec", "bare.rec"))
-    new.write_bytes(newer())
+    new.write_bytes(newer_file())
     text.write_text("hello\n")
     empty.touch()
     bare.write_bytes(FILE_HEADER)
@@ -131,9 +131,12 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
         (["replay", str(new)], "a recording of version 2; expected version 1 at most"),
         (["replay", str(text)], "no recording; expected a recording by `harness record`"),
         (["replay", str(empty)], "an empty file"),
-        (["replay", str(bare)], "the device was never set up in it"),
+        (["replay", str(bare)], "the device was never configured in it"),
         (["replay", str(tmp_path / "none.rec")], "no such file"),
-        (["replay", str(simulated), "--speed", "fast"], "Speed 'fast'. It is `step`, `max`, or a positive number"),
+        (
+            ["replay", str(simulated), "--speed", "fast"],
+            "Speed 'fast' is not possible. Give `step`, `max`, or a positive number",
+        ),
         (["replay", str(simulated), "--methods", "il"], "no method called 'il'"),
         (["replay", str(simulated), "--scenario", "dem"], "no scenario called 'dem'"),
         (["replay", str(simulated), "--clip", "walking_p1_01", "--methods", "ik:previous"], "of another motion"),
@@ -157,7 +160,7 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
         assert expected in refused(words, capsys), words
     assert not (tmp_path / "b.rec").exists()
     assert text.read_text() == "hello\n"
-    assert new.read_bytes() == newer()
+    assert new.read_bytes() == newer_file()
     assert simulated.read_bytes() == before
 
 
@@ -167,12 +170,12 @@ def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Pl
     for _ in range(2):
         with (
             RecordingWriter(tmp_path / "a.rec") as writer,
-            Is900(port, DriverConfig(stations=played.samples.stations), witness=writer) as device,
+            Is900(port, DriverConfig(stations=played.samples.stations), observer=writer) as device,
         ):
             frames = iter(device)
             live.append([next(frames) for _ in range(60)])
     replayed = list(RecordingStream(tmp_path / "a.rec"))
-    assert all(same(a, b) for a, b in zip(live[0], replayed, strict=False))
+    assert all(frames_equal(a, b) for a, b in zip(live[0], replayed, strict=False))
     start = next(i for i, frame in enumerate(replayed) if frame.received_s == live[1][0].received_s)
     again = replayed[start : start + 60]
     assert [f.received_s for f in again] == [f.received_s for f in live[1]]
@@ -184,7 +187,7 @@ def test_a_device_that_was_gone_replays_as_it_was_live(played: Playback, tmp_pat
     link, path, wanted = tmp_path / "link", tmp_path / "a.rec", DriverConfig(stations=played.samples.stations)
     with RecordingWriter(path) as writer:
         with serve_emulator(played.samples, pty=link):
-            device = Is900(str(link), wanted, witness=writer)
+            device = Is900(str(link), wanted, observer=writer)
             frames = iter(device)
             live = [next(frames) for _ in range(40)]
         with device, ThreadPoolExecutor() as beside:
@@ -195,7 +198,7 @@ def test_a_device_that_was_gone_replays_as_it_was_live(played: Playback, tmp_pat
     for speed in ("max", 1e9):
         stream = RecordingStream(path, speed)
         replayed = list(stream)
-        assert all(same(one, other) for one, other in zip(live, replayed, strict=False))
+        assert all(frames_equal(one, other) for one, other in zip(live, replayed, strict=False))
         assert len(replayed) >= len(live)
         assert stream.counts["sessions"] == 2
 

@@ -22,7 +22,7 @@ from harness.stream.emulator.device import Device
 from harness.stream.inputs import make_inputs
 from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
-from tests.stream.wire import same
+from tests.stream.wire import frames_equal
 
 CLIP, METHODS = "boxing_p1_01", ("ik:previous", "best_match")
 NOTE = {"scenario": "demo", "clip": CLIP, "rate_hz": 40.0}
@@ -80,7 +80,7 @@ def test_a_recorded_simulation_has_its_frames_bit_by_bit(rate_hz: float, tmp_pat
     record_capture(tmp_path / "a.rec", simulation.wire_format, simulation.wire, {})
     frames = list(RecordingStream(tmp_path / "a.rec"))
     assert len(frames) == len(simulation.frames)
-    assert all(same(one, other) for one, other in zip(frames, simulation.frames, strict=True))
+    assert all(frames_equal(one, other) for one, other in zip(frames, simulation.frames, strict=True))
 
 
 def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: Path) -> None:

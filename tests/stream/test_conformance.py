@@ -18,30 +18,30 @@ from harness.stream.recording.recording import RecordingWriter, record_capture
 from harness.stream.recording.replay import RecordingStream
 
 FRAMES = 80
-AT_ONCE, SHOWN = 15, 60
-"""The motion begins with `MZ`; by so many samples later a client that means to stream has sent its `C`."""
-RATE_HZ, ATTEMPTS, LATEST_MS = 10.0, 5, 100.0
-"""A period is 100 ms, and a frame waits for one and a half."""
+MAX_START_FRAMES, ESTIMATED_FRAMES = 15, 60
+"""The motion begins with `MZ`. A client has sent its `C` at most this many samples later."""
+RATE_HZ, ATTEMPTS, MAX_LATE_MS = 10.0, 5, 100.0
+"""A period is 100 ms, and a frame waits for 1.5 periods."""
 SOURCES = ("recorded simulation", "pty", "recorded pty", "tcp", "recorded tcp")
 
 Sources = dict[str, list[TrackerFrame]]
 
 
 @pytest.fixture(scope="module")
-def played() -> Playback:
-    """Four stations with all errors of the device, at a rate that a busy computer can keep."""
+def playback() -> Playback:
+    """Four stations with all errors of the device, at a rate that a busy computer can sustain."""
     return prepare_playback("demo", clip="boxing_p1_01", stations=4, rate_hz=RATE_HZ)
 
 
 @pytest.fixture(scope="module")
-def seen(played: Playback, tmp_path_factory: pytest.TempPathFactory) -> Sources:
-    """The frames of each source; those of ports are read in real time, at the same time."""
+def frames_by_source(playback: Playback, tmp_path_factory: pytest.TempPathFactory) -> Sources:
+    """The frames of each source. Those of ports are read in real time, at the same time."""
     folder = tmp_path_factory.mktemp("conformance")
-    simulation = played.simulation
+    simulation = playback.simulation
     record_capture(folder / "simulated", simulation.wire_format, simulation.wire, {})
     with ThreadPoolExecutor() as pool:
-        pty = pool.submit(_from_port, played, folder / "recorded pty", pty=folder / "link")
-        tcp = pool.submit(_from_port, played, folder / "recorded tcp", tcp="127.0.0.1:0")
+        pty = pool.submit(_read_from_port, playback, folder / "recorded pty", pty=folder / "link")
+        tcp = pool.submit(_read_from_port, playback, folder / "recorded tcp", tcp="127.0.0.1:0")
     return {
         "recorded simulation": list(RecordingStream(folder / "simulated")),
         "pty": pty.result(),
@@ -51,59 +51,67 @@ def seen(played: Playback, tmp_path_factory: pytest.TempPathFactory) -> Sources:
     }
 
 
-def _from_port(played: Playback, into: Path, *, pty: Path | None = None, tcp: str | None = None) -> list[TrackerFrame]:
-    """A frame is closed when its stations are late, so a computer that holds the emulator up is no device to compare
-    with: then it is tried again."""
+def _read_from_port(
+    playback: Playback, path: Path, *, pty: Path | None = None, tcp: str | None = None
+) -> list[TrackerFrame]:
+    """Read frames at a port; try again when the emulator was too late.
+
+    A frame is closed when its stations are late, so an emulator that the computer delays is no reference.
+    """
     for _ in range(ATTEMPTS):
-        into.unlink(missing_ok=True)
-        with serve_emulator(played.samples, pty=pty, tcp=tcp) as device, RecordingWriter(into) as recording:
-            stream = Is900(device.name, DriverConfig(stations=played.samples.stations), witness=recording)
+        path.unlink(missing_ok=True)
+        with serve_emulator(playback.samples, pty=pty, tcp=tcp) as device, RecordingWriter(path) as recording:
+            stream = Is900(device.name, DriverConfig(stations=playback.samples.stations), observer=recording)
             frames = list(islice(stream, FRAMES))
             stream.close()
-        if device.summary()["pacing_max_ms"] < LATEST_MS:
+        if device.summary()["pacing_max_ms"] < MAX_LATE_MS:
             return frames
-    raise AssertionError(f"the emulator was more than {LATEST_MS} ms late in each of {ATTEMPTS} attempts")
+    raise AssertionError(f"the emulator was more than {MAX_LATE_MS} ms late in each of {ATTEMPTS} attempts")
 
 
-def _common(one: Sequence[TrackerFrame], other: Sequence[TrackerFrame]) -> tuple[list[TrackerFrame], ...]:
-    """Both from the first sample on that both have, which must come soon, and as long as both go on."""
-    begin = next(i for i, frame in enumerate(one) if np.array_equal(frame.measured_s, other[0].measured_s))
-    assert begin < AT_ONCE
-    count = min(len(one) - begin, len(other))
-    assert count >= FRAMES - AT_ONCE
-    return list(one[begin : begin + count]), list(other[:count])
+def _overlap(first: Sequence[TrackerFrame], second: Sequence[TrackerFrame]) -> tuple[list[TrackerFrame], ...]:
+    """Return both from the first sample that both have, which must come soon, to the end of the shorter one."""
+    begin = next(i for i, frame in enumerate(first) if np.array_equal(frame.measured_s, second[0].measured_s))
+    assert begin < MAX_START_FRAMES
+    count = min(len(first) - begin, len(second))
+    assert count >= FRAMES - MAX_START_FRAMES
+    return list(first[begin : begin + count]), list(second[:count])
 
 
-def _differences(one: Iterable[TrackerFrame], other: Iterable[TrackerFrame]) -> list[str]:
-    """All but when the host received them."""
+def _differences(first: Iterable[TrackerFrame], second: Iterable[TrackerFrame]) -> list[str]:
+    """Describe all differences except the times of reception."""
     names = [field.name for field in fields(TrackerFrame) if field.name != "received_s"]
     return [
         f"{name} of frame {i}"
-        for i, (a, b) in enumerate(zip(one, other, strict=True))
+        for i, (a, b) in enumerate(zip(first, second, strict=True))
         for name in names
         if not np.array_equal(getattr(a, name), getattr(b, name), equal_nan=getattr(a, name).dtype == float)
     ]
 
 
 @pytest.mark.parametrize("source", SOURCES)
-def test_every_source_gives_the_frames_of_the_simulation(played: Playback, seen: Sources, source: str) -> None:
-    simulated, came = _common(played.simulation.frames, seen[source])
-    assert _differences(simulated, came) == []
-    assert any(not frame.position_valid.all() for frame in came), "no loss was among them: the motion is too tame"
+def test_every_source_yields_the_frames_of_the_simulation(
+    playback: Playback, frames_by_source: Sources, source: str
+) -> None:
+    simulated, received = _overlap(playback.simulation.frames, frames_by_source[source])
+    assert _differences(simulated, received) == []
+    assert any(not frame.position_valid.all() for frame in received), "no station was lost: the motion is too easy"
 
 
 @pytest.mark.parametrize("name", sorted(registry.methods()))
-def test_every_method_answers_alike_whatever_the_source(played: Playback, seen: Sources, name: str) -> None:
+def test_every_method_estimates_the_same_from_every_source(
+    playback: Playback, frames_by_source: Sources, name: str
+) -> None:
     """Bit by bit, although a busy host receives the frames of ports at other times than the simulation says."""
-    fitted = played.clip_evaluation.fit_method(registry.resolve(name), name)
-    sources = {"simulation": list(played.simulation.frames), **seen}
+    reconstructor = playback.clip_evaluation.fit_method(registry.resolve(name), name)
+    sources = {"simulation": list(playback.simulation.frames), **frames_by_source}
     first_s = max(frames[0].measured_s[0] for frames in sources.values())
 
     def estimates(source: str) -> list[tuple[bytes, int]]:
-        session = fitted.begin(played.calibration)
-        shown = [frame for frame in sources[source] if frame.measured_s[0] >= first_s][:SHOWN]
-        assert len(shown) == SHOWN
-        return [(e.qpos.tobytes(), int(e.status)) for e in map(session.step, shown)]
+        session = reconstructor.begin(playback.calibration)
+        frames = [frame for frame in sources[source] if frame.measured_s[0] >= first_s][:ESTIMATED_FRAMES]
+        assert len(frames) == ESTIMATED_FRAMES
+        return [(e.qpos.tobytes(), int(e.status)) for e in map(session.step, frames)]
 
     simulated = estimates("simulation")
     for source in ("pty", "tcp", "recorded pty"):

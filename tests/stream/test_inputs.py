@@ -1,4 +1,4 @@
-"""Input combinations mask exactly what they say."""
+"""Each input combination masks exactly the readings it should."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from harness.stream.inputs import INPUT_COMBINATIONS, make_inputs
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 
 
-def frame(stations: int) -> TrackerFrame:
+def make_frame(stations: int) -> TrackerFrame:
     return TrackerFrame(
         received_s=0.0,
         measured_s=np.zeros(stations),
@@ -33,10 +33,10 @@ def frame(stations: int) -> TrackerFrame:
         ("mixed", {"torso", "left_ankle", "right_ankle"}, {"torso", "head", "left_wrist", "right_wrist"}),
     ],
 )
-def test_a_combination_keeps_what_it_names(name: str, position: set[str], orientation: set[str]) -> None:
-    masked = make_inputs(name, SIX).mask(frame(6))
-    assert {s for s, v in zip(SIX, masked.position_valid, strict=True) if v} == position
-    assert {s for s, v in zip(SIX, masked.orientation_valid, strict=True) if v} == orientation
+def test_a_combination_keeps_the_named_readings(name: str, position: set[str], orientation: set[str]) -> None:
+    masked = make_inputs(name, SIX).mask(make_frame(6))
+    assert {s for s, is_valid in zip(SIX, masked.position_valid, strict=True) if is_valid} == position
+    assert {s for s, is_valid in zip(SIX, masked.orientation_valid, strict=True) if is_valid} == orientation
     assert np.array_equal(np.isnan(masked.position_m).any(1), ~masked.position_valid)
     assert np.array_equal(np.isnan(masked.tracker_from_station).any(1), ~masked.orientation_valid)
 

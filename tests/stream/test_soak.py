@@ -1,6 +1,6 @@
-"""A device that does everything wrong for half an hour: every record that it sent undamaged arrives.
+"""A device with every fault for half an hour: every record that it sent undamaged arrives.
 
-The faults are those of `scenarios/emulator_faults.toml`, drawn at random. HARNESS_SOAK_MINUTES changes how long.
+The faults are those of `scenarios/emulator_faults.toml`, drawn at random. HARNESS_SOAK_MINUTES changes the duration.
 """
 
 import os
@@ -20,114 +20,121 @@ from harness.stream.driver import DriverConfig, Is900, LineEvent
 from harness.stream.emulator import EmulatorConfig, SentMessage, serve_emulator
 from harness.stream.frame import TrackerFrame
 
-AWAY = {"unplugged", "stalled", "silent", "reset", "wrong list", "refused"}
-"""After these the driver sets the device up anew, and what comes meanwhile is no data to it."""
-EDGE_S, PATIENCE_S = 0.25, 2.0
-"""What waits in a pipe that is closed is gone; what arrives does so within this."""
+RECONFIGURING_EVENTS = {"unplugged", "stalled", "silent", "reset", "wrong list", "refused"}
+"""After these events the driver configures the device again, and data that arrive meanwhile are ignored."""
+CLOSING_S, MAX_DELAY_S = 0.25, 2.0
+"""Data in a pipe that is closed within this time are lost; other data arrive within `MAX_DELAY_S` [s]."""
 
-BESIDE = 2
-"""So many messages before and after: in order, since a busy machine writes neighbours any time apart."""
+NEIGHBOURS = 2
+"""Number of messages before and after, counted in sequence, since a busy machine delays neighbours by any time."""
 
 Reading = tuple[int, bytes]
-"""Row of a station, and its position as bytes: no two of a lap are alike."""
+"""Row of a station, and its position as bytes, which is unique within a loop."""
 
 
 @dataclass
-class Soak:
+class SoakResult:
+    """Everything that was sent and received."""
+
     sent: list[SentMessage] = field(default_factory=list)
     events: list[LineEvent] = field(default_factory=list)
-    came: dict[Reading, list[float]] = field(default_factory=lambda: defaultdict(list))
-    """When each reading came [s]."""
+    received: dict[Reading, list[float]] = field(default_factory=lambda: defaultdict(list))
+    """When each reading was received [s]."""
     frames: int = 0
 
-    def take(self, frame: TrackerFrame) -> None:
+    def add_frame(self, frame: TrackerFrame) -> None:
         self.frames += 1
         for row in np.flatnonzero(frame.position_valid).tolist():
-            self.came[row, frame.position_m[row].tobytes()].append(frame.received_s)
+            self.received[row, frame.position_m[row].tobytes()].append(frame.received_s)
 
-    def away(self, at_s: float) -> bool:
-        """Whether the driver was setting the device up at this moment, or about to."""
-        begun_s = None
+    def reconfiguring(self, at_s: float) -> bool:
+        """Whether the driver was configuring the device at this time, or about to."""
+        began_s = None
         for event in self.events:
-            if event.kind in AWAY and begun_s is None:
-                begun_s = event.monotonic_s
-            elif event.kind == "connected" and begun_s is not None:
-                if begun_s - EDGE_S <= at_s <= event.monotonic_s + EDGE_S:
+            if event.kind in RECONFIGURING_EVENTS and began_s is None:
+                began_s = event.monotonic_s
+            elif event.kind == "connected" and began_s is not None:
+                if began_s - CLOSING_S <= at_s <= event.monotonic_s + CLOSING_S:
                     return True
-                begun_s = None
-        return begun_s is not None and at_s >= begun_s - EDGE_S
+                began_s = None
+        return began_s is not None and at_s >= began_s - CLOSING_S
 
     def arrived(self, reading: Reading, written_s: float) -> bool:
-        times_s = self.came.get(reading, [])
-        place = bisect_left(times_s, written_s - EDGE_S)
-        return place < len(times_s) and times_s[place] <= written_s + PATIENCE_S
+        times_s = self.received.get(reading, [])
+        index = bisect_left(times_s, written_s - CLOSING_S)
+        return index < len(times_s) and times_s[index] <= written_s + MAX_DELAY_S
 
 
-def soak(seconds: float, folder: Path, seed: int) -> Soak:
-    played, out = prepare_playback("emulator_faults", stations=4, seed=seed), Soak()
-    config = EmulatorConfig(faults=played.scenario.fault, seed=seed)
+def run_soak(seconds: float, folder: Path, seed: int) -> SoakResult:
+    playback, soak = prepare_playback("emulator_faults", stations=4, seed=seed), SoakResult()
+    config = EmulatorConfig(faults=playback.scenario.fault, seed=seed)
+    stations = playback.samples.stations
     with (
-        serve_emulator(played.samples, config, pty=folder / "tracker", on_sent=out.sent.append) as device,
-        Is900(device.name, DriverConfig(stations=played.samples.stations), on_event=out.events.append) as stream,
+        serve_emulator(playback.samples, config, pty=folder / "tracker", on_sent=soak.sent.append) as device,
+        Is900(device.name, DriverConfig(stations=stations), on_event=soak.events.append) as stream,
     ):
         end = Timer(seconds, stream.close)
         end.start()
         for frame in stream:
-            out.take(frame)
+            soak.add_frame(frame)
         end.join()
-    return out
+    return soak
 
 
-def judge(seen: Soak) -> dict[str, int]:
-    """Counts; `missing` are undamaged readings of a working line that never came."""
-    kind = record_type(STANDARD_LIST)
-    first_s = next(event.monotonic_s for event in seen.events if event.kind == "connected")
-    last_s = seen.sent[-1].written_s
+def count_outcomes(result: SoakResult) -> dict[str, int]:
+    """Count outcomes; `missing` are undamaged readings of a working line that never arrived."""
+    record_dtype = record_type(STANDARD_LIST)
+    first_s = next(event.monotonic_s for event in result.events if event.kind == "connected")
+    last_s = result.sent[-1].written_s
     counts = dict.fromkeys(("records", "damaged", "undamaged", "while away", "missing", "beside damage"), 0)
-    records = [sent for sent in seen.sent if sent.message.station and not sent.unread and sent.written_s > first_s]
-    hurt = [bool(sent.damage) for sent in seen.sent]
-    beside = {id(sent): any(hurt[max(n - BESIDE, 0) : n + BESIDE + 1]) for n, sent in enumerate(seen.sent)}
+    records = [sent for sent in result.sent if sent.message.station and not sent.unread and sent.written_s > first_s]
+    is_damaged = [bool(sent.damage) for sent in result.sent]
+    near_damage = {
+        id(sent): any(is_damaged[max(n - NEIGHBOURS, 0) : n + NEIGHBOURS + 1]) for n, sent in enumerate(result.sent)
+    }
     for sent in records:
         counts["records"] += 1
-        if sent.damage or len(sent.data) != kind.itemsize or sent.written_s > last_s - PATIENCE_S:
+        if sent.damage or len(sent.data) != record_dtype.itemsize or sent.written_s > last_s - MAX_DELAY_S:
             counts["damaged"] += bool(sent.damage)
             continue
-        (record,) = np.frombuffer(sent.data, kind)
+        (record,) = np.frombuffer(sent.data, record_dtype)
         if not record["quality"]:
             continue
         counts["undamaged"] += 1
         position_m = record["position"].astype(float) * RecordFormat().metres_per_unit
         reading = STATION_CHARACTERS.index(record["station"]), position_m.tobytes()
-        if seen.arrived(reading, sent.written_s):
+        if result.arrived(reading, sent.written_s):
             continue
-        if seen.away(sent.written_s):
+        if result.reconfiguring(sent.written_s):
             counts["while away"] += 1
             continue
         counts["missing"] += 1
-        counts["beside damage"] += beside[id(sent)]
+        counts["beside damage"] += near_damage[id(sent)]
     return counts
 
 
-def check(seen: Soak, capsys: pytest.CaptureFixture[str]) -> None:
-    counts = judge(seen)
-    told: dict[str, int] = defaultdict(int)
-    for event in seen.events:
-        told[event.kind] += 1
+def check_result(result: SoakResult, capsys: pytest.CaptureFixture[str]) -> None:
+    counts = count_outcomes(result)
+    event_counts: dict[str, int] = defaultdict(int)
+    for event in result.events:
+        event_counts[event.kind] += 1
     with capsys.disabled():
-        print(f"\nsoak: {seen.frames} frames; {counts}; events {dict(told)}")
+        print(f"\nsoak: {result.frames} frames; {counts}; events {dict(event_counts)}")
     assert counts["undamaged"] > 0.8 * counts["records"] > 0
     assert counts["damaged"] > 0
     assert counts["missing"] == counts["beside damage"], "a record was lost with no damage near it"
     assert counts["missing"] <= max(1, counts["damaged"] // 1000), "damage costs more than one further record in 1,000"
-    assert told["connected"] > max(told["unplugged"], told["reset"]) > 0, "it did not come back each time"
-    assert not seen.away(seen.sent[-1].written_s), "it did not come back in the end"
+    assert event_counts["connected"] > max(event_counts["unplugged"], event_counts["reset"]) > 0, (
+        "the driver did not reconnect each time"
+    )
+    assert not result.reconfiguring(result.sent[-1].written_s), "the driver did not reconnect in the end"
 
 
 def test_a_short_soak(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Half a minute of the faults that have a time: burst, stall, unplugged."""
-    check(soak(36.0, tmp_path, seed=1), capsys)
+    """Half a minute of the faults with fixed times: burst, stall, disconnection."""
+    check_result(run_soak(36.0, tmp_path, seed=1), capsys)
 
 
 @pytest.mark.slow
 def test_a_long_soak(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    check(soak(60.0 * float(os.environ.get("HARNESS_SOAK_MINUTES", "30")), tmp_path, seed=2), capsys)
+    check_result(run_soak(60.0 * float(os.environ.get("HARNESS_SOAK_MINUTES", "30")), tmp_path, seed=2), capsys)

@@ -1,4 +1,4 @@
-"""A device's bytes made by hand, for tests: rounds of stations that stand still, each at its own place."""
+"""Bytes of a device for tests: rounds of stations that stand still, each at its own position."""
 
 from typing import Any
 
@@ -18,41 +18,43 @@ FOUR = WireFormat(("head", "torso", "left_wrist", "right_wrist"), RATE_HZ)
 
 
 def stamps_s(rounds: int, stations: int = 4, begin_s: float = 12.0) -> Floats:
-    """(rounds * stations,) device time of each record, in the order of the wire [s]."""
+    """Return the device time (rounds * stations,) of each record, in the order of the wire [s]."""
     out: Floats = (begin_s + np.arange(rounds)[:, None] / RATE_HZ + SLOT_S * np.arange(stations)).ravel()
     return out
 
 
-def sent(stamp_s: Floats, stations: int = 4, seed: int = 1) -> bytes:
-    """Records of stations that sway a little, each about a place and a turn of its own; no two records are equal."""
+def device_bytes(stamp_s: Floats, stations: int = 4, seed: int = 1) -> bytes:
+    """Return records of stations that sway a little about their own pose; no two records are equal."""
     rng = np.random.default_rng(seed)
     number = np.arange(len(stamp_s)) % stations
-    turn = np.random.default_rng(seed + 1).normal(size=(12, 4))[number] + 0.05 * rng.normal(size=(len(stamp_s), 4))
-    said = RecordValues(
+    quaternions = np.random.default_rng(seed + 1).normal(size=(12, 4))[number] + 0.05 * rng.normal(
+        size=(len(stamp_s), 4)
+    )
+    values = RecordValues(
         measured_s=stamp_s,
         position_m=number[:, None] + 0.01 * rng.normal(size=(len(stamp_s), 3)),
-        tracker_from_station=turn / np.linalg.norm(turn, axis=1, keepdims=True),
+        tracker_from_station=quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
         quality=rng.uniform(0.1, 1.0, len(stamp_s)),
     )
     return encode_records(
-        STANDARD_LIST, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], said, RecordFormat()
+        STANDARD_LIST, np.frombuffer(STATION_CHARACTERS, np.uint8)[number], values, RecordFormat()
     ).tobytes()
 
 
-def received(data: bytes, stamp_s: Floats, chunk: int = RECORD) -> ByteCapture:
-    """The bytes in chunks, each of which comes 5 ms after the stamp of the record that its last byte belongs to."""
+def in_chunks(data: bytes, stamp_s: Floats, chunk: int = RECORD) -> ByteCapture:
+    """Return the bytes in chunks. Each arrives 5 ms after the stamp of the record that its last byte belongs to."""
     ends = np.append(np.arange(chunk, len(data), chunk), len(data))
     record = np.minimum((ends - 1) // RECORD, len(stamp_s) - 1)
     return ByteCapture(data, ends, stamp_s[record] - stamp_s[0] + 100.005)
 
 
-def frames_of(capture: ByteCapture, wire: WireFormat = FOUR) -> list[TrackerFrame]:
+def decode_frames(capture: ByteCapture, wire: WireFormat = FOUR) -> list[TrackerFrame]:
     reader = FrameReader(wire)
     return [*reader.feed_all(capture), *reader.finish()]
 
 
-def columns(frame: TrackerFrame) -> tuple[NDArray[Any], ...]:
-    """Everything that a frame says of its stations."""
+def station_columns(frame: TrackerFrame) -> tuple[NDArray[Any], ...]:
+    """Return everything that a frame contains about its stations."""
     return (
         frame.measured_s,
         frame.position_m,
@@ -64,7 +66,8 @@ def columns(frame: TrackerFrame) -> tuple[NDArray[Any], ...]:
     )
 
 
-def same(one: TrackerFrame, other: TrackerFrame) -> bool:
-    return one.received_s == other.received_s and all(
-        np.array_equal(a, b, equal_nan=True) for a, b in zip(columns(one), columns(other), strict=True)
+def frames_equal(first: TrackerFrame, second: TrackerFrame) -> bool:
+    return first.received_s == second.received_s and all(
+        np.array_equal(a, b, equal_nan=True)
+        for a, b in zip(station_columns(first), station_columns(second), strict=True)
     )

@@ -1,4 +1,4 @@
-"""Records into frames: one row per station, in station order."""
+"""Assembly of records into frames: one row per station, in station order."""
 
 from dataclasses import dataclass
 
@@ -9,157 +9,176 @@ from harness.stream.codec.readings import Readings, concatenate_readings
 from harness.stream.frame import TrackerFrame
 
 TIMEOUT_PERIODS = 1.5
-"""A frame that lacks stations is closed after so many periods."""
+"""A frame that lacks stations is closed after this many periods."""
 _NEVER = -np.inf
 
 
 @dataclass(frozen=True)
 class _RoundState:
-    """What the device's clock leads to expect of the next reading."""
+    """The stamps, host times and stations with which the next reading is compared."""
 
-    began_s: float = _NEVER
-    """Stamp of the first reading of this round of stations."""
-    first: int = 0
-    """Its station."""
-    before_s: float = _NEVER
-    """Stamp of the reading before."""
-    arrived_s: float = _NEVER
-    """Host time of the first reading of this round [s]."""
-    led: int = 0
-    """Its station, where stamps are missing."""
-    heard: int = 0
-    """Stations of the latest frame, a bit each."""
-    heard_before: int = 0
-    """Those of the one before."""
+    first_s: float = _NEVER
+    """Stamp of the first reading of this round of stations [s]."""
+    first_station: int = 0
+    """Station of that reading."""
+    previous_s: float = _NEVER
+    """Stamp of the previous reading [s]."""
+    host_first_s: float = _NEVER
+    """Host time of the first reading of this round, used where stamps are missing [s]."""
+    host_first_station: int = 0
+    """Station of that reading."""
+    seen: int = 0
+    """Stations of the latest frame, one bit each."""
+    seen_before: int = 0
+    """Stations of the frame before it, one bit each."""
 
 
 class FrameAssembler:
-    """Closes a frame when the station number does not increase, at once when every station is there, or after
-    1.5 periods.
+    """Closes a frame when the station number does not increase, when every station is present, or after 1.5 periods.
 
-    A reading a period or more after the first of its frame, by the device's clock, belongs to the next one (by the
-    host's clock 1.5 periods, where stamps are missing). A station number that does not increase in the middle of a
-    period, or a stamp that steps back, shows a damaged record: the readings on both sides are suspect, since either
-    may be the wrong one. Where stamps are missing the host's clock serves, and a station that is silent round after
-    round is no sign of damage. So is one that is `doubtful` by itself.
+    By the device's clock, a reading a period or more after the first of its frame belongs to the next frame. Where
+    stamps are missing, the host's clock and 1.5 periods serve instead. A station number that does not increase in the
+    middle of a period, or a stamp that steps back, shows a damaged record. The readings on both sides are then suspect,
+    since either may be the wrong one. Where stamps are missing, a station that is silent in round after round is no
+    sign of damage. A reading that is already `suspect` stays so.
     """
 
     def __init__(self, stations: int, period_s: float) -> None:
         self._stations = stations
         self._period_s = period_s
         self._open: Readings | None = None
-        """The beginning of a frame."""
-        self._round, self._after = _RoundState(), _RoundState()
-        """As it was before and after that beginning."""
+        """Readings of the unfinished frame."""
+        self._round, self._round_after = _RoundState(), _RoundState()
+        """State before and after those readings."""
         self._received_s = _NEVER
-        """When the frame that was closed last was complete."""
+        """When the latest closed frame was complete (host clock) [s]."""
 
     @property
     def since_s(self) -> float | None:
-        """When the first reading of the unfinished frame came (host clock); None where none has begun."""
+        """When the first reading of the unfinished frame arrived (host clock) [s]; None when there is none."""
         return None if self._open is None else float(self._open.received_s[0])
 
-    def add(self, more: Readings) -> list[TrackerFrame]:
-        """The frames that these readings complete."""
-        if len(more) == 0:
+    def add(self, new_readings: Readings) -> list[TrackerFrame]:
+        """Return the frames that these readings complete."""
+        if len(new_readings) == 0:
             return []
-        given = more if self._open is None else concatenate_readings([self._open, more])
-        frame, doubtful = self._cut(given)
-        given = given.with_suspect(doubtful)
+        readings = new_readings if self._open is None else concatenate_readings([self._open, new_readings])
+        frame, suspect = self._split(readings)
+        readings = readings.with_suspect(suspect)
         open_from = int(np.searchsorted(frame, frame[-1]))
-        if len(given) - open_from == self._stations:
-            open_from, self._round = len(given), self._after
-        self._open = given[open_from:] if open_from < len(given) else None
-        return self._frames(given[:open_from], frame[:open_from])
+        if len(readings) - open_from == self._stations:
+            open_from, self._round = len(readings), self._round_after
+        self._open = readings[open_from:] if open_from < len(readings) else None
+        return self._frames(readings[:open_from], frame[:open_from])
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
-        """The unfinished frame, if its first reading came more than 1.5 periods before `now_s` (host clock)."""
+        """Return the unfinished frame if its first reading arrived more than 1.5 periods before `now_s`.
+
+        `now_s` is a time of the host clock [s].
+        """
         return self.finish() if self.has_waited(self.since_s, now_s) else []
 
     def has_waited(self, since_s: float | None, now_s: float) -> bool:
-        """Whether a frame that began then has waited long enough for its last stations."""
+        """Whether a frame that began at `since_s` has waited 1.5 periods for its last stations."""
         return since_s is not None and now_s - since_s > TIMEOUT_PERIODS * self._period_s
 
     def finish(self) -> list[TrackerFrame]:
-        """The unfinished frame."""
-        given, self._open, self._round = self._open, None, self._after
-        return [] if given is None else self._frames(given, np.zeros(len(given), dtype=np.int64))
+        """Return the unfinished frame."""
+        readings, self._open, self._round = self._open, None, self._round_after
+        return [] if readings is None else self._frames(readings, np.zeros(len(readings), dtype=np.int64))
 
-    def _cut(self, given: Readings) -> tuple[Ints, Bools]:
-        """The frame of each reading (N,), from 0, and which ones (N,) are doubtful after a look at their neighbours."""
-        frame, doubtful = np.zeros(len(given), dtype=np.int64), given.suspect.copy()
-        began_s, first, before_s = self._round.began_s, self._round.first, self._round.before_s
-        led_s, led = self._round.arrived_s, self._round.led
-        heard, heard_before = self._round.heard, self._round.heard_before
-        station_before, filled, number, arrived_s = self._stations, self._stations, -1, _NEVER
-        rows = zip(given.station.tolist(), given.measured_s.tolist(), given.received_s.tolist(), strict=True)
+    def _split(self, readings: Readings) -> tuple[Ints, Bools]:
+        """Return the frame (N,) of each reading, counted from 0, and which readings (N,) are suspect.
+
+        A reading may become suspect here because of its neighbours.
+        """
+        frame, suspect = np.zeros(len(readings), dtype=np.int64), readings.suspect.copy()
+        state = self._round
+        first_s, first_station, previous_s = state.first_s, state.first_station, state.previous_s
+        host_first_s, host_first_station = state.host_first_s, state.host_first_station
+        seen, seen_before = state.seen, state.seen_before
+        previous_station, filled, number, frame_began_s = self._stations, self._stations, -1, _NEVER
+        rows = zip(readings.station.tolist(), readings.measured_s.tolist(), readings.received_s.tolist(), strict=True)
         for i, (station, stamp_s, received_s) in enumerate(rows):
-            elapsed_s = stamp_s - began_s
-            untimed = elapsed_s != elapsed_s  # NaN: a stamp is missing
-            increases, back = station > station_before, stamp_s < before_s
-            if untimed:  # the host may read late: only a round of other stations than the one before is amiss
-                amiss = 0 < heard_before != heard < (1 << self._stations) - 1
-                early = not increases and amiss and received_s - led_s < self._shortest_s(led, station)
+            elapsed_s = stamp_s - first_s
+            unstamped = elapsed_s != elapsed_s  # NaN: a stamp is missing
+            increases, steps_back = station > previous_station, stamp_s < previous_s
+            # Too early: the station number does not increase, but the next round cannot have begun yet.
+            if unstamped:
+                # The host may read late, so time alone is no evidence: the round must also be incomplete and differ
+                # from the round before it.
+                differs = 0 < seen_before != seen < (1 << self._stations) - 1
+                shortest_s = self._shortest_gap_s(host_first_station, station)
+                too_early = not increases and differs and received_s - host_first_s < shortest_s
             else:
-                early = not increases and elapsed_s < self._shortest_s(first, station)
-            if early or back:
-                doubtful[i] = True
+                too_early = not increases and elapsed_s < self._shortest_gap_s(first_station, station)
+            if too_early or steps_back:
+                suspect[i] = True
                 if filled < self._stations:
-                    doubtful[i - 1] = True
-            late = received_s - arrived_s > TIMEOUT_PERIODS * self._period_s if untimed else elapsed_s >= self._period_s
-            opens = late or not increases
-            if opens:
-                self._round = _RoundState(began_s, first, before_s, led_s, led, heard, heard_before)
-                number, filled, arrived_s, heard, heard_before = number + 1, 0, received_s, 0, heard
-            if back or began_s != began_s or (opens and not early):
-                began_s, first = stamp_s, station
-            if opens and not early:
-                led_s, led = received_s, station
+                    suspect[i - 1] = True
+            if unstamped:
+                too_late = received_s - frame_began_s > TIMEOUT_PERIODS * self._period_s
+            else:
+                too_late = elapsed_s >= self._period_s
+            starts_frame = too_late or not increases
+            if starts_frame:
+                self._round = _RoundState(
+                    first_s, first_station, previous_s, host_first_s, host_first_station, seen, seen_before
+                )
+                number, filled, frame_began_s, seen, seen_before = number + 1, 0, received_s, 0, seen
+            if steps_back or first_s != first_s or (starts_frame and not too_early):
+                first_s, first_station = stamp_s, station
+            if starts_frame and not too_early:
+                host_first_s, host_first_station = received_s, station
             if stamp_s == stamp_s:
-                before_s = stamp_s
-            station_before, filled, heard = station, filled + 1, heard | 1 << station
+                previous_s = stamp_s
+            previous_station, filled, seen = station, filled + 1, seen | 1 << station
             frame[i] = number
-        self._after = _RoundState(began_s, first, before_s, led_s, led, heard, heard_before)
-        return frame, doubtful
+        self._round_after = _RoundState(
+            first_s, first_station, previous_s, host_first_s, host_first_station, seen, seen_before
+        )
+        return frame, suspect
 
-    def _shortest_s(self, first: int, station: int) -> float:
-        """From a reading of one station to the next round's of another, were all slots as long as they may be."""
+    def _shortest_gap_s(self, first: int, station: int) -> float:
+        """Shortest time from the first reading of a round to a station of the next round, if all slots are as long as
+        possible [s].
+        """
         slots_between = max(first - station, 0) + 0.5
         return (1.0 - slots_between / self._stations) * self._period_s
 
-    def _frames(self, given: Readings, frame: Ints) -> list[TrackerFrame]:
-        """Whole frames of readings (N,), of which `frame` (N,) tells the frame of each, from 0 without gaps."""
-        if len(given) == 0:
+    def _frames(self, readings: Readings, frame: Ints) -> list[TrackerFrame]:
+        """Build whole frames from readings (N,), whose frame numbers `frame` (N,) run from 0 without gaps."""
+        if len(readings) == 0:
             return []
-        count, at = int(frame[-1]) + 1, (frame, given.station)
+        count, index = int(frame[-1]) + 1, (frame, readings.station)
 
-        def spread(column: Floats | Bools, *width: int, missing: float = np.nan) -> Floats:
+        def to_frames(column: Floats | Bools, *width: int, missing: float = np.nan) -> Floats:
             out = np.full((count, self._stations, *width), missing)
-            out[at] = column
+            out[index] = column
             return out
 
-        usable = given.quality > 0.0
-        placed = usable & np.isfinite(given.position_m).all(axis=1)
+        usable = readings.quality > 0.0
+        position_valid = usable & np.isfinite(readings.position_m).all(axis=1)
         with np.errstate(invalid="ignore", over="ignore"):
-            length = np.sqrt(np.sum(given.tracker_from_station**2, axis=1))
-            turned = usable & (length > 0.5) & (length < 2.0)
-            turn = given.tracker_from_station / length[:, None]
+            length = np.sqrt(np.sum(readings.tracker_from_station**2, axis=1))
+            orientation_valid = usable & (length > 0.5) & (length < 2.0)
+            quaternion = readings.tracker_from_station / length[:, None]
         columns = (
-            self._receptions_s(given, frame).tolist(),
-            spread(given.measured_s),
-            spread(np.where(placed[:, None], given.position_m, np.nan), 3),
-            spread(np.where(turned[:, None], turn, np.nan), 4),
-            spread(placed, missing=0.0) > 0.0,
-            spread(turned, missing=0.0) > 0.0,
-            spread(given.quality, missing=0.0),
-            spread(given.suspect, missing=0.0) > 0.0,
+            self._received_times_s(readings, frame).tolist(),
+            to_frames(readings.measured_s),
+            to_frames(np.where(position_valid[:, None], readings.position_m, np.nan), 3),
+            to_frames(np.where(orientation_valid[:, None], quaternion, np.nan), 4),
+            to_frames(position_valid, missing=0.0) > 0.0,
+            to_frames(orientation_valid, missing=0.0) > 0.0,
+            to_frames(readings.quality, missing=0.0),
+            to_frames(readings.suspect, missing=0.0) > 0.0,
         )
         return [TrackerFrame(*row) for row in zip(*columns, strict=True)]
 
-    def _receptions_s(self, given: Readings, frame: Ints) -> Floats:
-        """When the last reading of each frame came (F,); frames of one chunk follow each other by the least step."""
+    def _received_times_s(self, readings: Readings, frame: Ints) -> Floats:
+        """Time of the last reading of each frame (F,) [s]; strictly increasing, if only by one rounding step."""
         last = np.append(np.flatnonzero(np.diff(frame)), len(frame) - 1)
-        out = np.maximum.accumulate(given.received_s[last])
+        out = np.maximum.accumulate(readings.received_s[last])
         for i, received_s in enumerate(out.tolist()):
             if received_s <= self._received_s:
                 out[i] = np.nextafter(self._received_s, np.inf)

@@ -1,4 +1,4 @@
-"""A stretch of the wire as it was received: bytes, and when they came."""
+"""A stretch of received bytes with their times."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,13 @@ from harness.core.arrays import Floats, Ints, freeze
 
 @dataclass(frozen=True, eq=False)
 class ByteCapture:
-    """K chunks, one after another."""
+    """K consecutive chunks of received bytes."""
 
     data: bytes
     ends: Ints
-    """(K,) bytes received with the end of each chunk."""
+    """(K,) number of bytes received up to the end of each chunk."""
     received_s: Floats
-    """(K,) host clock at that moment [s]."""
+    """(K,) host clock when each chunk was received [s]."""
 
     def __post_init__(self) -> None:
         freeze(self, np.int64, ends=("K",))

@@ -1,7 +1,8 @@
-"""What a host says to an IS-900: commands as bytes, and bytes into commands (docs/is900.md 3 and 4).
+"""Commands that a host sends to an IS-900, as bytes, and a parser of such bytes (docs/is900.md 3 and 4).
 
-Eight letters and `W` act at once; so do four control characters, wherever they stand. Everything else is a line.
-Builders end lines in CR LF, as the manuals do. Stations are their characters, "1" to "9" and "A" to "C".
+Nine letters act at once; so do four control characters, wherever they occur. Every other command is a line. The
+functions here end lines with CR LF, as the manuals do. Stations are named by their characters, "1" to "9" and "A" to
+"C".
 """
 
 from collections.abc import Sequence
@@ -20,7 +21,7 @@ IMMEDIATE_LETTERS = b"PCcFfSUuW"
 CONTROL_CHARACTERS = SAVE + RESUME + SUSPEND + RESTART
 """Characters that act at once anywhere."""
 LONGEST_LINE = 256
-"""No command in the sources is half as long; what goes on is cut [bytes]."""
+"""Longest command line; the rest is discarded. No command in the sources is half as long [bytes]."""
 
 
 def _line(text: str) -> bytes:
@@ -28,54 +29,59 @@ def _line(text: str) -> bytes:
 
 
 def set_output_list(station: str, items: Sequence[int]) -> bytes:
-    """Set the output list of a station; it answers nothing."""
+    """Command that sets the output list of a station; it has no reply."""
     return _line(f"O{station}," + ",".join(map(str, items)))
 
 
 def query_output_list(station: str) -> bytes:
+    """Command that queries the output list of a station."""
     return _line(f"O{station}")
 
 
 def switch_station(station: str, active: bool) -> bytes:
-    """Switch a station on or off; it answers nothing."""
+    """Command that switches a station on or off; it has no reply."""
     return _line(f"l{station},{int(active)}")
 
 
 def boresight(station: str) -> bytes:
-    """The way it points now becomes heading 0."""
+    """Command that makes the present direction of the station heading 0."""
     return _line(f"B{station}")
 
 
 def undo_boresight(station: str) -> bytes:
+    """Command that undoes the boresight of a station."""
     return _line(f"b{station}")
 
 
 def alignment(station: str, origin_cm: Sequence[float], on_x_cm: Sequence[float], on_y_cm: Sequence[float]) -> bytes:
-    """A new frame: its origin, a point on its X axis and one on its Y axis, on top of the present one [cm]."""
+    """Command that sets a new frame: its origin, a point on its X axis and one on its Y axis, in the present frame
+    [cm].
+    """
     return _line(f"A{station}," + ",".join(f"{value:.2f}" for value in (*origin_cm, *on_x_cm, *on_y_cm)))
 
 
 def undo_alignment(station: str) -> bytes:
+    """Command that resets the frame of a station."""
     return _line(f"R{station}")
 
 
 def prediction(station: str, ahead_ms: int) -> bytes:
-    """0 to 50 ms."""
+    """Command that sets the prediction interval, 0 to 50 ms."""
     return _line(f"Mp{station},{ahead_ms}")
 
 
 def enhancement(station: str, mode: int) -> bytes:
-    """0 most exact, 1 less jitter, 2 for head displays."""
+    """Command that sets the filter: 0 most exact, 1 less jitter, 2 for head displays."""
     return _line(f"MF{station},{mode}")
 
 
 def sensitivity(station: str, level: int) -> bytes:
-    """To rotation, 1 to 5."""
+    """Command that sets the sensitivity to rotation, 1 to 5."""
     return _line(f"MQ{station},{level}")
 
 
 def serial_line(baud: int) -> bytes:
-    """The device's side of the line: 8N1 at this rate [bit/s], no handshake."""
+    """Command that sets the device's baud rate [bit/s], with 8N1 and no handshake."""
     return _line(f"o{baud // 100},N,8,0")
 
 
@@ -84,21 +90,22 @@ class Command:
     """One command: a letter or control character that acts at once, or a line."""
 
     line: bytes
-    """Without its terminator."""
+    """The command without its terminator."""
     cut: bool = False
-    """Whether it was longer than `LONGEST_LINE`; the rest is gone."""
+    """Whether it was longer than `LONGEST_LINE` and its end was discarded."""
 
     @property
     def immediate(self) -> bool:
-        """Whether it needed no terminator."""
+        """Whether it acts at once, without a terminator."""
         return len(self.line) == 1 and self.line in IMMEDIATE_LETTERS + CONTROL_CHARACTERS
 
 
 class CommandReader:
-    """Takes bytes as they come, gives commands as they become complete.
+    """Splits incoming bytes into commands.
 
-    A line ends at CR or LF; empty ones are ignored. A letter acts at once only at the start of a line: in the middle
-    of one no source says what happens, and this worked with every client tried. A restart forgets the line begun.
+    A line ends at CR or LF; empty lines are ignored. A letter acts at once only at the start of a line. No source says
+    what happens in the middle of a line; this rule worked with every client tried. A restart discards an unfinished
+    line.
     """
 
     def __init__(self) -> None:
@@ -106,23 +113,23 @@ class CommandReader:
         self._cut = False
 
     def feed(self, data: bytes) -> list[Command]:
-        """The commands that these bytes complete."""
+        """Return the commands that these bytes complete."""
         out: list[Command] = []
         for byte in data:
             if byte in CONTROL_CHARACTERS or (not self._line and byte in IMMEDIATE_LETTERS):
                 out.append(Command(bytes([byte])))
                 if byte == RESTART[0]:
-                    self._forget()
+                    self._clear()
             elif byte in b"\r\n":
                 if self._line:
                     out.append(Command(bytes(self._line), self._cut))
-                self._forget()
+                self._clear()
             elif len(self._line) < LONGEST_LINE:
                 self._line.append(byte)
             else:
                 self._cut = True
         return out
 
-    def _forget(self) -> None:
+    def _clear(self) -> None:
         self._line.clear()
         self._cut = False

@@ -1,6 +1,6 @@
-"""The packet that an IS-900 sends over UDP, one per station, port 5001 by default (docs/is900.md 9).
+"""The UDP packet of an IS-900: one per station, port 5001 by default (docs/is900.md 9).
 
-Unlike the serial record it has a checksum: a sum, so that a flipped bit is always caught, but not two bytes swapped.
+Unlike the serial record it has a checksum. It is a sum, so a flipped bit is always detected, but swapped bytes are not.
 """
 
 import struct
@@ -13,27 +13,27 @@ _TIME_STRUCT = struct.Struct("<f")
 
 @dataclass(frozen=True)
 class Datagram:
-    """What one station says. Values are kept as they are on the wire, single precision where they have fractions."""
+    """The report of one station. Values are as on the wire; those with fractions are single precision."""
 
     sequence: int
-    """0 to 255, then again from 0."""
+    """Counter, 0 to 255, then 0 again."""
     model: int
-    """Of the tracker; no source lists the numbers."""
+    """Model of the tracker; no source lists the numbers."""
     station: int
-    """From 1."""
+    """Station number, from 1."""
     quality: int
-    """0 lost to 255, as item 40."""
+    """Tracking quality, 0 (lost) to 255, as item 40."""
     buttons: int
-    """Bits, as item 22."""
+    """Button bits, as item 22."""
     analogue: tuple[int, ...]
-    """(8,) 0 to 255; the joystick's are the first two."""
+    """(8,) analogue values 0 to 255; the joystick has the first two."""
     yaw_pitch_roll_deg: tuple[float, float, float]
     position_m: tuple[float, float, float]
     time_s: float | None = None
-    """Device clock [s]; None where it was not asked for."""
+    """Device clock [s]; None where the time was not configured."""
 
     def packet(self) -> bytes:
-        """40 bytes, or 44 with the time."""
+        """Return the packet: 40 bytes, or 44 with the time."""
         values = (self.model, self.station, self.quality, self.buttons, *self.analogue)
         places = (*self.yaw_pitch_roll_deg, *self.position_m)
         body = _BODY_STRUCT.pack(_HEAD, _STATION_DATA, self.sequence & 0xFF, 0, *values, *places)[4:]
@@ -42,7 +42,7 @@ class Datagram:
 
 
 def parse_datagram(packet: bytes) -> Datagram | None:
-    """What a packet says; None for camera data, a wrong length or a wrong sum."""
+    """Parse a packet; None for camera data, a wrong length or a wrong checksum."""
     if len(packet) not in (_BODY_STRUCT.size, _BODY_STRUCT.size + _TIME_STRUCT.size) or packet[:2] != bytes(
         [_HEAD, _STATION_DATA]
     ):

@@ -1,10 +1,10 @@
-"""Bytes in, events out: finds data records and replies in the stream of an IS-900, without input or output.
+"""Decoder: finds data records and replies in the bytes of an IS-900; no input or output.
 
-There is no checksum and no escape: a record is known by its head and its length, by the CR LF (or space) that its
-output list may end in, by the marks of 16-bit values and, in ASCII, by the shape of its numbers. While in step, a
-record counts once its last byte is there. Out of step, the head of whatever follows must be there too; so it must for
-lists that end in nothing fixed, where one byte of it may be damaged while in step. Every decision depends on the
-bytes alone, never on how they were cut into chunks. Between records, lines that start with 2, 3 or 5 are replies.
+There is no checksum and no escape. A record is recognised by its head and length, by the CR LF (or space) that its
+output list may end in, by the marks of 16-bit values and, in ASCII, by the format of its numbers. While in step, a
+record is accepted once its last byte is there. Out of step, the head of the next record or reply must be there too. The
+same holds in step for lists without a fixed end, where one byte of that head may be damaged. Every decision depends on
+the bytes alone, never on how they were split into chunks. Between records, lines that start with 2, 3 or 5 are replies.
 """
 
 import re
@@ -18,9 +18,9 @@ from harness.stream.codec.layout import RecordLayout, record_head_pattern
 from harness.stream.codec.records import RecordFormat, Table
 
 LONGEST_REPLY = 256
-"""No reply in the sources is half as long [bytes]."""
+"""Longest reply; no reply in the sources is half as long [bytes]."""
 _REPLY_HEAD_PATTERN = rb"(?:[235][1-9A-Ca-c][A-Za-z]|[235] E)"
-"""What the lines of section 6 begin with: a station and a letter, or an error."""
+"""Beginning of the reply lines of docs/is900.md 6: a station and a letter, or an error."""
 _STATUS_BYTES = b" ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 _RECORD_HEAD_BYTES = b"0", STATION_CHARACTERS, _STATUS_BYTES
 _REPLY_HEAD_BYTES = (b"235", b"123456789ABCabc", _STATUS_BYTES[1:]), (b"235", b" ", b"E")
@@ -29,33 +29,33 @@ _UNPRINTABLE = re.compile(rb"[^ -~]")
 
 @dataclass(frozen=True, eq=False)
 class RecordRun:
-    """A run of records of one output list, without a byte between them."""
+    """A run of adjacent records of one output list."""
 
     offset: int
-    """Bytes of the stream before the run."""
+    """Offset of the run in the stream [bytes]."""
     items: tuple[int, ...]
     table: Table
     size: int
-    """Bytes of a record on the wire, which in ASCII are not those of a row of the table."""
+    """Length of a record on the wire [bytes]; in ASCII it differs from a row of the table."""
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the run on the wire."""
+        """Length of the run on the wire [bytes]."""
         return self.size * len(self.table)
 
 
 @dataclass(frozen=True)
 class Reply:
-    """A line that is no data."""
+    """A line that is not a data record."""
 
     offset: int
     line: bytes
-    """Without its CR LF."""
+    """The line without its CR LF."""
 
 
 @dataclass(frozen=True)
 class Garbage:
-    """Bytes that belong to nothing."""
+    """Bytes that belong to no record and no reply."""
 
     offset: int
     size: int
@@ -65,7 +65,9 @@ DecoderEvent = RecordRun | Reply | Garbage
 
 
 def merge_adjacent(events: Iterable[DecoderEvent]) -> list[DecoderEvent]:
-    """The same events with neighbours made one wherever they touch: what any split of the bytes gives alike."""
+    """Return the events with adjacent runs and adjacent garbage merged: the result is the same for any split of the
+    bytes.
+    """
     out: list[DecoderEvent] = []
     for event in events:
         last = out[-1] if out else None
@@ -84,13 +86,16 @@ def merge_adjacent(events: Iterable[DecoderEvent]) -> list[DecoderEvent]:
 
 
 class Decoder:
-    """Keeps at most one undecided record or reply between calls, whatever comes in.
+    """Decodes bytes to events. It keeps at most one undecided record or reply between calls.
 
-    A device that was given another list or format is read with a new decoder.
+    Use a new decoder when the device is given another list or format.
     """
 
     def __init__(self, lists: Mapping[int, tuple[int, ...]], settings: RecordFormat | None = None) -> None:
-        """`lists` is the output list of each station, by its character's code. Records of others are garbage."""
+        """`lists` maps the code of each station's character to its output list.
+
+        Records of other stations are garbage.
+        """
         heads = b"(?:%b|%b)" % (record_head_pattern(STATION_CHARACTERS), _REPLY_HEAD_PATTERN)
         self._layouts: dict[int, RecordLayout] = {}
         for items in set(lists.values()):
@@ -99,116 +104,116 @@ class Decoder:
         self._head = re.compile(heads)
         self._buffer = b""
         self._offset = 0
-        """Bytes of the stream before the buffer."""
+        """Offset of the buffer in the stream [bytes]."""
         self._in_step = False
 
     @property
     def pending(self) -> int:
-        """Bytes that wait for more."""
+        """Number of undecided bytes."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> list[DecoderEvent]:
-        """What became certain with these bytes."""
-        return self._decode(self._buffer + data, ended=False)
+        """Return the events that these bytes make certain."""
+        return self._decode(self._buffer + data, at_end=False)
 
     def finish(self) -> list[DecoderEvent]:
-        """What is left when nothing more will come: the end stands for the head of the next record."""
-        return self._decode(self._buffer, ended=True)
+        """Return the remaining events at the end of the stream, which counts as the head of the next record."""
+        return self._decode(self._buffer, at_end=True)
 
-    def _decode(self, buffer: bytes, ended: bool) -> list[DecoderEvent]:
+    def _decode(self, buffer: bytes, at_end: bool) -> list[DecoderEvent]:
         events: list[DecoderEvent] = []
-        at = 0
-        while at < len(buffer):
-            taken = self._run(buffer, at, events)
-            if taken == 0:
-                taken = self._single(buffer, at, events, ended)
-            if taken == 0:
+        offset = 0
+        while offset < len(buffer):
+            consumed = self._run(buffer, offset, events)
+            if consumed == 0:
+                consumed = self._single(buffer, offset, events, at_end)
+            if consumed == 0:
                 break
-            at += taken
-        self._buffer = buffer[at:]
-        self._offset += at
+            offset += consumed
+        self._buffer = buffer[offset:]
+        self._offset += offset
         return merge_adjacent(events)
 
-    def _run(self, buffer: bytes, at: int, events: list[DecoderEvent]) -> int:
-        """Take as many whole records of one list as follow each other in step; the bytes they have."""
-        layout = self._layouts.get(buffer[at + 1]) if self._in_step and at + 1 < len(buffer) else None
-        found = layout.run.match(buffer, at) if layout else None
-        if layout is None or found is None or found.end() == at:
+    def _run(self, buffer: bytes, offset: int, events: list[DecoderEvent]) -> int:
+        """Take as many adjacent records of one list as there are in step; return their length [bytes]."""
+        layout = self._layouts.get(buffer[offset + 1]) if self._in_step and offset + 1 < len(buffer) else None
+        match = layout.run.match(buffer, offset) if layout else None
+        if layout is None or match is None or match.end() == offset:
             return 0
-        taken = found.end() - at
-        table = layout.table(buffer, at, taken // layout.size)
-        events.append(RecordRun(self._offset + at, layout.items, table, layout.size))
-        return taken
+        consumed = match.end() - offset
+        table = layout.table(buffer, offset, consumed // layout.size)
+        events.append(RecordRun(self._offset + offset, layout.items, table, layout.size))
+        return consumed
 
-    def _single(self, buffer: bytes, at: int, events: list[DecoderEvent], ended: bool) -> int:
-        """Take one record, reply or piece of garbage; the bytes it has, 0 when more are needed to tell."""
-        head = buffer[at : at + HEADER_BYTES]
+    def _single(self, buffer: bytes, offset: int, events: list[DecoderEvent], at_end: bool) -> int:
+        """Take one record, reply or piece of garbage; return its length [bytes], 0 when more bytes are needed."""
+        head = buffer[offset : offset + HEADER_BYTES]
         if not self._may_begin(head):
             size: int | None = 0
         elif len(head) < HEADER_BYTES:
-            size = 0 if ended else None
+            size = 0 if at_end else None
         else:
-            size = (self._size_of_record if head[0] == RECORD_HEAD else _size_of_reply)(buffer, at, ended)
+            size = (self._size_of_record if head[0] == RECORD_HEAD else _size_of_reply)(buffer, offset, at_end)
         if size is None:
             return 0
         self._in_step = size > 0
         if size == 0:
-            size = self._next_head(buffer, at + 1) - at
-            events.append(Garbage(self._offset + at, size))
+            size = self._next_head(buffer, offset + 1) - offset
+            events.append(Garbage(self._offset + offset, size))
         elif head[0] == RECORD_HEAD:
             layout = self._layouts[head[1]]
-            events.append(RecordRun(self._offset + at, layout.items, layout.table(buffer, at, 1), layout.size))
+            events.append(RecordRun(self._offset + offset, layout.items, layout.table(buffer, offset, 1), layout.size))
         else:
-            events.append(Reply(self._offset + at, buffer[at : at + size - 2]))
+            events.append(Reply(self._offset + offset, buffer[offset : offset + size - 2]))
         return size
 
-    def _size_of_record(self, buffer: bytes, at: int, ended: bool) -> int | None:
-        """Bytes of the record at this place; 0 if it is none, None when it cannot be told yet."""
-        layout = self._layouts.get(buffer[at + 1])
+    def _size_of_record(self, buffer: bytes, offset: int, at_end: bool) -> int | None:
+        """Return the length of the record at this offset [bytes]; 0 if there is none, None when undecided."""
+        layout = self._layouts.get(buffer[offset + 1])
         if layout is None:
             return 0
-        after = at + layout.size
+        after = offset + layout.size
         if after > len(buffer):
-            return 0 if ended else None
-        if not layout.record.match(buffer, at):
+            return 0 if at_end else None
+        if not layout.record.match(buffer, offset):
             return 0
         if self._in_step and layout.end:
             return layout.size
-        follows = buffer[after : after + HEADER_BYTES]
-        if len(follows) < HEADER_BYTES and not ended:
+        next_head = buffer[after : after + HEADER_BYTES]
+        if len(next_head) < HEADER_BYTES and not at_end:
             return None
-        return layout.size if self._may_begin(follows) or (self._in_step and self._one_off(follows)) else 0
+        return layout.size if self._may_begin(next_head) or (self._in_step and self._has_one_error(next_head)) else 0
 
     def _may_begin(self, head: bytes) -> bool:
-        """Whether these bytes, three or fewer, begin a record or a reply."""
+        """Whether these bytes, at most three, begin a record or a reply."""
         if len(head) == HEADER_BYTES:
             return self._head.match(head) is not None
         return any(
-            all(byte in own for byte, own in zip(head, places, strict=False))
-            for places in (_RECORD_HEAD_BYTES, *_REPLY_HEAD_BYTES)
+            all(byte in own for byte, own in zip(head, allowed, strict=False))
+            for allowed in (_RECORD_HEAD_BYTES, *_REPLY_HEAD_BYTES)
         )
 
-    def _one_off(self, head: bytes) -> bool:
-        """Whether these bytes are a record's head but for one."""
-        amiss = [byte not in own for byte, own in zip(head, _RECORD_HEAD_BYTES, strict=False)]
-        return len(head) == HEADER_BYTES and sum(amiss) == 1
+    def _has_one_error(self, head: bytes) -> bool:
+        """Whether these bytes are a record's head with exactly one wrong byte."""
+        errors = [byte not in own for byte, own in zip(head, _RECORD_HEAD_BYTES, strict=False)]
+        return len(head) == HEADER_BYTES and sum(errors) == 1
 
-    def _next_head(self, buffer: bytes, at: int) -> int:
-        """Where the next record or reply may begin, from here on; the end of the buffer where nothing can."""
-        found = self._head.search(buffer, at)
-        if found:
-            return found.start()
-        last = range(max(at, len(buffer) - HEADER_BYTES + 1), len(buffer))
+    def _next_head(self, buffer: bytes, offset: int) -> int:
+        """Return where the next record or reply may begin from this offset on; the buffer's end when nowhere."""
+        match = self._head.search(buffer, offset)
+        if match:
+            return match.start()
+        last = range(max(offset, len(buffer) - HEADER_BYTES + 1), len(buffer))
         return next((k for k in last if self._may_begin(buffer[k:])), len(buffer))
 
 
-def _size_of_reply(buffer: bytes, at: int, ended: bool) -> int | None:
-    """Bytes of the line at this place; 0 if it is none, None when it cannot be told yet."""
-    broken = _UNPRINTABLE.search(buffer, at, at + LONGEST_REPLY)
-    if broken is None:
-        return 0 if ended or len(buffer) - at >= LONGEST_REPLY else None
-    stop = broken.start()
+def _size_of_reply(buffer: bytes, offset: int, at_end: bool) -> int | None:
+    """Return the length of the line at this offset [bytes]; 0 if there is none, None when undecided."""
+    unprintable = _UNPRINTABLE.search(buffer, offset, offset + LONGEST_REPLY)
+    if unprintable is None:
+        return 0 if at_end or len(buffer) - offset >= LONGEST_REPLY else None
+    stop = unprintable.start()
     end = buffer[stop : stop + 2]
     if end == b"\r\n":
-        return stop + 2 - at
-    return None if end == b"\r" and not ended else 0
+        return stop + 2 - offset
+    return None if end == b"\r" and not at_end else 0

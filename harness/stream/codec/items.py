@@ -1,7 +1,7 @@
-"""What a data record may hold: the items of an output list, as data (docs/is900.md 5.1).
+"""The items that a data record may contain, as a table (docs/is900.md 5.1).
 
-A record is a row of a structured numpy type, one field per item, whether it came in binary or as text: the type is
-the binary layout itself, and `ascii` turns text into the same rows.
+A record is a row of a structured numpy type with one field per item, whether it was binary or ASCII. The type is the
+binary layout itself; `ascii_records` converts text to the same rows.
 """
 
 from dataclasses import dataclass, replace
@@ -15,43 +15,44 @@ from harness.errors import BadInput, UnknownName
 RECORD_HEAD = ord("0")
 """Byte 0 of every data record."""
 BLANK_STATUS = ord(" ")
-"""Byte 2, the status, of an IS-900."""
+"""Byte 2, the status, of records of an IS-900."""
 HEADER_BYTES = 3
-"""Bytes before the items: head, station, status."""
+"""Number of bytes before the items: head, station, status."""
 STATION_CHARACTERS = b"123456789ABC"
 STANDARD_LIST = (40, 2, 11, 21, 1)
 """Quality, position, quaternion, time, CR LF: 38 bytes."""
 SHORT_LIST = (40, 18, 19, 21, 1)
 """Quality, position and angles in the 16-bit format, time, CR LF: 22 bytes."""
 SINCE_FIRMWARE = {40: 4.13, 76: 4.26}
-"""Firmware from which on an item is known (docs/is900.md 5.1)."""
+"""Firmware version that introduced an item (docs/is900.md 5.1)."""
 BITS_PER_BYTE = 10
-"""8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
+"""Bits on the line per byte for 8N1: a start bit, eight bits, a stop bit (docs/is900.md 2)."""
 BAUD_RATES = (115200, 57600, 38400, 19200, 9600)
-"""In the order in which InterSense's own library looks for a tracker (docs/is900.md 2) [bit/s]."""
+"""Baud rates in the sequence in which InterSense's own library tries them (docs/is900.md 2) [bit/s]."""
 
 
 @dataclass(frozen=True)
 class OutputItem:
-    """One entry of an output list: `count` values."""
+    """One entry of an output list; it has `count` values."""
 
     name: str
     kind: str
-    """numpy's name of one value in binary."""
+    """numpy type of one binary value."""
     count: int
     width: int = 0
-    """Characters of one value in ASCII, right-aligned; 0 where ASCII records hold the same bytes as binary ones."""
+    """Characters of one right-aligned value in ASCII; 0 where ASCII records hold the binary bytes."""
     decimals: int = 0
+    """Digits after the decimal point in ASCII."""
     blanks: int = 0
-    """After the values, in ASCII."""
+    """Blanks after the values in ASCII."""
     fixed: bytes = b""
-    """The bytes themselves where they never change."""
+    """The bytes of an item whose bytes never change."""
     sevens: bool = False
-    """Whether these are the 7-bit pairs of section 5.2."""
+    """Whether the bytes are the 7-bit pairs of docs/is900.md 5.2."""
 
     @property
     def ascii_size(self) -> int:
-        """Bytes in an ASCII record."""
+        """Length in an ASCII record [bytes]."""
         return self.count * (self.width or np.dtype(self.kind).itemsize) + self.blanks
 
 
@@ -86,54 +87,54 @@ ITEMS: dict[int, OutputItem] = {
     75: OutputItem("radio_integrity", "u1", 1, 4),
     76: OutputItem("measurement_quality", "u1", 1, 4),
 }
-"""By code. Inferred, not documented: what the bytes of 41 to 45 mean (integers), how 16 looks in ASCII (a digit per
-byte), and 75 and 76 altogether (their ranges are known, the layout is taken to be that of 40)."""
+"""Items by code. Some facts are inferred, not documented: 41 to 45 are integers; 16 has one digit per byte in ASCII; 75
+and 76, whose ranges are known, have the layout of 40."""
 UNDOCUMENTED_ITEMS = (68, 69, 70, 71)
-"""The auxiliary inputs: their sizes stand on pages of the manual that nobody could read."""
+"""The auxiliary inputs. Their sizes are on pages of the manual that are illegible."""
 
 
 @lru_cache(maxsize=64)
 def resolve_items(items: tuple[int, ...], stylus_bytes: int = 2) -> tuple[OutputItem, ...]:
-    """The items of a list; those that come again are spaces and line ends, and are given names of their own.
+    """Return the items of a list. Repeated items are spaces and line ends; they get names of their own.
 
-    UnknownName for a code that no source has, BadInput for one of unknown size or one listed twice.
+    Raises UnknownName for a code in no source, and BadInput for an item of unknown size or one listed twice.
     """
     out: list[OutputItem] = []
-    for at, code in enumerate(items):
+    for position, code in enumerate(items):
         if code in UNDOCUMENTED_ITEMS:
             raise BadInput(
-                f"Output item {code} (auxiliary input): no source tells its size, so records cannot be found.",
-                "Leave it out of the list.",
+                f"Output item {code} (auxiliary input): no source gives its size, so records cannot be decoded.",
+                "Remove it from the list.",
             )
         if code not in ITEMS:
             raise UnknownName("output item", str(code), [str(known) for known in ITEMS])
         item = ITEMS[code] if code != 16 else replace(ITEMS[code], count=stylus_bytes)
-        if code in items[:at]:
+        if code in items[:position]:
             if not item.fixed:
                 raise BadInput(f"Output item {code} ({item.name}) is listed twice.", "List it once.")
-            item = replace(item, name=f"{item.name}_{at}")
+            item = replace(item, name=f"{item.name}_{position}")
         out.append(item)
     return tuple(out)
 
 
 @lru_cache(maxsize=64)
 def record_type(items: tuple[int, ...], stylus_bytes: int = 2) -> np.dtype[Any]:
-    """The packed layout of a binary record: `head`, `station`, `status`, then each item by its name."""
-    own = [
+    """Return the packed layout of a binary record: `head`, `station`, `status`, then each item by its name."""
+    fields = [
         (item.name, item.kind) if item.count == 1 else (item.name, item.kind, (item.count,))
         for item in resolve_items(items, stylus_bytes)
     ]
-    return np.dtype([("head", "u1"), ("station", "u1"), ("status", "u1"), *own])
+    return np.dtype([("head", "u1"), ("station", "u1"), ("status", "u1"), *fields])
 
 
 @lru_cache(maxsize=64)
 def record_size(items: tuple[int, ...], binary: bool = True, stylus_bytes: int = 2) -> int:
-    """Bytes of a record on the wire."""
+    """Return the length of a record on the wire [bytes]."""
     if binary:
         return int(record_type(items, stylus_bytes).itemsize)
     return HEADER_BYTES + sum(item.ascii_size for item in resolve_items(items, stylus_bytes))
 
 
 def terminator(items: tuple[int, ...]) -> bytes:
-    """The fixed bytes that end a record: CR LF, a space, or nothing to go by."""
+    """Return the fixed bytes at the end of a record: CR LF, a space, or b"" when the last item is not fixed."""
     return ITEMS[items[-1]].fixed if items else b""

@@ -1,4 +1,4 @@
-"""How the records of an output list are recognised and read: a regular expression of all that is fixed in them."""
+"""Recognition and parsing of the records of one output list, by a regular expression of their fixed bytes."""
 
 import re
 
@@ -10,27 +10,27 @@ from harness.stream.codec.records import RecordFormat, Table
 
 
 class RecordLayout:
-    """Records of one list, sent by these stations with these settings."""
+    """The records of one output list, from these stations, in this format."""
 
     def __init__(self, items: tuple[int, ...], stations: bytes, settings: RecordFormat, next_head: bytes) -> None:
         """`next_head` is a regular expression of what may follow a record."""
         self.items = items
         self.size = record_size(items, settings.binary, settings.stylus_bytes)
         self.end = terminator(items)
-        """What every record ends in; empty where nothing is fixed."""
+        """Fixed bytes at the end of every record; empty where there are none."""
         self._binary, self._stylus_bytes = settings.binary, settings.stylus_bytes
-        own = resolve_items(items, settings.stylus_bytes)
-        record = record_head_pattern(stations) + b"".join(self._expression(item) for item in own)
-        ahead = b"" if self.end else b"(?=%b)" % next_head
+        output_items = resolve_items(items, settings.stylus_bytes)
+        record = record_head_pattern(stations) + b"".join(self._expression(item) for item in output_items)
+        lookahead = b"" if self.end else b"(?=%b)" % next_head
         self.record = re.compile(record, re.DOTALL)
-        self.run = re.compile(b"(?:%b%b)*+" % (record, ahead), re.DOTALL)
-        """As many whole records as follow each other; where nothing fixed ends them, a head behind each."""
+        self.run = re.compile(b"(?:%b%b)*+" % (record, lookahead), re.DOTALL)
+        """Matches as many adjacent records as possible. Without a fixed end, each must be followed by a head."""
 
-    def table(self, buffer: bytes, at: int, count: int) -> Table:
-        """Records (N,) that begin at this place and match `record`."""
+    def table(self, buffer: bytes, offset: int, count: int) -> Table:
+        """Parse `count` records that begin at this offset and match `record` into a table (N,)."""
         if self._binary:
-            return np.frombuffer(buffer, record_type(self.items, self._stylus_bytes), count, at)
-        raw = np.frombuffer(buffer, np.uint8, count * self.size, at).reshape(count, self.size)
+            return np.frombuffer(buffer, record_type(self.items, self._stylus_bytes), count, offset)
+        raw = np.frombuffer(buffer, np.uint8, count * self.size, offset).reshape(count, self.size)
         return text.parse_records(self.items, raw, self._stylus_bytes)
 
     def _expression(self, item: OutputItem) -> bytes:
@@ -44,5 +44,8 @@ class RecordLayout:
 
 
 def record_head_pattern(stations: bytes) -> bytes:
-    """A regular expression of a record's head: a blank is an IS-900's status, a letter a Fastrak's."""
+    """Return a regular expression of a record's head.
+
+    A blank is the status of an IS-900, a letter that of a Fastrak.
+    """
     return b"0[%b][ A-Za-z]" % stations

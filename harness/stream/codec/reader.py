@@ -1,4 +1,4 @@
-"""The whole way from bytes to frames, without input or output: what every source of IS-900 bytes goes through."""
+"""The complete path from bytes to frames, without input or output. Every source of IS-900 bytes uses it."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -22,35 +22,37 @@ from harness.stream.frame import TrackerFrame
 
 @dataclass(frozen=True)
 class WireFormat:
-    """What both ends agree on before data flow."""
+    """What both ends of the line agree on before data flow. Raises BadInput where it is contradictory."""
 
     stations: tuple[str, ...]
-    """Names, in the order of the device's stations."""
+    """Station names, in the order of the device's stations."""
     rate_hz: float
     """Records per second of each station."""
     items: tuple[int, ...] = STANDARD_LIST
     """Output list of every station."""
     settings: RecordFormat = field(default_factory=RecordFormat)
     characters: bytes = b""
-    """What the stations are called on the wire, ascending; by default the first is `1`, and so on."""
+    """Characters of the stations on the wire, ascending; by default `1` for the first, and so on."""
 
     def __post_init__(self) -> None:
         if not self.characters:
             object.__setattr__(self, "characters", STATION_CHARACTERS[: len(self.stations)])
         if not 1 <= len(self.stations) <= len(STATION_CHARACTERS):
-            raise BadInput(f"{len(self.stations)} stations.", f"An IS-900 has 1 to {len(STATION_CHARACTERS)}.")
-        if len(set(self.stations)) < len(self.stations):
-            raise BadInput(f"Stations {', '.join(self.stations)}: a name twice.", "Each has a name of its own.")
-        known = [STATION_CHARACTERS.find(character) for character in self.characters]
-        if len(known) != len(self.stations) or min(known) < 0 or known != sorted(set(known)):
             raise BadInput(
-                f"Stations {self.characters.decode('latin-1')!r} for {len(self.stations)} names.",
-                f"One of {STATION_CHARACTERS.decode()} for each, ascending, as the device reads them.",
+                f"{len(self.stations)} stations are not possible.", f"An IS-900 has 1 to {len(STATION_CHARACTERS)}."
+            )
+        if len(set(self.stations)) < len(self.stations):
+            raise BadInput(f"Stations {', '.join(self.stations)}: a name occurs twice.", "Give each its own name.")
+        positions = [STATION_CHARACTERS.find(character) for character in self.characters]
+        if len(positions) != len(self.stations) or min(positions) < 0 or positions != sorted(set(positions)):
+            raise BadInput(
+                f"Station characters {self.characters.decode('latin-1')!r} do not fit {len(self.stations)} names.",
+                f"Give one of {STATION_CHARACTERS.decode()} for each, ascending, as the device reads them.",
             )
 
 
 class FrameReader:
-    """Takes bytes as they come, gives frames as they become complete, and counts what else there was.
+    """Converts bytes to frames as they become complete, and counts everything else.
 
     Where the list has no quality (items 40 and 76), a station is lost from a reply to `MP` that says so until one that
     does not.
@@ -61,39 +63,39 @@ class FrameReader:
         self.records = 0
         self.garbage_bytes = 0
         self.replies: deque[Reply] = deque(maxlen=100)
-        """The latest lines that were no data."""
+        """The latest lines that are not data records."""
         self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
         self._clock = ClockUnwrapper()
-        self._motion = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
+        self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
         self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
-        self._stamped, self._tells_quality = 21 in wire.items, has_quality(wire.items)
+        self._has_stamps, self._has_quality = 21 in wire.items, has_quality(wire.items)
         self._lost: Bools | None = None
-        """(S,) by the latest reply to `MP`, where records do not tell."""
-        self._aside: list[tuple[Table, Floats]] = []
-        """Records that cannot complete a frame yet, and when they came."""
+        """(S,) lost stations by the latest reply to `MP`, where records have no quality."""
+        self._deferred: list[tuple[Table, Floats]] = []
+        """Records that cannot complete a frame yet, and their host times."""
         self._row = -1
-        """Of the record that came last; -1 when no frame has begun."""
+        """Station row of the latest record; -1 when no frame has begun."""
         self._ends: Ints = np.zeros(0, dtype=np.int64)
-        """Where the chunks end that undecided bytes came in, counted from the beginning of the stream."""
+        """Offsets in the stream at which the chunks with undecided bytes end."""
         self._ends_s: Floats = np.zeros(0)
         self._fed = 0
 
     @property
     def pending(self) -> int:
-        """Bytes that wait for more; a record or a reply at most."""
+        """Number of undecided bytes; at most a record or a reply."""
         return self._decoder.pending
 
     @property
     def clock_resets(self) -> int:
-        """How often the device's clock was set anew."""
+        """Number of times the device's clock was reset."""
         return self._clock.resets
 
     def feed(self, data: bytes, received_s: float) -> list[TrackerFrame]:
-        """The frames that these bytes, received at this moment, complete."""
+        """Return the frames that these bytes, received at `received_s` [s], complete."""
         return self._feed(data, np.array([len(data)]), np.array([received_s]))
 
     def feed_all(self, capture: ByteCapture) -> list[TrackerFrame]:
-        """The frames of many chunks at once; the same as chunk by chunk."""
+        """Return the frames that many chunks complete; the result is the same as chunk by chunk."""
         return self._feed(capture.data, capture.ends, capture.received_s)
 
     def _feed(self, data: bytes, ends: Ints, received_s: Floats) -> list[TrackerFrame]:
@@ -106,71 +108,75 @@ class FrameReader:
         return frames
 
     def expire(self, now_s: float) -> list[TrackerFrame]:
-        """The frame that has waited for its last stations for more than 1.5 periods at this moment (host clock)."""
+        """Return the frame whose first reading is more than 1.5 periods older than `now_s` (host clock) [s]."""
         began_s = self._assembler.since_s
-        if began_s is None and self._aside:
-            began_s = float(self._aside[0][1][0])
-        return [*self._settle(), *self._assembler.expire(now_s)] if self._assembler.has_waited(began_s, now_s) else []
+        if began_s is None and self._deferred:
+            began_s = float(self._deferred[0][1][0])
+        return (
+            [*self._process_deferred(), *self._assembler.expire(now_s)]
+            if self._assembler.has_waited(began_s, now_s)
+            else []
+        )
 
     def finish(self) -> list[TrackerFrame]:
-        """What is left at the end of the stream."""
-        return [*self._frames(self._decoder.finish()), *self._settle(), *self._assembler.finish()]
+        """Return the remaining frame at the end of the stream."""
+        return [*self._frames(self._decoder.finish()), *self._process_deferred(), *self._assembler.finish()]
 
     def _frames(self, events: list[DecoderEvent]) -> list[TrackerFrame]:
         frames: list[TrackerFrame] = []
         for event in events:
             match event:
                 case RecordRun():
-                    if self._take(event):
-                        frames += self._settle()
+                    if self._defer(event):
+                        frames += self._process_deferred()
                 case Reply():
-                    frames += self._settle()
+                    frames += self._process_deferred()
                     self.replies.append(event)
-                    self._heed(parse_reply(event.line))
+                    self._take_reply(parse_reply(event.line))
                 case Garbage():
                     self.garbage_bytes += event.size
         return frames
 
-    def _take(self, run: RecordRun) -> bool:
-        """Put records aside until they may complete a frame; whether they may."""
+    def _defer(self, run: RecordRun) -> bool:
+        """Defer records until they may complete a frame; return whether they may."""
         count = len(run.table)
         last_byte = run.offset + run.size * np.arange(1, count + 1)
-        self._aside.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
+        self._deferred.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
         self.records += count
         before, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
         return count > 1 or self._row <= before or self._row == len(self.wire.stations) - 1
 
-    def _settle(self) -> list[TrackerFrame]:
-        """The frames that the records put aside complete: a round of stations at once costs little more than one."""
-        if not self._aside:
+    def _process_deferred(self) -> list[TrackerFrame]:
+        """Return the frames that the deferred records complete. Together they cost little more than one record."""
+        if not self._deferred:
             return []
-        tables, received_s = zip(*self._aside, strict=True)
-        self._aside.clear()
+        tables, received_s = zip(*self._deferred, strict=True)
+        self._deferred.clear()
         table = tables[0]
         if len(tables) > 1:
-            table = np.frombuffer(b"".join(one.tobytes() for one in tables), table.dtype)
+            table = np.frombuffer(b"".join(part.tobytes() for part in tables), table.dtype)
         frames = self._assembler.add(self._readings(table, np.concatenate(received_s)))
         if self._assembler.since_s is None:
             self._row = -1
         return frames
 
-    def _heed(self, said: ParsedReply) -> None:
-        if isinstance(said, TrackingStatus) and not self._tells_quality:
-            self._lost = np.array([character in said.lost for character in self.wire.characters])
+    def _take_reply(self, reply: ParsedReply) -> None:
+        if isinstance(reply, TrackingStatus) and not self._has_quality:
+            self._lost = np.array([character in reply.lost for character in self.wire.characters])
 
     def _readings(self, table: Table, received_s: Floats) -> Readings:
         raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
         measured_s = self._clock.unwrap(raw.measured_s, received_s)
-        doubtful = raw.suspect | np.isnan(measured_s) if self._stamped else raw.suspect
+        suspect = raw.suspect | np.isnan(measured_s) if self._has_stamps else raw.suspect
         quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
-        place_m, turn = raw.position_m, raw.tracker_from_station
-        return self._motion.mark_suspect(
-            Readings(raw.station, received_s, measured_s, place_m, turn, quality, doubtful)
+        position_m, quaternion = raw.position_m, raw.tracker_from_station
+        return self._plausibility.mark_suspect(
+            Readings(raw.station, received_s, measured_s, position_m, quaternion, quality, suspect)
         )
 
 
 class CaptureStream:
-    """A `TrackerStream` over bytes received before."""
+    """A `TrackerStream` over recorded bytes in memory."""
 
     def __init__(self, wire: WireFormat, capture: ByteCapture) -> None:
         self._wire, self._capture, self._closed = wire, capture, False

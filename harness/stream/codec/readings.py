@@ -1,4 +1,4 @@
-"""What records say, in SI units: one row per record, whatever the output list."""
+"""The content of records in SI units: one row per record, whatever the output list."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,17 +21,17 @@ from harness.stream.codec.records import (
 )
 
 MAX_DISTANCE_M = 20.0
-"""No IS-900 tracks farther from its origin; a place beyond is a damaged number."""
+"""An IS-900 tracks no farther from its origin; a larger distance is a damaged number [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """N records in the order of the wire."""
+    """N records, in the order of the wire."""
 
     station: Ints
     """(N,) row of the station."""
     received_s: Floats
-    """(N,) host clock when the last byte was there [s]."""
+    """(N,) host clock when the last byte arrived [s]."""
     measured_s: Floats
     """(N,) device clock [s]; NaN where the record has no usable stamp."""
     position_m: Floats
@@ -39,9 +39,9 @@ class Readings:
     tracker_from_station: Floats
     """(N, 4) as on the wire, nearly of unit length; NaN when the list has none."""
     quality: Floats
-    """(N,) 0 lost to 1 best, from item 40, else 76; 1 when the list has neither."""
+    """(N,) 0 (lost) to 1 (best), from item 40, else 76; 1 when the list has neither."""
     suspect: Bools
-    """(N,) True where something speaks against the record."""
+    """(N,) True where there is evidence against the record."""
 
     def __len__(self) -> int:
         return len(self.station)
@@ -49,55 +49,56 @@ class Readings:
     def __getitem__(self, rows: slice) -> "Readings":
         return Readings(*(column[rows] for column in self.columns()))
 
-    def with_suspect(self, doubtful: Bools) -> "Readings":
-        """The same readings, of which these (N,) are doubtful."""
-        first = self.station, self.received_s, self.measured_s, self.position_m
-        return Readings(*first, self.tracker_from_station, self.quality, doubtful)
+    def with_suspect(self, suspect: Bools) -> "Readings":
+        """Return the same readings with this (N,) `suspect`."""
+        leading = self.station, self.received_s, self.measured_s, self.position_m
+        return Readings(*leading, self.tracker_from_station, self.quality, suspect)
 
     def columns(self) -> list[NDArray[Any]]:
-        """The arrays, in the order of the fields."""
+        """Return the arrays, in the order of the fields."""
         return [getattr(self, name) for name in self.__dataclass_fields__]
 
 
 def concatenate_readings(parts: list[Readings]) -> Readings:
-    """Readings one after another; at least one part."""
+    """Concatenate readings; at least one part is needed."""
     return (
         parts[0] if len(parts) == 1 else Readings(*map(np.concatenate, zip(*(p.columns() for p in parts), strict=True)))
     )
 
 
 def decode_readings(table: Table, received_s: Floats, stations: bytes, settings: RecordFormat) -> Readings:
-    """A table (N,) of records whose stations are among these characters, in this order, received at these times (N,).
+    """Decode a table (N,) of records received at times (N,) [s]; `stations` are the characters of the rows, in this
+    order.
 
-    Orientation is the quaternion's (items 11, 20), else the angles' (4, 19), else that of two or three axes (5 to 7).
-    Doubtful is what no sound record says: a number that is not finite, a place beyond `MAX_DISTANCE_M`, a quaternion or
-    axes whose length is not 1, angles out of their range, a stamp before zero.
+    Orientation is taken from the quaternion (items 11, 20), else the angles (4, 19), else two or three axes (5 to 7). A
+    reading is suspect when no sound record can contain it. That is a number that is not finite, a position beyond
+    `MAX_DISTANCE_M`, a quaternion or axes of another length than 1, angles out of range, or a negative stamp.
     """
     names = table.dtype.names or ()
     count = len(table)
-    doubtful = np.zeros(count, bool)
-    position_m, turn, measured_s = _nan_array(count, 3), _nan_array(count, 4), _nan_array(count)
+    suspect = np.zeros(count, bool)
+    position_m, quaternion, measured_s = _nan_array(count, 3), _nan_array(count, 4), _nan_array(count)
     with np.errstate(invalid="ignore", over="ignore"):
         if name := next((n for n in names if n in _POSITION_DECODERS), ""):
             position_m = _POSITION_DECODERS[name](table[name], settings)
-            doubtful |= ~(np.abs(position_m).max(axis=1, initial=0.0) < MAX_DISTANCE_M)
+            suspect |= ~(np.abs(position_m).max(axis=1, initial=0.0) < MAX_DISTANCE_M)
         if convert := next((c for kind, c in _ORIENTATION_DECODERS.items() if kind in names), None):
-            turn, sound = convert(table, settings)
-            doubtful |= ~sound
+            quaternion, sound = convert(table, settings)
+            suspect |= ~sound
         elif len(axes := [n for n in _AXES if n in names]) >= 2:
-            turn, sound = _quaternions_from_axes(table, axes, settings)
-            doubtful |= ~sound
+            quaternion, sound = _quaternions_from_axes(table, axes, settings)
+            suspect |= ~sound
         if "time" in names:
             measured_s = table["time"].astype(float) * settings.seconds_per_tick
-            amiss = ~((measured_s >= 0.0) & (measured_s < MAX_STAMP_S))
-            measured_s[amiss] = np.nan
-            doubtful |= amiss
+            invalid = ~((measured_s >= 0.0) & (measured_s < MAX_STAMP_S))
+            measured_s[invalid] = np.nan
+            suspect |= invalid
     station = _station_rows(stations)[table["station"]]
-    return Readings(station, received_s, measured_s, position_m, turn, _quality(table, names, count), doubtful)
+    return Readings(station, received_s, measured_s, position_m, quaternion, _quality(table, names, count), suspect)
 
 
 def has_quality(items: tuple[int, ...]) -> bool:
-    """Whether records of this list say how well their station is tracked."""
+    """Whether records of this list report how well their station is tracked."""
     return 40 in items or 76 in items
 
 
@@ -115,27 +116,31 @@ def _nan_array(*shape: int) -> Floats:
 
 @lru_cache(maxsize=16)
 def _station_rows(stations: bytes) -> Ints:
-    """(256,) the row of each station character, -1 where there is none."""
+    """Return the row (256,) of each station character, -1 where there is none."""
     row = np.full(256, -1, dtype=np.int64)
     row[np.frombuffer(stations, np.uint8)] = np.arange(len(stations))
     return row
 
 
-def _check_quaternions(turn: Floats, slack: float) -> tuple[Floats, Bools]:
-    """Quaternions (N, 4) and whether the squares of their lengths (N,) are 1, but for so much."""
-    return turn, np.abs(np.einsum("ij,ij->i", turn, turn) - 1.0) < slack
+def _check_quaternions(quaternion: Floats, tolerance: float) -> tuple[Floats, Bools]:
+    """Return quaternions (N, 4) and whether their squared norms (N,) are 1 within the tolerance."""
+    return quaternion, np.abs(np.einsum("ij,ij->i", quaternion, quaternion) - 1.0) < tolerance
 
 
 def _quaternions_from_angles(angles: Floats) -> tuple[Floats, Bools]:
-    """Quaternions (N, 4) of yaw, pitch and roll (N, 3) [deg], and whether these are within their ranges (N,);
-    NaN where not."""
+    """Convert yaw, pitch and roll (N, 3) [deg] to quaternions (N, 4), and check their ranges (N,).
+
+    Rows out of range are NaN.
+    """
     sound: Bools = np.all(np.abs(angles) < _ANGLES_DEG, axis=1)
     return from_yaw_pitch_roll_deg(np.where(sound[:, None], angles, np.nan)), sound
 
 
 def _quaternions_from_axes(table: Table, axes: list[str], settings: RecordFormat) -> tuple[Floats, Bools]:
-    """Quaternions (N, 4) of two or three of the station's axes, and whether these are an orthonormal set (N,);
-    NaN where not."""
+    """Convert two or three of the station's axes to quaternions (N, 4), and check that they are orthonormal (N,).
+
+    Other rows are NaN.
+    """
     columns = {name: table[name].astype(float) for name in axes}
     for k, name in enumerate(_AXES):
         if name not in columns:
@@ -143,12 +148,12 @@ def _quaternions_from_axes(table: Table, axes: list[str], settings: RecordFormat
     matrix = np.stack([columns[name] for name in _AXES], axis=-1)
     off = np.abs(np.swapaxes(matrix, 1, 2) @ matrix - np.eye(3)).max(axis=(1, 2))
     sound = (off < _norm_tolerance(settings)) & (np.linalg.det(np.nan_to_num(matrix)) > 0.0)
-    turn = rotations.from_matrix(np.where(sound[:, None, None], matrix, np.eye(3)))
-    return np.where(sound[:, None], turn, np.nan), sound
+    quaternion = rotations.from_matrix(np.where(sound[:, None, None], matrix, np.eye(3)))
+    return np.where(sound[:, None], quaternion, np.nan), sound
 
 
 def _norm_tolerance(settings: RecordFormat) -> float:
-    """How far the square of a length may be from 1: by rounding to single precision, or to four decimals."""
+    """Tolerance of the squared norm: rounding to single precision, or to four decimals."""
     return 1e-4 if settings.binary else 1e-3
 
 
@@ -168,4 +173,4 @@ _ORIENTATION_DECODERS: dict[str, Callable[[Table, RecordFormat], tuple[Floats, B
         FULL_SCALE_DEG * unpack_14_bit(table["yaw_pitch_roll_16"])
     ),
 }
-"""What the item becomes: quaternions (N, 4) and whether they are sound (N,)."""
+"""Convert an item to quaternions (N, 4) and whether they are sound (N,)."""

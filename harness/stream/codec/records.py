@@ -1,4 +1,4 @@
-"""Data records to be sent: SI units into the items of an output list, and those into bytes (docs/is900.md 5)."""
+"""Encoding of data records: SI units to the items of an output list, and items to bytes (docs/is900.md 5)."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,52 +17,52 @@ Table = NDArray[Any]
 """Records (N,) of one output list, with a field for each item (`items.record_type`)."""
 
 FULL_SCALE_M, FULL_SCALE_DEG = 3.0, 180.0
-"""Of the 16-bit format (section 5.2)."""
+"""Full scale of the 16-bit format (docs/is900.md 5.2) [m, deg]."""
 
 
 @dataclass(frozen=True)
 class RecordFormat:
-    """How the device was told to write numbers."""
+    """How the device is configured to write numbers."""
 
     metres_per_unit: float = 0.01
-    """0.01 after `u` (centimetres), 0.0254 after `U` or power-on (inches)."""
+    """Length of a unit [m]: 0.01 after `u` (centimetres), 0.0254 after `U` or power-on (inches)."""
     seconds_per_tick: float = 1e-3
-    """1e-3 after `MT` or power-on, 1e-6 after `Mt`."""
+    """Length of a clock tick [s]: 1e-3 after `MT` or power-on, 1e-6 after `Mt`."""
     binary: bool = True
     """True after `f`; False (ASCII) after `F` or power-on."""
     stylus_bytes: int = 2
-    """Of item 16, which has 1 or 2 by the source (section 14)."""
+    """Length of item 16: 1 or 2, depending on the source (docs/is900.md 14)."""
 
     def __post_init__(self) -> None:
         if not (self.metres_per_unit > 0.0 and self.seconds_per_tick > 0.0 and self.stylus_bytes in (1, 2)):
-            raise BadInput(f"Not a device's settings: {self}.", "Units are positive; item 16 has 1 or 2 bytes.")
+            raise BadInput(f"Not a record format: {self}.", "Units are positive; item 16 has 1 or 2 bytes.")
 
 
 @dataclass(frozen=True, eq=False)
 class RecordValues:
-    """What N records are to say."""
+    """The values that N records report."""
 
     measured_s: Floats
-    """(N,) the device's clock [s]."""
+    """(N,) device clock [s]."""
     position_m: Floats
-    """(N, 3)"""
+    """(N, 3) position in the tracker frame [m]."""
     tracker_from_station: Floats
     """(N, 4) unit quaternions."""
     quality: Floats
-    """(N,) 0 lost to 1 best."""
+    """(N,) 0 (lost) to 1 (best)."""
     buttons: Ints | int = 0
-    """(N,) bits, 0 where all are up (item 22)."""
+    """(N,) button bits, 0 where all are up (item 22)."""
     joystick: Ints | int = 127
     """(N, 2) left to right and rear to front, 0 to 255, centre 127 (item 23)."""
 
 
 def encode_records(
-    items: tuple[int, ...], stations: NDArray[np.uint8], said: RecordValues, settings: RecordFormat
+    items: tuple[int, ...], stations: NDArray[np.uint8], values: RecordValues, settings: RecordFormat
 ) -> Table:
-    """Records (N,) of these station characters (N,), of which `to_bytes` makes the bytes.
+    """Build the table (N,) of records of these station characters (N,); `to_bytes` converts it to bytes.
 
-    Nothing is said of cameras, lenses and the stylus: their items are 0, and the frame of a camera set is the
-    tracker's. Radio never loses a packet. UnknownName or BadInput for an item of unknown size.
+    Items of cameras, lenses and the stylus are 0, except that the frame of a camera set is the tracker's. The radio
+    never loses a packet. Raises UnknownName or BadInput for an item of unknown size.
     """
     table = np.zeros(len(stations), record_type(items, settings.stylus_bytes))
     table["head"], table["station"], table["status"] = RECORD_HEAD, stations, BLANK_STATUS
@@ -70,17 +70,17 @@ def encode_records(
         if item.fixed:
             table[item.name] = np.frombuffer(item.fixed, np.uint8) if item.count > 1 else item.fixed[0]
         elif item.name in _ITEM_ENCODERS:
-            table[item.name] = _ITEM_ENCODERS[item.name](said, settings)
+            table[item.name] = _ITEM_ENCODERS[item.name](values, settings)
     return table
 
 
 def to_bytes(items: tuple[int, ...], table: Table, settings: RecordFormat) -> bytes:
-    """Records (N,) as they go over the wire, binary or ASCII."""
+    """Return records (N,) as they go over the wire, binary or ASCII."""
     return table.tobytes() if settings.binary else text.format_records(items, table, settings.stylus_bytes)
 
 
 def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
-    """The two-byte form (N, 2k) of values (N, k) within -1 to 1 of full scale (section 5.2)."""
+    """Pack values (N, k), -1 to 1 of full scale, into the two-byte form (N, 2k) (docs/is900.md 5.2)."""
     sixteen = np.clip(np.trunc(np.asarray(values) * 32768.0), -32768, 32767).astype(np.int64)
     fourteen = (sixteen >> 2) & 0x3FFF
     pairs = (
@@ -93,55 +93,58 @@ def pack_14_bit(values: Floats) -> NDArray[np.uint8]:
 
 
 def unpack_14_bit(pairs: NDArray[np.uint8]) -> Floats:
-    """Values (N, k), -1 to 1 of full scale, of the two-byte form (N, 2k)."""
+    """Unpack the two-byte form (N, 2k) to values (N, k), -1 to 1 of full scale."""
     low, high = pairs[:, ::2].astype(np.uint16) & 0x7F, pairs[:, 1::2].astype(np.uint16) & 0x7F
     out: Floats = ((low << 2) | (high << 9)).view(np.int16) / 32768.0
     return out
 
 
-def yaw_pitch_roll_deg(turn: Floats) -> Floats:
-    """Angles (N, 3) [deg] about Z, the new Y and the new X that give these quaternions (N, 4) (section 5.3)."""
-    r = rotations.to_matrix(turn)
-    pitch = np.arcsin(np.clip(-r[:, 2, 0], -1.0, 1.0))
+def yaw_pitch_roll_deg(quaternions: Floats) -> Floats:
+    """Convert quaternions (N, 4) to angles (N, 3) about Z, the new Y and the new X [deg] (docs/is900.md 5.3)."""
+    rotation = rotations.to_matrix(quaternions)
+    pitch = np.arcsin(np.clip(-rotation[:, 2, 0], -1.0, 1.0))
     out: Floats = np.rad2deg(
-        np.stack([np.arctan2(r[:, 1, 0], r[:, 0, 0]), pitch, np.arctan2(r[:, 2, 1], r[:, 2, 2])], axis=1)
+        np.stack(
+            [np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]), pitch, np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])],
+            axis=1,
+        )
     )
     return out
 
 
 def from_yaw_pitch_roll_deg(angles: Floats) -> Floats:
-    """Quaternions (N, 4) of yaw about Z, then pitch about the new Y, then roll about the new X (N, 3) [deg]."""
+    """Convert yaw about Z, then pitch about the new Y, then roll about the new X (N, 3) [deg] to quaternions (N, 4)."""
     half = np.deg2rad(angles)[:, :, None]
     x, y, z = np.eye(3)
     yaw, pitch, roll = (rotations.exp(half[:, i] * axis) for i, axis in enumerate((z, y, x)))
     return rotations.multiply(rotations.multiply(yaw, pitch), roll)
 
 
-def direction_cosines(turn: Floats, axis: int) -> Floats:
-    """The station's X, Y or Z axis (N, 3) in the tracker's frame, of quaternions (N, 4) (items 5, 6, 7)."""
-    out: Floats = rotations.to_matrix(turn)[:, :, axis]
+def direction_cosines(quaternions: Floats, axis: int) -> Floats:
+    """Return the station's X, Y or Z axis (N, 3) in the tracker frame, from quaternions (N, 4) (items 5, 6, 7)."""
+    out: Floats = rotations.to_matrix(quaternions)[:, :, axis]
     return out
 
 
 _ITEM_ENCODERS: dict[str, Callable[[RecordValues, RecordFormat], Any]] = {
-    "position": lambda said, settings: said.position_m / settings.metres_per_unit,
-    "yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
-    "x_cosines": lambda said, settings: direction_cosines(said.tracker_from_station, 0),
-    "y_cosines": lambda said, settings: direction_cosines(said.tracker_from_station, 1),
-    "z_cosines": lambda said, settings: direction_cosines(said.tracker_from_station, 2),
-    "quaternion": lambda said, settings: said.tracker_from_station,
-    "position_16": lambda said, settings: pack_14_bit(said.position_m / FULL_SCALE_M),
-    "yaw_pitch_roll_16": lambda said, settings: pack_14_bit(
-        yaw_pitch_roll_deg(said.tracker_from_station) / FULL_SCALE_DEG
+    "position": lambda values, settings: values.position_m / settings.metres_per_unit,
+    "yaw_pitch_roll_deg": lambda values, settings: yaw_pitch_roll_deg(values.tracker_from_station),
+    "x_cosines": lambda values, settings: direction_cosines(values.tracker_from_station, 0),
+    "y_cosines": lambda values, settings: direction_cosines(values.tracker_from_station, 1),
+    "z_cosines": lambda values, settings: direction_cosines(values.tracker_from_station, 2),
+    "quaternion": lambda values, settings: values.tracker_from_station,
+    "position_16": lambda values, settings: pack_14_bit(values.position_m / FULL_SCALE_M),
+    "yaw_pitch_roll_16": lambda values, settings: pack_14_bit(
+        yaw_pitch_roll_deg(values.tracker_from_station) / FULL_SCALE_DEG
     ),
-    "quaternion_16": lambda said, settings: pack_14_bit(said.tracker_from_station),
-    "time": lambda said, settings: said.measured_s / settings.seconds_per_tick,
-    "buttons": lambda said, settings: said.buttons,
-    "joystick": lambda said, settings: said.joystick,
-    "camera_position": lambda said, settings: said.position_m / settings.metres_per_unit,
-    "camera_yaw_pitch_roll_deg": lambda said, settings: yaw_pitch_roll_deg(said.tracker_from_station),
-    "quality": lambda said, settings: np.round(255.0 * np.clip(said.quality, 0.0, 1.0)),
-    "radio_integrity": lambda said, settings: 100,
-    "measurement_quality": lambda said, settings: np.round(100.0 * np.clip(said.quality, 0.0, 1.0)),
+    "quaternion_16": lambda values, settings: pack_14_bit(values.tracker_from_station),
+    "time": lambda values, settings: values.measured_s / settings.seconds_per_tick,
+    "buttons": lambda values, settings: values.buttons,
+    "joystick": lambda values, settings: values.joystick,
+    "camera_position": lambda values, settings: values.position_m / settings.metres_per_unit,
+    "camera_yaw_pitch_roll_deg": lambda values, settings: yaw_pitch_roll_deg(values.tracker_from_station),
+    "quality": lambda values, settings: np.round(255.0 * np.clip(values.quality, 0.0, 1.0)),
+    "radio_integrity": lambda values, settings: 100,
+    "measurement_quality": lambda values, settings: np.round(100.0 * np.clip(values.quality, 0.0, 1.0)),
 }
-"""How each item is filled, in wire units; the others are 0."""
+"""Encoder of each item, in wire units; other items are 0."""

@@ -1,7 +1,7 @@
-"""What an IS-900 says besides data, as values: a line into one of them, and each into its line (docs/is900.md 6, 7).
+"""Replies of an IS-900: parses a line into a value, and formats each value as its line (docs/is900.md 6, 7).
 
-`parse_reply` never fails: what no source describes is `UnknownReply`. `line()` is what the device sends, with its CR LF, so that
-an emulator says what a driver reads. Stations are their characters, "1" to "9" and "A" to "C".
+`parse_reply` never fails: a line in no source is an `UnknownReply`. `line()` is what the device sends, with CR LF, so
+that the emulator writes what the driver reads. Stations are named by their characters, "1" to "9" and "A" to "C".
 """
 
 import re
@@ -43,7 +43,7 @@ _STATIONS = "123456789ABC"
 
 @dataclass(frozen=True)
 class StatusRecord:
-    """The answer to `S`: 55 bytes, or 54 from some firmware (6.1)."""
+    """The reply to `S`: 55 bytes, or 54 from some firmware (docs/is900.md 6.1)."""
 
     station: str = "1"
     binary: bool = False
@@ -55,11 +55,11 @@ class StatusRecord:
     """At most 31 characters."""
     compensation: bool = False
     self_test: str = ""
-    """Three characters when something is amiss."""
+    """Three characters when the self-test found a fault."""
     reserved: int = 0x3F0
-    """The flags above these four."""
+    """The flags above the four that are known."""
     short: bool = False
-    """Whether it has 54 bytes."""
+    """Whether the record has 54 bytes."""
 
     def line(self) -> bytes:
         low = self.binary | self.centimetres << 1 | self.compensation << 2 | self.continuous << 3
@@ -88,7 +88,7 @@ class StatusRecord:
 
 @dataclass(frozen=True)
 class OutputList:
-    """The answer to `O{st}` (6.2)."""
+    """The reply to `O{st}` (docs/is900.md 6.2)."""
 
     station: str
     items: tuple[int, ...]
@@ -98,30 +98,30 @@ class OutputList:
 
     @classmethod
     def parse(cls, text: str) -> "OutputList | None":
-        found = re.fullmatch(r"2([1-9A-C])O((?:[ 1-9]\d)*)", text)
-        return found and cls(found[1], tuple(int(found[2][k : k + 2]) for k in range(0, len(found[2]), 2)))
+        match = re.fullmatch(r"2([1-9A-C])O((?:[ 1-9]\d)*)", text)
+        return match and cls(match[1], tuple(int(match[2][k : k + 2]) for k in range(0, len(match[2]), 2)))
 
 
 @dataclass(frozen=True)
 class StationStates:
-    """The answer to `l{st}` or `l*` (6.3)."""
+    """The reply to `l{st}` or `l*` (docs/is900.md 6.3)."""
 
     station: str | None
-    """The one asked for; None for all."""
+    """The station of the query; None for all."""
     active: tuple[bool, ...]
-    """(4,) the station asked for, then stations 2, 3 and 4; (32,) all."""
+    """(4,) the queried station, then stations 2, 3 and 4; or (32,) all stations."""
 
     def line(self) -> bytes:
         return _encode_line(f"2{self.station or '1'}l" + "".join("01"[on] for on in self.active))
 
     @classmethod
     def parse(cls, text: str) -> "StationStates | None":
-        found = re.fullmatch(r"2([1-9A-C])l([01]{4}|[01]{32})", text)
-        return found and cls(None if len(found[2]) == 32 else found[1], tuple(digit == "1" for digit in found[2]))
+        match = re.fullmatch(r"2([1-9A-C])l([01]{4}|[01]{32})", text)
+        return match and cls(None if len(match[2]) == 32 else match[1], tuple(digit == "1" for digit in match[2]))
 
     @property
     def stations(self) -> tuple[str, ...]:
-        """Those that are known to be active; of 32 flags, the twelve that the protocol can name."""
+        """Stations that are known to be active; of 32 flags, the twelve stations that the protocol can name."""
         named = _STATIONS if self.station is None else dict.fromkeys((self.station, *"234"))
         first = dict(zip((self.station, *"234"), self.active, strict=False))
         flags = dict(zip(_STATIONS, self.active, strict=False)) if self.station is None else first
@@ -130,10 +130,10 @@ class StationStates:
 
 @dataclass(frozen=True)
 class GeometryReply:
-    """The answer to a question for a station's settings: alignment `A` [cm], mounting angles `G` [deg], boresight
-    reference `H` [deg], tip offset `N` [cm] or envelope `V` [m].
+    """The reply to a query of a station's geometry. Widths are those of docs/is900.md 14.
 
-    The widths are those of section 14; the decimals of `N` and `V` are a guess, so nothing should rely on them.
+    The letter is `A` alignment [cm], `G` mounting angles [deg], `H` boresight reference [deg], `N` tip offset [cm] or
+    `V` envelope [m]. The decimals of `N` and `V` are a guess, so nothing should rely on them.
     """
 
     station: str
@@ -154,14 +154,16 @@ class GeometryReply:
 
 
 _GEOMETRY_COLUMNS = {"A": (9, 7, 2), "G": (3, 7, 2), "H": (3, 7, 2), "N": (3, 8, 3), "V": (6, 8, 3)}
-"""How many, how wide, how many decimals."""
+"""Number of values, their width and their decimals, by letter."""
 _FLOAT = re.compile(r" *-?\d*\.?\d+ *")
 
 
 @dataclass(frozen=True)
 class DeviceError:
-    """What the device could not do (6.4): -1 a field is missing, -2 not a number, -3 out of range, -4 frequency,
-    -5 buffer full, -99 no such command."""
+    """An error record of the device (docs/is900.md 6.4).
+
+    Codes: -1 a field is missing, -2 not a number, -3 out of range, -4 frequency, -5 buffer full, -99 no such command.
+    """
 
     command: str
     code: int
@@ -170,17 +172,17 @@ class DeviceError:
     st: int = 0
 
     def line(self) -> bytes:
-        said = _printable(self.command)
-        return _encode_line(f"2 E*ERROR*{said}*ERROR* EC {self.code}*PS{self.ps}  *FL{self.fl} *ST{self.st}")
+        command_text = _printable(self.command)
+        return _encode_line(f"2 E*ERROR*{command_text}*ERROR* EC {self.code}*PS{self.ps}  *FL{self.fl} *ST{self.st}")
 
     @classmethod
     def parse(cls, text: str) -> "DeviceError | None":
-        found = _ERROR.match(text)
-        return found and cls(_printable(found[1]), *(int(found[k] or 0) for k in range(2, 6)))
+        match = _ERROR.match(text)
+        return match and cls(_printable(match[1]), *(int(match[k] or 0) for k in range(2, 6)))
 
 
 def _printable(command: str) -> str:
-    """What a line may repeat of a command that was not understood."""
+    """Return the part of a rejected command that an error record may repeat."""
     return re.sub(r"[^ -~]", "?", command)[:80]
 
 
@@ -194,7 +196,7 @@ class UnknownReply:
     """A line that no source describes."""
 
     text: bytes
-    """Without its CR LF."""
+    """The line without its CR LF."""
 
     def line(self) -> bytes:
         return self.text + b"\r\n"
@@ -235,10 +237,10 @@ _PARSERS: tuple[Callable[[str], ParsedReply | None], ...] = (
 
 
 def parse_reply(line: bytes) -> ParsedReply:
-    """What a line says, with or without its CR LF."""
+    """Parse a line, with or without its CR LF."""
     bare = line.removesuffix(b"\n").removesuffix(b"\r")
     text = bare.decode("latin-1")
-    return next((found for read in _PARSERS if (found := read(text)) is not None), UnknownReply(bare))
+    return next((reply for parse in _PARSERS if (reply := parse(text)) is not None), UnknownReply(bare))
 
 
 def _encode_line(text: str) -> bytes:

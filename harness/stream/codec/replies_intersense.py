@@ -1,4 +1,4 @@
-"""The replies that InterSense added to the Fastrak's: lines that start with `3` (docs/is900.md 6.4 and 7)."""
+"""Replies that InterSense added to those of the Fastrak: lines that start with `3` (docs/is900.md 6.4 and 7)."""
 
 import re
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class SystemRecord:
-    """The answer to `MS`."""
+    """The reply to `MS`."""
 
     product: str = "g"
     """`4` IS-300, `8` IS-600, `g` IS-900; one manual calls it reserved."""
@@ -21,20 +21,20 @@ class SystemRecord:
 
     @classmethod
     def parse(cls, text: str) -> "SystemRecord | None":
-        found = re.fullmatch(r"31S(.)([0-9A-Fa-f])([0-9A-Fa-f])", text)
-        if found is None:
+        match = re.fullmatch(r"31S(.)([0-9A-Fa-f])([0-9A-Fa-f])", text)
+        if match is None:
             return None
-        flags = int(found[3], 16)
-        return cls(found[1], bool(int(found[2], 16) & 1), bool(flags & 2), bool(flags & 4), bool(flags & 8))
+        flags = int(match[3], 16)
+        return cls(match[1], bool(int(match[2], 16) & 1), bool(flags & 2), bool(flags & 4), bool(flags & 8))
 
 
 @dataclass(frozen=True)
 class StationRecord:
-    """The answer to `Ms{st}`."""
+    """The reply to `Ms{st}`."""
 
     station: str
     enhancement: int = 0
-    """0 most exact, 1 less jitter, 2 for head displays."""
+    """Filter: 0 most exact, 1 less jitter, 2 for head displays."""
     compass: int = 0
     """0 off, 1 partial, 2 full."""
 
@@ -43,13 +43,13 @@ class StationRecord:
 
     @classmethod
     def parse(cls, text: str) -> "StationRecord | None":
-        found = re.fullmatch(r"3([1-9A-C])s.([0-2])([0-9A-Fa-f])", text)
-        return found and cls(found[1], int(found[2]), int(found[3], 16) >> 1 & 3)
+        match = re.fullmatch(r"3([1-9A-C])s.([0-2])([0-9A-Fa-f])", text)
+        return match and cls(match[1], int(match[2]), int(match[3], 16) >> 1 & 3)
 
 
 @dataclass(frozen=True)
 class PredictionReply:
-    """The answer to `Mp{st}`."""
+    """The reply to `Mp{st}`."""
 
     station: str
     ahead_ms: int
@@ -59,13 +59,13 @@ class PredictionReply:
 
     @classmethod
     def parse(cls, text: str) -> "PredictionReply | None":
-        found = re.fullmatch(r"3([1-9A-C])p([ \d]\d)", text)
-        return found and cls(found[1], int(found[2]))
+        match = re.fullmatch(r"3([1-9A-C])p([ \d]\d)", text)
+        return match and cls(match[1], int(match[2]))
 
 
 @dataclass(frozen=True)
 class SensitivityReply:
-    """The answer to `MQ{st}`: how closely rotation is followed, 1 to 5."""
+    """The reply to `MQ{st}`: sensitivity to rotation, 1 to 5."""
 
     station: str
     level: int
@@ -75,18 +75,21 @@ class SensitivityReply:
 
     @classmethod
     def parse(cls, text: str) -> "SensitivityReply | None":
-        found = re.fullmatch(r"3([1-9A-C])Q(\d)", text)
-        return found and cls(found[1], int(found[2]))
+        match = re.fullmatch(r"3([1-9A-C])Q(\d)", text)
+        return match and cls(match[1], int(match[2]))
 
 
 @dataclass(frozen=True)
 class IntegerReply:
-    """The answer to `MU` (ultrasonic time-out, two digits), `Mg` (ultrasonic sensitivity, one) or `MCI{st}` (the
-    InertiaCube that serves a station, one or two; -1 for none)."""
+    """The reply to `MU`, `Mg` or `MCI{st}`.
+
+    `MU` is the ultrasonic time-out (two digits), `Mg` the ultrasonic sensitivity (one digit), `MCI{st}` the InertiaCube
+    that serves a station (one or two digits; -1 for none).
+    """
 
     station: str
     letter: str
-    """`U`, `g` or `I`."""
+    """Kind of the value: `U`, `g` or `I`."""
     value: int
 
     def line(self) -> bytes:
@@ -95,13 +98,13 @@ class IntegerReply:
 
     @classmethod
     def parse(cls, text: str) -> "IntegerReply | None":
-        found = re.fullmatch(r"3([1-9A-C])(U(?=..$)|g(?=.$)|I)(-1|[ \d]?\d)", text)
-        return found and cls(found[1], found[2], int(found[3]))
+        match = re.fullmatch(r"3([1-9A-C])(U(?=..$)|g(?=.$)|I)(-1|[ \d]?\d)", text)
+        return match and cls(match[1], match[2], int(match[3]))
 
 
 @dataclass(frozen=True)
 class GenlockReply:
-    """The answer to `MG`."""
+    """The reply to `MG`."""
 
     state: str = "0"
     rate_hz: float = 0.0
@@ -112,13 +115,13 @@ class GenlockReply:
 
     @classmethod
     def parse(cls, text: str) -> "GenlockReply | None":
-        found = re.fullmatch(r"31G(.)(?=.{7}.{3}$)( *\d+\.\d\d)( *\d+)", text)
-        return found and cls(found[1], float(found[2]), int(found[3]))
+        match = re.fullmatch(r"31G(.)(?=.{7}.{3}$)( *\d+\.\d\d)( *\d+)", text)
+        return match and cls(match[1], float(match[2]), int(match[3]))
 
 
 @dataclass(frozen=True)
 class Emitter:
-    """One of the lines that answer `MCF`: a fixed emitter."""
+    """One line of the reply to `MCF`: a fixed emitter."""
 
     number: int
     position_m: tuple[float, float, float]
@@ -126,47 +129,50 @@ class Emitter:
     identity: int
 
     def line(self) -> bytes:
-        place = "".join(f"{value:10.4f}" for value in self.position_m)
+        position = "".join(f"{value:10.4f}" for value in self.position_m)
         normal = "".join(f"{value:7.2f}" for value in self.normal)
-        return f"31F{self.number:7d}{place}{normal}{self.identity:7d}\r\n".encode("latin-1")
+        return f"31F{self.number:7d}{position}{normal}{self.identity:7d}\r\n".encode("latin-1")
 
     @classmethod
     def parse(cls, text: str) -> "Emitter | None":
-        """By blanks, since some firmware widens the number."""
+        """Parse by blanks, since some firmware widens the number."""
         number = r" *(-?\d+\.\d+)"
-        found = re.fullmatch(rf"31F *(\d+){number * 6} *(\d+)", text)
-        if found is None:
+        match = re.fullmatch(rf"31F *(\d+){number * 6} *(\d+)", text)
+        if match is None:
             return None
-        x, y, z, a, b, c = map(float, found.groups()[1:7])
-        return cls(int(found[1]), (x, y, z), (a, b, c), int(found[8]))
+        x, y, z, a, b, c = map(float, match.groups()[1:7])
+        return cls(int(match[1]), (x, y, z), (a, b, c), int(match[8]))
 
 
 @dataclass(frozen=True)
 class TrackingStatus:
-    """The answer to `MP`: 48 bytes on how all twelve stations are tracked."""
+    """The reply to `MP`: 48 bytes on the tracking of all twelve stations."""
 
     states: str
     """(12,) `T` tracking, `L` lost, `X` absent or not valid."""
     received: tuple[int, ...]
-    """(12,) ranges of the last cycle, 0 to 15."""
+    """(12,) ranges received in the last cycle, 0 to 15."""
     rejected: tuple[int, ...]
-    """(12,) likewise."""
+    """(12,) ranges rejected in the last cycle, 0 to 15."""
     rate_hz: float
     genlock: str = " "
-    """`G`, `X` or blank."""
+    """Genlock state: `G`, `X` or blank."""
 
     def line(self) -> bytes:
         ranges = zip(self.states, self.received, self.rejected, strict=True)
-        stations = "".join(f"{state}{min(got, 15):x}{min(dropped, 15):x}" for state, got, dropped in ranges)
+        stations = "".join(
+            f"{state}{min(received_count, 15):x}{min(rejected_count, 15):x}"
+            for state, received_count, rejected_count in ranges
+        )
         return f"31P{stations}{self.rate_hz:5.0f} {self.genlock}\r\n".encode("latin-1")
 
     @classmethod
     def parse(cls, text: str) -> "TrackingStatus | None":
-        found = re.fullmatch(r"(?=.{46}$)31P((?:[TLX][0-9A-Fa-f ]{2}){12})( *\d+(?:\.\d*)? *) (.)", text)
-        if found is None:
+        match = re.fullmatch(r"(?=.{46}$)31P((?:[TLX][0-9A-Fa-f ]{2}){12})( *\d+(?:\.\d*)? *) (.)", text)
+        if match is None:
             return None
-        received, rejected = (tuple(int(digit.strip() or "0", 16) for digit in found[1][k::3]) for k in (1, 2))
-        return cls(found[1][::3], received, rejected, float(found[2]), found[3])
+        received, rejected = (tuple(int(digit.strip() or "0", 16) for digit in match[1][k::3]) for k in (1, 2))
+        return cls(match[1][::3], received, rejected, float(match[2]), match[3])
 
     @property
     def lost(self) -> bytes:

@@ -1,4 +1,4 @@
-"""What a device has to say, before it is asked for it: the readings that an emulator plays, lap after lap."""
+"""The readings that an emulated device plays in a loop."""
 
 from dataclasses import dataclass
 
@@ -7,43 +7,46 @@ from harness.core.arrays import Floats, freeze
 
 @dataclass(frozen=True, eq=False)
 class DeviceSamples:
-    """E instants of S stations in the tracker's frame; after the last one it goes on from the first, without a jump."""
+    """E instants of S stations in the tracker frame.
+
+    After the last instant the motion continues from the first without a jump.
+    """
 
     stations: tuple[str, ...]
-    """Names; the first is station `1` of the device, and so on."""
+    """Station names; the first is station `1` of the device, and so on."""
     rate_hz: float
     """Readings per second of each station."""
     take_frames: int
-    """So many instants, from the first, are the take itself; the others lead back to its beginning."""
+    """Number of instants, from the first, that belong to the take itself; the others lead back to its beginning."""
     taken_s: Floats
-    """(E, S) when each station is sampled, from the beginning of a lap [s]."""
+    """(E, S) when each station is sampled, from the beginning of the loop [s]."""
     ready_s: float
-    """From the sample to the first bit on the line, when that is free [s]."""
+    """Time from the sample to its first bit on a free line [s]."""
     device_s: Floats
-    """(E, S) what the device's clock says then, in the lap that began when it was set to zero [s]."""
+    """(E, S) the device's clock at that time, in the loop in which it was set to zero [s]."""
     position_m: Floats
-    """(E, S, 3) as the device believes."""
+    """(E, S, 3) position as the device estimates it [m]."""
     tracker_from_station: Floats
     """(E, S, 4) unit quaternions."""
     quality: Floats
-    """(E, S) 0 lost to 1 best."""
+    """(E, S) tracking quality, 0 (lost) to 1 (best)."""
 
     def __post_init__(self) -> None:
         freeze(self, taken_s=("E", "S"))
-        each = self.taken_s.shape
-        freeze(self, device_s=each, quality=each, position_m=(*each, 3), tracker_from_station=(*each, 4))
+        shape = self.taken_s.shape
+        freeze(self, device_s=shape, quality=shape, position_m=(*shape, 3), tracker_from_station=(*shape, 4))
 
     def __len__(self) -> int:
         return len(self.taken_s)
 
     @property
     def loop_s(self) -> float:
-        """How long a lap takes [s]."""
+        """Duration of a loop [s]."""
         return len(self) / self.rate_hz
 
     @property
     def device_loop_s(self) -> float:
-        """The same by the device's clock [s]."""
+        """Duration of a loop by the device's clock [s]."""
         if len(self) < 2:
             return self.loop_s
         pace = (self.device_s[-1, 0] - self.device_s[0, 0]) / (self.taken_s[-1, 0] - self.taken_s[0, 0])

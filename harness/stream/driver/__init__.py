@@ -1,4 +1,4 @@
-"""A real IS-900 on a serial port or a TCP connection, as a `TrackerStream` (docs/device.md, Driver)."""
+"""Driver of a real IS-900 on a serial port or a TCP connection, as a `TrackerStream` (docs/device.md, Driver)."""
 
 from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.is900 import Is900

@@ -1,4 +1,4 @@
-"""Whether a serial line can carry what is asked for: ten bits a byte (docs/is900.md 10)."""
+"""Whether a serial line can carry the requested records: ten bits a byte (docs/is900.md 10)."""
 
 import math
 
@@ -6,32 +6,32 @@ from harness.errors import BadInput
 from harness.stream.codec.items import BITS_PER_BYTE, SHORT_LIST, record_size
 
 TRACKING_REPLY_BYTES = 48
-"""Of an answer to `MP` (docs/is900.md 7)."""
+"""Length of the reply to `MP` [bytes] (docs/is900.md 7)."""
 
 
-def required_bit_rate(stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float = 0.0) -> float:
-    """Bits per second of so many stations, with `MP` asked so often."""
-    return BITS_PER_BYTE * (stations * record_size(items) * rate_hz + TRACKING_REPLY_BYTES * asked_hz)
+def required_bit_rate(stations: int, items: tuple[int, ...], rate_hz: float, poll_hz: float = 0.0) -> float:
+    """Bit rate of this many stations at `rate_hz` when `MP` is polled at `poll_hz` [bit/s]."""
+    return BITS_PER_BYTE * (stations * record_size(items) * rate_hz + TRACKING_REPLY_BYTES * poll_hz)
 
 
 def check_capacity(
-    port: str, baud: int | None, stations: int, items: tuple[int, ...], rate_hz: float, asked_hz: float
+    port: str, baud: int | None, stations: int, items: tuple[int, ...], rate_hz: float, poll_hz: float
 ) -> None:
-    """BadInput when the stations say more than the line carries; `baud` is None where there is no such limit."""
-    if baud is None or required_bit_rate(stations, items, rate_hz, asked_hz) <= baud:
+    """Raise BadInput when the stations send more than the line carries. `baud` is None where there is no such limit."""
+    if baud is None or required_bit_rate(stations, items, rate_hz, poll_hz) <= baud:
         return
-    fitting = max((n for n in range(stations) if required_bit_rate(n, items, rate_hz, asked_hz) <= baud), default=0)
-    ways = [f"{fitting} station{'s' * (fitting > 1)}"] if fitting else []
-    if required_bit_rate(stations, SHORT_LIST, rate_hz, asked_hz) <= baud and record_size(items) > record_size(
+    fitting = max((n for n in range(stations) if required_bit_rate(n, items, rate_hz, poll_hz) <= baud), default=0)
+    remedies = [f"{fitting} station{'s' * (fitting > 1)}"] if fitting else []
+    if required_bit_rate(stations, SHORT_LIST, rate_hz, poll_hz) <= baud and record_size(items) > record_size(
         SHORT_LIST
     ):
-        ways.append(f"the {record_size(SHORT_LIST)}-byte list (--items {','.join(map(str, SHORT_LIST))})")
-    slower = (baud - required_bit_rate(0, items, 0.0, asked_hz)) / required_bit_rate(stations, items, 1.0)
-    ways.append(f"a device that runs at {math.floor(slower)} Hz or less")
+        remedies.append(f"the {record_size(SHORT_LIST)}-byte list (--items {','.join(map(str, SHORT_LIST))})")
+    max_rate_hz = (baud - required_bit_rate(0, items, 0.0, poll_hz)) / required_bit_rate(stations, items, 1.0)
+    remedies.append(f"a device that runs at {math.floor(max_rate_hz)} Hz or less")
     if baud < 115200:
-        ways.append("a device set to 115200 baud")
+        remedies.append("a device set to 115200 baud")
     raise BadInput(
         f"Port {port}: {stations} stations x {record_size(items)} bytes x {BITS_PER_BYTE} bits x {rate_hz:g} Hz are "
-        f"{required_bit_rate(stations, items, rate_hz, asked_hz):.0f} bit/s, and the line carries {baud}.",
-        f"Try {', or '.join(ways)}.",
+        f"{required_bit_rate(stations, items, rate_hz, poll_hz):.0f} bit/s, but the line carries {baud}.",
+        f"Try {', or '.join(remedies)}.",
     )

@@ -1,4 +1,4 @@
-"""What the user wants of the device, and the time constants of the driver."""
+"""The device configuration that a user requests, and the time constants of the driver."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,88 +9,95 @@ from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, record_type
 from harness.stream.codec.records import RecordFormat
 
 QUALITY_ITEMS = (40, 76)
-"""Items that say how well a station is tracked (docs/is900.md 7)."""
+"""Items that report how well a station is tracked (docs/is900.md 7)."""
 
 Alignment = tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
-"""Origin, a point on +X and a point on +Y of the frame that a station is to report in [m]."""
+"""Origin, a point on +X and a point on +Y of the frame that a station reports in [m]."""
 
 
 @dataclass(frozen=True)
 class DriverConfig:
-    """The set-up asked for; BadInput where it contradicts itself."""
+    """The requested configuration of the device. Raises BadInput where it is contradictory."""
 
     items: tuple[int, ...] = STANDARD_LIST
     """Output list of every station (docs/is900.md 5.1)."""
     centimetres: bool = True
-    """Else inches, on the wire alone."""
+    """Whether positions on the wire are in centimetres; False is inches. Frames are in metres either way."""
     milliseconds: bool = True
-    """Else microseconds, likewise."""
+    """Whether times on the wire are in milliseconds; False is microseconds. Frames are in seconds either way."""
     stations: tuple[str, ...] | None = None
-    """Names; the first is the first active station of the device, and so on. None: all, by their characters."""
+    """Station names: the first is the first active station of the device, and so on. None takes all, named by their
+    characters.
+    """
     rate_hz: float | None = None
-    """Rounds per second that the device is known to run at. None: as it says itself, else measured."""
+    """Rounds per second of the device, if known. None takes the rate that the device reports, or else measures it."""
     baud: int | None = None
-    """Of a serial port. None: each of `BAUD_RATES` is tried."""
+    """Baud rate of a serial port [bit/s]. None tries each of `BAUD_RATES`."""
     boresight: bool = False
-    """Whether every station's heading is zeroed where it points at set-up."""
+    """Whether the heading of every station is set to zero at its present direction during configuration."""
     alignment: Alignment | Mapping[str, Alignment] | None = None
-    """The frame to report in: of all stations, or by station name; None leaves it as it is."""
+    """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
     quality: Literal["record", "mp"] = "record"
-    """Where lost stations show: in the records (items 40, 76), or in the answers to `MP`, asked for once a second."""
+    """Where lost stations show: "record" in items 40 and 76, "mp" in the replies to `MP`, polled once a second."""
 
     def __post_init__(self) -> None:
         record_type(self.items)
         if self.quality not in ("record", "mp"):
-            raise BadInput(f"Quality {self.quality!r} is not known.", "Take 'record' or 'mp'.")
+            raise BadInput(f"Quality {self.quality!r} is not known.", "Use 'record' or 'mp'.")
         if self.quality == "record" and not set(QUALITY_ITEMS) & set(self.items):
             raise BadInput(
                 f"The output list {_join_commas(self.items)} has no item 40, so a lost station would not show.",
-                "Add 40 to it, or take quality 'mp' (--quality mp).",
+                "Add 40 to it, or use quality 'mp' (--quality mp).",
             )
         if self.rate_hz is not None and not 0.0 < self.rate_hz <= 1000.0:
-            raise BadInput(f"A rate of {self.rate_hz} Hz.", "An IS-900 runs at up to 180 Hz.")
+            raise BadInput(f"A rate of {self.rate_hz} Hz is not possible.", "An IS-900 runs at up to 180 Hz.")
         if self.baud is not None and self.baud <= 0:
-            raise BadInput(f"{self.baud} baud.", f"An IS-900 speaks at {_join_commas(BAUD_RATES)}.")
+            raise BadInput(f"{self.baud} baud is not possible.", f"An IS-900 uses {_join_commas(BAUD_RATES)}.")
         if self.stations is not None and len(set(self.stations)) < len(self.stations):
-            raise BadInput(f"Stations {_join_commas(self.stations)}: a name twice.", "Each has a name of its own.")
+            raise BadInput(f"Stations {_join_commas(self.stations)}: a name occurs twice.", "Give each its own name.")
 
     @property
     def settings(self) -> RecordFormat:
-        """How numbers will be written."""
+        """Number format that the device will be configured for."""
         return RecordFormat(0.01 if self.centimetres else 0.0254, 1e-3 if self.milliseconds else 1e-6)
 
     def alignment_of(self, station: str) -> Alignment | None:
-        """The frame of a station, by its name."""
+        """Return the reporting frame of the station with this name, or None."""
         return self.alignment.get(station) if isinstance(self.alignment, Mapping) else self.alignment
 
 
 @dataclass(frozen=True)
 class DriverTiming:
-    """How long the driver waits for what [s]."""
+    """Time constants of the driver [s]."""
 
     quiet_s: float = 0.1
-    """So long without a byte after `c`, and the device has stopped. Ten times a character at 9600 baud is 0.01 s, and
-    USB adapters hold bytes back for 0.016 s."""
+    """Silence after `c` that shows that the device has stopped. Ten characters at 9600 baud take 0.01 s, and USB
+    adapters hold bytes back for up to 0.016 s.
+    """
     answer_s: float = 1.0
-    """VRPN allows as much for `S` (docs/is900.md 11.1); InterSense's library 2 s for lists."""
+    """Longest wait for a reply. VRPN waits this long for `S` (docs/is900.md 11.1); InterSense's library waits 2 s for
+    lists.
+    """
     stalled_s: float = 0.5
-    """Nothing, or no record, for so long: the device is asked how it is."""
+    """Time without a byte, or without a record, after which the driver queries the state of the device."""
     silent_s: float = 2.0
-    """No record for so long: the line is opened anew. VRPN's watchdog bites after as much."""
+    """Time without a record after which the driver reopens the line. VRPN's watchdog waits as long."""
     retry_s: float = 0.25
-    """Between two attempts to come back; a device should stream again within 2 s of its return."""
+    """Interval between two attempts to reconnect. A device should stream again within 2 s of its return."""
     tracking_s: float = 1.0
-    """Between two `MP`, where records do not tell quality."""
+    """Interval between two `MP` queries, where records do not report quality."""
     rezero_s: float = 3600.0
-    """Between two `MZ`. After an hour a step of a 32-bit millisecond clock is 0.25 ms, after a day 8 ms
-    (docs/is900.md 8)."""
+    """Interval between two `MZ` commands. The step of a 32-bit millisecond clock is 0.25 ms after an hour and 8 ms
+    after a day (docs/is900.md 8).
+    """
     garbage_s: float = 1.0
-    """Garbage is told anew after so long without any."""
+    """Time without garbage after which new garbage is reported again."""
     measure_s: float = 1.0
-    """For a rate that the device does not tell."""
+    """Duration of the rate measurement of a device that does not report its rate."""
     poll_s: float = 0.05
-    """The longest single wait, so that closing is prompt; nothing for so long, and an unfinished frame is given up: USB
-    adapters hold bytes back for 0.016 s, and what is only late shall not be torn."""
+    """Longest single wait, so that closing is prompt. After this long without a byte an overdue frame is closed. It
+    exceeds the 0.016 s for which USB adapters hold bytes back, so that late bytes do not split a frame.
+    """
 
 
 def _join_commas(values: tuple[object, ...]) -> str:

@@ -1,4 +1,7 @@
-"""The set-up: tell the device how to report, ask it whether it does. No setter is acknowledged (docs/is900.md 1)."""
+"""Configuration of the device: send the commands, then query whether it obeys.
+
+No setter is acknowledged (docs/is900.md 1).
+"""
 
 import re
 from dataclasses import replace
@@ -15,160 +18,170 @@ from harness.stream.driver.rate_measurement import measure_rate_hz
 from harness.stream.driver.stations import StationSelection
 
 SATURATED_SHARE = 0.95
-"""A line that carries this share of what it can may have left records out [choice]."""
+"""A line that carries this share of its capacity may have dropped records [choice]."""
 RATE_TOLERANCE = 0.1
-"""Rates that differ by less than this share are one; `MP` rounds to whole numbers."""
+"""Rates that differ by less than this share count as equal. `MP` rounds to whole numbers."""
 
 
-def select_items(port: str, status: StatusRecord, wanted: DriverConfig) -> tuple[int, ...]:
-    """The output list: without quality where `MP` is to tell it; BadInput when the firmware is too old for it."""
-    if wanted.quality == "mp":
-        return tuple(code for code in wanted.items if code not in QUALITY_ITEMS)
-    found = re.match(r"\d+\.\d+", status.firmware)
-    version = float(found[0]) if found else float("inf")  # then the device itself says whether it takes the list
-    for code in wanted.items:
+def select_items(port: str, status: StatusRecord, config: DriverConfig) -> tuple[int, ...]:
+    """Return the output list, without quality items where `MP` reports quality.
+
+    Raises BadInput when the firmware is too old for an item.
+    """
+    if config.quality == "mp":
+        return tuple(code for code in config.items if code not in QUALITY_ITEMS)
+    match = re.match(r"\d+\.\d+", status.firmware)
+    version = float(match[0]) if match else float("inf")  # unknown: the device itself accepts or refuses the list
+    for code in config.items:
         if version < SINCE_FIRMWARE.get(code, 0.0):
             raise BadInput(
-                f"Port {port}: firmware {status.firmware} does not know item {code} (quality), "
-                f"which came with {SINCE_FIRMWARE[code]}.",
-                "Take quality 'mp' (--quality mp), which asks the device once a second instead, or newer firmware.",
+                f"Port {port}: firmware {status.firmware} has no item {code} (quality), "
+                f"which needs {SINCE_FIRMWARE[code]} or newer.",
+                "Use quality 'mp' (--quality mp), which queries the device once a second, or install newer firmware.",
             )
-    return wanted.items
+    return config.items
 
 
 class DeviceConfigurator:
-    """Sets up one device, once. `boresight` is for the first time: later, nobody stands in the pose of reference."""
+    """Configures one device.
+
+    `boresight` belongs to the first configuration only: later nobody stands in the reference pose.
+    """
 
     def __init__(
-        self, port: str, baud: int | None, line: DeviceConnection, status: StatusRecord, wanted: DriverConfig
+        self, port: str, baud: int | None, line: DeviceConnection, status: StatusRecord, config: DriverConfig
     ) -> None:
-        self._port, self._baud, self._line, self._wanted = port, baud, line, wanted
-        self._items = select_items(port, status, wanted)
+        self._port, self._baud, self._line, self._config = port, baud, line, config
+        self._items = select_items(port, status, config)
 
-    def configure(self, stations: StationSelection, boresight: bool, known_hz: float | None = None) -> WireFormat:
-        """Tell and ask; BadInput when the device does not do as it is told, or the line is too slow for it.
+    def configure(self, stations: StationSelection, boresight: bool, previous_hz: float | None = None) -> WireFormat:
+        """Send the configuration and check it; return the resulting wire format.
 
-        `known_hz` is the rate that an earlier set-up found; without it the device is believed what it says of its rate
-        only where its records say the same.
+        `previous_hz` is the rate that an earlier configuration determined [Hz]. Without it, the rate that the device
+        reports is trusted only where its records agree. Raises BadInput when the device does not accept the
+        configuration, or when the line is too slow for it.
         """
-        told_hz = known_hz or self._told_rate_hz()
-        if sure_hz := known_hz or self._wanted.rate_hz:
-            self._check_capacity(len(stations.names), sure_hz)
+        reported_hz = previous_hz or self._query_rate_hz()
+        if given_hz := previous_hz or self._config.rate_hz:
+            self._check_capacity(len(stations.names), given_hz)
         wire = WireFormat(
-            stations.names, told_hz or 1.0, self._items, self._wanted.settings, stations.characters.encode()
+            stations.names, reported_hz or 1.0, self._items, self._config.settings, stations.characters.encode()
         )
         self._line.errors.clear()
-        self._tell(wire)
-        if amiss := self._differences(wire):
-            self._tell(wire)
-            amiss = self._differences(wire)
-        if amiss:
-            raise BadInput(f"Port {self._port}: the device does not do as it is told: {amiss}.", self._advice())
-        self._place(wire, boresight)
-        if known_hz is None:
-            wire = replace(wire, rate_hz=self._rate_hz(wire, told_hz))
+        self._send_settings(wire)
+        if differences := self._differences(wire):
+            self._send_settings(wire)
+            differences = self._differences(wire)
+        if differences:
+            raise BadInput(f"Port {self._port}: the device does not obey its commands: {differences}.", self._advice())
+        self._set_frames(wire, boresight)
+        if previous_hz is None:
+            wire = replace(wire, rate_hz=self._rate_hz(wire, reported_hz))
             self._check_capacity(len(stations.names), wire.rate_hz)
         return wire
 
-    def _told_rate_hz(self) -> float:
-        """As the device says; 0 when it does not."""
+    def _query_rate_hz(self) -> float:
+        """Return the rate that the device reports [Hz]; 0 when it reports none."""
         tracking = self._line.ask(commands.TRACKING, TrackingStatus, self._line.timing.answer_s)
         return tracking.rate_hz if tracking is not None else 0.0
 
-    def _rate_hz(self, wire: WireFormat, told_hz: float) -> float:
-        """As asked for, as told, or as measured, where the records do not say otherwise; BadInput.
+    def _rate_hz(self, wire: WireFormat, reported_hz: float) -> float:
+        """Choose the requested, the reported or the measured rate [Hz]; raise BadInput when they contradict each other.
 
-        Records that fill the line say nothing against a higher rate: the others have found no room.
+        Records that saturate the line are no evidence against a higher rate, because the missing ones found no room.
         """
-        asked_hz, measured_hz = self._wanted.rate_hz, measure_rate_hz(self._line, wire)
-        own_hz = measured_hz or told_hz
-        if asked_hz and own_hz and not _rates_agree(asked_hz, own_hz):
+        requested_hz, measured_hz = self._config.rate_hz, measure_rate_hz(self._line, wire)
+        device_hz = measured_hz or reported_hz
+        if requested_hz and device_hz and not _rates_agree(requested_hz, device_hz):
             raise BadInput(
-                f"Port {self._port}: a rate of {asked_hz:g} Hz is asked for, the device runs at {own_hz:.4g} Hz.",
-                "Leave the rate out, or set the device's own.",
+                f"Port {self._port}: a rate of {requested_hz:g} Hz is requested, "
+                f"but the device runs at {device_hz:.4g} Hz.",
+                "Omit the rate, or give that of the device.",
             )
-        for rate_hz in (asked_hz, told_hz):
+        for rate_hz in (requested_hz, reported_hz):
             if rate_hz and (measured_hz is None or _rates_agree(rate_hz, measured_hz)):
                 return rate_hz
-        if measured_hz is not None and told_hz > measured_hz and self._filled(len(wire.stations), measured_hz):
-            return told_hz
         if measured_hz is None:
             raise BadInput(
-                f"Port {self._port}: the device does not tell its rate, and sent next to no records of station "
-                f"{chr(wire.characters[0])} in {self._line.timing.measure_s:g} s.",
-                "See that this station is plugged in, or give the rate.",
+                f"Port {self._port}: the device does not report its rate, and sent too few records of station "
+                f"{chr(wire.characters[0])} in {self._line.timing.measure_s:g} s to measure it.",
+                "Check that this station is plugged in, or give the rate.",
             )
+        if reported_hz > measured_hz and self._is_saturated(len(wire.stations), measured_hz):
+            return reported_hz
         return measured_hz
 
     def _check_capacity(self, stations: int, rate_hz: float) -> None:
-        """BadInput when the line cannot carry it."""
-        check_capacity(self._port, self._baud, stations, self._items, rate_hz, self._asked_hz)
+        """Raise BadInput when the line cannot carry this many stations at this rate."""
+        check_capacity(self._port, self._baud, stations, self._items, rate_hz, self._poll_hz)
 
-    def _filled(self, stations: int, rate_hz: float) -> bool:
-        """Whether the line has next to no room left at this rate."""
+    def _is_saturated(self, stations: int, rate_hz: float) -> bool:
+        """Whether the line has almost no capacity left at this rate."""
         return (
             self._baud is not None
-            and required_bit_rate(stations, self._items, rate_hz, self._asked_hz) >= SATURATED_SHARE * self._baud
+            and required_bit_rate(stations, self._items, rate_hz, self._poll_hz) >= SATURATED_SHARE * self._baud
         )
 
     @property
-    def _asked_hz(self) -> float:
-        """How often `MP` is asked for."""
-        return 1.0 / self._line.timing.tracking_s if self._wanted.quality == "mp" else 0.0
+    def _poll_hz(self) -> float:
+        """How often `MP` is sent [Hz]."""
+        return 1.0 / self._line.timing.tracking_s if self._config.quality == "mp" else 0.0
 
-    def _tell(self, wire: WireFormat) -> None:
-        wanted = self._wanted
+    def _send_settings(self, wire: WireFormat) -> None:
+        config = self._config
         self._line.send(commands.BINARY)
-        self._line.send(commands.CENTIMETRES if wanted.centimetres else commands.INCHES)
-        self._line.send(commands.MILLISECONDS if wanted.milliseconds else commands.MICROSECONDS)
+        self._line.send(commands.CENTIMETRES if config.centimetres else commands.INCHES)
+        self._line.send(commands.MILLISECONDS if config.milliseconds else commands.MICROSECONDS)
         for station in wire.characters.decode():
             self._line.send(commands.set_output_list(station, wire.items))
-            # the answer paces us: the device's own buffer is small (error -5, docs/is900.md 6.4)
+            # Wait for the reply, because the device's input buffer is small (error -5, docs/is900.md 6.4).
             self._line.ask(commands.query_output_list(station), OutputList, self._line.timing.answer_s)
 
     def _differences(self, wire: WireFormat) -> str:
-        """What the device has otherwise than it was told; empty when all is well."""
+        """Describe where the device differs from the configuration; empty when it agrees."""
         line, answer_s = self._line, self._line.timing.answer_s
         status = line.ask(commands.STATUS, StatusRecord, answer_s)
         if status is None:
             return "no answer to S"
         system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
-        found = [
+        texts = [
             "it reports in ASCII" if not status.binary else "",
-            "it goes on sending" if status.continuous else "",
+            "it does not stop streaming" if status.continuous else "",
             f"it reports in {'centimetres' if status.centimetres else 'inches'}"
-            if status.centimetres != self._wanted.centimetres
+            if status.centimetres != self._config.centimetres
             else "",
             f"its clock counts {'micro' if system.microseconds else 'milli'}seconds"
-            if system is not None and system.microseconds == self._wanted.milliseconds
+            if system is not None and system.microseconds == self._config.milliseconds
             else "",
         ]
         for station in wire.characters.decode():
-            answer = line.ask(commands.query_output_list(station), OutputList, answer_s)
-            if answer is None:
-                found.append(f"no answer to O{station}")
-            elif answer.station != station or answer.items != wire.items:
-                found.append(f"the list of station {answer.station} is {','.join(map(str, answer.items))}")
-        return ", ".join(filter(None, found))
+            reply = line.ask(commands.query_output_list(station), OutputList, answer_s)
+            if reply is None:
+                texts.append(f"no answer to O{station}")
+            elif reply.station != station or reply.items != wire.items:
+                texts.append(f"the list of station {reply.station} is {','.join(map(str, reply.items))}")
+        return ", ".join(filter(None, texts))
 
-    def _place(self, wire: WireFormat, boresight: bool) -> None:
-        """The frames that stations report in; BadInput when the device refuses them."""
+    def _set_frames(self, wire: WireFormat, boresight: bool) -> None:
+        """Set the frames that stations report in. Raises BadInput when the device refuses them."""
         self._line.errors.clear()
         for station, name in zip(wire.characters.decode(), wire.stations, strict=True):
-            if (frame := self._wanted.alignment_of(name)) is not None:
+            if (frame := self._config.alignment_of(name)) is not None:
                 self._line.send(commands.undo_alignment(station))
                 self._line.send(commands.alignment(station, *([100.0 * value for value in point] for point in frame)))
             if boresight:
                 self._line.send(commands.boresight(station))
-        if boresight or self._wanted.alignment is not None:
-            self._line.ask(commands.STATUS, StatusRecord, self._line.timing.answer_s)  # errors come before its answer
+        if boresight or self._config.alignment is not None:
+            self._line.ask(commands.STATUS, StatusRecord, self._line.timing.answer_s)  # error records come before it
         if self._line.errors:
-            raise BadInput(f"Port {self._port}: the device refuses its frame.", self._advice())
+            raise BadInput(f"Port {self._port}: the device refuses the alignment or boresight.", self._advice())
 
     def _advice(self) -> str:
-        said = "; ".join(f"{error.command}: error {error.code}" for error in self._line.errors[-3:])
-        return f"It said: {said}." if said else "Switch it off and on, and see that no other program talks to it."
+        errors = "; ".join(f"{error.command}: error {error.code}" for error in self._line.errors[-3:])
+        if errors:
+            return f"The device reported: {errors}."
+        return "Switch it off and on, and check that no other program uses it."
 
 
-def _rates_agree(one_hz: float, other_hz: float) -> bool:
-    return abs(one_hz - other_hz) <= RATE_TOLERANCE * other_hz
+def _rates_agree(first_hz: float, second_hz: float) -> bool:
+    return abs(first_hz - second_hz) <= RATE_TOLERANCE * second_hz

@@ -1,4 +1,4 @@
-"""Find the device: which rate the port speaks, and whether it is an IS-900 that answers."""
+"""Detection of the device: find the baud rate of the port, and check that an IS-900 answers."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from harness.stream.driver.transport import LineLost
 
 
 class NoAnswer(BadInput):
-    """Nothing that an IS-900 says came over the line."""
+    """No reply of an IS-900 came over the line."""
 
 
 @dataclass(frozen=True)
@@ -23,22 +23,22 @@ class DetectedDevice:
 
     line: DeviceConnection
     baud: int | None
-    """Of the port [bit/s]; None where bytes go as fast as they can, over TCP."""
+    """Baud rate of the port [bit/s]; None over TCP, where there is no such limit."""
     status: StatusRecord
 
 
-def candidate_baud_rates(port: str, wanted: DriverConfig) -> Sequence[int | None]:
-    """The rates to try on this port."""
+def candidate_baud_rates(port: str, config: DriverConfig) -> Sequence[int | None]:
+    """Return the baud rates to try on this port; (None,) over TCP."""
     if "://" in port:
         return (None,)
-    return BAUD_RATES if wanted.baud is None else (wanted.baud,)
+    return BAUD_RATES if config.baud is None else (config.baud,)
 
 
 def detect_device(
     port: str, bauds: Sequence[int | None], connect: Callable[[int | None], DeviceConnection], answer_s: float
 ) -> DetectedDevice:
-    """Open the port at one rate after another, until an IS-900 answers; BadInput when none does."""
-    heard = 0
+    """Open the port at one baud rate after another until an IS-900 answers. Raises BadInput when none does."""
+    total_bytes = 0
     for baud in bauds:
         line = connect(baud)
         try:
@@ -46,7 +46,7 @@ def detect_device(
             if status is not None:
                 _check_kind(port, status)
                 return DetectedDevice(line, baud, status)
-            heard += line.received_bytes
+            total_bytes += line.received_bytes
         except LineLost as lost:
             line.transport.close()
             raise NoAnswer(
@@ -56,11 +56,11 @@ def detect_device(
             line.transport.close()
             raise
         line.transport.close()
-    raise _no_answer_error(port, bauds, heard)
+    raise _no_answer_error(port, bauds, total_bytes)
 
 
 def query_status(line: DeviceConnection, answer_s: float) -> StatusRecord | None:
-    """The device's answer to `S`, once it is silent."""
+    """Stop the device and return its reply to `S`; None when it does not stop or does not answer."""
     if not line.stop(WAKE_UP):
         return None
     status = line.ask(STATUS, StatusRecord, answer_s)
@@ -73,20 +73,20 @@ def query_status(line: DeviceConnection, answer_s: float) -> StatusRecord | None
 def _check_kind(port: str, status: StatusRecord) -> None:
     if "IS900" not in re.sub("[- ]", "", status.identification.upper()):
         raise BadInput(
-            f"Port {port}: {status.identification.strip()!r}, firmware {status.firmware}, answers, which is no IS-900.",
+            f"Port {port}: the device {status.identification.strip()!r}, firmware {status.firmware}, is no IS-900.",
             "Name the port of an IS-900.",
         )
 
 
-def _no_answer_error(port: str, bauds: Sequence[int | None], heard: int) -> NoAnswer:
+def _no_answer_error(port: str, bauds: Sequence[int | None], received_bytes: int) -> NoAnswer:
     rates = " at " + ", ".join(map(str, bauds)) + " baud" if bauds[0] else ""
-    one_rate = "The rate may be wrong: leave it out, and each is tried. " if bauds[0] and len(bauds) == 1 else ""
-    if heard == 0:
+    advice = "The baud rate may be wrong: omit it, and each is tried. " if bauds[0] and len(bauds) == 1 else ""
+    if received_bytes == 0:
         return NoAnswer(
             f"Port {port}: nothing answers{rates}.",
-            f"{one_rate}Is the device on and has it started (up to 20 s), the cable a null modem, and this its port?",
+            f"{advice}Is the device on and started (up to 20 s), the cable a null modem, and this its port?",
         )
     return NoAnswer(
-        f"Port {port}: {heard} bytes came{rates}, but no answer of an IS-900.",
-        one_rate.strip() or "Something else may be at this port, or the cable is bad. Name the port of an IS-900.",
+        f"Port {port}: {received_bytes} bytes arrived{rates}, but no reply of an IS-900.",
+        advice.strip() or "Another device may be at this port, or the cable is bad. Name the port of an IS-900.",
     )

@@ -1,4 +1,4 @@
-"""What the driver needs of the computer it runs on; a test puts its own in, where hours pass at once."""
+"""What the driver needs from its computer: ports and clocks. Tests replace it with a simulated one."""
 
 import time
 from collections.abc import Callable
@@ -9,10 +9,10 @@ from harness.stream.driver.transport import Transport, open_transport
 
 @dataclass(frozen=True)
 class Host:
-    """Ports and clocks."""
+    """Ports and clocks of the computer that the driver runs on."""
 
     open: Callable[[str, int], Transport] = open_transport
-    """Port and baud to a line; BadInput."""
+    """Opens a port at a baud rate. Raises BadInput."""
     monotonic_s: Callable[[], float] = time.monotonic
     wall_s: Callable[[], float] = time.time
     sleep: Callable[[float], None] = time.sleep

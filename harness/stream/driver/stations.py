@@ -1,4 +1,4 @@
-"""Which of the device's stations are read, and what they are called."""
+"""Selection of the device's stations that are read, and their names."""
 
 from dataclasses import dataclass
 
@@ -11,19 +11,19 @@ from harness.stream.driver.connection import DeviceConnection
 
 @dataclass(frozen=True)
 class StationSelection:
-    """Those that are read."""
+    """The stations that are read, and the active ones that are not."""
 
     characters: str
-    """As on the wire, ascending."""
+    """Their characters on the wire, ascending."""
     names: tuple[str, ...]
     others: str
-    """Active ones that nobody named: switched off while the driver is at work, since they would fill the line."""
+    """Active stations without a name. They are switched off while the driver runs, since they would load the line."""
 
 
 def select_stations(port: str, line: DeviceConnection, names: tuple[str, ...] | None) -> StationSelection:
-    """The first so many active stations; BadInput when the device has fewer.
+    """Select the first active stations, as many as there are names. Raises BadInput when the device has fewer.
 
-    A device that does not say which it has is believed to have those that are named.
+    A device that does not report its stations is assumed to have the named ones.
     """
     active = _query_active(port, line, STATION_CHARACTERS.decode()[: len(names or ())])
     if not active:
@@ -31,16 +31,19 @@ def select_stations(port: str, line: DeviceConnection, names: tuple[str, ...] | 
     names = tuple(active) if names is None else names
     if not 1 <= len(names) <= len(active):
         raise BadInput(
-            f"Port {port}: {len(names)} stations wanted ({', '.join(names)}), the device has {len(active)} active "
+            f"Port {port}: {len(names)} stations requested ({', '.join(names)}), the device has {len(active)} active "
             f"({', '.join(active)}).",
-            "Name as many as there are or fewer, plug in what is missing, or switch the device off and on: another "
+            "Name at most the active ones, plug in the missing ones, or switch the device off and on: another "
             "program may have switched stations off.",
         )
     return StationSelection(active[: len(names)], names, active[len(names) :])
 
 
 def restore_stations(port: str, line: DeviceConnection, stations: StationSelection) -> str:
-    """Switch on what is read and off what is not, as far as it is otherwise; the stations that stay missing."""
+    """Switch on the selected stations and switch off the others where needed; return those that stay missing.
+
+    Raises BadInput when a station cannot be switched off.
+    """
     active = _query_active(port, line, stations.characters)
     wrong = [name for name in stations.characters if name not in active] + [
         name for name in stations.others if name in active
@@ -50,13 +53,16 @@ def restore_stations(port: str, line: DeviceConnection, stations: StationSelecti
     for name in wrong:
         line.send(switch_station(name, name in stations.characters))
     active = _query_active(port, line, stations.characters)
-    if stay := [name for name in stations.others if name in active]:
-        raise BadInput(f"Port {port}: station {', '.join(stay)} cannot be switched off.", "Unplug it, or name it.")
+    if stubborn := [name for name in stations.others if name in active]:
+        raise BadInput(f"Port {port}: station {', '.join(stubborn)} cannot be switched off.", "Unplug it, or name it.")
     return "".join(name for name in stations.characters if name not in active)
 
 
-def _query_active(port: str, line: DeviceConnection, silent: str) -> str:
-    """By `l*`, or by `MP`, which old firmware may know alone; `silent` when the device answers neither. BadInput."""
+def _query_active(port: str, line: DeviceConnection, fallback: str) -> str:
+    """Return the active stations by `l*`, or by `MP`, because old firmware may know only that.
+
+    `fallback` is returned when the device answers neither. Raises BadInput when it is empty.
+    """
     answer_s = line.timing.answer_s
     states = line.ask(STATION_STATES, StationStates, answer_s) or line.ask(STATION_STATES, StationStates, answer_s)
     if states is not None:
@@ -66,9 +72,9 @@ def _query_active(port: str, line: DeviceConnection, silent: str) -> str:
         return "".join(
             name for name, state in zip(STATION_CHARACTERS.decode(), tracking.states, strict=True) if state in "TL"
         )
-    if not silent:
+    if not fallback:
         raise BadInput(
-            f"Port {port}: the device does not answer l* nor MP, so which stations it has is not known.",
-            "Name the stations that are plugged in, from the first on, or switch it off and on.",
+            f"Port {port}: the device answers neither l* nor MP, so its stations are not known.",
+            "Name the stations that are plugged in, from the first on, or switch the device off and on.",
         )
-    return silent
+    return fallback

@@ -1,8 +1,9 @@
-"""A line to a device: a serial port by pyserial, or TCP by a socket of our own. Bytes, no meaning.
+"""Transports: a serial port by pyserial, or TCP by a socket of our own. They carry bytes without interpretation.
 
-pyserial's `socket://` loses bytes that come while it opens and those already read when the peer closes, and its
-`in_waiting` is 0 or 1; so TCP goes without it, and nothing here asks how much is waiting: reads take what is there.
-Where the operating system can wait for a port (everywhere but on Windows), a read waits in `select`.
+pyserial's `socket://` loses bytes that arrive while it opens and those already read when the peer closes, and its
+`in_waiting` is only 0 or 1. Therefore TCP does not use it, and no transport asks how many bytes are waiting: reads take
+what is available. A read waits in `select` wherever the operating system can wait for a port, which is everywhere but
+on Windows.
 """
 
 import contextlib
@@ -32,15 +33,15 @@ else:
 
     _IO_ERRORS = (OSError, ValueError, termios.error)
 READ_BYTES = 65536
-"""More than any operating system keeps for a port [bytes]."""
+"""More than any operating system buffers for a port [bytes]."""
 WRITE_TIMEOUT_S, CONNECT_TIMEOUT_S = 2.0, 2.0
-"""A line that takes no byte for so long is lost; so is a host that does not answer [s]."""
+"""A line that takes no byte for so long is lost; a host that does not answer for so long is unreachable [s]."""
 _POLL_INTERVAL_S = 0.002
-"""Between two looks at a port that cannot be waited for [s]."""
+"""Interval between two reads of a port that cannot be waited for [s]."""
 
 
 class LineLost(HarnessError):
-    """The line is gone: unplugged, closed by the other side, or closed by us."""
+    """The line is gone: unplugged, closed by the other side, or closed by this program."""
 
     def __init__(self, port: str, why: str) -> None:
         super().__init__(port, why)
@@ -51,31 +52,34 @@ class LineLost(HarnessError):
 
 
 class Transport(Protocol):
-    """A line that is open. One thread reads; another may write or close meanwhile."""
+    """Interface of an open line. One thread reads; another may write or close meanwhile."""
 
     @property
     def name(self) -> str:
-        """As the user named it."""
+        """The port as the user named it."""
         ...
 
     def read(self, timeout_s: float) -> bytes:
-        """What is there; waits for the first byte at most so long, then b"". LineLost when nothing can come."""
+        """Return the available bytes, after a wait of at most `timeout_s` for the first one; b"" when none arrives.
+
+        Raises LineLost when nothing can arrive any more.
+        """
         ...
 
     def write(self, data: bytes) -> None:
-        """Send all of it; LineLost when the line does not take it."""
+        """Send all bytes. Raises LineLost when the line does not take them."""
         ...
 
     def close(self) -> None:
-        """May be done twice, and while another thread reads: its read ends with LineLost."""
+        """Close the line. May be called twice, and while another thread reads: its read raises LineLost."""
         ...
 
 
 def open_transport(port: str, baud: int = 115200) -> Transport:
-    """Open `/dev/ttyUSB0`, `COM3`, a pty, `tcp://host:port` or `socket://host:port`, and nothing else.
+    """Open `/dev/ttyUSB0`, `COM3`, a pty, `tcp://host:port` or `socket://host:port`; other addresses are refused.
 
     A serial port is opened for this process alone: 8N1, no handshake, as every IS-900 client does (docs/is900.md 2).
-    BadInput when there is no such port or host, it is taken, or may not be opened.
+    Raises BadInput when there is no such port or host, or when it is in use or may not be opened.
     """
     if port.startswith(("tcp://", "socket://")):
         return _TcpTransport(port, parse_tcp_address(port))
@@ -89,7 +93,7 @@ def open_transport(port: str, baud: int = 115200) -> Transport:
 
 
 class _BaseTransport(ABC):
-    """What the kinds of lines share: one reader at a time, and a close that a reader notices."""
+    """Shared part of all transports: one reader at a time, and a close that the reader notices."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -116,27 +120,27 @@ class _BaseTransport(ABC):
         self._closed.set()
         self._wake()
         with self._reading:
-            self._shut()
+            self._release()
 
     def _reason(self, error: Exception) -> str:
         return "closed" if self._closed.is_set() else f"the line is gone ({error})"
 
     @abstractmethod
     def _receive(self, timeout_s: float) -> bytes:
-        """What is there after a wait of at most so long."""
+        """Return the bytes that are available after a wait of at most `timeout_s` [s]."""
 
     @abstractmethod
     def _send(self, data: bytes) -> None: ...
 
-    def _wake(self) -> None:  # noqa: B027  # where nothing waits for long there is nothing to end
+    def _wake(self) -> None:  # noqa: B027  # the default does nothing: short waits need no waking
         """End the wait of another thread."""
 
     @abstractmethod
-    def _shut(self) -> None: ...
+    def _release(self) -> None: ...
 
 
 class _SelectTransport(_BaseTransport):
-    """A line whose descriptor can be waited for."""
+    """A transport whose file descriptor can be waited for."""
 
     def __init__(self, name: str, descriptor: int) -> None:
         super().__init__(name)
@@ -147,27 +151,27 @@ class _SelectTransport(_BaseTransport):
         ready, _, _ = select.select([self._descriptor, self._woken.fileno()], [], [], max(timeout_s, 0.0))
         if self._descriptor in ready:
             return self._take()
-        self._look()
+        self._check_alive()
         return b""
 
     @abstractmethod
     def _take(self) -> bytes:
-        """What is there, now that something is."""
+        """Return the available bytes, of which there is at least one."""
 
-    def _look(self) -> None:  # a socket tells by itself
-        """Nothing came: OSError when nothing can."""
+    def _check_alive(self) -> None:  # a socket reports a lost peer by itself
+        """Called when nothing arrived; raises OSError when nothing can arrive any more."""
 
     def _wake(self) -> None:
-        with contextlib.suppress(OSError):  # closed before
+        with contextlib.suppress(OSError):  # closed already
             self._waker.send(b"x")
 
-    def _shut(self) -> None:
+    def _release(self) -> None:
         self._woken.close()
         self._waker.close()
 
 
 class SelectSerialTransport(_SelectTransport):
-    """A serial port where the operating system can wait for it."""
+    """A serial port that the operating system can wait for."""
 
     def __init__(self, name: str, port: serial.Serial) -> None:
         super().__init__(name, port.fileno())
@@ -176,20 +180,20 @@ class SelectSerialTransport(_SelectTransport):
     def _take(self) -> bytes:
         return bytes(self._port.read(READ_BYTES))
 
-    def _look(self) -> None:
+    def _check_alive(self) -> None:
         if os.stat(self.name).st_rdev != os.fstat(self._descriptor).st_rdev:
-            raise OSError("the name stands for another port now")
+            raise OSError("the name belongs to another port now")
 
     def _send(self, data: bytes) -> None:
         self._port.write(data)
 
-    def _shut(self) -> None:
+    def _release(self) -> None:
         self._port.close()
-        super()._shut()
+        super()._release()
 
 
 class PolledSerialTransport(_BaseTransport):
-    """A serial port on Windows: looked at every other millisecond."""
+    """A serial port on Windows, polled every 2 ms."""
 
     def __init__(self, name: str, port: serial.Serial) -> None:
         super().__init__(name)
@@ -205,12 +209,12 @@ class PolledSerialTransport(_BaseTransport):
     def _send(self, data: bytes) -> None:
         self._port.write(data)
 
-    def _shut(self) -> None:
+    def _release(self) -> None:
         self._port.close()
 
 
 class _TcpTransport(_SelectTransport):
-    """A TCP connection, small packets sent at once."""
+    """A TCP connection that sends small packets at once."""
 
     def __init__(self, name: str, address: tuple[str, int]) -> None:
         try:
@@ -230,6 +234,6 @@ class _TcpTransport(_SelectTransport):
     def _send(self, data: bytes) -> None:
         self._socket.sendall(data)
 
-    def _shut(self) -> None:
+    def _release(self) -> None:
         self._socket.close()
-        super()._shut()
+        super()._release()

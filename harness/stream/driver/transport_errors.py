@@ -1,4 +1,4 @@
-"""Why a line could not be opened: what, where, why, and what to try."""
+"""Errors of opening a line: which port, why, and what to try."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ _BAUD_RATES_TEXT = f"{', '.join(map(str, BAUD_RATES[:-1]))} and {BAUD_RATES[-1]}
 
 
 def unknown_scheme_error(port: str) -> BadInput:
-    """For `spy://...` and other addresses that are not ours."""
+    """Return the error for `spy://...` and other unsupported addresses."""
     return BadInput(
         f"Port {port}: this kind of address is not known.",
         "Name a serial port (/dev/ttyUSB0, COM3), tcp://HOST:PORT or socket://HOST:PORT.",
@@ -23,21 +23,21 @@ def unknown_scheme_error(port: str) -> BadInput:
 
 
 def parse_tcp_address(port: str) -> tuple[str, int]:
-    """Host and number of `tcp://host:port`; BadInput when either is missing."""
+    """Split `tcp://host:port` into host and port number. Raises BadInput when either is missing."""
     try:
         parts = urlsplit(port)
         host, number = parts.hostname, parts.port
     except ValueError as error:
-        raise BadInput(f"Port {port}: {error}.", "Write tcp://HOST:PORT, as tcp://127.0.0.1:5005.") from error
+        raise BadInput(f"Port {port}: {error}.", "Write tcp://HOST:PORT, such as tcp://127.0.0.1:5005.") from error
     if not host or not number:
         raise BadInput(
-            f"Port {port}: host or port number is missing.", "Write tcp://HOST:PORT, as tcp://127.0.0.1:5005."
+            f"Port {port}: host or port number is missing.", "Write tcp://HOST:PORT, such as tcp://127.0.0.1:5005."
         )
     return host, number
 
 
 def tcp_connection_error(port: str, address: tuple[str, int], error: Exception) -> BadInput:
-    """A host that could not be reached."""
+    """Return the error for a host that could not be reached."""
     host, number = address
     if isinstance(error, (socket.gaierror, UnicodeError)):
         return BadInput(f"Port {port}: there is no host called {host}.", "Check the name, or give its address.")
@@ -46,26 +46,26 @@ def tcp_connection_error(port: str, address: tuple[str, int], error: Exception) 
     if isinstance(error, ConnectionRefusedError):
         return BadInput(
             f"Port {port}: nothing listens at {host}, port {number}.",
-            "Start the device (or `harness emulate`) first, and check the number.",
+            "Start the device (or `harness emulate`) first, and check the port number.",
         )
     return BadInput(f"Port {port}: {_error_text(error)}.", "Check the address and the network.")
 
 
 def serial_port_error(port: str, baud: int, error: Exception) -> BadInput:
-    """A serial port that could not be opened."""
+    """Return the error for a serial port that could not be opened."""
     number = getattr(error, "errno", None)
     if isinstance(error, ValueError):
-        return BadInput(f"Port {port} at {baud} baud: {error}.", f"An IS-900 speaks at {_BAUD_RATES_TEXT}.")
+        return BadInput(f"Port {port} at {baud} baud: {error}.", f"An IS-900 uses {_BAUD_RATES_TEXT}.")
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV) or isinstance(error, FileNotFoundError):
-        here = ", ".join(sorted(known.device for known in list_ports.comports())) or "none"
-        return BadInput(f"Port {port}: there is no such port.", f"Serial ports of this computer: {here}.")
+        ports = ", ".join(sorted(known.device for known in list_ports.comports())) or "none"
+        return BadInput(f"Port {port}: there is no such port.", f"Serial ports of this computer: {ports}.")
     if number == errno.EACCES and os.name == "posix":
         return BadInput(
             f"Port {port}: permission denied.",
-            f"Join the group that may open it ({_owner_group(port)}), then log in anew.",
+            f"Join the group that may open it ({_owner_group(port)}), then log in again.",
         )
     if number in (*_BUSY_ERRNOS, errno.EACCES):
-        return BadInput(f"Port {port}: another program has it open.", "Close that program; one alone may use the port.")
+        return BadInput(f"Port {port}: another program has it open.", "Close that program; only one may use the port.")
     return BadInput(
         f"Port {port} cannot be used as a serial port: {_error_text(error)}.", "Name the port of the device."
     )
@@ -76,7 +76,7 @@ def _error_text(error: Exception) -> str:
 
 
 def _owner_group(port: str) -> str:
-    """Who owns a port file, as far as can be told."""
+    """Return the group that owns a port file, or a guess where that cannot be determined."""
     try:
         import grp
 

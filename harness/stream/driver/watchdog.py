@@ -1,7 +1,7 @@
-"""Is all well on the line? Told what comes and when, it finds trouble and says what to do; no input or output.
+"""Watchdog of the line: given what arrives and when, it detects trouble and chooses a recovery action; no I/O.
 
-Trouble is told once, until records have come again. What the device is asked meanwhile it answers between records, so
-that nothing is lost where all was well.
+Each trouble is reported once, until records arrive again. The device answers status queries between records, so that a
+query costs nothing where all is well.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,13 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEventKind
 
 RecoveryAction = Literal["none", "ask", "set up", "reopen"]
-"""Ask how the device is, set it up anew, or open the line anew and then set it up."""
+"""What to do: query the state of the device ("ask"), configure it again ("set up"), or reopen the line and then
+configure it ("reopen")."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """Something to be told, something to be done, or both."""
+    """A recovery action, an event to report, or both."""
 
     action: RecoveryAction
     kind: LineEventKind | None = None
@@ -30,132 +31,136 @@ class Diagnosis:
 
 
 class Watchdog:
-    """Looks on while data flow; `pause` and `start` enclose a set-up."""
+    """Monitors the stream while data flow. Call `pause` before a configuration and `start` after it."""
 
     def __init__(self, timing: DriverTiming) -> None:
         self._timing = timing
-        self._told: dict[LineEventKind, float] = {}
-        """Troubles since records came last, and when each was told [s]."""
+        self._reported: dict[LineEventKind, float] = {}
+        """Troubles since the last record, and when each was reported [s]."""
         self._wire: WireFormat | None = None
-        """While data flow."""
-        self._began_s = self._sound_s = self._heard_s = self._asked_s = self._spoilt_s = self._clean_until_s = 0.0
-        self._framed_s: float | None = None
-        """When the last sound frame came [s]; None before the first."""
+        """Wire format while data flow; None otherwise."""
+        self._began_s = self._last_record_s = self._last_byte_s = self._asked_s = 0.0
+        self._last_garbage_s = self._garbage_began_s = 0.0
+        self._last_frame_s: float | None = None
+        """Time of the last sound frame [s]; None before the first."""
         self._device_s = -np.inf
-        self._garbage, self._resets, self._zeroed = 0, 0, 0
+        self._garbage_bytes, self._resets, self._expected_resets = 0, 0, 0
         self._complaints: dict[str, float] = {}
-        """What answers showed amiss, and when [s]."""
+        """Differences found in replies, and when [s]."""
         self._connected = False
 
     def pause(self) -> None:
-        """Data do not flow."""
+        """Data stop flowing."""
         self._wire = None
 
     def start(self, wire: WireFormat, now_s: float) -> None:
-        """Data are about to flow."""
+        """Data are about to flow in this format."""
         self._wire = wire
-        self._began_s = self._sound_s = self._heard_s = self._asked_s = now_s
-        self._garbage, self._resets, self._zeroed, self._complaints, self._connected = 0, 0, 0, {}, False
+        self._began_s = self._last_record_s = self._last_byte_s = self._asked_s = now_s
+        self._garbage_bytes, self._resets, self._expected_resets, self._complaints, self._connected = 0, 0, 0, {}, False
 
-    def zeroed(self) -> None:
-        """The device's clock was set to zero on purpose."""
-        self._zeroed += 1
+    def note_zeroing(self) -> None:
+        """Note that the driver has set the device's clock to zero."""
+        self._expected_resets += 1
 
-    def tell(self, kind: LineEventKind, text: str, now_s: float, step: RecoveryAction = "none") -> Diagnosis:
-        """The finding, without its words when it was told before."""
-        if kind in self._told:
-            return Diagnosis(step)
-        self._told[kind] = now_s
-        return Diagnosis(step, kind, text)
+    def report(self, kind: LineEventKind, text: str, now_s: float, action: RecoveryAction = "none") -> Diagnosis:
+        """Return a diagnosis of this kind; it has no event when one of this kind was reported already."""
+        if kind in self._reported:
+            return Diagnosis(action)
+        self._reported[kind] = now_s
+        return Diagnosis(action, kind, text)
 
-    def framed(self, frames: Sequence[TrackerFrame], now_s: float) -> list[Diagnosis]:
-        """Frames came; they are sound when the device's clock goes on."""
+    def add_frames(self, frames: Sequence[TrackerFrame], now_s: float) -> list[Diagnosis]:
+        """Take frames that arrived. They count as sound only when the device's clock advances."""
         if self._wire is None or not frames:
             return []
         device_s = max(float(np.fmax.reduce(frame.measured_s, initial=-np.inf)) for frame in frames)
         if 21 in self._wire.items and device_s <= self._device_s:
             return []
-        news = not self._connected or set(self._told) - {"garbage"}
-        again = "" if self._framed_s is None else f" again after {now_s - self._framed_s:.1f} s"
+        changed = not self._connected or set(self._reported) - {"garbage"}
+        gap = "" if self._last_frame_s is None else f" again after {now_s - self._last_frame_s:.1f} s"
         self._device_s, self._connected = device_s, True
-        self._sound_s = self._framed_s = now_s
-        self._told = {kind: told_s for kind, told_s in self._told.items() if kind == "garbage"}
-        if not news:
+        self._last_record_s = self._last_frame_s = now_s
+        self._reported = {kind: reported_s for kind, reported_s in self._reported.items() if kind == "garbage"}
+        if not changed:
             return []
         stations = f"{len(self._wire.stations)} stations at {self._wire.rate_hz:g} Hz"
-        return [Diagnosis("none", "connected", f"records come{again}: {stations}")]
+        return [Diagnosis("none", "connected", f"records arrive{gap}: {stations}")]
 
-    def check(self, now_s: float, came: bool, reader: FrameReader) -> list[Diagnosis]:
-        """What is amiss now; `came` tells whether bytes did since the last look."""
+    def check(self, now_s: float, bytes_arrived: bool, reader: FrameReader) -> list[Diagnosis]:
+        """Return what is wrong now. `bytes_arrived` tells whether bytes arrived since the last check."""
         if self._wire is None:
             return []
-        if came:
-            self._heard_s = now_s
-        found = self._garbage_found(now_s, reader)
-        found += self._silence_found(now_s)
+        if bytes_arrived:
+            self._last_byte_s = now_s
+        diagnoses = self._check_garbage(now_s, reader)
+        diagnoses += self._check_silence(now_s)
         while reader.replies:
-            found += self._answer(self._wire, parse_reply(reader.replies.popleft().line), now_s)
-        if reader.clock_resets > self._resets + self._zeroed:
-            found.append(self._ask(now_s))
+            diagnoses += self._check_reply(self._wire, parse_reply(reader.replies.popleft().line), now_s)
+        if reader.clock_resets > self._resets + self._expected_resets:
+            diagnoses.append(self._ask(now_s))
         if reader.clock_resets > self._resets:
-            self._zeroed = max(self._zeroed - 1, 0)
+            self._expected_resets = max(self._expected_resets - 1, 0)
         self._resets = reader.clock_resets
-        return found
+        return diagnoses
 
-    def _garbage_found(self, now_s: float, reader: FrameReader) -> list[Diagnosis]:
-        more, self._garbage = reader.garbage_bytes - self._garbage, reader.garbage_bytes
-        if not more:
-            if now_s - self._spoilt_s > self._timing.garbage_s:
-                self._told.pop("garbage", None)
+    def _check_garbage(self, now_s: float, reader: FrameReader) -> list[Diagnosis]:
+        new_bytes, self._garbage_bytes = reader.garbage_bytes - self._garbage_bytes, reader.garbage_bytes
+        if not new_bytes:
+            if now_s - self._last_garbage_s > self._timing.garbage_s:
+                self._reported.pop("garbage", None)
             return []
-        if now_s - self._spoilt_s > self._timing.garbage_s:
-            self._clean_until_s = now_s
-        self._spoilt_s = now_s
-        found = [self.tell("garbage", f"{more} bytes belong to nothing", now_s)]
-        if min(now_s - self._clean_until_s, now_s - self._asked_s) > self._timing.stalled_s:
-            found.append(self._ask(now_s))  # it goes on: is it the list that we expect?
-        return found
+        if now_s - self._last_garbage_s > self._timing.garbage_s:
+            self._garbage_began_s = now_s
+        self._last_garbage_s = now_s
+        diagnoses = [self.report("garbage", f"{new_bytes} bytes belong to no record and no reply", now_s)]
+        if min(now_s - self._garbage_began_s, now_s - self._asked_s) > self._timing.stalled_s:
+            diagnoses.append(self._ask(now_s))  # garbage continues: check the output list
+        return diagnoses
 
-    def _silence_found(self, now_s: float) -> list[Diagnosis]:
-        without_s, timing = now_s - self._sound_s, self._timing
-        if without_s > timing.silent_s:
-            if now_s - self._heard_s < timing.stalled_s:
+    def _check_silence(self, now_s: float) -> list[Diagnosis]:
+        elapsed_s, timing = now_s - self._last_record_s, self._timing
+        if elapsed_s > timing.silent_s:
+            if now_s - self._last_byte_s < timing.stalled_s:
                 return [Diagnosis("set up")]
-            return [self.tell("silent", f"no byte for {now_s - self._heard_s:.1f} s", now_s, "reopen")]
-        if without_s > timing.stalled_s and now_s - self._asked_s > timing.stalled_s:
-            silent = now_s - self._heard_s > timing.stalled_s
-            what = "no byte" if silent else "no record that is news"
-            return [self.tell("stalled", f"{what} for {without_s:.1f} s", now_s), self._ask(now_s)]
+            return [self.report("silent", f"no byte for {now_s - self._last_byte_s:.1f} s", now_s, "reopen")]
+        if elapsed_s > timing.stalled_s and now_s - self._asked_s > timing.stalled_s:
+            silent = now_s - self._last_byte_s > timing.stalled_s
+            what = "no byte" if silent else "no new record"
+            return [self.report("stalled", f"{what} for {elapsed_s:.1f} s", now_s), self._ask(now_s)]
         return []
 
     def _ask(self, now_s: float) -> Diagnosis:
         self._asked_s = now_s
         return Diagnosis("ask")
 
-    def _answer(self, wire: WireFormat, reply: ParsedReply, now_s: float) -> list[Diagnosis]:
-        """A wrong answer may be a damaged one: it counts when it soon comes twice."""
+    def _check_reply(self, wire: WireFormat, reply: ParsedReply, now_s: float) -> list[Diagnosis]:
+        """Compare a reply with the configuration.
+
+        A difference counts when it soon occurs twice, since one may be damage.
+        """
         recent_s = now_s - self._timing.silent_s
-        self._complaints = {text: said_s for text, said_s in self._complaints.items() if said_s > recent_s}
+        self._complaints = {text: since_s for text, since_s in self._complaints.items() if since_s > recent_s}
         kind, complaint = diagnose_reply(wire, reply)
         if kind is None:
             return []
         if complaint in self._complaints:
-            return [self.tell(kind, complaint, now_s, "set up")]
+            return [self.report(kind, complaint, now_s, "set up")]
         first = not self._complaints
         self._complaints[complaint] = now_s
         return [self._ask(now_s)] if first else []
 
 
 def diagnose_reply(wire: WireFormat, reply: ParsedReply, streaming: bool = True) -> tuple[LineEventKind | None, str]:
-    """What an answer shows to be otherwise than it was set up, as a kind of trouble and in words."""
+    """Return how a reply differs from the configuration, as an event kind and a text; (None, "") when it agrees."""
     if isinstance(reply, StatusRecord):
-        amiss = [
+        differences = [
             "it reports in ASCII" if not reply.binary else "",
-            "its unit is another" if reply.centimetres != (wire.settings.metres_per_unit == 0.01) else "",
+            "its unit differs" if reply.centimetres != (wire.settings.metres_per_unit == 0.01) else "",
             "it does not stream" if streaming and not reply.continuous else "",
         ]
-        if any(amiss):
-            return "reset", "the device was reset: " + ", ".join(filter(None, amiss))
+        if any(differences):
+            return "reset", "the device was reset: " + ", ".join(filter(None, differences))
     if isinstance(reply, OutputList) and reply.station in wire.characters.decode() and reply.items != wire.items:
         return "wrong list", f"the list of station {reply.station} is {','.join(map(str, reply.items))}"
     return None, ""

@@ -1,6 +1,8 @@
-"""An IS-900 that plays readings in real time, for drivers and for programs of others (docs/device.md, Emulator).
+"""Emulator: an IS-900 that plays readings in real time, for drivers and third-party programs (docs/device.md,
+Emulator).
 
-`Device` is the machine without input or output; `Emulator` adds a line and its faults; `serve_emulator` puts it at a port.
+`Device` is the device without input or output. `Emulator` adds a serial line and its faults. `serve_emulator` serves it
+at a port.
 """
 
 from harness.stream.emulator.config import EmulatorConfig

@@ -1,4 +1,4 @@
-"""The rest of a command line, after its name: a station and fields between commas, or what is wrong with them."""
+"""The argument of a command line, which follows its name: a station and fields between commas."""
 
 import math
 from dataclasses import dataclass
@@ -8,11 +8,11 @@ from harness.stream.emulator.settings import STATION_NAMES
 MISSING, NOT_A_NUMBER, OUT_OF_RANGE, UNKNOWN_COMMAND = -1, -2, -3, -99
 """Error codes (docs/is900.md 6.4)."""
 _MAX_MAGNITUDE = 1e6
-"""No place, angle or rate that a device could mean is larger [choice]."""
+"""No position, angle or rate that a device could mean is larger [choice]."""
 
 
 class CommandError(Exception):
-    """A command that gets an error record."""
+    """An error in a command, which the device answers with an error record."""
 
     def __init__(self, code: int, field: int = 1) -> None:
         super().__init__(code, field)
@@ -21,22 +21,22 @@ class CommandError(Exception):
 
 @dataclass(frozen=True)
 class CommandArgument:
-    """Such as `1,2,11,0` of `O1,2,11,0`."""
+    """The argument of a command, such as `1,2,11,0` of `O1,2,11,0`. Methods raise CommandError for an invalid field."""
 
     text: str
 
     @property
     def fields(self) -> list[str]:
-        """Between commas, without blanks; the first one is the station where the command has one."""
+        """The fields between commas, without blanks. The first is the station if the command has one."""
         return [field.strip() for field in self.text.split(",")]
 
     @property
     def sets(self) -> bool:
-        """Whether something follows the first field."""
+        """Whether a field follows the first one."""
         return "," in self.text
 
     def station(self) -> str:
-        """Stations may be named in either case (docs/is900.md 3)."""
+        """Return the station, which may be given in either case (docs/is900.md 3)."""
         name = self.fields[0].upper()
         if not name:
             raise CommandError(MISSING)
@@ -44,37 +44,37 @@ class CommandArgument:
             raise CommandError(OUT_OF_RANGE)
         return name
 
-    def numbers(self, count: int | None = None, after: int = 1, largest: float = _MAX_MAGNITUDE) -> list[float]:
-        """The fields after so many others, as many as `count`; none is larger in size."""
+    def numbers(self, count: int | None = None, after: int = 1, max_magnitude: float = _MAX_MAGNITUDE) -> list[float]:
+        """Return the fields from index `after` on, exactly `count` of them, each of at most this magnitude."""
         texts = self.fields[after:]
         if count is not None and len(texts) > count:
             raise CommandError(OUT_OF_RANGE, after + count + 1)
         if count is not None and len(texts) < count:
             raise CommandError(MISSING, after + len(texts) + 1)
-        return [_parse_number(text, after + k + 1, largest) for k, text in enumerate(texts)]
+        return [_parse_number(text, after + k + 1, max_magnitude) for k, text in enumerate(texts)]
 
     def codes(self) -> list[int]:
-        """The fields after the first: whole numbers."""
+        """Return the fields after the first as integers."""
         values = self.numbers()
-        for place, value in enumerate(values):
+        for index, value in enumerate(values):
             if value != int(value):
-                raise CommandError(OUT_OF_RANGE, place + 2)
+                raise CommandError(OUT_OF_RANGE, index + 2)
         return [int(value) for value in values]
 
     def integer(self, low: int, high: int, after: int = 1) -> int:
-        """The one field after so many others: a whole number within these."""
-        (value,) = self.numbers(1, after, largest=high)
+        """Return the only field from index `after` on, an integer from `low` to `high`."""
+        (value,) = self.numbers(1, after, max_magnitude=high)
         if value != int(value) or not low <= value <= high:
             raise CommandError(OUT_OF_RANGE, after + 1)
         return int(value)
 
     def require_empty(self) -> None:
-        """The command has no argument."""
+        """Raise CommandError unless the argument is empty."""
         if self.text.strip():
             raise CommandError(UNKNOWN_COMMAND)
 
 
-def _parse_number(text: str, field: int, largest: float) -> float:
+def _parse_number(text: str, field: int, max_magnitude: float) -> float:
     if not text:
         raise CommandError(MISSING, field)
     try:
@@ -83,6 +83,6 @@ def _parse_number(text: str, field: int, largest: float) -> float:
         value = math.nan
     if not math.isfinite(value):
         raise CommandError(NOT_A_NUMBER, field)
-    if abs(value) > largest:
+    if abs(value) > max_magnitude:
         raise CommandError(OUT_OF_RANGE, field)
     return value

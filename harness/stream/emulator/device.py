@@ -1,165 +1,55 @@
-"""An IS-900 without input or output: what it is told goes in, what it says comes out, and time is an argument.
+"""An IS-900 without input or output: bytes from the host go in, messages come out, and time is an argument.
 
-It does what docs/is900.md says of commands (3, 4), replies (6, 7), records (5) and of the state after power-on (12);
-where the sources say nothing it does what section 14 settles on.
+It follows docs/is900.md on commands (3, 4), replies (6, 7), records (5) and the state after power-on (12). Where the
+sources are silent it follows section 14.
 """
-
-from collections import deque
-from collections.abc import Iterable
-from dataclasses import replace
 
 from harness.stream.codec.commands import Command, CommandReader
 from harness.stream.codec.items import SINCE_FIRMWARE
-from harness.stream.codec.replies import DeviceError, ParsedReply
+from harness.stream.codec.replies import DeviceError
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.emulator.argument import OUT_OF_RANGE, UNKNOWN_COMMAND, CommandArgument, CommandError
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.device_commands import DEVICE_COMMANDS, IMMEDIATE_COMMANDS
-from harness.stream.emulator.message import Message
-from harness.stream.emulator.player import SamplePlayer
+from harness.stream.emulator.device_state import DeviceState
 from harness.stream.emulator.queries import QUERIES
-from harness.stream.emulator.round_encoder import RoundEncoder
 from harness.stream.emulator.setters import SET_ONLY_COMMANDS, SETTER_COMMANDS, SINGLE_FIELD_SETTERS
-from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
 
 _BUFFER_FULL = -5
-_LOG_LENGTH = 100
-"""Entries of a log."""
 _COMMAND_NAMES = sorted({*DEVICE_COMMANDS, *SET_ONLY_COMMANDS, *SETTER_COMMANDS, *QUERIES}, key=len, reverse=True)
-"""Longest first, since some begin with others."""
+"""Longest first, since some names are the beginning of others."""
 
 
-class Device:
-    """Plays samples; stations beyond the samples' are not plugged in. Same bytes at the same times: same answer."""
+class Device(DeviceState):
+    """An IS-900 that plays samples and executes commands. The same bytes at the same times give the same answers."""
 
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
-        """Power-on at this moment."""
-        self.samples, self.config = samples, config or EmulatorConfig()
-        self.firmware = self.config.firmware
-        self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
-        self.streaming = self.suspended = False
-        self.command_count = self.refused_count = 0
-        """Commands obeyed or refused, and those refused."""
-        self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
-        self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
-        """Commands, while that is asked for."""
-        stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
-        self._factory = DeviceSettings(stations, baud=self.config.baud)
-        self.settings: DeviceSettings = self._factory
-        self._saved = self._factory
+        """Switch the device on at `now_s` [s]."""
+        super().__init__(samples, config, now_s)
         self._reader = CommandReader()
-        self._next = 0, 0
-        """Round and row of the reading that is sent next while streaming."""
-        self._silent_until_s = float("-inf")
-        self._out: list[Message] = []
-        self._held: deque[Message] = deque(maxlen=_LOG_LENGTH)
-        """Replies of a suspended device."""
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Bytes from the host; lost while it starts."""
+        """Take bytes from the host; they are lost while the device restarts."""
         self._play(now_s)
         for command in self._reader.feed(data) if now_s >= self._silent_until_s else ():
             if now_s < self._silent_until_s:
                 return
             self.command_count += 1
             try:
-                self._obey(command, now_s)
-            except CommandError as refused:
+                self._execute(command, now_s)
+            except CommandError as rejected:
                 self.refused_count += 1
-                error = DeviceError(command.line.decode("latin-1"), refused.code, fl=refused.field)
+                error = DeviceError(command.line.decode("latin-1"), rejected.code, fl=rejected.field)
                 if self.settings.error_log:
                     self.errors.append(error)
-                self.say(now_s, error)
-
-    def messages(self, now_s: float) -> list[Message]:
-        """What it has said since it was asked last, in order, with the readings until now."""
-        self._play(now_s)
-        out, self._out = self._out, []
-        return out
-
-    def advance(self, now_s: float) -> bytes:
-        """The same as bytes, for an endlessly fast line."""
-        return b"".join(message.data for message in self.messages(now_s))
-
-    @property
-    def next_s(self) -> float:
-        """When the next reading is taken [s]; inf unless streaming."""
-        return self.rounds.player.time_s(*self._next) if self.streaming else float("inf")
-
-    @property
-    def active(self) -> str:
-        """Characters of the stations that report."""
-        return "".join(name for name in self.rounds.plugged if self.settings.station(name).active)
-
-    def set_lost_stations(self, stations: Iterable[str]) -> None:
-        """From now on these are out of sight, and no others (but where the samples say so)."""
-        self.rounds.set_lost_stations(stations)
-
-    def say(self, now_s: float, *replies: ParsedReply) -> None:
-        said = [Message(now_s, reply.line()) for reply in replies]
-        if self.suspended:
-            self._held.extend(said)
-        else:
-            self._out += said
-
-    def start_streaming(self, now_s: float) -> None:
-        """From the next whole round of stations on."""
-        if not self.streaming:
-            self.streaming, self._next = True, (self.rounds.player.first_from(now_s), 0)
-
-    def stop(self, now_s: float) -> None:
-        """Before the next record, never inside one."""
-        self.streaming = False
-        self._out.append(Message(now_s, b"", halts=True))
-
-    def poll(self, now_s: float) -> None:
-        """One record of each active station, ascending: its last reading."""
-        for name in "" if self.suspended else self.active:
-            number = self.rounds.player.latest(now_s, STATION_NAMES.index(name))
-            self._out.append(Message(now_s, self.rounds.records(number, self.settings)[name], name))
-
-    def suspend(self, now_s: float) -> None:
-        """Readings are lost meanwhile, replies wait."""
-        self.suspended = True
-        self._out.append(Message(now_s, b"", halts=True))
-
-    def resume(self, now_s: float) -> None:
-        self.suspended = False
-        self._out += [replace(message, ready_s=now_s) for message in self._held]
-        self._held.clear()
-
-    def save(self) -> None:
-        self._saved = self.settings
-
-    def restore_factory_defaults(self) -> None:
-        """Back to factory defaults; what was saved stays saved until it is saved anew."""
-        self.settings = self._factory
+                self.reply(now_s, error)
 
     def restart(self, now_s: float) -> None:
-        """As after 19 or a cut of its power: saved settings, polled, a new clock, silence at first."""
-        self._play(now_s)
-        self.stop(now_s)
-        self.suspended = False
-        self.settings = self._saved
-        self._held.clear()
+        """Restart as after command 19 or a power cut; an unfinished command is forgotten too."""
+        super().restart(now_s)
         self._reader = CommandReader()
-        self._silent_until_s = now_s + self.config.restart_s
-        self.rounds.player.begin(self._silent_until_s)
 
-    def _play(self, now_s: float) -> None:
-        """Send the readings until now."""
-        player, rows = self.rounds.player, len(self.rounds.plugged)
-        while self.streaming:
-            number, row = self._next
-            taken_s = player.time_s(number, row)
-            if taken_s > now_s:
-                return
-            self._next = (number, row + 1) if row + 1 < rows else (number + 1, 0)
-            if self.settings.stations[row].active and not self.suspended:
-                data = self.rounds.records(number, self.settings)[STATION_NAMES[row]]
-                self._out.append(Message(taken_s + self.samples.ready_s, data, STATION_NAMES[row]))
-
-    def _obey(self, command: Command, now_s: float) -> None:
+    def _execute(self, command: Command, now_s: float) -> None:
         text = command.line.decode("latin-1")
         if self.settings.command_log and not text.startswith("MLog"):
             self.log.append(f"{1e3 * self.rounds.player.clock_s(now_s):.0f}:{text}")
@@ -182,10 +72,10 @@ class Device:
                 self._check_items(argument)
             self.settings = SETTER_COMMANDS[name](self.settings, argument)
         else:
-            self.say(now_s, *QUERIES[name](self.settings, argument))
+            self.reply(now_s, *QUERIES[name](self.settings, argument))
 
     def _check_items(self, argument: CommandArgument) -> None:
-        """Items that this firmware does not have yet."""
-        for place, code in enumerate(argument.numbers()):
+        """Raise CommandError for items that this firmware does not have yet."""
+        for index, code in enumerate(argument.numbers()):
             if float(self.firmware[:4]) < SINCE_FIRMWARE.get(int(code), 0.0):
-                raise CommandError(OUT_OF_RANGE, place + 2)
+                raise CommandError(OUT_OF_RANGE, index + 2)

@@ -2,24 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from harness.stream.codec.replies import StatusRecord, TrackingStatus, UnknownReply
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import CommandArgument
+from harness.stream.emulator.device_state import DeviceState
 from harness.stream.emulator.queries import QUERIES
 from harness.stream.emulator.settings import STATION_NAMES
 
-if TYPE_CHECKING:
-    from harness.stream.emulator.device import Device
-
 _MAX_RANGES = 12
-"""Two microphones, six emitters (docs/is900.md 7)."""
+"""Ranges per cycle: two microphones, six emitters (docs/is900.md 7)."""
 
 
-def _report_status(device: "Device", now_s: float) -> None:
+def _report_status(device: DeviceState, now_s: float) -> None:
     settings = device.settings
     status = StatusRecord(
         binary=settings.binary,
@@ -29,28 +27,28 @@ def _report_status(device: "Device", now_s: float) -> None:
         identification=device.config.identification,
         short=device.config.status_bytes == 54,
     )
-    device.say(now_s, status)
+    device.reply(now_s, status)
 
 
-def _switch_station(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    """`l`: sets with a second field, else asks. A station that is not plugged in stays off."""
+def _switch_station(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
+    """`l`: set the station's state with a second field, else query it. A station that is not plugged in stays off."""
     if not argument.sets:
-        device.say(now_s, *QUERIES["l"](device.settings, argument))
+        device.reply(now_s, *QUERIES["l"](device.settings, argument))
         return
     name, on = argument.station(), bool(argument.integer(0, 1))
     station = replace(device.settings.station(name), active=on and name in device.rounds.plugged)
     device.settings = device.settings.with_station(name, station)
 
 
-def _boresight(device: "Device", argument: CommandArgument, now_s: float, full: bool) -> None:
+def _boresight(device: DeviceState, argument: CommandArgument, now_s: float, full: bool) -> None:
     name = argument.station()
     if name in device.rounds.plugged:
-        station = geometry.boresight(device.settings.station(name), device.rounds.turn(now_s, name), full)
+        station = geometry.boresight(device.settings.station(name), device.rounds.raw_orientation(now_s, name), full)
         device.settings = device.settings.with_station(name, station)
 
 
-def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    """Polled, the motion begins anew too, so that what follows is known to the bit."""
+def _zero_clock(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
+    """Set the clock to zero. When polled, the motion starts again too, so that the following bytes are reproducible."""
     argument.require_empty()
     if device.streaming:
         device.rounds.player.zero(now_s)
@@ -58,50 +56,50 @@ def _zero_clock(device: "Device", argument: CommandArgument, now_s: float) -> No
         device.rounds.player.begin(now_s)
 
 
-def _report_tracking(device: "Device", argument: CommandArgument, now_s: float) -> None:
-    """Ranges are as many as the quality lets one expect; none is ever rejected."""
+def _report_tracking(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
+    """Report as many ranges as the quality suggests; none is ever rejected."""
     argument.require_empty()
     quality = {name: device.rounds.quality(now_s, name) for name in device.active}
     states = "".join(
         "X" if name not in quality else "T" if round(255 * quality[name]) else "L" for name in STATION_NAMES
     )
     received = tuple(int(np.ceil(_MAX_RANGES * quality.get(name, 0.0))) for name in STATION_NAMES)
-    device.say(now_s, TrackingStatus(states, received, (0,) * len(STATION_NAMES), device.samples.rate_hz))
+    device.reply(now_s, TrackingStatus(states, received, (0,) * len(STATION_NAMES), device.samples.rate_hz))
 
 
-def _read_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _read_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
-    device.say(now_s, *device.errors)
+    device.reply(now_s, *device.errors)
 
 
-def _clear_errors(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _clear_errors(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.errors.clear()
 
 
-def _send_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _send_log(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
-    device.say(now_s, *(UnknownReply(f"31LF{entry}".encode("latin-1")) for entry in device.log))
+    device.reply(now_s, *(UnknownReply(f"31LF{entry}".encode("latin-1")) for entry in device.log))
 
 
-def _clear_log(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _clear_log(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
     device.log.clear()
 
 
-def _report_information(device: "Device", argument: CommandArgument, now_s: float) -> None:
+def _report_information(device: DeviceState, argument: CommandArgument, now_s: float) -> None:
     argument.require_empty()
-    device.say(now_s, UnknownReply(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
+    device.reply(now_s, UnknownReply(f"51T{device.config.identification} {device.firmware}".encode("ascii")))
 
 
-def _settings_change(**values: Any) -> Callable[["Device", float], None]:
-    def order(device: "Device", now_s: float) -> None:
+def _settings_change(**values: Any) -> Callable[[DeviceState, float], None]:
+    def change(device: DeviceState, now_s: float) -> None:
         device.settings = replace(device.settings, **values)
 
-    return order
+    return change
 
 
-IMMEDIATE_COMMANDS: dict[str, Callable[["Device", float], None]] = {
+IMMEDIATE_COMMANDS: dict[str, Callable[[DeviceState, float], None]] = {
     "P": lambda device, now_s: device.poll(now_s),
     "C": lambda device, now_s: device.start_streaming(now_s),
     "c": lambda device, now_s: device.stop(now_s),
@@ -116,9 +114,9 @@ IMMEDIATE_COMMANDS: dict[str, Callable[["Device", float], None]] = {
     "\x13": lambda device, now_s: device.suspend(now_s),
     "\x19": lambda device, now_s: device.restart(now_s),
 }
-"""Without a terminator."""
+"""Commands that act at once, without a terminator."""
 
-DEVICE_COMMANDS: dict[str, Callable[["Device", CommandArgument, float], None]] = {
+DEVICE_COMMANDS: dict[str, Callable[[DeviceState, CommandArgument, float], None]] = {
     "l": _switch_station,
     "B": lambda device, argument, now_s: _boresight(device, argument, now_s, device.settings.boresight_as_fastrak),
     "MB": lambda device, argument, now_s: _boresight(device, argument, now_s, not device.settings.boresight_as_fastrak),
@@ -130,4 +128,4 @@ DEVICE_COMMANDS: dict[str, Callable[["Device", CommandArgument, float], None]] =
     "MLogClear": _clear_log,
     "MInfoSystem": _report_information,
 }
-"""Lines."""
+"""Commands that are lines."""

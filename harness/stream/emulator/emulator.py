@@ -1,4 +1,4 @@
-"""Device, faults and line together, still without input or output: bytes in, bytes with their times out."""
+"""Device, faults and line together, without input or output: bytes in, bytes with their times out."""
 
 from harness.errors import UnknownName
 from harness.stream.codec.samples import DeviceSamples
@@ -11,18 +11,18 @@ from harness.stream.emulator.settings import STATION_NAMES
 
 
 class Emulator:
-    """What a host finds at the other end of a line. Times are asked for in order."""
+    """The device and the line as a host sees them. Calls must have increasing times."""
 
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
-        """UnknownName when a fault is about a station that nobody wears."""
+        """Switch the device on. Raises UnknownName when a fault names a station that is not in the samples."""
         self.config = config or EmulatorConfig()
         self.device = Device(samples, self.config, now_s)
         self.line = SerialLine(self.config.baud, self.config.queue_records, self.config.paced)
         self.episodes: list[FaultEpisode] = []
-        """All that have begun."""
+        """All fault episodes that have begun."""
         self.unplugged_messages = 0
-        """Messages that went while the line was unplugged."""
-        self._lasting: list[FaultEpisode] = []
+        """Number of messages that were sent while the line was unplugged."""
+        self._active: list[FaultEpisode] = []
         self._faults = FaultInjector(self.config.faults, self.config.seed, now_s)
         for fault in self.config.faults:
             if fault.station and fault.station not in samples.stations:
@@ -31,68 +31,71 @@ class Emulator:
                 self.device.firmware = fault.firmware
 
     def receive(self, data: bytes, now_s: float) -> None:
-        """Bytes from the host; lost while the line is unplugged."""
-        self._until(now_s)
+        """Take bytes from the host; they are lost while the line is unplugged."""
+        self._advance_to(now_s)
         if not self.unplugged(now_s):
             self.device.receive(data, now_s)
-            self._hand_over(now_s)
+            self._queue_messages(now_s)
 
     def advance(self, now_s: float) -> list[SentMessage]:
-        """What has gone over the line by now, and was not asked for before."""
-        self._until(now_s)
-        out = []
-        for due_s, message in self.line.gone(now_s):
-            data, damage = self._faults.corrupt(message.data, self._on("burst", due_s), due_s)
-            if self._on("disconnect", due_s):
+        """Return the messages that have left the line since the last call."""
+        self._advance_to(now_s)
+        sent = []
+        for due_s, message in self.line.pop_sent(now_s):
+            data, damage = self._faults.corrupt(message.data, self._is_active("burst", due_s), due_s)
+            if self._is_active("disconnect", due_s):
                 self.unplugged_messages += 1
             else:
-                out.append(SentMessage(message, due_s, data, damage))
-        self._lasting = [spell for spell in self._lasting if spell.to_s > now_s]
-        return out
+                sent.append(SentMessage(message, due_s, data, damage))
+        self._active = [episode for episode in self._active if episode.to_s > now_s]
+        return sent
 
     def unplugged(self, now_s: float) -> bool:
-        """Whether the line is not there at this moment."""
-        return self._on("disconnect", now_s)
+        """Whether the line is unplugged at this time."""
+        return self._is_active("disconnect", now_s)
 
     @property
     def next_s(self) -> float:
-        """When there will be something to do, unless bytes come before [s]."""
+        """When something will happen next, unless bytes arrive before [s]."""
         ready_s = self.device.next_s + self.device.samples.ready_s
-        return min([self.line.next_s, ready_s, self._faults.next_s, *(spell.to_s for spell in self._lasting)])
+        return min([self.line.next_s, ready_s, self._faults.next_s, *(episode.to_s for episode in self._active)])
 
-    def _until(self, now_s: float) -> None:
-        """Let happen what happens until now."""
-        begun = self._faults.pop_started(now_s)
-        ended = [spell for spell in [*self._lasting, *begun] if spell.to_s <= now_s]
-        changes = [*((spell.from_s, True, spell) for spell in begun), *((spell.to_s, False, spell) for spell in ended)]
-        for at_s, begins, spell in sorted(changes, key=lambda change: change[0]):
-            self._hand_over(at_s)
-            if begins:
-                self._begin(spell)
-            if spell.fault.kind == "lost_station":
-                self._lose(at_s)
-        self._hand_over(now_s)
+    def _advance_to(self, now_s: float) -> None:
+        """Start and end the episodes that are due by now, in sequence."""
+        started = self._faults.pop_started(now_s)
+        ended = [episode for episode in [*self._active, *started] if episode.to_s <= now_s]
+        changes = [
+            *((episode.from_s, True, episode) for episode in started),
+            *((episode.to_s, False, episode) for episode in ended),
+        ]
+        for at_s, is_start, episode in sorted(changes, key=lambda change: change[0]):
+            self._queue_messages(at_s)
+            if is_start:
+                self._start_episode(episode)
+            if episode.fault.kind == "lost_station":
+                self._update_lost_stations(at_s)
+        self._queue_messages(now_s)
 
-    def _begin(self, spell: FaultEpisode) -> None:
-        self.episodes.append(spell)
-        self._lasting.append(spell)
-        if spell.fault.kind == "stall":
-            self.line.hold(spell.from_s, spell.to_s)
-        elif spell.fault.kind == "reset":
-            self.device.restart(spell.from_s)
+    def _start_episode(self, episode: FaultEpisode) -> None:
+        self.episodes.append(episode)
+        self._active.append(episode)
+        if episode.fault.kind == "stall":
+            self.line.hold(episode.from_s, episode.to_s)
+        elif episode.fault.kind == "reset":
+            self.device.restart(episode.from_s)
 
-    def _lose(self, at_s: float) -> None:
-        """Tell the device which stations are out of sight at this moment."""
+    def _update_lost_stations(self, at_s: float) -> None:
+        """Tell the device which stations are lost at this time."""
         names = self.device.samples.stations
-        spells = (spell for spell in self._lasting if spell.fault.kind == "lost_station")
-        out = (spell.fault.station or names[0] for spell in spells if spell.from_s <= at_s < spell.to_s)
-        self.device.set_lost_stations(STATION_NAMES[names.index(name)] for name in out)
+        episodes = (episode for episode in self._active if episode.fault.kind == "lost_station")
+        lost = (episode.fault.station or names[0] for episode in episodes if episode.from_s <= at_s < episode.to_s)
+        self.device.set_lost_stations(STATION_NAMES[names.index(name)] for name in lost)
 
-    def _hand_over(self, now_s: float) -> None:
-        """What the device says until now goes to the line, at the rate that it has set."""
+    def _queue_messages(self, now_s: float) -> None:
+        """Pass the device's messages until now to the line, at the device's baud rate."""
         for message in self.device.messages(now_s):
             self.line.add(message)
         self.line.baud = self.device.settings.baud
 
-    def _on(self, kind: str, at_s: float) -> bool:
-        return any(spell.fault.kind == kind and spell.from_s <= at_s < spell.to_s for spell in self._lasting)
+    def _is_active(self, kind: str, at_s: float) -> bool:
+        return any(episode.fault.kind == kind and episode.from_s <= at_s < episode.to_s for episode in self._active)

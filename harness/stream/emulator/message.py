@@ -1,38 +1,38 @@
-"""What the device says in one piece: a data record or a reply, which nothing may split."""
+"""Messages of the device: data records and replies, which are never interrupted."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """Bytes for the line, or the word that what waits there is not wanted any more."""
+    """Bytes for the line, or a request to discard the records that wait for it."""
 
     ready_s: float
-    """When the first bit may go [s]."""
+    """Earliest time of the first bit [s]."""
     data: bytes
     station: str = ""
     """Character of the station of a data record; "" for a reply."""
     halts: bool = False
-    """Records that wait for the line are thrown away (`c`, restart)."""
+    """Whether records that wait for the line are discarded (`c`, restart)."""
 
 
 @dataclass(frozen=True, slots=True)
 class SentMessage:
-    """A message that has gone over the line."""
+    """A message that has left the line."""
 
     message: Message
     due_s: float
     """When its last byte is due [s]."""
     data: bytes
-    """The bytes that go out: the message's own unless something befell them."""
+    """The bytes that leave the line: those of the message unless a fault changed them."""
     damage: tuple[str, ...] = ()
-    """Kinds of the faults that befell it; () where it is as the device sent it."""
+    """Kinds of the faults that changed the message; () when it is intact."""
     written_s: float = float("nan")
     """When it was written [s]."""
     unread: bool = False
-    """Not written: the client left no room for it."""
+    """Whether it was not written, because the client left no room for it."""
 
     @property
     def sound(self) -> bool:
-        """Whether it went out, and as the device sent it."""
+        """Whether the message was written without change."""
         return not self.damage and not self.unread

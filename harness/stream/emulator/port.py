@@ -1,34 +1,37 @@
-"""The outside of an emulator: where a client finds it. Nothing here blocks."""
+"""The interface of a port at which a client finds an emulator. No method blocks."""
 
 from typing import Protocol
 
 
 class Port(Protocol):
-    """The outside of a line. A client may come and go."""
+    """The client's end of a line. A client may come and go."""
 
     @property
     def name(self) -> str:
-        """What a client opens."""
+        """The name that a client opens."""
         ...
 
     def readable(self) -> list[int]:
-        """Descriptors whose bytes or clients are to be waited for."""
+        """Return the descriptors to wait for bytes or clients from."""
         ...
 
     def writable(self) -> list[int]:
-        """Descriptors that have to take the rest of a message."""
+        """Return the descriptors that must take the rest of a message."""
         ...
 
     def read(self) -> bytes:
-        """What came, without waiting."""
+        """Return the bytes that have arrived, without waiting."""
         ...
 
     def write(self, data: bytes) -> bool:
-        """Send all of it sooner or later, or nothing: False when the client leaves no room, or is not there."""
+        """Send all of the data sooner or later, or nothing.
+
+        Returns False when the client is absent or leaves no room.
+        """
         ...
 
     def baud(self) -> int | None:
-        """Rate that the client has set [bit/s]; None where there is no such thing."""
+        """Return the baud rate that the client has set [bit/s]; None where there is none."""
         ...
 
     def unplug(self) -> None: ...

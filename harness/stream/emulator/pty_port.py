@@ -1,4 +1,4 @@
-"""A pseudo terminal with a name of its own, for clients that know nothing but serial ports. Not for Windows."""
+"""A pseudo terminal with a fixed name, for clients that can only open serial ports. Not available on Windows."""
 
 import array
 import contextlib
@@ -20,12 +20,12 @@ _BAUD_BY_CONSTANT = {getattr(termios, f"B{rate}"): rate for rate in SUPPORTED_BA
 
 
 class PtyPort:
-    """A pty in raw mode behind a symbolic link; its own end stays open, so that a client may close and open it."""
+    """A pty in raw mode behind a symbolic link. Its own end stays open, so that a client may close and reopen it."""
 
     def __init__(self, link: Path | str) -> None:
-        """BadInput when something else is there."""
+        """Create the pty and its link. Raises BadInput when the link's place is taken."""
         self._link = Path(link)
-        self._rest = b""
+        self._unsent = b""
         self._master = self._slave = -1
         self.plug()
 
@@ -37,7 +37,7 @@ class PtyPort:
         return [] if self._master < 0 else [self._master]
 
     def writable(self) -> list[int]:
-        return [self._master] if self._rest and self._master >= 0 else []
+        return [self._master] if self._unsent and self._master >= 0 else []
 
     def read(self) -> bytes:
         self._flush()
@@ -48,13 +48,13 @@ class PtyPort:
 
     def write(self, data: bytes) -> bool:
         self._flush()
-        if self._master < 0 or self._rest or self._waiting() + len(data) > _MAX_UNREAD_BYTES:
+        if self._master < 0 or self._unsent or self._unread_bytes() + len(data) > _MAX_UNREAD_BYTES:
             return False
-        self._rest = data
+        self._unsent = data
         self._flush()
-        if len(self._rest) < len(data):
+        if len(self._unsent) < len(data):
             return True
-        self._rest = b""
+        self._unsent = b""
         return False
 
     def baud(self) -> int | None:
@@ -72,44 +72,44 @@ class PtyPort:
                 self._link.unlink()
             self._link.symlink_to(os.ttyname(self._slave))
         except OSError as error:
-            self._shut()
+            self._release()
             raise BadInput(
-                f"{self._link}: {error.strerror}.", "Name a link in a folder that you may write to."
+                f"{self._link}: {error.strerror}.", "Name a link in a folder that you can write to."
             ) from error
 
     def unplug(self) -> None:
-        """The client's end goes dead, as when an adapter is pulled out."""
+        """Close the pty, as when an adapter is pulled out."""
         if self._master >= 0:
             with contextlib.suppress(OSError):
                 if os.readlink(self._link) == os.ttyname(self._slave):
                     self._link.unlink()
-            self._shut()
+            self._release()
 
     def close(self) -> None:
         self.unplug()
 
-    def _shut(self) -> None:
-        ends, self._master, self._slave, self._rest = (self._slave, self._master), -1, -1, b""
+    def _release(self) -> None:
+        ends, self._master, self._slave, self._unsent = (self._slave, self._master), -1, -1, b""
         for end in ends:
             os.close(end)
 
-    def _waiting(self) -> int:
-        """Bytes that the client has not read."""
+    def _unread_bytes(self) -> int:
+        """Return the number of bytes that the client has not read."""
         count = array.array("i", [0])
         fcntl.ioctl(self._slave, termios.FIONREAD, count)
         return count[0]
 
     def _flush(self) -> None:
-        if self._rest and self._master >= 0:
+        if self._unsent and self._master >= 0:
             with contextlib.suppress(BlockingIOError):
-                self._rest = self._rest[os.write(self._master, self._rest) :]
+                self._unsent = self._unsent[os.write(self._master, self._unsent) :]
 
 
 def _check_link_is_free(link: Path) -> None:
-    """BadInput unless the place is free, or a link to a pty that is gone."""
+    """Raise BadInput unless the place is free, or holds a link to a pty that no longer exists."""
     if link.is_symlink():
         target = os.readlink(link)
         if not target.startswith("/dev/pts/") or os.path.exists(target):
-            raise BadInput(f"{link} is there and leads to {target}.", "Name another link, or remove it.")
+            raise BadInput(f"{link} exists and leads to {target}.", "Name another link, or remove it.")
     elif link.exists():
-        raise BadInput(f"{link} is there and is no link of an emulator.", "Name another link; nothing is overwritten.")
+        raise BadInput(f"{link} exists and is no link of an emulator.", "Name another link; nothing is overwritten.")

@@ -1,4 +1,4 @@
-"""Questions about settings: settings in, replies out (docs/is900.md 6)."""
+"""Queries of settings: settings in, replies out (docs/is900.md 6)."""
 
 from collections.abc import Callable, Iterable
 
@@ -21,7 +21,7 @@ from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, Stat
 
 Query = Callable[[DeviceSettings, CommandArgument], Iterable[ParsedReply]]
 _STATE_FLAGS = 32
-"""In the answer to `l*`."""
+"""Number of flags in the reply to `l*`."""
 
 
 def _station_query(reply: Callable[[str, StationSettings], ParsedReply]) -> Query:
@@ -45,22 +45,22 @@ def _text_reply(text: str) -> ParsedReply:
 
 
 def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
-    """InterSense's library of 1999 names no station where it asks for all of them (docs/is900.md 14)."""
+    """Reply to `l`. InterSense's library of 1999 names no station when it queries all of them (docs/is900.md 14)."""
     if argument.text.strip() in ("*", ""):
         active = [station.active for station in settings.stations]
         return [StationStates(None, (*active, *[False] * (_STATE_FLAGS - len(active))))]
     name = argument.station()
-    return [StationStates(name, tuple(settings.station(asked).active for asked in (name, *"234")))]
+    return [StationStates(name, tuple(settings.station(queried).active for queried in (name, *"234")))]
 
 
 def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
     if not argument.text.strip():
         return settings.emitters
     number = argument.integer(1, 9999999, after=0)
-    found = [emitter for emitter in settings.emitters if emitter.number == number]
-    if not found:
+    matches = [emitter for emitter in settings.emitters if emitter.number == number]
+    if not matches:
         raise CommandError(OUT_OF_RANGE)
-    return found
+    return matches
 
 
 QUERIES: dict[str, Query] = {
@@ -99,4 +99,4 @@ QUERIES: dict[str, Query] = {
     "MSystemTest1": _device_query(lambda settings: _text_reply("51T1 OK")),
     "MSystemTest2": _device_query(lambda settings: _text_reply("51T2 OK")),
 }
-"""What each answers; the texts after `51T`, `31LS` and so on are ours where no source quotes them."""
+"""The reply to each query. Texts after `51T`, `31LS` and so on are ours where no source quotes them."""

@@ -1,4 +1,4 @@
-"""An emulator at a port, in real time: one loop that waits for the client or for the next byte that is due."""
+"""Server of an emulator at a port, in real time: one loop that waits for the client or for the next byte due."""
 
 import contextlib
 import select
@@ -25,24 +25,27 @@ from harness.stream.emulator.tcp_port import LogCallback, TcpPort
 SentCallback = Callable[[SentMessage], None]
 MAX_WAIT_S = 1.0
 _KEPT_LATENCIES = 100_000
-"""Pacing errors kept for the quantiles: some minutes of them."""
+"""Number of pacing errors kept for the quantiles, enough for some minutes."""
 
 
 @dataclass
 class ServerCounts:
-    """What has happened so far."""
+    """Counts of what has happened so far."""
 
     records: int = 0
-    """Written."""
+    """Records written."""
     replies: int = 0
+    """Replies written."""
     damaged: int = 0
-    """Of these, records and replies that a fault befell."""
+    """Records and replies, among those written, that a fault changed."""
     unread: int = 0
-    """Records and replies that found no room, or no client."""
+    """Records and replies that were not written: no client, or no room."""
     bytes: int = 0
+    """Bytes written."""
     late_s: deque[float] = field(default_factory=lambda: deque(maxlen=_KEPT_LATENCIES))
-    """From when a message's last byte was due to when it was written [s]."""
-    latest_s: float = 0.0
+    """Time from when a message's last byte was due to when it was written [s], of the latest messages."""
+    max_late_s: float = 0.0
+    """Greatest such time [s]."""
 
     def add(self, sent: SentMessage) -> None:
         if sent.unread:
@@ -53,11 +56,11 @@ class ServerCounts:
         self.damaged += bool(sent.damage)
         self.bytes += len(sent.data)
         self.late_s.append(sent.written_s - sent.due_s)
-        self.latest_s = max(self.latest_s, self.late_s[-1])
+        self.max_late_s = max(self.max_late_s, self.late_s[-1])
 
 
 class EmulatorServer:
-    """Plays until it is told to stop."""
+    """Serves an emulator until it is told to stop."""
 
     def __init__(self, emulator: Emulator, port: Port, on_sent: SentCallback | None = None) -> None:
         self.emulator, self.port, self.counts = emulator, port, ServerCounts()
@@ -67,13 +70,13 @@ class EmulatorServer:
         self._wrong_rate = generator(emulator.config.seed, "wrong rate")
 
     def run(self) -> None:
-        """Until `stop`, or an exception such as KeyboardInterrupt; the port is closed then."""
+        """Serve until `stop`, or an exception such as KeyboardInterrupt; then close the port."""
         try:
             while not self._stopped:
-                called = self._wait()
+                ready_port = self._wait()
                 now_s = time.monotonic()
-                if called and (data := self.port.read()):
-                    self.emulator.receive(self._heard(data), now_s)
+                if ready_port and (data := self.port.read()):
+                    self.emulator.receive(self._distort(data), now_s)
                 for sent in self.emulator.advance(now_s):
                     self._write(sent)
                 self._plug(now_s)
@@ -83,15 +86,15 @@ class EmulatorServer:
             self._waker.close()
 
     def stop(self) -> None:
-        """From any thread."""
+        """End `run`; may be called from any thread."""
         self._stopped = True
         try:
             self._waker.send(b"x")
         except OSError:
-            return  # it has ended by itself
+            return  # `run` has ended already
 
     def _wait(self) -> bool:
-        """Until something is due or comes; whether the port has something to read, or room for what it kept."""
+        """Wait until something is due or arrives; return whether the port can be read or takes more of a message."""
         wait_s = min(max(self.emulator.next_s - time.monotonic(), 0.0), MAX_WAIT_S)
         waking = self._woken.fileno()
         ready, free, _ = select.select([*self.port.readable(), waking], self.port.writable(), [], wait_s)
@@ -104,20 +107,20 @@ class EmulatorServer:
             self.port.plug()
 
     def _write(self, sent: SentMessage) -> None:
-        taken = self.port.write(self._heard(sent.data))
-        sent = replace(sent, written_s=time.monotonic(), unread=not taken)
+        accepted = self.port.write(self._distort(sent.data))
+        sent = replace(sent, written_s=time.monotonic(), unread=not accepted)
         self.counts.add(sent)
         if self._on_sent is not None:
             self._on_sent(sent)
 
-    def _heard(self, data: bytes) -> bytes:
-        """Bytes as the other side hears them: noise where it listens at another rate, and that is looked at."""
+    def _distort(self, data: bytes) -> bytes:
+        """Return bytes as the other side receives them: noise where the baud rates differ and this is checked."""
         if self.emulator.config.check_baud and self.port.baud() not in (None, self.emulator.device.settings.baud):
             return self._wrong_rate.bytes(len(data))
         return data
 
     def summary(self) -> dict[str, float]:
-        """Counts, and the pacing error [ms]."""
+        """Return the counts, and quantiles of the pacing error [ms]."""
         counts, line, device = self.counts, self.emulator.line, self.emulator.device
         late_ms = 1e3 * np.array(counts.late_s or [0.0])
         return {
@@ -131,12 +134,12 @@ class EmulatorServer:
             "commands_refused": float(device.refused_count),
             "pacing_p50_ms": float(np.quantile(late_ms, 0.5)),
             "pacing_p99_ms": float(np.quantile(late_ms, 0.99)),
-            "pacing_max_ms": 1e3 * counts.latest_s,
+            "pacing_max_ms": 1e3 * counts.max_late_s,
         }
 
 
 def play_samples(samples: DeviceSamples, config: EmulatorConfig, port: Port) -> dict[str, float]:
-    """Play samples at a port until Ctrl-C, the normal end; what was sent, as `EmulatorServer.summary` has it."""
+    """Play samples at a port until Ctrl-C, the normal end; return `EmulatorServer.summary`."""
     server = EmulatorServer(Emulator(samples, config, time.monotonic()), port)
     with contextlib.suppress(KeyboardInterrupt):
         server.run()
@@ -145,10 +148,10 @@ def play_samples(samples: DeviceSamples, config: EmulatorConfig, port: Port) -> 
 
 @dataclass(frozen=True)
 class RunningEmulator:
-    """An emulator that runs in a thread of its own."""
+    """An emulator that runs in its own thread."""
 
     name: str
-    """What a client opens: a link to a pty, or tcp://host:port."""
+    """The name that a client opens: a link to a pty, or tcp://host:port."""
     server: EmulatorServer
 
     @property
@@ -168,20 +171,20 @@ def serve_emulator(
     tcp: str | None = None,
     on_sent: SentCallback | None = None,
 ) -> Iterator[RunningEmulator]:
-    """Play samples at a pty behind this link or at this `host:port` (port 0 takes a free one) while the block runs.
+    """Play samples at a pty behind a link, or at `host:port` (port 0 takes a free one), while the block runs.
 
-    `on_sent` sees each record and reply that was written, with its times and damage, in the emulator's thread.
+    `on_sent` receives each record and reply that was written, with its times and damage, in the emulator's thread.
     """
     port = open_port(pty, tcp)
     server = EmulatorServer(Emulator(samples, config, time.monotonic()), port, on_sent)
     name = port.name
-    failed: list[BaseException] = []
+    errors: list[BaseException] = []
 
     def run() -> None:
         try:
             server.run()
         except BaseException as error:
-            failed.append(error)
+            errors.append(error)
 
     thread = threading.Thread(target=run, name="emulator")
     thread.start()
@@ -190,16 +193,16 @@ def serve_emulator(
     finally:
         server.stop()
         thread.join()
-    if failed:
-        raise failed[0]
+    if errors:
+        raise errors[0]
 
 
 def open_port(
-    pty: Path | str | None, tcp: str | None, *, anywhere: bool = False, say: LogCallback = lambda line: None
+    pty: Path | str | None, tcp: str | None, *, anywhere: bool = False, log: LogCallback = lambda line: None
 ) -> Port:
-    """The port that is asked for, one of the two; BadInput."""
+    """Open the requested port, either a pty or TCP. Raises BadInput."""
     if (pty is None) == (tcp is None):
-        raise BadInput("Neither or both of a pty and a TCP port are asked for.", "Name one of them.")
+        raise BadInput("Neither or both of a pty and a TCP port are given.", "Name one of them.")
     if pty is not None:
         if sys.platform == "win32":
             raise BadInput("Windows has no pseudo terminals.", "Use --tcp.")
@@ -208,5 +211,5 @@ def open_port(
         return PtyPort(pty)
     host, colon, number = (tcp or "").rpartition(":")
     if not colon or not (number.isascii() and number.isdecimal()) or int(number) > 65535:
-        raise BadInput(f"{tcp!r} is no HOST:PORT.", "For example 127.0.0.1:5005; port 0 takes a free one.")
-    return TcpPort(host.strip("[]"), int(number), anywhere=anywhere, say=say)
+        raise BadInput(f"{tcp!r} is no HOST:PORT.", "An example is 127.0.0.1:5005; port 0 takes a free one.")
+    return TcpPort(host.strip("[]"), int(number), anywhere=anywhere, log=log)

@@ -1,4 +1,4 @@
-"""Commands that change a setting and answer nothing: settings in, settings out (docs/is900.md 4)."""
+"""Commands that change a setting and have no reply: settings in, settings out (docs/is900.md 4)."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,7 +30,7 @@ def _set_output_list(settings: DeviceSettings, argument: CommandArgument) -> Dev
     try:
         record_type(items)
         encode_records(items, np.zeros(0, np.uint8), _NO_VALUES, RecordFormat())
-    except (HarnessError, ValueError) as error:  # no such item, none that can be written, or one listed twice
+    except (HarnessError, ValueError) as error:  # an unknown item, one that cannot be written, or one listed twice
         raise CommandError(OUT_OF_RANGE, 2) from error
     return _with_station(settings, argument, items=items)
 
@@ -50,7 +50,7 @@ def _clear_boresight(settings: DeviceSettings, argument: CommandArgument) -> Dev
 
 
 def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    """`o1152,N,8,0`: a hundredth of the rate, parity, bits, handshake."""
+    """Set the serial line: `o1152,N,8,0` is a hundredth of the baud rate, parity, bits, handshake."""
     if len(argument.fields) < 4:
         raise CommandError(MISSING, len(argument.fields) + 1)
     hundredths, parity = CommandArgument(argument.fields[0]).integer(3, 1152, after=0), argument.fields[1]
@@ -75,9 +75,9 @@ def _set_genlock(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
     number = CommandArgument(argument.fields[0]).integer(1, 9999999, after=0)
     x, y, z, nx, ny, nz, identity = argument.numbers(7)
-    made = Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
-    kept = (emitter for emitter in settings.draft_emitters if emitter.number != number)
-    return replace(settings, draft_emitters=tuple(sorted((*kept, made), key=lambda emitter: emitter.number)))
+    emitter = Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
+    others = (emitter for emitter in settings.draft_emitters if emitter.number != number)
+    return replace(settings, draft_emitters=tuple(sorted((*others, emitter), key=lambda emitter: emitter.number)))
 
 
 def _remove_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
@@ -163,7 +163,7 @@ SETTER_COMMANDS: dict[str, Setter] = {
     "MEthUdp": _device_setter("udp", 0, 1, bool),
     "MEthUdpPort": _device_setter("udp_port", 1, 65535),
 }
-"""Commands that read where nothing is to be set."""
+"""Commands that set, or query when they have nothing to set."""
 
 SET_ONLY_COMMANDS: dict[str, Setter] = {
     "R": _station_reset(origin_m=ZERO_VECTOR, tracker_from_aligned=IDENTITY_QUATERNION),
@@ -181,9 +181,9 @@ SET_ONLY_COMMANDS: dict[str, Setter] = {
     "MGP": _set_genlock_phase,
     "MGS": _device_setter("genlock_source", 1, 2),
     "MCf": _remove_emitter,
-    "MCC": _constant_setter(drafted=()),
+    "MCC": _constant_setter(draft_emitters=()),
     "MCe": _emitter_setter(lambda settings: {"emitters": settings.draft_emitters}),
-    "MCx": _emitter_setter(lambda settings: {"drafted": settings.emitters}),
+    "MCx": _emitter_setter(lambda settings: {"draft_emitters": settings.emitters}),
     "MCi": _no_change,
     "ML0": _constant_setter(lights=False),
     "ML1": _constant_setter(lights=True),
@@ -193,7 +193,7 @@ SET_ONLY_COMMANDS: dict[str, Setter] = {
     "MLogOpen": _constant_setter(command_log=True),
     "MLogClose": _constant_setter(command_log=False),
 }
-"""Commands that only ever set."""
+"""Commands that only set."""
 
 SINGLE_FIELD_SETTERS = {"MU", "Mg", "MSchAlg", "MConfigLockMode", "MEthIp", "MEthUdp", "MEthUdpPort"}
-"""Those of `SETTER_COMMANDS` that set with their first field already."""
+"""Those of `SETTER_COMMANDS` that set with their first field."""

@@ -1,4 +1,4 @@
-"""Everything a host may set, as one value: saving it and going back to it is keeping it."""
+"""All settings of the device as one immutable value, which is saved and restored by keeping it."""
 
 from dataclasses import dataclass, field, replace
 
@@ -17,28 +17,29 @@ DEFAULT_EMITTERS = tuple(
     )
     for number, (row, column) in enumerate((row, column) for row in range(3) for column in range(3))
 )
-"""Three bars of three emitters that look down; made up, but for the spacings and the first number's form."""
+"""Three bars of three emitters that face down. They are made up, except for the spacings and the form of the first
+number."""
 
 
 @dataclass(frozen=True)
 class StationSettings:
-    """One station."""
+    """Settings of one station."""
 
     active: bool = False
     items: tuple[int, ...] = DEFAULT_OUTPUT_LIST
     origin_m: Vector = ZERO_VECTOR
-    """Of the alignment frame, in the tracker's."""
+    """Origin of the alignment frame in the tracker frame [m]."""
     tracker_from_aligned: Quaternion = IDENTITY_QUATERNION
     heading_boresight: Quaternion = IDENTITY_QUATERNION
-    """Boresight of the heading: turns what is reported about the frame's own axes."""
+    """Boresight of the heading: rotates reported orientations about the frame's own axes."""
     full_boresight: Quaternion = IDENTITY_QUATERNION
-    """Full boresight: turns the station's axes."""
+    """Full boresight: rotates the station's axes."""
     reference_deg: Vector = ZERO_VECTOR
-    """Angles that boresight makes of the present ones."""
+    """Angles that boresight gives the present orientation [deg]."""
     tip_m: Vector = ZERO_VECTOR
-    """In the station's own axes."""
+    """Tip offset in the station's own axes [m]."""
     mounting_deg: Vector = ZERO_VECTOR
-    """Yaw, pitch and roll of the transmitter's mounting."""
+    """Yaw, pitch and roll of the transmitter's mounting [deg]."""
     envelope_m: tuple[float, ...] = (10.0, 10.0, 10.0, -10.0, -10.0, -10.0)
     prediction_ms: int = 0
     enhancement: int = 0
@@ -56,7 +57,7 @@ class StationSettings:
 
 @dataclass(frozen=True)
 class DeviceSettings:
-    """The device; the defaults are those after power-on (docs/is900.md 12)."""
+    """Settings of the device; the defaults are those after power-on (docs/is900.md 12)."""
 
     stations: tuple[StationSettings, ...] = field(default_factory=lambda: (StationSettings(),) * len(STATION_NAMES))
     binary: bool = False
@@ -66,7 +67,7 @@ class DeviceSettings:
     lights: bool = True
     brightness: int = 100
     timeout_ms: int = 20
-    """Ultrasonic time-out; the default is a choice."""
+    """Ultrasonic time-out [ms]; the default is a choice."""
     gain: int = 1
     """Ultrasonic sensitivity; the default is a choice."""
     genlock: str = "0"
@@ -75,7 +76,7 @@ class DeviceSettings:
     genlock_phase: float = 0.0
     emitters: tuple[Emitter, ...] = DEFAULT_EMITTERS
     draft_emitters: tuple[Emitter, ...] = DEFAULT_EMITTERS
-    """Emitters as `MCe` would make them."""
+    """Emitters that `MCe` would activate."""
     error_log: bool = True
     command_log: bool = False
     scheduling: int = 1
@@ -85,7 +86,7 @@ class DeviceSettings:
     udp_port: int = 5001
     baud: int = 115200
     framing: tuple[str, int, int] = ("N", 8, 0)
-    """Parity, bits and hardware handshake; kept and without effect."""
+    """Parity, bits and hardware handshake; stored without effect."""
 
     def station(self, name: str) -> StationSettings:
         return self.stations[STATION_NAMES.index(name)]

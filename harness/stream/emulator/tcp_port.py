@@ -1,4 +1,4 @@
-"""A TCP port: the same bytes as on the serial line (docs/is900.md 9)."""
+"""A TCP port of the emulator: it carries the same bytes as the serial line (docs/is900.md 9)."""
 
 import socket
 from collections.abc import Callable
@@ -6,22 +6,22 @@ from collections.abc import Callable
 from harness.errors import BadInput
 
 LogCallback = Callable[[str], None]
-"""Takes a line for whoever watches."""
+"""Receives one line of text for the user."""
 _READ_BYTES = 4096
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
 class TcpPort:
-    """A TCP port for one client at a time; others are turned away at once."""
+    """A TCP port for one client at a time; further clients are turned away at once."""
 
-    def __init__(self, host: str, port: int, *, anywhere: bool = False, say: LogCallback = lambda line: None) -> None:
-        """BadInput when it is taken, or open to others unless that is asked for."""
+    def __init__(self, host: str, port: int, *, anywhere: bool = False, log: LogCallback = lambda line: None) -> None:
+        """Listen at this address. Raises BadInput when it is taken, or reachable by others without `anywhere`."""
         if host not in _LOOPBACK and not anywhere:
-            advice = "Use 127.0.0.1, or say --anywhere: whoever reaches the port may then command the emulator."
-            raise BadInput(f"{host} is not this computer alone.", advice)
-        self._say = say
+            advice = "Use 127.0.0.1, or --anywhere: anyone who reaches the port can then command the emulator."
+            raise BadInput(f"{host} is reachable from other computers.", advice)
+        self._log = log
         self._client: socket.socket | None = None
-        self._rest = b""
+        self._unsent = b""
         self._server: socket.socket | None = None
         self._address = host, port
         self.plug()
@@ -35,16 +35,16 @@ class TcpPort:
         return [end.fileno() for end in (self._server, self._client) if end is not None]
 
     def writable(self) -> list[int]:
-        return [self._client.fileno()] if self._rest and self._client is not None else []
+        return [self._client.fileno()] if self._unsent and self._client is not None else []
 
     def read(self) -> bytes:
         self._flush()
-        data = self._take()
-        if not data:  # first of all notice that a client has left: it may be the one that comes back
-            self._welcome()
+        data = self._receive()
+        if not data:  # notice a departed client before accepting one: the same client may be reconnecting
+            self._accept_client()
         return data
 
-    def _take(self) -> bytes:
+    def _receive(self) -> bytes:
         if self._client is None:
             return b""
         try:
@@ -54,25 +54,25 @@ class TcpPort:
         except OSError:
             data = b""
         if not data:
-            self._leave()
+            self._drop_client()
         return data
 
     def write(self, data: bytes) -> bool:
         self._flush()
-        if self._client is None or self._rest:
+        if self._client is None or self._unsent:
             return False
-        self._rest = data
+        self._unsent = data
         self._flush()
-        if self._client is not None and len(self._rest) < len(data):
+        if self._client is not None and len(self._unsent) < len(data):
             return True
-        self._rest = b""
+        self._unsent = b""
         return False
 
     def baud(self) -> int | None:
         return None
 
     def unplug(self) -> None:
-        self._leave()
+        self._drop_client()
         if self._server is not None:
             self._server.close()
             self._server = None
@@ -92,8 +92,8 @@ class TcpPort:
     def close(self) -> None:
         self.unplug()
 
-    def _welcome(self) -> None:
-        """Let in whoever waits, if nobody is there."""
+    def _accept_client(self) -> None:
+        """Accept a waiting client if there is none; turn away further ones."""
         while self._server is not None:
             try:
                 client, address = self._server.accept()
@@ -101,25 +101,25 @@ class TcpPort:
                 return
             if self._client is not None:
                 client.close()
-                self._say(f"turned away {address[0]}:{address[1]}: one client at a time")
+                self._log(f"turned away {address[0]}:{address[1]}: one client at a time")
                 continue
             client.setblocking(False)
             client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             client.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
             self._client = client
-            self._say(f"client {address[0]}:{address[1]}")
+            self._log(f"client {address[0]}:{address[1]}")
 
-    def _leave(self) -> None:
+    def _drop_client(self) -> None:
         if self._client is not None:
             self._client.close()
-            self._client, self._rest = None, b""
-            self._say("client gone")
+            self._client, self._unsent = None, b""
+            self._log("client gone")
 
     def _flush(self) -> None:
-        if self._rest and self._client is not None:
+        if self._unsent and self._client is not None:
             try:
-                self._rest = self._rest[self._client.send(self._rest) :]
+                self._unsent = self._unsent[self._client.send(self._unsent) :]
             except BlockingIOError:
                 pass
             except OSError:
-                self._leave()
+                self._drop_client()

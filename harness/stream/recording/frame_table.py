@@ -1,4 +1,4 @@
-"""Frames as a table for other programs: a row for every station of every frame."""
+"""Frames as a table for other programs: one row for each station of each frame."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -25,7 +25,7 @@ FRAME_COLUMNS = (
 
 
 def frame_rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> Iterator[dict[str, Any]]:
-    """One for each station, by the names of COLUMNS; None for what did not come or is not valid."""
+    """Yield one row per station, keyed by `FRAME_COLUMNS`; None for numbers that are missing or not valid."""
     for i, station in enumerate(stations):
         numbers = (frame.measured_s[i], *frame.position_m[i], *frame.tracker_from_station[i])
         values = (
@@ -42,7 +42,10 @@ def frame_rows(frame: TrackerFrame, stations: Sequence[str], wall_s: float) -> I
 
 
 def format_csv_row(row: dict[str, Any]) -> str:
-    """A line; numbers in full, so that they come back as they were, 1 and 0 for yes and no."""
+    """Format a row as a CSV line.
+
+    Floats have full precision, so that they read back unchanged. Booleans are 1 and 0.
+    """
     return ",".join(_format_value(row[name]) for name in FRAME_COLUMNS)
 
 

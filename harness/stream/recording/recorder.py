@@ -1,4 +1,4 @@
-"""Records a device until told to stop."""
+"""Recording of a device until told to stop."""
 
 import threading
 from collections.abc import Callable
@@ -10,48 +10,48 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import RecordingWriter
 
 PROGRESS_INTERVAL_S = 1.0
-"""Progress is told so often [s]."""
+"""Interval between two progress reports [s]."""
 
 
 def record_port(
     port: str,
-    wanted: DriverConfig,
-    into: RecordingWriter,
+    config: DriverConfig,
+    writer: RecordingWriter,
     *,
     seconds: float | None = None,
-    say: Callable[[str], None] = lambda line: None,
+    log: Callable[[str], None] = lambda line: None,
     progress: Callable[[str], None] = lambda line: None,
 ) -> None:
-    """Let a device stream until Ctrl-C, or for so long, and write all that goes over its line.
+    """Let a device stream until Ctrl-C, or for `seconds`, and record everything that passes over its line.
 
-    `say` hears what is worth a line of its own, `progress` how it goes. BadInput when there is no device, BadFile when
-    the recording cannot be written; what had come until then is kept.
+    `log` receives the messages that deserve a line of their own, `progress` the text of the progress line. Raises
+    BadInput when there is no device, and BadFile when the recording cannot be written; blocks written before are kept.
     """
 
-    def happened(event: LineEvent) -> None:
-        say(event.text)
+    def report_event(event: LineEvent) -> None:
+        log(event.text)
 
-    with suppress(KeyboardInterrupt), Is900(port, wanted, witness=into, on_event=happened) as device:
+    with suppress(KeyboardInterrupt), Is900(port, config, observer=writer, on_event=report_event) as device:
         names = ", ".join(f"{number} {name}" for number, name in enumerate(device.stations, 1))
-        say(f"{device.identification or 'a device'} at {port}; stations {names}; Ctrl-C ends the recording")
+        log(f"{device.identification or 'a device'} at {port}; stations {names}; Ctrl-C ends the recording")
         end = threading.Timer(seconds or 0.0, device.close)
         if seconds is not None:
             end.start()
         try:
-            told_s = -PROGRESS_INTERVAL_S
+            reported_s = -PROGRESS_INTERVAL_S
             for frame in device:
-                if frame.received_s - told_s >= PROGRESS_INTERVAL_S:
-                    told_s = frame.received_s
-                    progress(_progress_text(device, frame, into))
+                if frame.received_s - reported_s >= PROGRESS_INTERVAL_S:
+                    reported_s = frame.received_s
+                    progress(_progress_text(device, frame, writer))
         finally:
             end.cancel()
             progress("")
 
 
-def _progress_text(device: Is900, frame: TrackerFrame, into: RecordingWriter) -> str:
+def _progress_text(device: Is900, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
     tracked = int((frame.position_valid | frame.orientation_valid).sum())
     return (
         f"{health['frames']:.0f} frames, {health['rate_hz']:.1f} Hz, {tracked} of {len(device.stations)} stations "
-        f"tracked, {1e-3 * into.counts[RECEIVED]:.0f} kB"
+        f"tracked, {1e-3 * writer.counts[RECEIVED]:.0f} kB"
     )

@@ -1,12 +1,12 @@
-"""Recordings: all that went over the line, both ways, with the host's times; the layout is that of `read_blocks.py`.
+"""Recordings: everything that passed over the line, in both directions, with the host's times.
 
-A recording only ever grows, by whole blocks. What a crash cut off at the end, or a disk spoilt in the middle, costs
-the blocks it touches and is named; recording into a file of ours goes on behind it. Blocks by kind:
+The file layout is described in `codec/blocks.py`. A recording only grows, by whole blocks. A crash or a damaged disk
+costs only the blocks it touches, and these are reported. A recording that was cut off can be continued. Blocks by kind:
 
-    recv, sent   bytes from and to the device; of no bytes: nothing was there, and a frame was given up waiting for
-    conf         JSON of the `WireFormat` that the bytes after it are read with; the device's clock starts anew
-    evnt         JSON of what befell the line, as the driver reported it
-    note         JSON of what made what follows: the port, or the scenario, clip, seed, stations and rate
+    recv, sent   bytes from and to the device; an empty recv block: nothing arrived and an overdue frame was closed
+    conf         JSON of the `WireFormat` of the bytes that follow; the device's clock starts at zero there
+    evnt         JSON of an event on the line, as the driver reported it
+    note         JSON of the origin of what follows: the port, or the scenario, clip, seed, stations and rate
 """
 
 import json
@@ -20,7 +20,7 @@ from functools import cached_property
 from pathlib import Path
 from threading import Lock
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from harness.core.fields import build
 from harness.errors import BadFile, HarnessError
@@ -41,60 +41,59 @@ from harness.stream.codec.blocks import (
 )
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.reader import WireFormat
-
-if TYPE_CHECKING:
-    from harness.stream.driver import LineEvent
+from harness.stream.line_events import LineEvent
 
 EXPECTED_FILE = "a recording by `harness record`"
+_WRITABLE_FILE = "a file to record into"
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A recording as it was when it was read."""
+    """The content of a recording at the time it was read."""
 
     path: Path
     data: bytes
 
     def blocks(self) -> Iterator[RecordingBlock]:
-        """Every whole block, in the order of the file."""
+        """Yield every whole block, in file order."""
         return (entry for entry in self._entries() if isinstance(entry, RecordingBlock))
 
     @cached_property
     def damage(self) -> tuple[str, ...]:
-        """What is cut off or damaged, a line each, in the order of the file."""
+        """Descriptions of the damaged or truncated parts, in file order."""
         out: list[str] = []
-        spoilt: DamagedSpan | None = None
+        damaged: DamagedSpan | None = None
         before_s = None
         for entry in self._entries():
             if isinstance(entry, DamagedSpan):
-                spoilt = entry
+                damaged = entry
                 continue
-            if spoilt:
-                out.append(_damage_text(spoilt, before_s, entry.monotonic_s))
-            spoilt, before_s = None, entry.monotonic_s
-        if spoilt:
-            out.append(_truncation_text(spoilt, before_s))
+            if damaged:
+                out.append(_damage_text(damaged, before_s, entry.monotonic_s))
+            damaged, before_s = None, entry.monotonic_s
+        if damaged:
+            out.append(_truncation_text(damaged, before_s))
         return tuple(out)
 
     @cached_property
     def formats(self) -> tuple[WireFormat, ...]:
-        """How it was read, each time the device was set up; BadFile when one cannot be made out."""
+        """Wire format of each configuration of the device. Raises BadFile when one cannot be read."""
         return tuple(self.format_of(block) for block in self.blocks() if block.kind == CONFIGURED)
 
     @cached_property
     def note(self) -> dict[str, Any]:
-        """The last word on what made it; empty when nothing is said."""
+        """The latest note on the origin of the recording; empty when there is none."""
         notes = [block for block in self.blocks() if block.kind == NOTE]
         return self._json(notes[-1]) if notes else {}
 
     @property
     def events(self) -> list[dict[str, Any]]:
-        """What befell the line: kind, text and when, by the host's clock [s]."""
-        happened = [block for block in self.blocks() if block.kind == EVENT]
-        return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in happened]
+        """Events on the line: kind, text and time on the host's clock [s]."""
+        event_blocks = [block for block in self.blocks() if block.kind == EVENT]
+        return [{"monotonic_s": block.monotonic_s, **self._json(block)} for block in event_blocks]
 
     def format_of(self, configured: RecordingBlock) -> WireFormat:
-        """The wire format in a block of that kind; BadFile."""
+        """Parse the wire format in a "conf" block. Raises BadFile."""
         content = self._json(configured)
         try:
             content["characters"] = str(content.get("characters", "")).encode()
@@ -103,13 +102,13 @@ class Recording:
                 raise TypeError(f"wire format.rate_hz: {wire.rate_hz:g} is not positive")
             return wire
         except (TypeError, HarnessError) as error:
-            raise BadFile(self.path, f"a wire format that cannot be used ({error})", EXPECTED_FILE, "") from error
+            raise BadFile(self.path, f"an unusable wire format ({error})", EXPECTED_FILE, "") from error
 
     def _json(self, block: RecordingBlock) -> dict[str, Any]:
         try:
             content = json.loads(block.payload)
         except ValueError as error:
-            raise BadFile(self.path, f"a {block.kind} block that is no JSON", EXPECTED_FILE, "") from error
+            raise BadFile(self.path, f"a {block.kind} block that is not JSON", EXPECTED_FILE, "") from error
         return content if isinstance(content, dict) else {}
 
     def _entries(self) -> Iterator[RecordingBlock | DamagedSpan]:
@@ -117,7 +116,10 @@ class Recording:
 
 
 def read_recording(path: Path | str) -> Recording:
-    """What a file holds, whatever was cut off or damaged; BadFile for no recording, or one of a newer version."""
+    """Read a recording, whatever part of it is damaged or truncated.
+
+    Raises BadFile for a file that is no recording, or one of a newer version.
+    """
     path = Path(path)
     try:
         data = path.read_bytes()
@@ -130,11 +132,11 @@ def read_recording(path: Path | str) -> Recording:
 
 
 def _check_kind(path: Path, data: bytes) -> None:
-    """BadFile unless the file is ours, as far as it goes."""
+    """Raise BadFile unless the file is a recording or the beginning of one."""
     version = read_version(data)
     if version is not None and version > VERSION:
-        found = f"a recording of version {version}"
-        raise BadFile(path, found, f"version {VERSION} at most", "A newer version of the harness made it; use that.")
+        problem = f"a recording of version {version}"
+        raise BadFile(path, problem, f"version {VERSION} at most", "Use the newer version of the harness that made it.")
     if (
         version is None
         and not FILE_HEADER.startswith(data)
@@ -144,26 +146,26 @@ def _check_kind(path: Path, data: bytes) -> None:
 
 
 class RecordingWriter:
-    """Appends to a recording; a `Witness` of the driver. Blocks go to the system as they come: a process that dies
-    loses none that was finished.
+    """Appends to a recording; it is a `LineObserver` of the driver.
 
-    The file is looked at when this is made and touched when there is something to write. BadFile for one that is not
-    ours, that another process is recording into, or that cannot be written.
+    Blocks are handed to the operating system at once, so that a process that dies loses no finished block. The file is
+    checked when the writer is made, and opened at the first write. Raises BadFile for a file that is no recording, that
+    another process is recording into, or that cannot be written.
     """
 
     def __init__(self, path: Path | str, note: Mapping[str, Any] | None = None) -> None:
-        """`note` says what makes the recording."""
+        """Check the file. `note` describes the origin of the recording."""
         self.path = Path(path)
         self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT), 0)
-        """Bytes received and sent, and how often it was set up and something happened, by kind."""
+        """Bytes received and sent, and numbers of configurations and events, by block kind."""
         self._note = dict(note or {})
-        before = self._what_is_there()
+        before = self._existing_recording()
         self._new = before is None
         self._stations = before.formats[-1].stations if before and before.formats else None
         self._file: int | None = None
         self._closed = False
         self._lock = Lock()
-        """The thread that reads and the one that closes both write."""
+        """Held while writing: the thread that reads and the one that closes both write."""
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
         self._append_all(RECEIVED, data, monotonic_s, wall_s)
@@ -172,7 +174,10 @@ class RecordingWriter:
         self._append_all(SENT, data, monotonic_s, wall_s)
 
     def on_configured(self, wire: WireFormat, monotonic_s: float | None = None, wall_s: float | None = None) -> None:
-        """BadFile for other stations than the recording has had: a stream's never change."""
+        """Write the wire format.
+
+        Raises BadFile for other stations than before, because a stream's stations never change.
+        """
         if self._stations not in (None, wire.stations):
             raise BadFile(
                 self.path,
@@ -185,13 +190,15 @@ class RecordingWriter:
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 
-    def on_event(self, event: "LineEvent") -> None:
+    def on_event(self, event: LineEvent) -> None:
         self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
 
     def close(self) -> None:
-        """Have it all on the disk; may be done twice. A new file in which no device was ever set up is removed: nothing
-        could be made of it."""
+        """Flush everything to the disk and close the file; may be called twice.
+
+        A new file is removed when no device was ever configured in it, because it contains nothing usable.
+        """
         with self._lock:
             self._closed = True
             if self._file is not None:
@@ -227,7 +234,7 @@ class RecordingWriter:
                 return
             try:
                 if self._file is None:
-                    self._file = self._opened()
+                    self._file = self._open_file()
                     note = RecordingBlock(
                         NOTE, block.monotonic_s, block.wall_s, json.dumps(self._note, default=str).encode()
                     )
@@ -236,30 +243,30 @@ class RecordingWriter:
             except OSError as error:
                 raise _file_error(self.path, error) from error
 
-    def _opened(self) -> int:
-        """The file, ours alone, with its header whole."""
+    def _open_file(self) -> int:
+        """Open the file with an exclusive lock and complete its header."""
         new = os.O_CREAT | os.O_EXCL if self._new else 0
         file = os.open(self.path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0) | new, 0o644)
         if not _lock_file(file):
             os.close(file)
-            raise BadFile(self.path, "in use", "a file to record into", "Another process is recording into it.")
+            raise BadFile(self.path, "in use", _WRITABLE_FILE, "Another process is recording into it.")
         size = os.fstat(file).st_size
         _write_all(file, FILE_HEADER[size:])
         return file
 
-    def _what_is_there(self) -> Recording | None:
-        """The recording to go on with; None for a new file."""
+    def _existing_recording(self) -> Recording | None:
+        """Return the recording to continue; None for a new file. Raises BadFile."""
         try:
             mode = self.path.stat().st_mode
             if not stat.S_ISREG(mode):
-                advice = "Nothing was sent to it. The port comes first: `harness record PORT FILE`."
-                raise BadFile(self.path, "no ordinary file", "a file to record into", advice)
+                advice = "Nothing was written to it. The port comes first: `harness record PORT FILE`."
+                raise BadFile(self.path, "no regular file", _WRITABLE_FILE, advice)
             if not os.access(self.path, os.W_OK):
-                raise PermissionError("it is not yours to write")
+                raise PermissionError("you may not write to it")
             data = self.path.read_bytes()
         except FileNotFoundError:
             if not self.path.parent.is_dir():
-                raise BadFile(self.path, "no such folder", "a file to record into", "Make the folder first.") from None
+                raise BadFile(self.path, "no such folder", _WRITABLE_FILE, "Make the folder first.") from None
             return None
         except OSError as error:
             raise _file_error(self.path, error) from error
@@ -270,9 +277,9 @@ class RecordingWriter:
 def record_capture(
     path: Path | str, wire: WireFormat, capture: ByteCapture, note: Mapping[str, Any], *, seconds: float = math.inf
 ) -> RecordingWriter:
-    """Write what a simulated line carried (in its first so many seconds), chunk by chunk.
+    """Record what a simulated line carried in its first `seconds`, chunk by chunk.
 
-    The simulation's clock stands for both of the host's. Returns the writer, closed, for its counts.
+    The simulation's clock serves as both of the host's clocks. Returns the writer, closed, for its counts.
     """
     ends, received_s = capture.ends.tolist(), capture.received_s.tolist()
     with RecordingWriter(path, note) as writer:
@@ -285,14 +292,14 @@ def record_capture(
 
 
 def _write_all(file: int, data: bytes) -> None:
-    """All of it, though the system may take it in parts."""
-    left = memoryview(data)
-    while left:
-        left = left[os.write(file, left) :]
+    """Write all of the data, although the operating system may take it in parts."""
+    remaining = memoryview(data)
+    while remaining:
+        remaining = remaining[os.write(file, remaining) :]
 
 
 def _lock_file(file: int) -> bool:
-    """Whether nobody else records into the file, where the system can tell."""
+    """Lock the file for this process; False when another process holds it. Windows has no such lock: always True."""
     try:
         import fcntl
     except ImportError:  # Windows
@@ -306,21 +313,21 @@ def _lock_file(file: int) -> bool:
 
 def _file_error(path: Path, error: OSError) -> BadFile:
     if isinstance(error, IsADirectoryError):
-        return BadFile(path, "a folder", EXPECTED_FILE, "Name a file in it.")
+        return BadFile(path, "a folder", EXPECTED_FILE, "Name a file in that folder.")
     if isinstance(error, FileNotFoundError):
         return BadFile(path, "no such file", EXPECTED_FILE, "`harness record PORT FILE` makes one.")
     return BadFile(
-        path, f"cannot be used ({error.strerror or error})", EXPECTED_FILE, "What it held before is still there."
+        path, f"cannot be used ({error.strerror or error})", EXPECTED_FILE, "Its earlier content is unchanged."
     )
 
 
-def _damage_text(lost: DamagedSpan, before_s: float | None, after_s: float) -> str:
-    what = f"bytes {lost.begin} to {lost.end} are damaged"
+def _damage_text(span: DamagedSpan, before_s: float | None, after_s: float) -> str:
+    what = f"bytes {span.begin} to {span.end} are damaged"
     if before_s is None:
-        return f"{what}: the beginning, until {after_s:.3f} s"
+        return f"{what}: from the beginning to {after_s:.3f} s of the host's clock"
     return f"{what}: between {before_s:.3f} s and {after_s:.3f} s of the host's clock"
 
 
-def _truncation_text(lost: DamagedSpan, before_s: float | None) -> str:
+def _truncation_text(span: DamagedSpan, before_s: float | None) -> str:
     when = "" if before_s is None else f", from {before_s:.3f} s of the host's clock on"
-    return f"the last {lost.end - lost.begin} bytes are no whole block: cut off{when}"
+    return f"the last {span.end - span.begin} bytes are cut off{when}"

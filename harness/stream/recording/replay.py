@@ -1,7 +1,7 @@
 """A recording as a stream: the same decoder on a virtual clock, at any speed.
 
-What a frame says depends on the recorded bytes and times alone, never on the speed. Frames carry the recorded times
-of reception. Frames that the driver gave up waiting for are given up at the same moment of the virtual clock.
+The content of frames depends on the recorded bytes and times alone, never on the speed. Frames carry the recorded times
+of reception. Frames that the driver closed on a timeout are closed at the same moment of the virtual clock.
 """
 
 import math
@@ -23,13 +23,13 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import EXPECTED_FILE, Recording, read_recording
 
 CHUNKS_PER_BATCH = 1000
-"""Chunks that are decoded together where nobody waits for the clock."""
+"""Chunks that are decoded together where the replay does not wait for the clock."""
 ReplaySpeed = float | Literal["step", "max"]
-"""So many times as fast as it was, a frame at a time, or without waiting."""
+"""A factor of the recorded speed; "step" for one frame at a time; "max" for no waiting."""
 
 
 def parse_speed(text: str) -> ReplaySpeed:
-    """`step`, `max`, or a positive number; BadInput."""
+    """Parse `step`, `max`, or a positive number. Raises BadInput."""
     if text in ("step", "max"):
         return "step" if text == "step" else "max"
     try:
@@ -37,21 +37,21 @@ def parse_speed(text: str) -> ReplaySpeed:
     except ValueError:
         speed = math.nan
     if not 0.0 < speed < math.inf:
-        raise BadInput(f"Speed {text!r}.", "It is `step`, `max`, or a positive number: 1 is as it was.")
+        raise BadInput(f"Speed {text!r} is not possible.", "Give `step`, `max`, or a positive number; 1 is real time.")
     return speed
 
 
 def wait_for_enter() -> bool:
-    """Wait for Enter; False at the end of the input."""
+    """Wait for the Enter key. Returns False at the end of the input."""
     return bool(sys.stdin.readline())
 
 
 class RecordingStream:
-    """A `TrackerStream` over a recording; every iteration is from its beginning.
+    """A `TrackerStream` over a recording; every iteration starts at its beginning.
 
-    Where the device was set up anew, or the recording was continued, the stream goes on: device time by the host's
-    clock, and the host's clock by the wall's where it began anew. BadFile for a recording that cannot be read, was
-    never set up, or changes its stations.
+    Where the device was configured again, or the recording was continued, the stream goes on. Device time then advances
+    by the host's clock, and the host's clock by the wall clock where it began anew. Raises BadFile for a recording that
+    cannot be read, was never configured, or changes its stations.
     """
 
     def __init__(
@@ -61,22 +61,26 @@ class RecordingStream:
         *,
         step: Callable[[], bool] = wait_for_enter,
     ) -> None:
-        """`step` waits for leave to give the next frame where the speed is `step`, and says False to end."""
+        """Open a recording.
+
+        At speed "step", `step` waits for permission to yield the next frame; it returns False to end the iteration.
+        """
         self.recording = recording if isinstance(recording, Recording) else read_recording(recording)
         formats = self.recording.formats
         if not formats:
-            lost = "; ".join(self.recording.damage)
-            found = "the device was never set up in it" + (f" ({lost})" if lost else "")
-            raise BadFile(self.recording.path, found, EXPECTED_FILE, "There are no frames in it.")
+            damage = "; ".join(self.recording.damage)
+            problem = "the device was never configured in it" + (f" ({damage})" if damage else "")
+            raise BadFile(self.recording.path, problem, EXPECTED_FILE, "It contains no frames.")
         for wire in formats[1:]:
             if wire.stations != formats[0].stations:
-                found = f"stations {', '.join(formats[0].stations)} become {', '.join(wire.stations)}"
-                raise BadFile(self.recording.path, found, "the same stations throughout", "Replay the parts apart.")
+                problem = f"stations {', '.join(formats[0].stations)} become {', '.join(wire.stations)}"
+                advice = "Replay the parts separately."
+                raise BadFile(self.recording.path, problem, "the same stations throughout", advice)
         self.wire: WireFormat = formats[0]
-        """As it was first set up."""
+        """The wire format of the first configuration."""
         self._speed, self._step = speed, step
         self._wall_ahead_s = 0.0
-        self._played_by = ContinuousFrameReader()
+        self._reader = ContinuousFrameReader()
         self._closed = Event()
 
     @property
@@ -85,24 +89,24 @@ class RecordingStream:
 
     @property
     def device_zero_s(self) -> float:
-        """What `measured_s` of the frame given last is where the device's own clock is zero [s]."""
-        return self._played_by.device_zero_s
+        """The value of `measured_s` at which the device's own clock was zero, for the latest frame [s]."""
+        return self._reader.device_zero_s
 
     @property
     def counts(self) -> dict[str, int]:
-        """Of what was read so far (see `ContinuousFrameReader.counts`)."""
-        return self._played_by.counts
+        """Counts of what was read so far (see `ContinuousFrameReader.counts`)."""
+        return self._reader.counts
 
     def close(self) -> None:
         self._closed.set()
 
     def wall_s(self, received_s: float) -> float:
-        """Wall clock at a moment of the host's monotonic clock, as it was when the device was set up last."""
+        """Wall clock at a time of the host's monotonic clock [s], as they were related at the latest configuration."""
         return received_s + self._wall_ahead_s
 
     def __iter__(self) -> Iterator[TrackerFrame]:
         began_s = first_s = None
-        for due_s, frame in self._played():
+        for due_s, frame in self._due_frames():
             if isinstance(self._speed, float):
                 if began_s is None or first_s is None:
                     began_s, first_s = time.monotonic(), due_s
@@ -111,44 +115,44 @@ class RecordingStream:
                 return
             yield frame
 
-    def _played(self) -> Iterator[tuple[float, TrackerFrame]]:
-        """Every frame, and when it was due by the virtual clock [s]."""
-        self._played_by = sessions = ContinuousFrameReader()
-        at_once = 1 if isinstance(self._speed, float) else CHUNKS_PER_BATCH
+    def _due_frames(self) -> Iterator[tuple[float, TrackerFrame]]:
+        """Yield every frame with the time at which it is due on the virtual clock [s]."""
+        self._reader = reader = ContinuousFrameReader()
+        batch_size = 1 if isinstance(self._speed, float) else CHUNKS_PER_BATCH
         now_s, wall_s, shift_s = -math.inf, 0.0, 0.0
-        waiting: list[tuple[float, bytes]] = []
+        chunks_waiting: list[tuple[float, bytes]] = []
         for block in self.recording.blocks():
             if block.kind == RECEIVED and block.payload:
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
-                waiting.append((now_s, block.payload))
-                if len(waiting) >= at_once:
-                    yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
+                chunks_waiting.append((now_s, block.payload))
+                if len(chunks_waiting) >= batch_size:
+                    yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
             elif block.kind == RECEIVED:
-                yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
+                yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
-                yield from _with_due_time(now_s, sessions.expire(now_s))
+                yield from _with_due_time(now_s, reader.expire(now_s))
             elif block.kind == CONFIGURED:
-                yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
-                yield from _with_due_time(now_s, sessions.finish())
+                yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
+                yield from _with_due_time(now_s, reader.finish())
                 wire = self.recording.format_of(block)
                 if block.monotonic_s + shift_s < now_s:  # recorded after a restart of the computer
                     pause_s = max(block.wall_s - wall_s, 1.0 / wire.rate_hz)
                     shift_s = now_s + pause_s - block.monotonic_s
                 now_s, wall_s = block.monotonic_s + shift_s, block.wall_s
                 self._wall_ahead_s = wall_s - now_s
-                sessions.begin_session(wire, now_s)
-        yield from _with_due_time(now_s, sessions.feed_all(_concatenate_chunks(waiting)))
-        yield from _with_due_time(now_s, sessions.finish())
+                reader.begin_session(wire, now_s)
+        yield from _with_due_time(now_s, reader.feed_all(_concatenate_chunks(chunks_waiting)))
+        yield from _with_due_time(now_s, reader.finish())
 
 
 def _with_due_time(now_s: float, frames: list[TrackerFrame]) -> Iterator[tuple[float, TrackerFrame]]:
     return ((now_s, frame) for frame in frames)
 
 
-def _concatenate_chunks(waiting: list[tuple[float, bytes]]) -> ByteCapture:
-    """The chunks as one capture; they wait no longer."""
-    received_s, chunks = [now_s for now_s, _ in waiting], [data for _, data in waiting]
-    waiting.clear()
+def _concatenate_chunks(chunks_waiting: list[tuple[float, bytes]]) -> ByteCapture:
+    """Return the waiting chunks as one capture, and empty the list."""
+    received_s, chunks = [now_s for now_s, _ in chunks_waiting], [data for _, data in chunks_waiting]
+    chunks_waiting.clear()
     return ByteCapture(
         b"".join(chunks), np.cumsum([len(data) for data in chunks], dtype=np.int64), np.array(received_s)
     )

@@ -1,4 +1,4 @@
-"""Device time goes on, whatever the clock's stamps do."""
+"""Device time continues, whatever the clock's stamps do."""
 
 import numpy as np
 import pytest
@@ -10,29 +10,29 @@ from tests.stream.wire import stamps_s
 HOST_S: Floats = stamps_s(50) + 1000.0
 
 
-def unwrapped(stamp_s: Floats, host_s: Floats = HOST_S, pieces: int = 1) -> tuple[Floats, ClockUnwrapper]:
+def unwrap(stamp_s: Floats, host_s: Floats = HOST_S, chunks: int = 1) -> tuple[Floats, ClockUnwrapper]:
     clock = ClockUnwrapper()
-    parts = zip(np.array_split(stamp_s, pieces), np.array_split(host_s, pieces), strict=True)
+    parts = zip(np.array_split(stamp_s, chunks), np.array_split(host_s, chunks), strict=True)
     return np.concatenate([clock.unwrap(stamp, host) for stamp, host in parts]), clock
 
 
-def zeroed(stamp_s: Floats, at: int) -> Floats:
-    """The same moments on a clock that was set to zero between two records."""
+def reset_at(stamp_s: Floats, at: int) -> Floats:
+    """Return the stamps of a clock that was set to zero before record `at`."""
     return np.where(np.arange(len(stamp_s)) < at, stamp_s, stamp_s - stamp_s[at] + 0.001)
 
 
-def test_a_steady_clock_is_left_alone() -> None:
-    out, clock = unwrapped(stamps_s(50))
+def test_a_steady_clock_is_unchanged() -> None:
+    out, clock = unwrap(stamps_s(50))
     np.testing.assert_array_equal(out, stamps_s(50))
     assert clock.resets == 0
 
 
 @pytest.mark.parametrize("at", [1, 7, 100, 198])
 def test_setting_the_clock_to_zero_costs_one_stamp_and_no_time(at: int) -> None:
-    out, clock = unwrapped(zeroed(stamps_s(50), at))
+    out, clock = unwrap(reset_at(stamps_s(50), at))
     assert np.flatnonzero(np.isnan(out)).tolist() == [at]
-    known = ~np.isnan(out)
-    np.testing.assert_allclose(out[known], stamps_s(50)[known], atol=1e-9)
+    valid = ~np.isnan(out)
+    np.testing.assert_allclose(out[valid], stamps_s(50)[valid], atol=1e-9)
     assert clock.resets == 1
 
 
@@ -40,20 +40,20 @@ def test_a_clock_may_be_set_to_zero_many_times() -> None:
     true_s = stamps_s(400)
     stamp_s = true_s
     for at in (200, 600, 800, 1500):
-        stamp_s = zeroed(stamp_s, at)
-    out, clock = unwrapped(stamp_s, true_s + 1000.0)
+        stamp_s = reset_at(stamp_s, at)
+    out, clock = unwrap(stamp_s, true_s + 1000.0)
     assert np.flatnonzero(np.isnan(out)).tolist() == [200, 600, 800, 1500]
-    known = ~np.isnan(out)
-    np.testing.assert_allclose(out[known], true_s[known], atol=1e-9)
+    valid = ~np.isnan(out)
+    np.testing.assert_allclose(out[valid], true_s[valid], atol=1e-9)
     assert clock.resets == 4
 
 
 @pytest.mark.parametrize("wrong_s", [1e30, -3.0, 0.0, 4000.0, np.inf, np.nan, 11.0])
 @pytest.mark.parametrize("at", [1, 77, 199])
-def test_a_damaged_stamp_costs_itself_alone(wrong_s: float, at: int) -> None:
+def test_a_damaged_stamp_costs_only_itself(wrong_s: float, at: int) -> None:
     stamp_s = stamps_s(50)
     stamp_s[at] = wrong_s
-    out, clock = unwrapped(stamp_s)
+    out, clock = unwrap(stamp_s)
     assert np.flatnonzero(np.isnan(out)).tolist() == [at]
     np.testing.assert_array_equal(np.delete(out, at), np.delete(stamps_s(50), at))
     assert clock.resets == 0
@@ -61,41 +61,41 @@ def test_a_damaged_stamp_costs_itself_alone(wrong_s: float, at: int) -> None:
 
 @pytest.mark.parametrize("wrong_s", [9e6, 4000.0, np.nan])
 def test_time_survives_a_damaged_first_stamp(wrong_s: float) -> None:
-    """Whatever the first stamp was, time advances rightly from the third on."""
+    """Whatever the first stamp was, time advances correctly from the third on."""
     stamp_s = stamps_s(50)
     stamp_s[0] = wrong_s
-    out, _ = unwrapped(stamp_s)
+    out, _ = unwrap(stamp_s)
     np.testing.assert_allclose(np.diff(out[3:]), np.diff(stamps_s(50)[3:]), atol=1e-6)
 
 
-@pytest.mark.parametrize("pieces", [1, 2, 13, 200])
-def test_pieces_do_not_matter(pieces: int, rng: np.random.Generator) -> None:
-    stamp_s = zeroed(stamps_s(50), 90)
+@pytest.mark.parametrize("chunks", [1, 2, 13, 200])
+def test_pieces_do_not_matter(chunks: int, rng: np.random.Generator) -> None:
+    stamp_s = reset_at(stamps_s(50), 90)
     stamp_s[rng.integers(0, 200, 8)] = rng.uniform(0.0, 1e6, 8)
-    np.testing.assert_array_equal(unwrapped(stamp_s, pieces=pieces)[0], unwrapped(stamp_s)[0])
+    np.testing.assert_array_equal(unwrap(stamp_s, chunks=chunks)[0], unwrap(stamp_s)[0])
 
 
 def test_late_reading_by_the_host_is_no_reason_for_doubt(rng: np.random.Generator) -> None:
     late_s = np.maximum.accumulate(HOST_S + rng.uniform(0.0, 0.2, len(HOST_S)))
-    out, clock = unwrapped(stamps_s(50), late_s)
+    out, clock = unwrap(stamps_s(50), late_s)
     np.testing.assert_array_equal(out, stamps_s(50))
     assert clock.resets == 0
 
 
-def test_a_long_silence_is_no_reason_for_doubt() -> None:
+def test_stamps_are_accepted_after_a_long_silence() -> None:
     pause = np.where(np.arange(200) < 80, 0.0, 3600.0)
-    out, clock = unwrapped(stamps_s(50) + pause, HOST_S + pause)
+    out, clock = unwrap(stamps_s(50) + pause, HOST_S + pause)
     np.testing.assert_array_equal(out, stamps_s(50) + pause)
     assert clock.resets == 0
 
 
 @pytest.mark.parametrize("off_s", [-0.256, -0.249, -0.128, 0.128, 0.249, 0.256])
 @pytest.mark.parametrize("at", [1, 77, 198])
-def test_a_stamp_at_the_edge_of_belief_shifts_no_other(off_s: float, at: int) -> None:
-    """A flipped bit is worth 256 ms: believed or not, time must not go on from there."""
+def test_a_stamp_near_the_tolerance_shifts_no_other(off_s: float, at: int) -> None:
+    """A flipped bit may shift a stamp by 256 ms. Accepted or not, time must not continue from there."""
     stamp_s = stamps_s(50)
     stamp_s[at] += off_s
-    for pieces in (1, 7, 200):
-        out, clock = unwrapped(stamp_s, pieces=pieces)
+    for chunks in (1, 7, 200):
+        out, clock = unwrap(stamp_s, chunks=chunks)
         np.testing.assert_array_equal(np.delete(out, at), np.delete(stamps_s(50), at))
         assert clock.resets == 0

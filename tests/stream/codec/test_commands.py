@@ -33,7 +33,7 @@ def read(data: bytes) -> list[bytes]:
     ],
     ids=lambda given: given[:8].decode("latin-1") if isinstance(given, bytes) else "",
 )
-def test_what_real_clients_send(data: bytes, lines: list[bytes]) -> None:
+def test_commands_of_real_clients_are_parsed(data: bytes, lines: list[bytes]) -> None:
     assert read(data) == lines
 
 
@@ -41,14 +41,14 @@ def test_what_real_clients_send(data: bytes, lines: list[bytes]) -> None:
     st.lists(st.sampled_from([b"c", b"S", b"\x19", b"\x0b", b"O1,2\r", b"MZ\r\n", b"\n", b"M", b"l*", b"\xff"])),
     st.data(),
 )
-def test_any_pieces_give_the_same_commands(parts: list[bytes], choose: st.DataObject) -> None:
+def test_any_split_gives_the_same_commands(parts: list[bytes], choose: st.DataObject) -> None:
     data = b"".join(parts)
     cut = choose.draw(st.integers(0, len(data)))
     reader = CommandReader()
     assert reader.feed(data[:cut]) + reader.feed(data[cut:]) == CommandReader().feed(data)
 
 
-def test_an_endless_line_is_cut_and_the_next_is_read() -> None:
+def test_an_endless_line_is_truncated_and_the_next_is_read() -> None:
     reader = CommandReader()
     out: list[Command] = []
     for _ in range(1000):
@@ -58,7 +58,7 @@ def test_an_endless_line_is_cut_and_the_next_is_read() -> None:
 
 
 @pytest.mark.parametrize(
-    ("built", "sent"),
+    ("command", "expected_bytes"),
     [
         (commands.set_output_list("1", (40, 2, 11, 21, 1)), b"O1,40,2,11,21,1\r\n"),
         (commands.query_output_list("A"), b"OA\r\n"),
@@ -76,9 +76,9 @@ def test_an_endless_line_is_cut_and_the_next_is_read() -> None:
         (commands.serial_line(115200), b"o1152,N,8,0\r\n"),
     ],
 )
-def test_builders_write_what_the_manuals_say(built: bytes, sent: bytes) -> None:
-    assert built == sent
-    assert read(built) == [sent[:-2]]
+def test_commands_are_those_of_the_manuals(command: bytes, expected_bytes: bytes) -> None:
+    assert command == expected_bytes
+    assert read(command) == [expected_bytes[:-2]]
 
 
 def test_immediate_commands_need_no_terminator() -> None:

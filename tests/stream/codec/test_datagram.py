@@ -11,7 +11,7 @@ from harness.stream.codec.datagram import Datagram, parse_datagram
 EXAMPLE = bytes.fromhex(
     "ff010703 0401ff05 7fff000000000000 0000b442 000020c1 0000b040 0000803f 000000bf 0000c03f 2b874541"
 )
-SAID = Datagram(
+PARSED_EXAMPLE = Datagram(
     sequence=7,
     model=4,
     station=1,
@@ -24,32 +24,32 @@ SAID = Datagram(
 )
 
 
-def test_the_example_both_ways() -> None:
+def test_the_example_is_parsed_and_formatted() -> None:
     assert len(EXAMPLE) == 44
-    assert parse_datagram(EXAMPLE) == SAID
-    assert SAID.packet() == EXAMPLE
+    assert parse_datagram(EXAMPLE) == PARSED_EXAMPLE
+    assert PARSED_EXAMPLE.packet() == EXAMPLE
 
 
-def test_the_time_is_there_only_when_asked_for() -> None:
-    without = Datagram(*(getattr(SAID, name) for name in list(Datagram.__dataclass_fields__)[:-1]))
+def test_the_time_is_optional() -> None:
+    without = Datagram(*(getattr(PARSED_EXAMPLE, name) for name in list(Datagram.__dataclass_fields__)[:-1]))
     assert len(without.packet()) == 40
     assert parse_datagram(without.packet()) == without
 
 
 @pytest.mark.parametrize("at", range(2, 44))
 @pytest.mark.parametrize("bit", range(8))
-def test_a_flipped_bit_is_caught_but_for_the_sequence(at: int, bit: int) -> None:
-    hurt = bytearray(EXAMPLE)
-    hurt[at] ^= 1 << bit
-    assert (parse_datagram(bytes(hurt)) is None) == (at != 2), "the sum leaves the sequence number out"
+def test_a_flipped_bit_is_detected_except_in_the_sequence_number(at: int, bit: int) -> None:
+    damaged = bytearray(EXAMPLE)
+    damaged[at] ^= 1 << bit
+    assert (parse_datagram(bytes(damaged)) is None) == (at != 2), "the sum does not cover the sequence number"
 
 
 @given(st.binary(max_size=60))
-def test_rubbish_is_no_packet_or_is_what_was_read(data: bytes) -> None:
-    said = parse_datagram(data)
-    assert said is None or len(said.packet()) == len(data)
+def test_random_bytes_are_no_packet_or_keep_their_length(data: bytes) -> None:
+    parsed = parse_datagram(data)
+    assert parsed is None or len(parsed.packet()) == len(data)
 
 
-@pytest.mark.parametrize("damage", [EXAMPLE[:-1], EXAMPLE + b"\0", b"", b"\xff\x02" + EXAMPLE[2:]])
-def test_other_lengths_and_camera_data_are_refused(damage: bytes) -> None:
-    assert parse_datagram(damage) is None
+@pytest.mark.parametrize("packet", [EXAMPLE[:-1], EXAMPLE + b"\0", b"", b"\xff\x02" + EXAMPLE[2:]])
+def test_other_lengths_and_camera_data_are_refused(packet: bytes) -> None:
+    assert parse_datagram(packet) is None

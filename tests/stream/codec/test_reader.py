@@ -1,4 +1,4 @@
-"""The whole way from bytes to frames."""
+"""The complete path from bytes to frames."""
 
 from itertools import pairwise
 
@@ -15,18 +15,28 @@ from harness.stream.codec.reader import CaptureStream, FrameReader, WireFormat
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.frame import TrackerFrame
-from tests.stream.wire import FOUR, RATE_HZ, RECORD, columns, frames_of, received, same, sent, stamps_s
+from tests.stream.wire import (
+    FOUR,
+    RATE_HZ,
+    RECORD,
+    decode_frames,
+    device_bytes,
+    frames_equal,
+    in_chunks,
+    stamps_s,
+    station_columns,
+)
 
 ROUNDS = 12
 
 
-def clean() -> ByteCapture:
+def clean_capture() -> ByteCapture:
     stamp_s = stamps_s(ROUNDS)
-    return received(sent(stamp_s), stamp_s)
+    return in_chunks(device_bytes(stamp_s), stamp_s)
 
 
-def rows(frames: list[TrackerFrame]) -> set[tuple[float, ...]]:
-    """What valid stations said, without where in which frame."""
+def reading_rows(frames: list[TrackerFrame]) -> set[tuple[float, ...]]:
+    """Return the content of valid readings, without the frame that they are in."""
     return {
         (float(f.measured_s[s]), *f.position_m[s].tolist(), float(f.quality[s]), float(s))
         for f in frames
@@ -34,8 +44,8 @@ def rows(frames: list[TrackerFrame]) -> set[tuple[float, ...]]:
     }
 
 
-def test_frames_say_what_was_sent() -> None:
-    frames = frames_of(clean())
+def test_frames_contain_what_was_sent() -> None:
+    frames = decode_frames(clean_capture())
     stamp_s = stamps_s(ROUNDS).reshape(-1, 4)
     assert len(frames) == ROUNDS
     np.testing.assert_allclose([f.measured_s for f in frames], stamp_s, atol=1e-6)
@@ -46,40 +56,40 @@ def test_frames_say_what_was_sent() -> None:
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 37, 39, 200])
-def test_pieces_change_nothing_but_when_they_came(chunk: int) -> None:
+def test_chunks_change_only_the_times_of_reception(chunk: int) -> None:
     stamp_s = stamps_s(ROUNDS)
-    capture = received(sent(stamp_s), stamp_s, chunk)
-    at_once, reader, begin = frames_of(capture), FrameReader(FOUR), 0
+    capture = in_chunks(device_bytes(stamp_s), stamp_s, chunk)
+    all_at_once, reader, begin = decode_frames(capture), FrameReader(FOUR), 0
     piecemeal = []
     for end, received_s in zip(capture.ends.tolist(), capture.received_s.tolist(), strict=True):
         piecemeal += reader.feed(capture.data[begin:end], received_s)
         begin = end
     piecemeal += reader.finish()
-    assert len(piecemeal) == len(at_once) == ROUNDS
-    assert all(same(one, other) for one, other in zip(piecemeal, at_once, strict=True))
-    for one, other in zip(at_once, frames_of(clean()), strict=True):
-        assert all(np.array_equal(a, b) for a, b in zip(columns(one), columns(other), strict=True))
+    assert len(piecemeal) == len(all_at_once) == ROUNDS
+    assert all(frames_equal(first, second) for first, second in zip(piecemeal, all_at_once, strict=True))
+    for first, second in zip(all_at_once, decode_frames(clean_capture()), strict=True):
+        assert all(np.array_equal(a, b) for a, b in zip(station_columns(first), station_columns(second), strict=True))
 
 
 @pytest.mark.parametrize("kind", ["flipped", "lost", "added"])
 def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
     kind: str, rng: np.random.Generator
 ) -> None:
-    """Readings missing, changed or no longer trusted: that one, rarely another, in 600 trials never a third."""
+    """Readings that are missing, changed or no longer trusted: one, rarely two, and never three in 600 trials."""
     costs = []
     for trial in range(600):
         stamp_s = stamps_s(ROUNDS)
-        data = sent(stamp_s, seed=trial)
-        truth = rows(frames_of(received(data, stamp_s)))
+        data = device_bytes(stamp_s, seed=trial)
+        truth = reading_rows(decode_frames(in_chunks(data, stamp_s)))
         at = int(rng.integers(RECORD, len(data) - RECORD))
         bit, byte = 1 << int(rng.integers(8)), bytes([int(rng.integers(256))])
         if kind == "flipped":
             data = data[:at] + bytes([data[at] ^ bit]) + data[at + 1 :]
         else:
             data = data[:at] + byte * (kind == "added") + data[at + (kind == "lost") :]
-        frames = frames_of(received(data, stamp_s))
-        trusted = rows([f for f in frames if not f.suspect.any()]) | {
-            row for f in frames for row in rows([f]) if not f.suspect[int(row[-1])]
+        frames = decode_frames(in_chunks(data, stamp_s))
+        trusted = reading_rows([f for f in frames if not f.suspect.any()]) | {
+            row for f in frames for row in reading_rows([f]) if not f.suspect[int(row[-1])]
         }
         costs.append(len(truth - trusted))
     assert np.mean(np.array(costs) > 1) < 0.05, np.bincount(costs)
@@ -87,32 +97,32 @@ def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
 
 
 def test_a_wrong_station_is_never_passed_unmarked_inside_a_round(rng: np.random.Generator) -> None:
-    """A station character changed into any other of the four, anywhere: the row that took it is marked."""
+    """A station character is changed to any other of the four, anywhere: the row that received the record is marked."""
     for trial in range(300):
         stamp_s = stamps_s(ROUNDS)
-        data = bytearray(sent(stamp_s, seed=trial))
+        data = bytearray(device_bytes(stamp_s, seed=trial))
         record = int(rng.integers(4, 4 * ROUNDS - 4))
         right = data[record * RECORD + 1]
         wrong = int(rng.choice([c for c in b"1234" if c != right]))
         data[record * RECORD + 1] = wrong
-        frames = frames_of(received(bytes(data), stamp_s))
-        taken = [
+        frames = decode_frames(in_chunks(bytes(data), stamp_s))
+        misplaced = [
             (f.suspect[s], record)
             for f in frames
             for s in np.flatnonzero(f.position_valid)
             if abs(f.position_m[s, 0] - s) > 0.5
         ]
-        assert all(suspect for suspect, _ in taken), (trial, record, chr(right), chr(wrong))
+        assert all(suspect for suspect, _ in misplaced), (trial, record, chr(right), chr(wrong))
 
 
-def test_replies_and_rubbish_are_counted_not_mistaken() -> None:
+def test_replies_and_garbage_are_counted_and_not_mistaken_for_records() -> None:
     stamp_s = stamps_s(ROUNDS)
-    data = sent(stamp_s)
+    data = device_bytes(stamp_s)
     cut = 10 * RECORD
     mixed = data[:cut] + b"31Sg00\r\n" + b"\xfe\xff" + data[cut:]
     reader = FrameReader(FOUR)
-    frames = [*reader.feed_all(received(mixed, stamp_s)), *reader.finish()]
-    assert rows(frames) == rows(frames_of(clean()))
+    frames = [*reader.feed_all(in_chunks(mixed, stamp_s)), *reader.finish()]
+    assert reading_rows(frames) == reading_rows(decode_frames(clean_capture()))
     assert [reply.line for reply in reader.replies] == [b"31Sg00"]
     assert (reader.records, reader.garbage_bytes, reader.clock_resets) == (4 * ROUNDS, 2, 0)
 
@@ -120,16 +130,16 @@ def test_replies_and_rubbish_are_counted_not_mistaken() -> None:
 def test_silence_closes_the_frame() -> None:
     stamp_s = stamps_s(1)
     reader = FrameReader(FOUR)
-    assert reader.feed(sent(stamp_s)[: 2 * RECORD] + b"0", 100.0) == []
+    assert reader.feed(device_bytes(stamp_s)[: 2 * RECORD] + b"0", 100.0) == []
     assert reader.expire(100.0 + 1.4 / RATE_HZ) == []
     (frame,) = reader.expire(100.0 + 1.6 / RATE_HZ)
     assert frame.position_valid.tolist() == [True, True, False, False]
 
 
-def test_an_hour_of_uptime_is_still_in_order() -> None:
-    """A float32 of milliseconds then has steps of 0.25 ms (docs/is900.md section 8)."""
+def test_stamps_after_an_hour_are_still_in_sequence() -> None:
+    """A float32 of milliseconds has steps of 0.25 ms then (docs/is900.md 8)."""
     stamp_s = stamps_s(40, begin_s=3600.0)
-    frames = frames_of(received(sent(stamp_s), stamp_s))
+    frames = decode_frames(in_chunks(device_bytes(stamp_s), stamp_s))
     assert len(frames) == 40
     assert not any(f.suspect.any() for f in frames)
     assert np.abs([f.measured_s for f in frames] - stamp_s.reshape(-1, 4)).max() <= 0.125e-3 + 1e-9
@@ -143,7 +153,7 @@ def test_too_many_stations_are_refused() -> None:
 
 
 def test_a_capture_can_be_read_again_and_closed() -> None:
-    stream = CaptureStream(FOUR, clean())
+    stream = CaptureStream(FOUR, clean_capture())
     assert stream.stations == FOUR.stations
     assert len(list(stream)) == len(list(stream)) == ROUNDS
     reading = iter(stream)
@@ -152,8 +162,8 @@ def test_a_capture_can_be_read_again_and_closed() -> None:
     assert list(reading) == []
 
 
-def require_sound(frames: list[TrackerFrame]) -> None:
-    """What is valid can be used, whatever came in; what is not valid is NaN."""
+def check_sound(frames: list[TrackerFrame]) -> None:
+    """Check that valid numbers are usable, whatever was received, and that invalid ones are NaN."""
     for f in frames:
         assert np.isfinite(f.position_m[f.position_valid]).all()
         assert np.isnan(f.position_m[~f.position_valid]).all()
@@ -167,8 +177,8 @@ def require_sound(frames: list[TrackerFrame]) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(st.data())
-def test_whatever_records_hold_frames_are_sound(choose: st.DataObject) -> None:
-    """Well-formed records with any bytes in them: signalling NaN, infinities, times that jump about, any order."""
+def test_frames_are_sound_whatever_records_contain(choose: st.DataObject) -> None:
+    """Well-formed records with any bytes in them: signalling NaN, infinities, erratic times, any sequence."""
     records = choose.draw(
         st.lists(st.tuples(st.sampled_from(b"1234"), st.binary(min_size=33, max_size=33)), min_size=1, max_size=20)
     )
@@ -179,43 +189,46 @@ def test_whatever_records_hold_frames_are_sound(choose: st.DataObject) -> None:
         for k in range(0, len(data), RECORD)
         for frame in reader.feed(data[k : k + RECORD], 100.0 + 0.005 * k / RECORD)
     ]
-    require_sound([*frames, *reader.finish()])
+    check_sound([*frames, *reader.finish()])
 
 
 @pytest.mark.parametrize("share", [0.001, 0.01, 0.1])
-def test_many_damaged_bytes_make_no_frame_unsound(share: float) -> None:
+def test_frames_stay_sound_with_many_damaged_bytes(share: float) -> None:
     for trial in range(30):
         stamp_s, rng = stamps_s(100), np.random.default_rng(trial)
-        data = np.frombuffer(sent(stamp_s, seed=trial), np.uint8).copy()
-        hurt = rng.random(len(data)) < share
-        data[hurt] ^= rng.integers(1, 256, int(hurt.sum()), dtype=np.uint8)
-        capture = received(data.tobytes(), stamp_s)
-        frames = frames_of(capture)
-        require_sound(frames)
-        intact = 400 - len(np.unique(np.flatnonzero(hurt) // RECORD))
+        data = np.frombuffer(device_bytes(stamp_s, seed=trial), np.uint8).copy()
+        is_damaged = rng.random(len(data)) < share
+        data[is_damaged] ^= rng.integers(1, 256, int(is_damaged.sum()), dtype=np.uint8)
+        capture = in_chunks(data.tobytes(), stamp_s)
+        frames = decode_frames(capture)
+        check_sound(frames)
+        intact = 400 - len(np.unique(np.flatnonzero(is_damaged) // RECORD))
         assert sum(int(f.position_valid.sum()) for f in frames) >= 0.9 * intact
 
 
 @pytest.mark.parametrize("trials", [500, pytest.param(100_000, marks=pytest.mark.slow)])
-def test_a_record_under_another_stations_name_is_never_passed_on_unmarked(trials: int) -> None:
-    """Amid sound records, order or time shows it; every station stands at its own number, so a wrong one is seen."""
+def test_a_record_with_a_wrong_station_is_always_marked(trials: int) -> None:
+    """Among sound records, sequence or time reveals it.
+
+    Each station is at its own number, so a wrong one is noticed.
+    """
     rng, stamp_s = np.random.default_rng(5), stamps_s(12)
     for trial in range(trials):
-        data, record = bytearray(sent(stamp_s, seed=trial % 50)), int(rng.integers(4, 44))
+        data, record = bytearray(device_bytes(stamp_s, seed=trial % 50)), int(rng.integers(4, 44))
         at = record * RECORD + 1
         data[at] = int(rng.choice([station for station in b"1234" if station != data[at]]))
-        for frame in frames_of(received(bytes(data), stamp_s)):
+        for frame in decode_frames(in_chunks(bytes(data), stamp_s)):
             for row in np.flatnonzero(frame.position_valid & ~frame.suspect):
                 assert np.abs(frame.position_m[row] - row).max() < 0.3, (trial, record, row)
 
 
 @pytest.mark.slow
 def test_a_million_mutations() -> None:
-    """Bytes lost, added, changed, swapped and repeated all over long captures: no crash, nothing kept, frames sound."""
+    """Bytes lost, added, changed, swapped and repeated in long captures: no crash, bounded memory, sound frames."""
     rng, mutations = np.random.default_rng(1), 0
     while mutations < 1_000_000:
         stamp_s = stamps_s(500)
-        data = bytearray(sent(stamp_s, seed=mutations))
+        data = bytearray(device_bytes(stamp_s, seed=mutations))
         for _ in range(int(rng.integers(1, 2000))):
             at = int(rng.integers(len(data)))
             kind = int(rng.integers(4))
@@ -232,25 +245,25 @@ def test_a_million_mutations() -> None:
         for k in range(0, len(data), 1000):
             frames += reader.feed(bytes(data[k : k + 1000]), 100.0 + k / 1000.0 * 0.2)
             assert reader.pending < 300
-        require_sound([*frames, *reader.finish()])
+        check_sound([*frames, *reader.finish()])
 
 
-def rounds_of(wire: WireFormat, rounds: int = ROUNDS) -> list[bytes]:
-    """Records of stations that stand still, in the order of the wire."""
+def record_chunks(wire: WireFormat, rounds: int = ROUNDS) -> list[bytes]:
+    """Return the records of stations that stand still, in the order of the wire."""
     count = rounds * len(wire.stations)
     number = np.arange(count) % len(wire.stations)
-    place_m: Floats = np.full((count, 3), 0.3)
-    place_m *= number[:, None]
-    said = RecordValues(
-        stamps_s(rounds, len(wire.stations)), place_m, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.ones(count)
+    position_m: Floats = np.full((count, 3), 0.3)
+    position_m *= number[:, None]
+    values = RecordValues(
+        stamps_s(rounds, len(wire.stations)), position_m, np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)), np.ones(count)
     )
-    table = encode_records(wire.items, np.frombuffer(wire.characters, np.uint8)[number], said, wire.settings)
+    table = encode_records(wire.items, np.frombuffer(wire.characters, np.uint8)[number], values, wire.settings)
     data = to_bytes(wire.items, table, wire.settings)
     return [data[k : k + len(data) // count] for k in range(0, len(data), len(data) // count)]
 
 
-def fed(wire: WireFormat, chunks: list[bytes]) -> list[TrackerFrame]:
-    """Frames of chunks that come 5 ms apart."""
+def feed_chunks(wire: WireFormat, chunks: list[bytes]) -> list[TrackerFrame]:
+    """Return the frames of chunks that arrive 5 ms apart."""
     reader, out = FrameReader(wire), []
     for k, chunk in enumerate(chunks):
         out += reader.feed(chunk, 100.0 + 0.005 * k)
@@ -263,7 +276,7 @@ def fed(wire: WireFormat, chunks: list[bytes]) -> list[TrackerFrame]:
 @pytest.mark.parametrize("binary", [True, False])
 def test_every_format_gives_the_same_frames(items: tuple[int, ...], binary: bool) -> None:
     wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, items, RecordFormat(binary=binary))
-    frames = fed(wire, rounds_of(wire))
+    frames = feed_chunks(wire, record_chunks(wire))
     assert len(frames) == ROUNDS
     for number, frame in enumerate(frames):
         assert frame.position_valid.all()
@@ -276,15 +289,15 @@ def test_every_format_gives_the_same_frames(items: tuple[int, ...], binary: bool
 
 def test_any_stations_of_the_device_may_be_active() -> None:
     wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=b"25C")
-    chunks = rounds_of(wire)
+    chunks = record_chunks(wire)
     assert [chunk[1:2] for chunk in chunks[:3]] == [b"2", b"5", b"C"]
-    frames = fed(wire, chunks)
+    frames = feed_chunks(wire, chunks)
     assert len(frames) == ROUNDS
     assert all(frame.position_valid.all() and not frame.suspect.any() for frame in frames)
 
 
-def test_stations_that_nobody_asked_for_are_garbage_between_the_others() -> None:
-    chunks = rounds_of(WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=b"25C"))
+def test_records_of_unknown_stations_are_garbage() -> None:
+    chunks = record_chunks(WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=b"25C"))
     reader = FrameReader(WireFormat(("head", "torso"), RATE_HZ))
     frames = [*reader.feed(b"".join(chunks), 100.0), *reader.finish()]
     assert (reader.records, reader.garbage_bytes) == (ROUNDS, 2 * ROUNDS * RECORD)
@@ -292,42 +305,42 @@ def test_stations_that_nobody_asked_for_are_garbage_between_the_others() -> None
 
 
 @pytest.mark.parametrize("characters", [b"12", b"1234", b"132", b"112", b"1 2", b"12D"])
-def test_stations_that_cannot_be_are_refused(characters: bytes) -> None:
+def test_impossible_station_characters_are_refused(characters: bytes) -> None:
     with pytest.raises(BadInput, match="ascending"):
         WireFormat(("head", "torso", "wrist"), RATE_HZ, characters=characters)
 
 
-def tracking(states: str) -> bytes:
+def tracking_reply(states: str) -> bytes:
     return TrackingStatus(f"{states:X<12}", (0,) * 12, (0,) * 12, RATE_HZ).line()
 
 
-def test_a_reply_to_mp_says_which_stations_are_lost_where_records_do_not() -> None:
+def test_replies_to_mp_mark_lost_stations_where_records_have_no_quality() -> None:
     wire = WireFormat(("head", "torso", "wrist"), RATE_HZ, (2, 11, 21, 1))
-    chunks = rounds_of(wire, 8)
-    chunks.insert(6, tracking("TLT"))
-    chunks.insert(16, tracking("TTT"))
-    frames = fed(wire, chunks)
+    chunks = record_chunks(wire, 8)
+    chunks.insert(6, tracking_reply("TLT"))
+    chunks.insert(16, tracking_reply("TTT"))
+    frames = feed_chunks(wire, chunks)
     assert [frame.position_valid.tolist() for frame in frames] == [
         [True, not 2 <= number < 5, True] for number in range(8)
     ]
     assert [frame.quality[1] for frame in frames] == [1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0]
-    at_once = fed(wire, [b"".join(chunks)])
+    all_at_once = feed_chunks(wire, [b"".join(chunks)])
     assert all(
         np.array_equal(a, b, equal_nan=True)
-        for one, other in zip(frames, at_once, strict=True)
-        for a, b in zip(columns(one), columns(other), strict=True)
+        for first, second in zip(frames, all_at_once, strict=True)
+        for a, b in zip(station_columns(first), station_columns(second), strict=True)
     )
 
 
 def test_a_reply_to_mp_does_not_overrule_item_40() -> None:
-    chunks = rounds_of(FOUR)
-    chunks.insert(8, tracking("LLLL"))
-    assert all(frame.position_valid.all() for frame in fed(FOUR, chunks))
+    chunks = record_chunks(FOUR)
+    chunks.insert(8, tracking_reply("LLLL"))
+    assert all(frame.position_valid.all() for frame in feed_chunks(FOUR, chunks))
 
 
-def test_records_put_aside_come_out_when_a_frame_expires() -> None:
-    """Three of four stations came one by one: the frame is complete enough after 1.5 periods."""
-    reader, chunks = FrameReader(FOUR), rounds_of(FOUR)
+def test_deferred_records_are_returned_when_a_frame_expires() -> None:
+    """Three of four stations arrive one by one; the frame is closed after 1.5 periods."""
+    reader, chunks = FrameReader(FOUR), record_chunks(FOUR)
     for k in range(3):
         assert reader.feed(chunks[k], 100.0 + 0.001 * k) == []
     assert reader.records == 3

@@ -12,55 +12,55 @@ from harness.stream.codec.records import RecordFormat, RecordValues, encode_reco
 POSITION_M = np.array([[1.0, -0.5, 1.5]])
 INCHES, CENTIMETRES = RecordFormat(metres_per_unit=0.0254), RecordFormat(metres_per_unit=0.01)
 YAW_90 = np.array([[np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)]])
-SAID = RecordValues(np.array([12.3455]), POSITION_M, YAW_90, np.ones(1))
-A = bytes.fromhex("303120 f67a1d42 f67a9dc1 71386c42 f304353f 00000000 00000000 f304353f 20")
-C = bytes.fromhex("303220 0000c842 000048c2 00001643 0000b442 000020c1 0000b040 207f00 0d0a")
+VALUES = RecordValues(np.array([12.3455]), POSITION_M, YAW_90, np.ones(1))
+EXAMPLE_A = bytes.fromhex("303120 f67a1d42 f67a9dc1 71386c42 f304353f 00000000 00000000 f304353f 20")
+EXAMPLE_C = bytes.fromhex("303220 0000c842 000048c2 00001643 0000b442 000020c1 0000b040 207f00 0d0a")
 
 
-def _sent(
-    station: str, codes: tuple[int, ...], settings: RecordFormat, said: RecordValues = SAID, **columns: object
+def _encode(
+    station: str, codes: tuple[int, ...], settings: RecordFormat, values: RecordValues = VALUES, **columns: object
 ) -> bytes:
-    table = encode_records(codes, np.frombuffer(station.encode(), np.uint8), said, settings)
+    table = encode_records(codes, np.frombuffer(station.encode(), np.uint8), values, settings)
     for name, value in columns.items():
         table[name] = value
     return table.tobytes()
 
 
-def _read(data: bytes, codes: tuple[int, ...], settings: RecordFormat, stations: bytes = b"123") -> Readings:
+def _decode(data: bytes, codes: tuple[int, ...], settings: RecordFormat, stations: bytes = b"123") -> Readings:
     table = np.frombuffer(data, items.record_type(codes))
     return decode_readings(table, np.zeros(len(table)), stations, settings)
 
 
 def test_example_a_vrpn_in_inches() -> None:
-    assert _sent("1", (2, 11, 0), INCHES) == A
-    read = _read(A, (2, 11, 0), INCHES)
-    np.testing.assert_allclose(read.position_m, POSITION_M, atol=1e-6)
-    np.testing.assert_allclose(read.tracker_from_station, YAW_90, atol=1e-7)
-    assert not read.suspect.any()
-    assert np.isnan(read.measured_s).all()
-    assert read.quality.tolist() == [1.0]
+    assert _encode("1", (2, 11, 0), INCHES) == EXAMPLE_A
+    readings = _decode(EXAMPLE_A, (2, 11, 0), INCHES)
+    np.testing.assert_allclose(readings.position_m, POSITION_M, atol=1e-6)
+    np.testing.assert_allclose(readings.tracker_from_station, YAW_90, atol=1e-7)
+    assert not readings.suspect.any()
+    assert np.isnan(readings.measured_s).all()
+    assert readings.quality.tolist() == [1.0]
 
 
 def test_example_b_with_time_buttons_and_joystick() -> None:
     codes = (2, 11, 21, 22, 23, 0)
-    sent = _sent("1", codes, INCHES, buttons=5, joystick=[127, 255])
-    assert sent == A[:-1] + bytes.fromhex("00e64046 05 7fff 20")
-    assert _read(sent, codes, INCHES).measured_s.tolist() == [12.3455]
+    encoded = _encode("1", codes, INCHES, buttons=5, joystick=[127, 255])
+    assert encoded == EXAMPLE_A[:-1] + bytes.fromhex("00e64046 05 7fff 20")
+    assert _decode(encoded, codes, INCHES).measured_s.tolist() == [12.3455]
 
 
 def test_example_c_vrui_in_centimetres_with_angles() -> None:
     codes, angles = (2, 4, 22, 23, 1), np.array([[90.0, -10.0, 5.5]])
     z, y, x = np.deg2rad(angles[0])[:, None] * np.eye(3)[::-1]
-    turned = rotations.multiply(rotations.multiply(rotations.exp(z), rotations.exp(y)), rotations.exp(x))
-    said = RecordValues(np.zeros(1), POSITION_M, turned[None], np.ones(1))
-    sent = _sent("2", codes, CENTIMETRES, said, buttons=0x20, joystick=[127, 0])
-    ours, theirs = (np.frombuffer(data, items.record_type(codes)) for data in (sent, C))
-    np.testing.assert_allclose(ours["yaw_pitch_roll_deg"], theirs["yaw_pitch_roll_deg"], rtol=1e-6)
-    assert sent[:15] + sent[27:] == C[:15] + C[27:]
-    read = _read(C, codes, CENTIMETRES)
-    assert read.station.tolist() == [1]
-    np.testing.assert_allclose(read.position_m, POSITION_M, atol=1e-6)
-    assert rotations.angle_between_rad(read.tracker_from_station[0], turned) < 1e-6
+    quaternion = rotations.multiply(rotations.multiply(rotations.exp(z), rotations.exp(y)), rotations.exp(x))
+    values = RecordValues(np.zeros(1), POSITION_M, quaternion[None], np.ones(1))
+    encoded = _encode("2", codes, CENTIMETRES, values, buttons=0x20, joystick=[127, 0])
+    encoded_table, example_table = (np.frombuffer(data, items.record_type(codes)) for data in (encoded, EXAMPLE_C))
+    np.testing.assert_allclose(encoded_table["yaw_pitch_roll_deg"], example_table["yaw_pitch_roll_deg"], rtol=1e-6)
+    assert encoded[:15] + encoded[27:] == EXAMPLE_C[:15] + EXAMPLE_C[27:]
+    readings = _decode(EXAMPLE_C, codes, CENTIMETRES)
+    assert readings.station.tolist() == [1]
+    np.testing.assert_allclose(readings.position_m, POSITION_M, atol=1e-6)
+    assert rotations.angle_between_rad(readings.tracker_from_station[0], quaternion) < 1e-6
 
 
 @pytest.mark.parametrize(
@@ -99,12 +99,12 @@ def test_sixteen_bit_form_is_exact_on_its_own_grid() -> None:
         ((40, 18, 20, 21, 1), 24),
     ],
 )
-def test_lengths_are_those_of_the_table(codes: tuple[int, ...], length: int) -> None:
+def test_lengths_match_the_documented_table(codes: tuple[int, ...], length: int) -> None:
     assert items.record_size(codes) == length
 
 
 def test_an_item_without_a_known_size_is_refused() -> None:
-    with pytest.raises(BadInput, match=r"item 70 \(auxiliary input\): no source tells its size"):
+    with pytest.raises(BadInput, match=r"item 70 \(auxiliary input\): no source gives its size"):
         items.record_type((2, 70, 1))
     with pytest.raises(UnknownName, match="output item called '17'"):
         items.record_type((2, 17, 1))
@@ -126,34 +126,34 @@ def test_an_item_without_a_known_size_is_refused() -> None:
         ("time", 1e30),
     ],
 )
-def test_numbers_that_cannot_be_are_doubtful(field: str, value: float) -> None:
-    said = RecordValues(np.array([5.0, 6.0]), np.ones((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.ones(2))
-    table = encode_records(items.STANDARD_LIST, np.frombuffer(b"12", np.uint8), said, CENTIMETRES)
+def test_impossible_numbers_are_suspect(field: str, value: float) -> None:
+    values = RecordValues(np.array([5.0, 6.0]), np.ones((2, 3)), np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.ones(2))
+    table = encode_records(items.STANDARD_LIST, np.frombuffer(b"12", np.uint8), values, CENTIMETRES)
     table[field][1] = value
-    read = decode_readings(table, np.zeros(2), b"12", CENTIMETRES)
-    assert read.suspect.tolist() == [False, True]
+    readings = decode_readings(table, np.zeros(2), b"12", CENTIMETRES)
+    assert readings.suspect.tolist() == [False, True]
 
 
 def test_microseconds() -> None:
     settings = RecordFormat(seconds_per_tick=1e-6)
-    assert _read(_sent("1", (21, 1), settings), (21, 1), settings).measured_s.tolist() == [12.3455]
+    assert _decode(_encode("1", (21, 1), settings), (21, 1), settings).measured_s.tolist() == [12.3455]
 
 
 @pytest.mark.parametrize("codes", [(40, 2, 11, 21, 1), (40, 18, 20, 21, 1), (40, 18, 19, 21, 1), (2, 4, 0)])
 def test_what_was_said_is_what_is_read(codes: tuple[int, ...], rng: np.random.Generator) -> None:
-    turn = rng.normal(size=(200, 4))
-    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
-    said = RecordValues(
-        rng.uniform(0.0, 100.0, 200), rng.uniform(-2.9, 2.9, (200, 3)), turn, rng.uniform(0.0, 1.0, 200)
+    quaternions = rng.normal(size=(200, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    values = RecordValues(
+        rng.uniform(0.0, 100.0, 200), rng.uniform(-2.9, 2.9, (200, 3)), quaternions, rng.uniform(0.0, 1.0, 200)
     )
     stations = np.frombuffer(b"123", np.uint8)[rng.integers(0, 3, 200)]
-    read = _read(encode_records(codes, stations, said, CENTIMETRES).tobytes(), codes, CENTIMETRES)
+    readings = _decode(encode_records(codes, stations, values, CENTIMETRES).tobytes(), codes, CENTIMETRES)
     coarse = 18 in codes
-    assert bytes(b"123"[row] for row in read.station) == stations.tobytes()
-    assert np.abs(read.position_m - said.position_m).max() < (3.0 / 8192 if coarse else 1e-6)
-    assert rotations.angle_between_rad(read.tracker_from_station, turn).max() < (1e-3 if coarse else 2e-6)
-    assert not read.suspect.any()
+    assert bytes(b"123"[row] for row in readings.station) == stations.tobytes()
+    assert np.abs(readings.position_m - values.position_m).max() < (3.0 / 8192 if coarse else 1e-6)
+    assert rotations.angle_between_rad(readings.tracker_from_station, quaternions).max() < (1e-3 if coarse else 2e-6)
+    assert not readings.suspect.any()
     if 21 in codes:
-        assert np.abs(read.measured_s - said.measured_s).max() < 1e-5
+        assert np.abs(readings.measured_s - values.measured_s).max() < 1e-5
     if 40 in codes:
-        assert np.abs(read.quality - said.quality).max() < 0.5 / 255 + 1e-12
+        assert np.abs(readings.quality - values.quality).max() < 0.5 / 255 + 1e-12

@@ -68,31 +68,31 @@ EXAMPLES: list[tuple[bytes, int, ParsedReply]] = [
 @pytest.mark.parametrize(
     ("line", "length", "event"), EXAMPLES, ids=lambda x: x[:4].decode() if isinstance(x, bytes) else ""
 )
-def test_examples_both_ways(line: bytes, length: int, event: ParsedReply) -> None:
+def test_examples_are_parsed_and_formatted(line: bytes, length: int, event: ParsedReply) -> None:
     assert len(line) == length
     assert parse_reply(line) == event
     assert parse_reply(line[:-2]) == event
     assert event.line() == line
 
 
-def test_an_emitter_whose_number_widens_the_line_is_read_by_blanks() -> None:
-    read = parse_reply(b"31F            1    0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n")
-    assert read == Emitter(1, (0.9144, -0.6096, 0.0), (0.0, 0.0, 1.0), 5001)
+def test_an_emitter_with_a_wide_number_is_parsed_by_blanks() -> None:
+    emitter = parse_reply(b"31F            1    0.9144   -0.6096    0.0000   0.00   0.00   1.00   5001\r\n")
+    assert emitter == Emitter(1, (0.9144, -0.6096, 0.0), (0.0, 0.0, 1.0), 5001)
 
 
 def test_which_stations_are_active() -> None:
-    of_one, of_all = parse_reply(b"23l1010"), parse_reply(b"21l" + b"110000000001" + b"1" * 20)
-    assert isinstance(of_one, StationStates)
-    assert isinstance(of_all, StationStates)
-    assert of_one.stations == ("3",), "the first digit is station 3's; then 2, 3 and 4"
-    assert of_all.stations == ("1", "2", "C")
+    one_station, all_stations = parse_reply(b"23l1010"), parse_reply(b"21l" + b"110000000001" + b"1" * 20)
+    assert isinstance(one_station, StationStates)
+    assert isinstance(all_stations, StationStates)
+    assert one_station.stations == ("3",), "the first digit is that of station 3; then 2, 3 and 4"
+    assert all_stations.stations == ("1", "2", "C")
 
 
 def test_which_stations_are_lost() -> None:
-    said = parse_reply(b"31PT81L00XC0X00X00X00X00X00X00X00X00X00  180 G")
-    assert isinstance(said, TrackingStatus)
-    assert (said.rate_hz, said.genlock, said.received[2]) == (180.0, "G", 12)
-    assert said.lost == b"23456789ABC"
+    reply = parse_reply(b"31PT81L00XC0X00X00X00X00X00X00X00X00X00  180 G")
+    assert isinstance(reply, TrackingStatus)
+    assert (reply.rate_hz, reply.genlock, reply.received[2]) == (180.0, "G", 12)
+    assert reply.lost == b"23456789ABC"
 
 
 @pytest.mark.parametrize(
@@ -116,30 +116,32 @@ def test_which_stations_are_lost() -> None:
         b"2 E*ERROR*",
     ],
 )
-def test_what_no_source_describes_is_kept_as_it_is(line: bytes) -> None:
+def test_unknown_lines_are_kept_unchanged(line: bytes) -> None:
     assert parse_reply(line + b"\r\n") == UnknownReply(line)
     assert UnknownReply(line).line() == line + b"\r\n"
 
 
 @given(st.binary(max_size=80))
-def test_no_line_breaks_the_reader(line: bytes) -> None:
+def test_no_line_breaks_the_parser(line: bytes) -> None:
     parse_reply(line).line()
 
 
 @given(st.sampled_from([line for line, _, _ in EXAMPLES]), st.integers(0, 68), st.binary(max_size=3))
-def test_no_damage_breaks_the_reader(line: bytes, at: int, put: bytes) -> None:
-    said = parse_reply(line[:at] + put + line[at + len(put) :])
-    again = parse_reply(said.line())  # another value where damage made a number too long for its columns
-    assert parse_reply(again.line()) == again, "what is said anew is what was read"
+def test_no_damage_breaks_the_parser(line: bytes, at: int, damage: bytes) -> None:
+    reply = parse_reply(line[:at] + damage + line[at + len(damage) :])
+    second_reply = parse_reply(
+        reply.line()
+    )  # may differ from `reply` where damage made a number too long for its columns
+    assert parse_reply(second_reply.line()) == second_reply, "a formatted reply is parsed to itself"
 
 
-def test_a_damaged_command_is_kept_as_it_is_echoed() -> None:
-    said = parse_reply(b"2 E*ERROR*\x00:,40,2,4,1*ERROR* EC -1*PS1  *FL1 *ST0\r\n")
-    assert said == DeviceError("?:,40,2,4,1", -1)
-    assert parse_reply(said.line()) == said
+def test_a_damaged_command_in_an_error_record_is_made_printable() -> None:
+    reply = parse_reply(b"2 E*ERROR*\x00:,40,2,4,1*ERROR* EC -1*PS1  *FL1 *ST0\r\n")
+    assert reply == DeviceError("?:,40,2,4,1", -1)
+    assert parse_reply(reply.line()) == reply
 
 
-def test_what_cannot_be_printed_is_not_echoed() -> None:
+def test_unprintable_characters_are_not_echoed() -> None:
     assert (
         DeviceError("O\x01\xff" + "x" * 500, -99).line()
         == b"2 E*ERROR*O??" + b"x" * 77 + b"*ERROR* EC -99*PS1  *FL1 *ST0\r\n"

@@ -1,4 +1,4 @@
-"""A driver and a device on one bench, in a time of their own: hours pass at once, nothing is random, nothing sleeps."""
+"""A driver and a device on a simulated bench with its own time: hours pass at once, and nothing is random."""
 
 from collections.abc import Callable, Iterator
 from itertools import takewhile
@@ -18,17 +18,17 @@ from harness.stream.emulator.emulator import Emulator
 from harness.stream.frame import TrackerFrame
 
 NAMES = ("head", "torso", "left_wrist", "right_wrist", "left_ankle", "right_ankle")
-LAP_S = 10.0
-BEGAN_S = 1000.0
+LOOP_S = 10.0
+START_S = 1000.0
 TICK_S = 2e-4
-"""The least step of time on the bench [s]."""
+"""Shortest time step on the bench [s]."""
 
 
-def swaying(stations: int, rate_hz: float = 50.0) -> DeviceSamples:
-    """Stations that sway and never are where they were a reading before."""
-    count = round(LAP_S * rate_hz)
+def make_samples(stations: int, rate_hz: float = 50.0) -> DeviceSamples:
+    """Samples of stations that sway; no station is at the same place in two successive readings."""
+    count = round(LOOP_S * rate_hz)
     taken_s = np.arange(count)[:, None] / rate_hz + np.arange(stations) / (4.0 * stations * rate_hz)
-    angle = 2.0 * np.pi * taken_s / LAP_S
+    angle = 2.0 * np.pi * taken_s / LOOP_S
     zero = np.zeros_like(angle)
     return DeviceSamples(
         stations=NAMES[:stations],
@@ -44,15 +44,15 @@ def swaying(stations: int, rate_hz: float = 50.0) -> DeviceSamples:
 
 
 class Device(Protocol):
-    """The other end of the line."""
+    """The device's end of the line."""
 
     def receive(self, data: bytes, now_s: float) -> None: ...
-    def due(self, now_s: float) -> bytes: ...
+    def pop_due(self, now_s: float) -> bytes: ...
     @property
     def next_s(self) -> float: ...
 
 
-class Played:
+class EmulatedDevice:
     """The emulator as a device."""
 
     def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
@@ -61,7 +61,7 @@ class Played:
     def receive(self, data: bytes, now_s: float) -> None:
         self.emulator.receive(data, now_s)
 
-    def due(self, now_s: float) -> bytes:
+    def pop_due(self, now_s: float) -> bytes:
         return b"".join(sent.data for sent in self.emulator.advance(now_s))
 
     @property
@@ -70,58 +70,58 @@ class Played:
 
 
 class Adapter:
-    """Between device and host: hands bytes on every so often, as USB adapters do."""
+    """An adapter between device and host that passes bytes on at intervals, as USB adapters do."""
 
-    def __init__(self, device: Device, every_s: float = 0.016) -> None:
-        self._device, self._every_s, self.next_s = device, every_s, BEGAN_S
+    def __init__(self, device: Device, interval_s: float = 0.016) -> None:
+        self._device, self._interval_s, self.next_s = device, interval_s, START_S
 
     def receive(self, data: bytes, now_s: float) -> None:
         self._device.receive(data, now_s)
 
-    def due(self, now_s: float) -> bytes:
+    def pop_due(self, now_s: float) -> bytes:
         if now_s < self.next_s:
             return b""
-        self.next_s += self._every_s * (1 + (now_s - self.next_s) // self._every_s)
-        return self._device.due(now_s)
+        self.next_s += self._interval_s * (1 + (now_s - self.next_s) // self._interval_s)
+        return self._device.pop_due(now_s)
 
 
-class Scripted:
-    """Says one thing for each thing that it hears, and may chatter besides."""
+class ScriptedDevice:
+    """Sends a fixed reply to each command, and chatters if asked to."""
 
-    def __init__(self, answers: dict[bytes, bytes], chatter: bytes = b"", every_s: float = 0.02) -> None:
-        self._answers, self._chatter, self._every_s = answers, chatter, every_s
-        self._out, self._chattered_s = b"", BEGAN_S
+    def __init__(self, replies: dict[bytes, bytes], chatter: bytes = b"", interval_s: float = 0.02) -> None:
+        self._replies, self._chatter, self._interval_s = replies, chatter, interval_s
+        self._out, self._last_chatter_s = b"", START_S
 
     def receive(self, data: bytes, now_s: float) -> None:
-        self._out += b"".join(answer for heard, answer in self._answers.items() if heard in data)
+        self._out += b"".join(reply for command, reply in self._replies.items() if command in data)
 
-    def due(self, now_s: float) -> bytes:
+    def pop_due(self, now_s: float) -> bytes:
         out, self._out = self._out, b""
-        while self._chatter and self._chattered_s + self._every_s <= now_s:
-            self._chattered_s += self._every_s
+        while self._chatter and self._last_chatter_s + self._interval_s <= now_s:
+            self._last_chatter_s += self._interval_s
             out += self._chatter
         return out
 
     @property
     def next_s(self) -> float:
-        return self._chattered_s + self._every_s if self._chatter else float("inf")
+        return self._last_chatter_s + self._interval_s if self._chatter else float("inf")
 
 
 class Bench:
-    """One port, `bench`, with a device at it, or none."""
+    """One port, `bench`, with a device or without one."""
 
     def __init__(self, device: Device | None, port: str = "bench") -> None:
         self.device, self.port = device, port
-        self.now_s = BEGAN_S
+        self.now_s = START_S
         self.plugged = True
         self.opened: list[tuple[str, int]] = []
         self.open_lines = 0
         self.sent = bytearray()
-        """By the host."""
+        """Bytes sent by the host."""
         self.events: list[LineEvent] = []
         self.host = Host(self.open, lambda: self.now_s, lambda: 1.7e9 + self.now_s, self.sleep)
-        self.spoil: Callable[[bytes], bytes] = lambda data: data
-        """What becomes of bytes on their way to the host."""
+        self.corrupt: Callable[[bytes], bytes] = lambda data: data
+        """Applied to bytes on their way to the host."""
         self._plans: list[tuple[float, Callable[[], None]]] = []
 
     def open(self, port: str, baud: int) -> Transport:
@@ -130,16 +130,16 @@ class Bench:
             raise BadInput(f"Port {port}: there is no such port.", "")
         return BenchLine(self)
 
-    def driver(self, wanted: DriverConfig | None = None, timing: DriverTiming | None = None) -> Is900:
-        return Is900(self.port, wanted, on_event=self.events.append, timing=timing, host=self.host)
+    def driver(self, config: DriverConfig | None = None, timing: DriverTiming | None = None) -> Is900:
+        return Is900(self.port, config, on_event=self.events.append, timing=timing, host=self.host)
 
-    def after(self, delay_s: float, action: Callable[[], None]) -> None:
-        """Something that will happen."""
+    def schedule(self, delay_s: float, action: Callable[[], None]) -> None:
+        """Schedule an action."""
         self._plans.append((self.now_s + delay_s, action))
         self._plans.sort(key=lambda plan: plan[0])
 
-    def sleep(self, for_s: float) -> None:
-        until_s = self.now_s + for_s
+    def sleep(self, duration_s: float) -> None:
+        until_s = self.now_s + duration_s
         while self.next_plan_s <= until_s:
             self.now_s, action = self._plans.pop(0)
             action()
@@ -155,7 +155,7 @@ class Bench:
 
 
 class BenchLine:
-    """The host's end."""
+    """The host's end of the line."""
 
     def __init__(self, bench: Bench) -> None:
         self.name, self._bench, self._closed = bench.port, bench, False
@@ -165,8 +165,8 @@ class BenchLine:
         bench, until_s = self._bench, self._bench.now_s + timeout_s
         while True:
             self._check()
-            due = bench.device.due(bench.now_s) if bench.device else b""
-            if data := bench.spoil(due):
+            pop_due = bench.device.pop_due(bench.now_s) if bench.device else b""
+            if data := bench.corrupt(pop_due):
                 return data
             next_s = min(bench.device.next_s if bench.device else float("inf"), bench.next_plan_s)
             if bench.now_s >= until_s:
@@ -188,33 +188,33 @@ class BenchLine:
             raise LineLost(self.name, "closed" if self._closed else "unplugged")
 
 
-def frames_for(stream: Is900, bench: Bench, for_s: float) -> list[TrackerFrame]:
-    """Those of so long a time."""
-    until_s = bench.now_s + for_s
+def frames_for(stream: Is900, bench: Bench, duration_s: float) -> list[TrackerFrame]:
+    """Return the frames of this duration."""
+    until_s = bench.now_s + duration_s
     frames: Iterator[TrackerFrame] = iter(stream)
     return list(takewhile(lambda frame: frame.received_s < until_s, frames))
 
 
-class Notes:
-    """A witness that writes everything down."""
+class LineLog:
+    """An observer that stores everything."""
 
     def __init__(self) -> None:
-        self.got, self.said = bytearray(), bytearray()
+        self.received_data, self.sent_data = bytearray(), bytearray()
         self.formats: list[tuple[int, int, WireFormat]] = []
-        """Bytes received and sent before, and the format."""
+        """Number of bytes received and sent before, and the format."""
         self.events: list[LineEvent] = []
         self.times_s: list[float] = []
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
-        self.got += data
+        self.received_data += data
         self.times_s.append(monotonic_s)
 
     def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
-        self.said += data
+        self.sent_data += data
         self.times_s.append(monotonic_s)
 
     def on_configured(self, wire: WireFormat) -> None:
-        self.formats.append((len(self.got), len(self.said), wire))
+        self.formats.append((len(self.received_data), len(self.sent_data), wire))
 
     def on_event(self, event: LineEvent) -> None:
         self.events.append(event)

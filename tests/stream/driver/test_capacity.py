@@ -22,20 +22,20 @@ def test_records_per_second_are_those_of_the_protocol(items: tuple[int, ...], re
 @pytest.mark.parametrize(
     ("stations", "rate_hz", "items"), [(4, 75, STANDARD_LIST), (6, 50, STANDARD_LIST), (4, 120, SHORT_LIST)]
 )
-def test_what_live_use_needs_fits(stations: int, rate_hz: float, items: tuple[int, ...]) -> None:
+def test_typical_live_configurations_fit(stations: int, rate_hz: float, items: tuple[int, ...]) -> None:
     check_capacity("port", BAUD, stations, items, rate_hz, 0.0)
     assert required_bit_rate(stations, items, rate_hz) > 0.9 * BAUD
 
 
-def test_asking_for_mp_takes_its_share() -> None:
-    assert required_bit_rate(1, (2, 11, 1), 100.0, asked_hz=1.0) - required_bit_rate(1, (2, 11, 1), 100.0) == 480.0
+def test_polling_mp_adds_to_the_load() -> None:
+    assert required_bit_rate(1, (2, 11, 1), 100.0, poll_hz=1.0) - required_bit_rate(1, (2, 11, 1), 100.0) == 480.0
 
 
 def test_over_tcp_there_is_no_limit() -> None:
     check_capacity("tcp://a:1", None, 12, STANDARD_LIST, 180.0, 1.0)
 
 
-def test_what_would_fit_is_named_and_does_fit() -> None:
+def test_the_suggested_remedies_do_fit() -> None:
     with pytest.raises(BadInput) as raised:
         check_capacity("port", 9600, 2, STANDARD_LIST, 20.0, 0.0)
     assert "1 station," in raised.value.advice

@@ -1,4 +1,4 @@
-"""The driver at real ports in real time, against the emulator: a `TrackerStream` that leaves nothing behind."""
+"""The driver at real ports in real time, against the emulator: a `TrackerStream` that leaves nothing open."""
 
 import os
 import signal
@@ -21,35 +21,35 @@ from harness.stream.emulator.server import RunningEmulator
 from harness.stream.frame import TrackerFrame
 from harness.testing.stream_checks import check_stream
 from tests.interrupts import heeding_interrupts
-from tests.stream.driver.bench import swaying
+from tests.stream.driver.bench import make_samples
 
-PATIENT_S = 120.0
-"""A loaded machine gets so long before a test fails."""
-SERVED = ["pty", "tcp"]
+TIMEOUT_S = 120.0
+"""Time that a loaded machine gets before a test fails [s]."""
+PORT_KINDS = ["pty", "tcp"]
 Serve = Callable[..., AbstractContextManager[RunningEmulator]]
 
 
-@pytest.fixture(params=SERVED)
+@pytest.fixture(params=PORT_KINDS)
 def serve(request: pytest.FixtureRequest, tmp_path: Path) -> Serve:
-    def at(config: EmulatorConfig | None = None) -> AbstractContextManager[RunningEmulator]:
+    def serve_at(config: EmulatorConfig | None = None) -> AbstractContextManager[RunningEmulator]:
         if request.param == "pty":
-            return serve_emulator(swaying(4), config, pty=tmp_path / "is900")
-        return serve_emulator(swaying(4), config, tcp="127.0.0.1:0")
+            return serve_emulator(make_samples(4), config, pty=tmp_path / "is900")
+        return serve_emulator(make_samples(4), config, tcp="127.0.0.1:0")
 
-    return at
+    return serve_at
 
 
-def until(stream: Is900, wanted: Callable[[TrackerFrame], bool]) -> list[TrackerFrame]:
-    """Frames until one is as wanted."""
-    frames, ends_s = list[TrackerFrame](), time.monotonic() + PATIENT_S
+def until(stream: Is900, condition: Callable[[TrackerFrame], bool]) -> list[TrackerFrame]:
+    """Return frames until one meets the condition."""
+    frames, ends_s = list[TrackerFrame](), time.monotonic() + TIMEOUT_S
     for frame in stream:
         frames.append(frame)
-        if wanted(frame) or time.monotonic() > ends_s:
+        if condition(frame) or time.monotonic() > ends_s:
             break
     return frames
 
 
-def test_it_keeps_the_contract_of_streams(serve: Serve) -> None:
+def test_the_stream_contract_holds(serve: Serve) -> None:
     with serve() as emulator:
         opened: list[Is900] = []
 
@@ -64,7 +64,7 @@ def test_it_keeps_the_contract_of_streams(serve: Serve) -> None:
         assert not emulator.emulator.device.streaming
 
 
-def test_it_comes_back_when_the_line_was_unplugged(serve: Serve) -> None:
+def test_the_driver_reconnects_after_unplugging(serve: Serve) -> None:
     events: list[LineEvent] = []
     with serve(EmulatorConfig(faults=(Fault("disconnect", at_s=(4.0,), lasts_s=1.5),))) as emulator:
         stream = Is900(emulator.name, on_event=events.append)
@@ -77,16 +77,16 @@ def test_it_comes_back_when_the_line_was_unplugged(serve: Serve) -> None:
 
 @pytest.fixture
 def nothing_left() -> Iterator[None]:
-    """No thread and no descriptor more than before."""
+    """Check that no thread and no file descriptor is left."""
 
-    def held() -> tuple[set[threading.Thread], int]:
+    def resources() -> tuple[set[threading.Thread], int]:
         return set(threading.enumerate()), len(os.listdir("/proc/self/fd"))
 
     if not os.path.isdir("/proc/self/fd"):
         pytest.skip("this system does not list open descriptors in /proc")
-    before = held()
+    before = resources()
     yield
-    assert held() == before
+    assert resources() == before
 
 
 @pytest.mark.usefixtures("nothing_left")
@@ -117,9 +117,9 @@ def test_another_thread_may_close_it_at_any_moment(serve: Serve) -> None:
 
         reading = threading.Thread(target=read)
         reading.start()
-        assert first.wait(PATIENT_S)
+        assert first.wait(TIMEOUT_S)
         stream.close()
-        assert ended.wait(PATIENT_S)
+        assert ended.wait(TIMEOUT_S)
         reading.join()
         assert not emulator.emulator.device.streaming
     stream.close()
@@ -127,23 +127,23 @@ def test_another_thread_may_close_it_at_any_moment(serve: Serve) -> None:
 
 
 @pytest.mark.usefixtures("nothing_left")
-def test_it_may_be_closed_while_it_waits_for_a_device_that_is_gone(serve: Serve) -> None:
+def test_the_driver_can_be_closed_while_it_reconnects(serve: Serve) -> None:
     events: list[LineEvent] = []
-    gone = threading.Event()
+    line_gone = threading.Event()
 
-    def told(event: LineEvent) -> None:
+    def on_event(event: LineEvent) -> None:
         events.append(event)
         if event.kind == "unplugged":
-            gone.set()
+            line_gone.set()
 
     with serve() as emulator:
-        stream = Is900(emulator.name, on_event=told)
+        stream = Is900(emulator.name, on_event=on_event)
         next(iter(stream))
         reading = threading.Thread(target=lambda: list(stream))
         reading.start()
-    assert gone.wait(PATIENT_S)
+    assert line_gone.wait(TIMEOUT_S)
     stream.close()
-    reading.join(PATIENT_S)
+    reading.join(TIMEOUT_S)
     assert not reading.is_alive()
 
 
@@ -160,7 +160,7 @@ except KeyboardInterrupt:
 
 
 def test_ctrl_c_leaves_the_device_quiet(tmp_path: Path) -> None:
-    with serve_emulator(swaying(2), pty=tmp_path / "is900") as emulator:
+    with serve_emulator(make_samples(2), pty=tmp_path / "is900") as emulator:
         client = subprocess.Popen(
             [sys.executable, "-c", CLIENT, emulator.name],
             stdout=subprocess.PIPE,
@@ -171,30 +171,30 @@ def test_ctrl_c_leaves_the_device_quiet(tmp_path: Path) -> None:
         for _ in range(5):
             assert float(client.stdout.readline()) > 0.0
         client.send_signal(signal.SIGINT)
-        said, _ = client.communicate(timeout=PATIENT_S)
-        assert said.splitlines()[-1] == "interrupted"
+        output, _ = client.communicate(timeout=TIMEOUT_S)
+        assert output.splitlines()[-1] == "interrupted"
         assert client.returncode == 0
         assert not emulator.emulator.device.streaming
 
 
-def test_a_second_client_is_told_that_the_port_is_taken(serve: Serve) -> None:
+def test_a_second_client_is_refused(serve: Serve) -> None:
     with serve() as emulator, Is900(emulator.name), pytest.raises(BadInput, match="another program"):
         Is900(emulator.name)
 
 
 @pytest.mark.parametrize("baud", [9600, 57600])
-def test_the_rate_of_a_real_port_is_found(baud: int, tmp_path: Path) -> None:
+def test_the_baud_rate_of_a_real_port_is_detected(baud: int, tmp_path: Path) -> None:
     config = EmulatorConfig(baud=baud, check_baud=True)
-    with serve_emulator(swaying(1, rate_hz=10.0), config, pty=tmp_path / "is900") as emulator:
+    with serve_emulator(make_samples(1, rate_hz=10.0), config, pty=tmp_path / "is900") as emulator:
         with Is900(emulator.name) as stream:
             assert stream.baud == baud
             assert len(list(islice(stream, 3))) == 3
-        with pytest.raises(BadInput, match=r"at 19200 baud.*The rate may be wrong"):
+        with pytest.raises(BadInput, match=r"at 19200 baud.*The baud rate may be wrong"):
             Is900(emulator.name, DriverConfig(baud=19200), timing=DriverTiming(answer_s=0.3))
 
 
-def test_stopping_to_iterate_loses_no_frame(tmp_path: Path) -> None:
-    with serve_emulator(swaying(2), tcp="127.0.0.1:0") as emulator, Is900(emulator.name) as stream:
-        parts = [frame for _ in range(10) for frame in islice(stream, 3)]
-    periods = [round(50.0 * (b.measured_s[0] - a.measured_s[0])) for a, b in pairwise(parts)]
+def test_pausing_the_iteration_loses_no_frame(tmp_path: Path) -> None:
+    with serve_emulator(make_samples(2), tcp="127.0.0.1:0") as emulator, Is900(emulator.name) as stream:
+        frames = [frame for _ in range(10) for frame in islice(stream, 3)]
+    periods = [round(50.0 * (b.measured_s[0] - a.measured_s[0])) for a, b in pairwise(frames)]
     assert set(periods) == {1}

@@ -1,4 +1,4 @@
-"""Lines of bytes: serial ports (a pty stands in for one) and TCP, and what is said when one cannot be opened."""
+"""Lines of bytes: serial ports (a pty stands in for one) and TCP, and the errors of opening one."""
 
 import contextlib
 import os
@@ -15,7 +15,7 @@ import serial
 from harness.errors import BadInput
 from harness.stream.driver.transport import LineLost, PolledSerialTransport, Transport, open_transport
 
-PATIENT_S = 120.0
+TIMEOUT_S = 120.0
 
 
 class PtyEnd:
@@ -41,7 +41,7 @@ class PtyEnd:
 
 
 class TcpEnd:
-    """A server with one client, which says something the moment that it comes."""
+    """A server with one client, which it greets as soon as it connects."""
 
     def __init__(self, greeting: bytes = b"") -> None:
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -53,7 +53,7 @@ class TcpEnd:
     def client(self) -> socket.socket:
         if self._client is None:
             self._client, _ = self._server.accept()
-            self._client.settimeout(PATIENT_S)
+            self._client.settimeout(TIMEOUT_S)
             self._client.sendall(self._greeting)
         return self._client
 
@@ -70,87 +70,89 @@ class TcpEnd:
 
 
 End = PtyEnd | TcpEnd
-KINDS = ["pty", "polled", "tcp"]
+PORT_KINDS = ["pty", "polled", "tcp"]
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=PORT_KINDS)
 def line(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[tuple[Transport, End]]:
-    """The host's end and the device's; `polled` is what Windows gets."""
+    """The host's end and the device's end; `polled` is the transport of Windows."""
     end: End = TcpEnd() if request.param == "tcp" else PtyEnd(tmp_path / "port")
     if request.param == "polled":
-        ours: Transport = PolledSerialTransport(end.name, serial.Serial(end.name, 115200, timeout=0, write_timeout=2.0))
+        transport: Transport = PolledSerialTransport(
+            end.name, serial.Serial(end.name, 115200, timeout=0, write_timeout=2.0)
+        )
     else:
-        ours = open_transport(end.name)
-    yield ours, end
-    ours.close()
+        transport = open_transport(end.name)
+    yield transport, end
+    transport.close()
     end.close()
 
 
-def all_of(ours: Transport, size: int) -> bytes:
-    out, until_s = b"", time.monotonic() + PATIENT_S
+def read_bytes(transport: Transport, size: int) -> bytes:
+    out, until_s = b"", time.monotonic() + TIMEOUT_S
     while len(out) < size and time.monotonic() < until_s:
-        out += ours.read(0.5)
+        out += transport.read(0.5)
     return out
 
 
-def use(ours: Transport) -> None:
-    until_s = time.monotonic() + PATIENT_S
+def use_until_lost(transport: Transport) -> None:
+    until_s = time.monotonic() + TIMEOUT_S
     while time.monotonic() < until_s:
-        ours.read(0.05)
-        ours.write(b"?")
+        transport.read(0.05)
+        transport.write(b"?")
 
 
-def test_bytes_go_both_ways_as_they_are(line: tuple[Transport, End]) -> None:
-    ours, end = line
-    every = bytes(range(256)) * 4
-    end.send(every)
-    assert all_of(ours, len(every)) == every
-    ours.write(every[:256])
-    heard = b""
-    while len(heard) < 256:
-        heard += end.receive()
-    assert heard == every[:256]
+def test_bytes_pass_both_ways_unchanged(line: tuple[Transport, End]) -> None:
+    transport, end = line
+    all_bytes = bytes(range(256)) * 4
+    end.send(all_bytes)
+    assert read_bytes(transport, len(all_bytes)) == all_bytes
+    transport.write(all_bytes[:256])
+    received = b""
+    while len(received) < 256:
+        received += end.receive()
+    assert received == all_bytes[:256]
 
 
-def test_a_read_waits_no_longer_than_it_may_and_takes_what_is_there(line: tuple[Transport, End]) -> None:
-    ours, end = line
+def test_a_read_keeps_its_timeout_and_takes_available_bytes(line: tuple[Transport, End]) -> None:
+    transport, end = line
     began_s = time.monotonic()
-    assert ours.read(0.05) == b""
+    assert transport.read(0.05) == b""
     assert time.monotonic() - began_s >= 0.04
     end.send(b"a few bytes")
-    assert all_of(ours, 11) == b"a few bytes"
-    assert ours.read(0.0) == b""
+    assert read_bytes(transport, 11) == b"a few bytes"
+    assert transport.read(0.0) == b""
 
 
-def test_an_end_that_goes_away_is_a_line_lost_after_all_was_read(line: tuple[Transport, End]) -> None:
-    ours, end = line
+def test_a_departed_peer_is_a_lost_line_after_all_was_read(line: tuple[Transport, End]) -> None:
+    transport, end = line
     end.send(b"the last words")
-    assert all_of(ours, 14) == b"the last words"
+    assert read_bytes(transport, 14) == b"the last words"
     end.close()
     with pytest.raises(LineLost, match=r"gone|closed"):
-        use(ours)
+        use_until_lost(transport)
 
 
 def test_closing_from_another_thread_ends_a_read_at_once(line: tuple[Transport, End]) -> None:
-    ours, _ = line
+    transport, _ = line
     ended: list[float] = []
 
     def wait() -> None:
         with pytest.raises(LineLost, match="closed"):
-            ours.read(PATIENT_S)
+            transport.read(TIMEOUT_S)
         ended.append(time.monotonic())
 
     thread = threading.Thread(target=wait)
     thread.start()
     time.sleep(0.05)
-    ours.close()
-    ours.close()
-    thread.join(PATIENT_S)
+    transport.close()
+    transport.close()
+    thread.join(TIMEOUT_S)
     assert ended
     with pytest.raises(LineLost, match="closed"):
-        ours.read(0.0)
+        transport.read(0.0)
     with pytest.raises(LineLost):
-        ours.write(b"c")
+        transport.write(b"c")
 
 
 def test_nothing_stays_open(tmp_path: Path) -> None:
@@ -170,35 +172,35 @@ def test_nothing_stays_open(tmp_path: Path) -> None:
     assert descriptors() == before
 
 
-def test_what_the_peer_says_while_the_connection_opens_and_before_it_closes_is_kept() -> None:
+def test_bytes_sent_while_opening_and_before_closing_are_kept() -> None:
     end = TcpEnd(b"x" * 5000)
     accepting = threading.Thread(target=lambda: end.client)
     accepting.start()
-    ours = open_transport(end.name)
-    accepting.join(PATIENT_S)
+    transport = open_transport(end.name)
+    accepting.join(TIMEOUT_S)
     end.close()
-    assert all_of(ours, 5000) == b"x" * 5000
+    assert read_bytes(transport, 5000) == b"x" * 5000
     with pytest.raises(LineLost, match="closed by the other side"):
-        ours.read(PATIENT_S)
-    ours.close()
+        transport.read(TIMEOUT_S)
+    transport.close()
 
 
-def test_socket_is_tcp_and_small_packets_go_at_once() -> None:
+def test_socket_addresses_are_tcp_without_delay() -> None:
     end = TcpEnd()
-    ours = open_transport(end.name.replace("tcp://", "socket://"))
-    option = ours._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)  # type: ignore[attr-defined]
+    transport = open_transport(end.name.replace("tcp://", "socket://"))
+    option = transport._socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)  # type: ignore[attr-defined]
     assert option
-    ours.close()
+    transport.close()
     end.close()
 
 
-def test_a_link_that_leads_elsewhere_is_a_line_lost(tmp_path: Path) -> None:
-    one = PtyEnd(tmp_path / "port")
-    ours = open_transport(one.name)
-    other = PtyEnd(tmp_path / "port")
+def test_a_link_to_another_port_is_a_lost_line(tmp_path: Path) -> None:
+    first_end = PtyEnd(tmp_path / "port")
+    transport = open_transport(first_end.name)
+    second_end = PtyEnd(tmp_path / "port")
     with pytest.raises(LineLost, match="another port"):
-        ours.read(0.01)
-    for end in (ours, one, other):
+        transport.read(0.01)
+    for end in (transport, first_end, second_end):
         end.close()
 
 
@@ -208,7 +210,7 @@ def free_port() -> int:
 
 
 @pytest.mark.parametrize(
-    ("port", "says"),
+    ("port", "message"),
     [
         (lambda folder: str(folder / "nowhere"), "there is no such port"),
         (lambda folder: str(folder), "cannot be used as a serial port"),
@@ -221,28 +223,28 @@ def free_port() -> int:
         (lambda folder: "spy:///dev/ttyS0", "this kind of address is not known"),
     ],
 )
-def test_a_port_that_cannot_be_opened_is_named_with_what_to_try(
-    port: Callable[[Path], str], says: str, tmp_path: Path
+def test_a_port_that_cannot_be_opened_is_named_with_a_remedy(
+    port: Callable[[Path], str], message: str, tmp_path: Path
 ) -> None:
-    named = port(tmp_path)
+    port_name = port(tmp_path)
     with pytest.raises(BadInput) as raised:
-        open_transport(named)
-    assert says in str(raised.value)
-    assert named in str(raised.value)
+        open_transport(port_name)
+    assert message in str(raised.value)
+    assert port_name in str(raised.value)
     assert raised.value.advice
     assert "\n" not in str(raised.value)
 
 
-def test_a_host_that_nobody_knows_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    def unknown(*asked: object, **more: object) -> None:
+def test_an_unknown_host_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(*args: object, **kwargs: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
-    monkeypatch.setattr(socket, "getaddrinfo", unknown)  # no test asks a name server
+    monkeypatch.setattr(socket, "getaddrinfo", unknown)  # tests must not query a name server
     with pytest.raises(BadInput, match="there is no host called tracker"):
         open_transport("tcp://tracker:5005")
 
 
-def test_a_port_that_is_taken_says_so(tmp_path: Path) -> None:
+def test_a_port_in_use_is_reported(tmp_path: Path) -> None:
     end = PtyEnd(tmp_path / "port")
     first = open_transport(end.name)
     with pytest.raises(BadInput, match="another program has it open"):
@@ -252,20 +254,20 @@ def test_a_port_that_is_taken_says_so(tmp_path: Path) -> None:
     end.close()
 
 
-def test_a_port_that_may_not_be_opened_says_who_may(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_without_permission_names_the_group(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     end = PtyEnd(tmp_path / "port")
 
     def refuse(path: str, *flags: int) -> int:
         raise PermissionError(13, "Permission denied", path)
 
     with monkeypatch.context() as patched:
-        patched.setattr(os, "open", refuse)  # tests may run as root, whom nothing is forbidden
+        patched.setattr(os, "open", refuse)  # tests may run as root, who may open everything
         with pytest.raises(BadInput, match=r"permission denied\. Join the group"):
             open_transport(end.name)
     end.close()
 
 
-def test_a_rate_that_no_port_has_is_refused(tmp_path: Path) -> None:
+def test_an_impossible_baud_rate_is_refused(tmp_path: Path) -> None:
     end = PtyEnd(tmp_path / "port")
     with pytest.raises(BadInput, match="-5 baud"):
         open_transport(end.name, -5)

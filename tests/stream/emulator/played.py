@@ -1,4 +1,4 @@
-"""Samples that tests know by heart, and a way to talk to a device without a line."""
+"""Samples with known values, and a device to talk to without a line."""
 
 import numpy as np
 
@@ -11,12 +11,16 @@ from harness.stream.emulator.device import Device
 NAMES = ("left_hand", "right_hand", "left_ankle", "right_ankle", "torso", "head")
 
 
-def samples(stations: int = 4, rate_hz: float = 50.0, instants: int = 100, turn: Floats | None = None) -> DeviceSamples:
-    """Station s stands at (1 + s/10, -0.5, 1.5) m and moves 1 mm forward with each instant; 20 ppm fast from 5 s on."""
+def make_samples(
+    stations: int = 4, rate_hz: float = 50.0, instants: int = 100, quaternion: Floats | None = None
+) -> DeviceSamples:
+    """Station s is at (1 + s/10, -0.5, 1.5) m and moves 1 mm forward with each instant; its clock starts at 5 s, 20 ppm
+    fast.
+    """
     taken_s = np.arange(instants)[:, None] / rate_hz + np.arange(stations) / (rate_hz * stations)
-    place = np.empty((instants, stations, 3))
-    place[..., 0] = 1.0 + 0.1 * np.arange(stations) + 0.001 * np.arange(instants)[:, None]
-    place[..., 1:] = -0.5, 1.5
+    position_m = np.empty((instants, stations, 3))
+    position_m[..., 0] = 1.0 + 0.1 * np.arange(stations) + 0.001 * np.arange(instants)[:, None]
+    position_m[..., 1:] = -0.5, 1.5
     return DeviceSamples(
         stations=NAMES[:stations],
         rate_hz=rate_hz,
@@ -24,21 +28,25 @@ def samples(stations: int = 4, rate_hz: float = 50.0, instants: int = 100, turn:
         taken_s=taken_s,
         ready_s=0.004,
         device_s=5.0 + (1.0 + 20e-6) * taken_s,
-        position_m=place,
-        tracker_from_station=np.broadcast_to(rotations.IDENTITY if turn is None else turn, (instants, stations, 4)),
+        position_m=position_m,
+        tracker_from_station=np.broadcast_to(
+            rotations.IDENTITY if quaternion is None else quaternion, (instants, stations, 4)
+        ),
         quality=np.ones((instants, stations)),
     )
 
 
-class Talk:
+class DeviceSession:
     """A device and its clock."""
 
-    def __init__(self, config: EmulatorConfig | None = None, stations: int = 4, turn: Floats | None = None) -> None:
-        self.device = Device(samples(stations, turn=turn), config, 0.0)
+    def __init__(
+        self, config: EmulatorConfig | None = None, stations: int = 4, quaternion: Floats | None = None
+    ) -> None:
+        self.device = Device(make_samples(stations, quaternion=quaternion), config, 0.0)
         self.now_s = 0.0
 
-    def say(self, data: bytes, after_s: float = 0.0) -> bytes:
-        """What the device answers to these bytes at once, said this much later than the last ones."""
+    def send(self, data: bytes, after_s: float = 0.0) -> bytes:
+        """Return the device's immediate reply to bytes that are sent `after_s` seconds after the previous ones."""
         self.now_s += after_s
         before = self.device.advance(self.now_s)
         assert before == b"" or self.device.streaming
@@ -46,6 +54,6 @@ class Talk:
         return self.device.advance(self.now_s)
 
     def wait(self, seconds: float) -> bytes:
-        """What the device says during this time without being asked."""
+        """Return what the device sends by itself during this time."""
         self.now_s += seconds
         return self.device.advance(self.now_s)

@@ -1,14 +1,14 @@
-"""What the device answers, byte for byte: every question of docs/is900.md 4, and the errors."""
+"""Replies of the device, byte for byte: every query of docs/is900.md 4, and the errors."""
 
 import pytest
 
 from harness.stream.codec.replies import TrackingStatus
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.setters import SET_ONLY_COMMANDS, SETTER_COMMANDS
-from tests.stream.emulator.played import Talk
+from tests.stream.emulator.played import DeviceSession
 
 STATES = b"21l" + b"1111" + b"0" * 28 + b"\r\n"
-ANSWERS = [
+REPLIES = [
     (b"S", b"21S3F0" + b" " * 9 + b"4.2301 IS900VET" + b" " * 23 + b"\r\n"),
     (b"O1\r\n", b"21O 2 4 1\r\n"),
     (b"OC\r", b"2CO 2 4 1\r\n"),
@@ -64,11 +64,11 @@ ANSWERS = [
 ]
 
 
-def error(command: bytes, code: int, field: int = 1) -> bytes:
+def error_record(command: bytes, code: int, field: int = 1) -> bytes:
     return b"2 E*ERROR*%b*ERROR* EC %d*PS1  *FL%d *ST0\r\n" % (command, code, field)
 
 
-REFUSALS = [
+REJECTED = [
     (b"T", -99, 1),
     (b"e1,1", -99, 1),
     (b"t", -99, 1),
@@ -106,56 +106,56 @@ REFUSALS = [
 ]
 
 
-@pytest.mark.parametrize(("asked", "answer"), ANSWERS, ids=lambda value: repr(value)[:30])
-def test_a_question_is_answered(asked: bytes, answer: bytes) -> None:
-    assert Talk().say(asked) == answer
+@pytest.mark.parametrize(("query", "reply"), REPLIES, ids=lambda value: repr(value)[:30])
+def test_every_query_has_its_reply(query: bytes, reply: bytes) -> None:
+    assert DeviceSession().send(query) == reply
 
 
-@pytest.mark.parametrize(("asked", "code", "field"), REFUSALS)
-def test_what_cannot_be_done_gets_an_error_record_and_changes_nothing(asked: bytes, code: int, field: int) -> None:
-    talk = Talk()
-    before = talk.device.settings
-    assert talk.say(asked + b"\r\n") == error(asked, code, field)
-    assert talk.device.settings == before
-    assert talk.say(b"O1\r") == b"21O 2 4 1\r\n"
+@pytest.mark.parametrize(("query", "code", "field"), REJECTED)
+def test_a_rejected_command_gets_an_error_record_and_changes_nothing(query: bytes, code: int, field: int) -> None:
+    session = DeviceSession()
+    before = session.device.settings
+    assert session.send(query + b"\r\n") == error_record(query, code, field)
+    assert session.device.settings == before
+    assert session.send(b"O1\r") == b"21O 2 4 1\r\n"
 
 
-def test_an_overlong_line_is_refused_whole() -> None:
-    talk = Talk()
-    assert talk.say(b"O1," + b"2," * 400 + b"1\r").endswith(b"EC -5*PS1  *FL1 *ST0\r\n")
-    assert talk.say(b"O1\r") == b"21O 2 4 1\r\n"
+def test_an_overlong_line_is_rejected() -> None:
+    session = DeviceSession()
+    assert session.send(b"O1," + b"2," * 400 + b"1\r").endswith(b"EC -5*PS1  *FL1 *ST0\r\n")
+    assert session.send(b"O1\r") == b"21O 2 4 1\r\n"
 
 
-def test_errors_are_logged_while_that_is_on() -> None:
-    talk = Talk()
-    said = talk.say(b"T\r")
-    assert talk.say(b"ME\r") == said
-    assert talk.say(b"MEC\rME\r") == b""
-    assert talk.say(b"ME0\rT\rME\r") == said
-    assert talk.say(b"ME1\rT\rME\r") == 2 * said
+def test_errors_are_logged_while_the_log_is_on() -> None:
+    session = DeviceSession()
+    reply_bytes = session.send(b"T\r")
+    assert session.send(b"ME\r") == reply_bytes
+    assert session.send(b"MEC\rME\r") == b""
+    assert session.send(b"ME0\rT\rME\r") == reply_bytes
+    assert session.send(b"ME1\rT\rME\r") == 2 * reply_bytes
 
 
 def test_every_setter_is_tried_here() -> None:
-    tried = b" ".join(asked for asked, _ in ANSWERS) + b" ".join(asked for asked, *_ in REFUSALS)
+    tried_commands = b" ".join(query for query, _ in REPLIES) + b" ".join(query for query, *_ in REJECTED)
     assert [
-        name for name in {*SETTER_COMMANDS, *SET_ONLY_COMMANDS} - {"ME0", "ME1"} if name.encode() not in tried
+        name for name in {*SETTER_COMMANDS, *SET_ONLY_COMMANDS} - {"ME0", "ME1"} if name.encode() not in tried_commands
     ] == []
 
 
 @pytest.mark.parametrize("size", [54, 55])
-def test_the_status_tells_flags_and_firmware(size: int) -> None:
-    talk = Talk(EmulatorConfig(status_bytes=size, firmware="3.11", identification="IS900VWT"))
-    assert len(talk.say(b"S")) == size
-    assert talk.say(b"fS")[:6] == b"21S3F1"
-    assert talk.say(b"uS")[:6] == b"21S3F3"
-    assert talk.say(b"CS")[:6] == b"21S3FB"
-    said = talk.say(b"cUFS")
-    assert (said[:6], said[15:21], said[21:30]) == (b"21S3F0", b"3.11  ", b" IS900VWT")
+def test_the_status_record_has_flags_and_firmware(size: int) -> None:
+    session = DeviceSession(EmulatorConfig(status_bytes=size, firmware="3.11", identification="IS900VWT"))
+    assert len(session.send(b"S")) == size
+    assert session.send(b"fS")[:6] == b"21S3F1"
+    assert session.send(b"uS")[:6] == b"21S3F3"
+    assert session.send(b"CS")[:6] == b"21S3FB"
+    reply_bytes = session.send(b"cUFS")
+    assert (reply_bytes[:6], reply_bytes[15:21], reply_bytes[21:30]) == (b"21S3F0", b"3.11  ", b" IS900VWT")
 
 
-@pytest.mark.parametrize(("firmware", "item", "known"), [("4.1105", 40, 0), ("4.1301", 40, 1), ("4.2301", 76, 0)])
-def test_items_come_with_their_firmware(firmware: str, item: int, known: int) -> None:
-    talk = Talk(EmulatorConfig(firmware=firmware))
-    refused = error(b"O1,%d,2,4,1" % item, -3, 2)
-    assert talk.say(b"O1,%d,2,4,1\r" % item) == (b"" if known else refused)
-    assert talk.say(b"O1\r") == (b"21O%2d 2 4 1\r\n" % item if known else b"21O 2 4 1\r\n")
+@pytest.mark.parametrize(("firmware", "item", "supported"), [("4.1105", 40, 0), ("4.1301", 40, 1), ("4.2301", 76, 0)])
+def test_items_need_their_firmware(firmware: str, item: int, supported: int) -> None:
+    session = DeviceSession(EmulatorConfig(firmware=firmware))
+    expected_error = error_record(b"O1,%d,2,4,1" % item, -3, 2)
+    assert session.send(b"O1,%d,2,4,1\r" % item) == (b"" if supported else expected_error)
+    assert session.send(b"O1\r") == (b"21O%2d 2 4 1\r\n" % item if supported else b"21O 2 4 1\r\n")

@@ -1,4 +1,4 @@
-"""The emulator at real ports, with real clients: what it plays is the simulation, bit by bit."""
+"""The emulator at real ports, with real clients: it plays the frames of the simulation, bit by bit."""
 
 import time
 from pathlib import Path
@@ -13,8 +13,8 @@ from harness.stream.driver.transport import Transport, open_transport
 from harness.stream.emulator import EmulatorConfig, serve_emulator
 from harness.stream.frame import TrackerFrame
 
-PATIENT_S = 120.0
-"""A loaded machine gets so long before a test fails."""
+TIMEOUT_S = 120.0
+"""Time that a loaded machine gets before a test fails [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +22,7 @@ def walk() -> Playback:
     return prepare_playback("builtin_walking", noise="default", stations=6)
 
 
-def set_up(client: Transport, stations: str = "123456") -> None:
+def configure(client: Transport, stations: str = "123456") -> None:
     client.write(commands.STOP)
     for station in stations:
         client.write(commands.set_output_list(station, (40, 2, 11, 21, 1)))
@@ -30,28 +30,28 @@ def set_up(client: Transport, stations: str = "123456") -> None:
         client.write(command)
 
 
-def frames_of(client: Transport, wire: WireFormat, count: int) -> list[TrackerFrame]:
-    reader, frames, until_s = FrameReader(wire), list[TrackerFrame](), time.monotonic() + PATIENT_S
+def read_frames(client: Transport, wire: WireFormat, count: int) -> list[TrackerFrame]:
+    reader, frames, until_s = FrameReader(wire), list[TrackerFrame](), time.monotonic() + TIMEOUT_S
     while len(frames) < count and time.monotonic() < until_s:
         frames += reader.feed(client.read(1.0), time.monotonic())
     return frames
 
 
-def same(one: TrackerFrame, other: TrackerFrame) -> bool:
+def values_equal(first: TrackerFrame, second: TrackerFrame) -> bool:
     names = [name for name in TrackerFrame.__slots__ if name != "received_s"]
-    return all(np.array_equal(getattr(one, n).astype(float), getattr(other, n).astype(float), True) for n in names)
+    return all(np.array_equal(getattr(first, n).astype(float), getattr(second, n).astype(float), True) for n in names)
 
 
-@pytest.mark.parametrize("where", ["pty", "tcp"])
-def test_the_frames_are_the_simulations(where: str, walk: Playback, tmp_path: Path) -> None:
-    at = {"pty": tmp_path / "is900"} if where == "pty" else {"tcp": "127.0.0.1:0"}
-    with serve_emulator(walk.samples, EmulatorConfig(), **at) as emulator:
+@pytest.mark.parametrize("port_kind", ["pty", "tcp"])
+def test_the_frames_are_those_of_the_simulation(port_kind: str, walk: Playback, tmp_path: Path) -> None:
+    port_arguments = {"pty": tmp_path / "is900"} if port_kind == "pty" else {"tcp": "127.0.0.1:0"}
+    with serve_emulator(walk.samples, EmulatorConfig(), **port_arguments) as emulator:
         client = open_transport(emulator.name)
-        set_up(client)
-        frames = frames_of(client, WireFormat(walk.samples.stations, walk.samples.rate_hz), 40)
+        configure(client)
+        frames = read_frames(client, WireFormat(walk.samples.stations, walk.samples.rate_hz), 40)
         client.close()
     simulated = walk.simulation.frames
-    first = [frame.measured_s[0] for frame in simulated].index(frames[0].measured_s[0])
-    pairs = list(zip(frames, simulated[first:], strict=False))
+    start = [frame.measured_s[0] for frame in simulated].index(frames[0].measured_s[0])
+    pairs = list(zip(frames, simulated[start:], strict=False))
     assert len(pairs) >= 40
-    assert all(same(*pair) for pair in pairs)
+    assert all(values_equal(*pair) for pair in pairs)

@@ -1,4 +1,4 @@
-"""Recordings: what goes in comes out, whatever is cut off or damaged, and nothing else is ever written to."""
+"""Recordings: the content is preserved despite truncation and damage, and no other file is ever written to."""
 
 import json
 import os
@@ -37,16 +37,16 @@ ENTRIES = [
     RecordingBlock(RECEIVED, 11.0, 1e9 + 1.0, BLOCK_MARKER + b"among data" + bytes(range(256))),
     RecordingBlock(RECEIVED, 11.5, 1e9 + 1.5, b""),
 ]
-WHOLE = FILE_HEADER + b"".join(map(encode_block, ENTRIES))
+FILE_BYTES = FILE_HEADER + b"".join(map(encode_block, ENTRIES))
 
 
-def entries(data: bytes) -> tuple[list[RecordingBlock], list[DamagedSpan]]:
-    found = list(read_blocks(data, 0 if data[: len(FILE_HEADER)] != FILE_HEADER else len(FILE_HEADER)))
-    return [e for e in found if isinstance(e, RecordingBlock)], [e for e in found if isinstance(e, DamagedSpan)]
+def read_entries(data: bytes) -> tuple[list[RecordingBlock], list[DamagedSpan]]:
+    blocks = list(read_blocks(data, 0 if data[: len(FILE_HEADER)] != FILE_HEADER else len(FILE_HEADER)))
+    return [e for e in blocks if isinstance(e, RecordingBlock)], [e for e in blocks if isinstance(e, DamagedSpan)]
 
 
-def written(path: Path) -> Path:
-    """A small recording with something of everything."""
+def write_recording(path: Path) -> Path:
+    """Write a small recording with blocks of every kind."""
     with RecordingWriter(path, {"source": "a test"}) as writer:
         writer.on_sent(b"c", 1.0, 101.0)
         writer.on_configured(FOUR, 1.1, 101.1)
@@ -57,8 +57,8 @@ def written(path: Path) -> Path:
     return path
 
 
-def test_what_was_written_is_read(tmp_path: Path) -> None:
-    recording = read_recording(written(tmp_path / "a.rec"))
+def test_reading_returns_what_was_written(tmp_path: Path) -> None:
+    recording = read_recording(write_recording(tmp_path / "a.rec"))
     assert recording.damage == ()
     assert recording.note == {"source": "a test"}
     assert recording.formats == (FOUR,)
@@ -74,19 +74,19 @@ def test_what_was_written_is_read(tmp_path: Path) -> None:
 
 @settings(max_examples=50)
 @given(data=st.binary(max_size=300), monotonic_s=st.floats(0.0, 1e9), wall_s=st.floats(0.0, 1e10))
-def test_any_bytes_at_any_time_come_back(data: bytes, monotonic_s: float, wall_s: float) -> None:
+def test_any_bytes_at_any_time_are_preserved(data: bytes, monotonic_s: float, wall_s: float) -> None:
     block = RecordingBlock(RECEIVED, monotonic_s, wall_s, data)
     assert list(read_blocks(encode_block(block) * 2, 0)) == [block, block]
 
 
-def test_a_format_says_all_that_a_reader_needs(tmp_path: Path) -> None:
-    odd = WireFormat(("head", "torso"), 75.0, (18, 20, 21), RecordFormat(0.0254, 1e-6, binary=False), b"2A")
+def test_the_wire_format_is_complete(tmp_path: Path) -> None:
+    unusual_format = WireFormat(("head", "torso"), 75.0, (18, 20, 21), RecordFormat(0.0254, 1e-6, binary=False), b"2A")
     with RecordingWriter(tmp_path / "a.rec") as writer:
-        writer.on_configured(odd)
-    assert read_recording(tmp_path / "a.rec").formats == (odd,)
+        writer.on_configured(unusual_format)
+    assert read_recording(tmp_path / "a.rec").formats == (unusual_format,)
 
 
-def test_more_than_a_block_holds_is_cut_in_two(tmp_path: Path) -> None:
+def test_long_data_are_split_into_blocks(tmp_path: Path) -> None:
     data = os.urandom(MAX_PAYLOAD_BYTES + 5)
     with RecordingWriter(tmp_path / "a.rec") as writer:
         writer.on_configured(FOUR, 1.0, 2.0)
@@ -96,69 +96,71 @@ def test_more_than_a_block_holds_is_cut_in_two(tmp_path: Path) -> None:
     assert b"".join(b.payload for b in read) == data
 
 
-def test_cut_at_any_byte_it_opens_and_says_what_was_lost(tmp_path: Path) -> None:
-    whole = written(tmp_path / "a.rec").read_bytes()
-    every = list(Recording(tmp_path, whole).blocks())
+def test_a_recording_truncated_anywhere_is_readable_and_reports_the_damage(tmp_path: Path) -> None:
+    all_bytes = write_recording(tmp_path / "a.rec").read_bytes()
+    all_blocks = list(Recording(tmp_path, all_bytes).blocks())
     ends = [len(FILE_HEADER)]
-    for block in every:
+    for block in all_blocks:
         ends.append(ends[-1] + len(encode_block(block)))
-    assert ends[-1] == len(whole)
-    for cut in range(1, len(whole)):
-        (tmp_path / "cut.rec").write_bytes(whole[:cut])
+    assert ends[-1] == len(all_bytes)
+    for cut in range(1, len(all_bytes)):
+        (tmp_path / "cut.rec").write_bytes(all_bytes[:cut])
         recording = read_recording(tmp_path / "cut.rec")
-        kept = sum(end <= cut for end in ends[1:])
-        assert list(recording.blocks()) == every[:kept]
-        begin = ends[kept] if cut >= len(FILE_HEADER) else 0
-        assert [f"the last {cut - begin} bytes" in lost for lost in recording.damage] == [True] * (cut > begin)
+        whole_blocks = sum(end <= cut for end in ends[1:])
+        assert list(recording.blocks()) == all_blocks[:whole_blocks]
+        begin = ends[whole_blocks] if cut >= len(FILE_HEADER) else 0
+        assert [f"the last {cut - begin} bytes" in damage for damage in recording.damage] == [True] * (cut > begin)
 
 
-@given(at=st.integers(0, len(WHOLE) - 1), flip=st.integers(1, 255))
-def test_a_flipped_byte_costs_its_block_and_is_named(at: int, flip: int) -> None:
-    data = bytearray(WHOLE)
-    data[at] ^= flip
-    found, lost = entries(bytes(data))
-    end, hit = len(FILE_HEADER), 0
+@given(at=st.integers(0, len(FILE_BYTES) - 1), mask=st.integers(1, 255))
+def test_a_flipped_byte_costs_its_block_and_is_reported(at: int, mask: int) -> None:
+    data = bytearray(FILE_BYTES)
+    data[at] ^= mask
+    blocks, damage = read_entries(bytes(data))
+    end, block_index = len(FILE_HEADER), 0
     while at >= end:
-        end += len(encode_block(ENTRIES[hit]))
-        hit += 1
-    expected = [e for i, e in enumerate(ENTRIES) if i != hit - 1]
-    assert found == expected
-    assert len(lost) == 1
-    assert lost[0].begin <= at < lost[0].end
+        end += len(encode_block(ENTRIES[block_index]))
+        block_index += 1
+    expected = [e for i, e in enumerate(ENTRIES) if i != block_index - 1]
+    assert blocks == expected
+    assert len(damage) == 1
+    assert damage[0].begin <= at < damage[0].end
 
 
 @given(
-    pieces=st.lists(st.binary(max_size=80) | st.sampled_from([BLOCK_MARKER, encode_block(ENTRIES[0])[:20]]), max_size=5)
+    garbage=st.lists(
+        st.binary(max_size=80) | st.sampled_from([BLOCK_MARKER, encode_block(ENTRIES[0])[:20]]), max_size=5
+    )
 )
-def test_rubbish_between_blocks_hides_none_of_them(pieces: list[bytes]) -> None:
-    data = FILE_HEADER + b"".join(encode_block(ENTRIES[1]) + piece for piece in pieces) + encode_block(ENTRIES[2])
-    found, lost = entries(data)
-    assert found == [*[ENTRIES[1]] * len(pieces), ENTRIES[2]]
-    assert sum(e.end - e.begin for e in lost) == sum(map(len, pieces))
+def test_garbage_between_blocks_hides_no_block(garbage: list[bytes]) -> None:
+    data = FILE_HEADER + b"".join(encode_block(ENTRIES[1]) + part for part in garbage) + encode_block(ENTRIES[2])
+    blocks, damage = read_entries(data)
+    assert blocks == [*[ENTRIES[1]] * len(garbage), ENTRIES[2]]
+    assert sum(e.end - e.begin for e in damage) == sum(map(len, garbage))
 
 
-def test_damage_in_the_middle_is_named_by_place_and_time(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.rec")
+def test_damage_in_the_middle_is_reported_by_position_and_time(tmp_path: Path) -> None:
+    path = write_recording(tmp_path / "a.rec")
     data = bytearray(path.read_bytes())
     at = data.index(b"01 ")
     data[at] ^= 1
     path.write_bytes(data)
-    (lost,) = read_recording(path).damage
-    assert "damaged: between 1.200 s and" in lost
+    (damage,) = read_recording(path).damage
+    assert "damaged: between 1.200 s and" in damage
 
 
 def test_a_damaged_header_does_not_cost_the_rest(tmp_path: Path) -> None:
-    data = bytearray(written(tmp_path / "a.rec").read_bytes())
+    data = bytearray(write_recording(tmp_path / "a.rec").read_bytes())
     data[9] ^= 0xFF
     (tmp_path / "a.rec").write_bytes(data)
     recording = read_recording(tmp_path / "a.rec")
     assert recording.formats == (FOUR,)
-    assert recording.damage == ("bytes 0 to 16 are damaged: the beginning, until 1.000 s",)
+    assert recording.damage == ("bytes 0 to 16 are damaged: from the beginning to 1.000 s of the host's clock",)
 
 
-def test_recording_goes_on_behind_what_is_there(tmp_path: Path) -> None:
-    """Also behind a block that was cut off: nothing is ever taken away."""
-    path = written(tmp_path / "a.rec")
+def test_recording_continues_at_the_end_of_the_file(tmp_path: Path) -> None:
+    """Also after a block that was cut off: nothing is ever removed."""
+    path = write_recording(tmp_path / "a.rec")
     cut = path.read_bytes()[:-7]
     path.write_bytes(cut)
     with RecordingWriter(path, {"source": "another test"}) as writer:
@@ -172,17 +174,17 @@ def test_recording_goes_on_behind_what_is_there(tmp_path: Path) -> None:
     assert len(recording.damage) == 1
 
 
-@pytest.mark.parametrize("kept", range(len(FILE_HEADER)))
-def test_a_header_that_was_cut_is_completed(kept: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("size", range(len(FILE_HEADER)))
+def test_a_truncated_header_is_completed(size: int, tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
-    path.write_bytes(FILE_HEADER[:kept])
+    path.write_bytes(FILE_HEADER[:size])
     with RecordingWriter(path) as writer:
         writer.on_sent(b"c", 1.0, 2.0)
     assert path.read_bytes().startswith(FILE_HEADER + BLOCK_MARKER)
     assert read_recording(path).damage == ()
 
 
-def test_nothing_happens_to_a_file_before_there_is_something_to_write(tmp_path: Path) -> None:
+def test_no_file_is_made_before_the_first_write(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.rec"):
         pass
     assert list(tmp_path.iterdir()) == []
@@ -192,13 +194,13 @@ def test_nothing_happens_to_a_file_before_there_is_something_to_write(tmp_path: 
 def test_another_file_is_refused_untouched(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     path.write_bytes(content)
-    for use in (RecordingWriter, read_recording):
+    for open_file in (RecordingWriter, read_recording):
         with pytest.raises(BadFile, match="no recording"):
-            use(path)
+            open_file(path)
     assert path.read_bytes() == content
 
 
-def newer(version: int = VERSION + 1) -> bytes:
+def newer_file(version: int = VERSION + 1) -> bytes:
     import struct
     import zlib
 
@@ -208,14 +210,16 @@ def newer(version: int = VERSION + 1) -> bytes:
 
 def test_a_newer_version_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
-    path.write_bytes(newer())
-    for use in (RecordingWriter, read_recording):
-        with pytest.raises(BadFile, match=r"version 2; expected version 1 at most\. A newer version of the harness"):
-            use(path)
-    assert path.read_bytes() == newer()
+    path.write_bytes(newer_file())
+    for open_file in (RecordingWriter, read_recording):
+        with pytest.raises(
+            BadFile, match=r"version 2; expected version 1 at most\. Use the newer version of the harness"
+        ):
+            open_file(path)
+    assert path.read_bytes() == newer_file()
 
 
-def test_what_is_no_place_to_record_into_is_refused(tmp_path: Path) -> None:
+def test_unwritable_places_are_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="The port comes first"):
         RecordingWriter("/dev/null")
     with pytest.raises(BadFile, match="The port comes first"):
@@ -224,7 +228,7 @@ def test_what_is_no_place_to_record_into_is_refused(tmp_path: Path) -> None:
         RecordingWriter(tmp_path / "none" / "a.rec")
 
 
-def test_reading_what_is_not_there_is_refused(tmp_path: Path) -> None:
+def test_reading_a_missing_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="no such file"):
         read_recording(tmp_path / "a.rec")
     with pytest.raises(BadFile, match="a folder"):
@@ -235,7 +239,7 @@ def test_reading_what_is_not_there_is_refused(tmp_path: Path) -> None:
 
 
 def test_other_stations_are_refused(tmp_path: Path) -> None:
-    path = written(tmp_path / "a.rec")
+    path = write_recording(tmp_path / "a.rec")
     before = path.read_bytes()
     with (
         RecordingWriter(path) as writer,
@@ -245,30 +249,30 @@ def test_other_stations_are_refused(tmp_path: Path) -> None:
     assert path.read_bytes() == before
 
 
-def test_two_cannot_record_into_one_file(tmp_path: Path) -> None:
+def test_two_writers_of_one_file_are_refused(tmp_path: Path) -> None:
     pytest.importorskip("fcntl", reason="only where the system has flock")
-    with RecordingWriter(tmp_path / "a.rec") as first:
-        first.on_configured(FOUR, 1.0, 2.0)
-        with RecordingWriter(tmp_path / "a.rec") as second, pytest.raises(BadFile, match="Another process"):
-            second.on_sent(b"c", 1.0, 2.0)
+    with RecordingWriter(tmp_path / "a.rec") as first_writer:
+        first_writer.on_configured(FOUR, 1.0, 2.0)
+        with RecordingWriter(tmp_path / "a.rec") as second_writer, pytest.raises(BadFile, match="Another process"):
+            second_writer.on_sent(b"c", 1.0, 2.0)
     assert len(list(read_recording(tmp_path / "a.rec").blocks())) == 2
 
 
-def test_a_new_file_in_which_no_device_was_set_up_is_removed(tmp_path: Path) -> None:
+def test_a_new_file_without_a_configuration_is_removed(tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     with RecordingWriter(path) as writer:
         writer.on_sent(b"S", 1.0, 2.0)
         assert path.exists()
     assert not path.exists()
-    before = written(path).read_bytes()
+    before = write_recording(path).read_bytes()
     with RecordingWriter(path) as writer:
         writer.on_sent(b"S", 1.0, 2.0)
     assert path.read_bytes().startswith(before)
 
 
-def test_a_full_disk_is_said() -> None:
+def test_a_full_disk_is_reported() -> None:
     if not Path("/dev/full").exists():
-        pytest.skip("no /dev/full to stand for a full disk")
+        pytest.skip("no /dev/full to simulate a full disk")
     writer = RecordingWriter("unused")
     writer._file = os.open("/dev/full", os.O_WRONLY)
     with pytest.raises(BadFile, match="No space left"):
@@ -276,52 +280,54 @@ def test_a_full_disk_is_said() -> None:
     os.close(writer._file)
 
 
-ENDLESS = """
+ENDLESS_WRITER = """
 import sys
 from harness.stream.codec.reader import WireFormat
 from harness.stream.recording.recording import RecordingWriter
 writer = RecordingWriter(sys.argv[1], {"source": "a test"})
-writer.configured(WireFormat(("head",), 40.0), 0.0, 0.0)
+writer.on_configured(WireFormat(("head",), 40.0), 0.0, 0.0)
 for count in range(10**9):
-    writer.received(b"%d\\n" % count, float(count), float(count))
+    writer.on_received(b"%d\\n" % count, float(count), float(count))
     if count % 1000 == 0:
         print(count, flush=True)
 """
 
 
 def test_a_killed_process_loses_at_most_the_block_it_was_writing(tmp_path: Path) -> None:
-    """As by `kill -9`: all that it had handed over is there."""
+    """As by `kill -9`: every block handed over before is in the file."""
     path = tmp_path / "a.rec"
-    with subprocess.Popen([sys.executable, "-c", ENDLESS, str(path)], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", ENDLESS_WRITER, str(path)], stdout=subprocess.PIPE, text=True
+    ) as process:
         assert process.stdout is not None
-        said = [int(process.stdout.readline()) for _ in range(3)][-1]
+        last_count = [int(process.stdout.readline()) for _ in range(3)][-1]
         time.sleep(0.02)
         process.send_signal(signal.SIGKILL)
     recording = read_recording(path)
     counts = [int(b.payload) for b in recording.blocks() if b.kind == RECEIVED]
     assert counts == list(range(len(counts)))
-    assert len(counts) > said
+    assert len(counts) > last_count
     assert len(recording.damage) <= 1
 
 
-def test_blocks_are_json_where_the_layout_says_so(tmp_path: Path) -> None:
-    configured = next(b for b in read_recording(written(tmp_path / "a.rec")).blocks() if b.kind == "conf")
+def test_conf_blocks_are_json(tmp_path: Path) -> None:
+    configured = next(b for b in read_recording(write_recording(tmp_path / "a.rec")).blocks() if b.kind == "conf")
     content = json.loads(configured.payload)
     assert content["stations"] == list(FOUR.stations)
     assert content["items"] == list(FOUR.items)
 
 
 @pytest.mark.parametrize(
-    ("payload", "found"),
+    ("payload", "message"),
     [
-        (b"no JSON", "a conf block that is no JSON"),
+        (b"no JSON", "a conf block that is not JSON"),
         (b"[]", "missing stations, rate_hz"),
         (b'{"stations": ["head"], "rate_hz": 0}', "0 is not positive"),
         (b'{"stations": ["head"], "rate_hz": 40, "pace": 1}', "no key in wire format called 'pace'"),
-        (b'{"stations": ["head"], "rate_hz": 40, "characters": "Z"}', "One of 123456789ABC for each"),
+        (b'{"stations": ["head"], "rate_hz": 40, "characters": "Z"}', "one of 123456789ABC for each"),
     ],
 )
-def test_a_format_that_cannot_be_used_is_refused(payload: bytes, found: str) -> None:
+def test_an_unusable_format_is_refused(payload: bytes, message: str) -> None:
     data = FILE_HEADER + encode_block(RecordingBlock("conf", 1.0, 2.0, payload))
-    with pytest.raises(BadFile, match=found):
+    with pytest.raises(BadFile, match=message):
         _ = Recording(Path("a.rec"), data).formats

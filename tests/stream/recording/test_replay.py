@@ -1,4 +1,4 @@
-"""Replay: the frames of a recording, whatever the speed and however the bytes were cut."""
+"""Replay: the frames of a recording, whatever the speed and the split of the bytes."""
 
 import io
 import threading
@@ -20,30 +20,30 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import Recording, RecordingWriter, read_recording, record_capture
 from harness.stream.recording.replay import RecordingStream, ReplaySpeed, parse_speed, wait_for_enter
 from harness.testing.stream_checks import check_stream
-from tests.stream.wire import FOUR, RATE_HZ, RECORD, frames_of, received, same, sent, stamps_s
+from tests.stream.wire import FOUR, RATE_HZ, RECORD, decode_frames, device_bytes, frames_equal, in_chunks, stamps_s
 
 ROUNDS = 24
 STAMPS_S = stamps_s(ROUNDS)
-DATA = sent(STAMPS_S)
+DATA = device_bytes(STAMPS_S)
 
 
-def alike(one: Sequence[TrackerFrame], other: Sequence[TrackerFrame]) -> bool:
-    return len(one) == len(other) and all(same(a, b) for a, b in zip(one, other, strict=True))
+def all_equal(first: Sequence[TrackerFrame], second: Sequence[TrackerFrame]) -> bool:
+    return len(first) == len(second) and all(frames_equal(a, b) for a, b in zip(first, second, strict=True))
 
 
-def recorded(path: Path, capture: ByteCapture | None = None) -> Path:
-    record_capture(path, FOUR, received(DATA, STAMPS_S) if capture is None else capture, {})
+def write_capture(path: Path, capture: ByteCapture | None = None) -> Path:
+    record_capture(path, FOUR, in_chunks(DATA, STAMPS_S) if capture is None else capture, {})
     return path
 
 
 @pytest.fixture
-def whole(tmp_path: Path) -> Path:
-    return recorded(tmp_path / "whole.rec")
+def recording_path(tmp_path: Path) -> Path:
+    return write_capture(tmp_path / "whole.rec")
 
 
 @pytest.fixture
-def broken(tmp_path: Path) -> Path:
-    """Silences, lost and damaged records, and a second set-up after a minute."""
+def damaged_path(tmp_path: Path) -> Path:
+    """A recording with silences, lost and damaged records, and a second configuration after a minute."""
     with RecordingWriter(tmp_path / "broken.rec") as writer:
         for begin_s in (100.0, 160.0):
             writer.on_configured(FOUR, begin_s - 0.1, 1e9)
@@ -59,42 +59,42 @@ def broken(tmp_path: Path) -> Path:
     return tmp_path / "broken.rec"
 
 
-def test_it_is_a_tracker_stream(whole: Path, broken: Path) -> None:
-    assert len(check_stream(lambda: RecordingStream(whole), rate_hz=RATE_HZ)) == ROUNDS
-    assert len(check_stream(lambda: RecordingStream(broken), rate_hz=RATE_HZ)) > ROUNDS
+def test_the_stream_contract_holds(recording_path: Path, damaged_path: Path) -> None:
+    assert len(check_stream(lambda: RecordingStream(recording_path), rate_hz=RATE_HZ)) == ROUNDS
+    assert len(check_stream(lambda: RecordingStream(damaged_path), rate_hz=RATE_HZ)) > ROUNDS
 
 
-def test_frames_are_those_of_the_wire(whole: Path) -> None:
-    assert alike(list(RecordingStream(whole)), frames_of(received(DATA, STAMPS_S)))
+def test_frames_are_those_of_the_wire(recording_path: Path) -> None:
+    assert all_equal(list(RecordingStream(recording_path)), decode_frames(in_chunks(DATA, STAMPS_S)))
 
 
 @settings(max_examples=10, deadline=None)
 @given(chunk=st.integers(1, 300))
 @example(chunk=159)
-def test_how_bytes_were_cut_changes_nothing_but_when_they_came(
-    chunk: int, tmp_path_factory: pytest.TempPathFactory
-) -> None:
-    capture = received(DATA, STAMPS_S, chunk)
+def test_chunks_change_only_the_times_of_reception(chunk: int, tmp_path_factory: pytest.TempPathFactory) -> None:
+    capture = in_chunks(DATA, STAMPS_S, chunk)
     path = tmp_path_factory.mktemp("cut") / "a.rec"
-    assert alike(list(RecordingStream(recorded(path, capture))), frames_of(capture))
+    assert all_equal(list(RecordingStream(write_capture(path, capture))), decode_frames(capture))
 
 
 @pytest.mark.parametrize("speed", [40.0, 1000.0, "step"])
-def test_frames_are_the_same_at_any_speed(speed: ReplaySpeed, broken: Path) -> None:
-    assert alike(list(RecordingStream(broken)), list(RecordingStream(broken, 1e6)))
-    whole = recorded(broken.with_name("whole.rec"))
-    assert alike(list(RecordingStream(whole)), list(RecordingStream(whole, speed, step=lambda: True)))
+def test_frames_are_the_same_at_any_speed(speed: ReplaySpeed, damaged_path: Path) -> None:
+    assert all_equal(list(RecordingStream(damaged_path)), list(RecordingStream(damaged_path, 1e6)))
+    recording_path = write_capture(damaged_path.with_name("whole.rec"))
+    assert all_equal(
+        list(RecordingStream(recording_path)), list(RecordingStream(recording_path, speed, step=lambda: True))
+    )
 
 
-def test_at_speed_it_takes_as_long_as_it_took(whole: Path) -> None:
-    """Never shorter, however busy the computer; half a second of motion at half its speed."""
+def test_replay_keeps_the_recorded_pace(recording_path: Path) -> None:
+    """It is never faster, however busy the computer; half a second of motion at half its speed."""
     began_s = time.monotonic()
-    frames = list(RecordingStream(whole, 0.5))
+    frames = list(RecordingStream(recording_path, 0.5))
     assert time.monotonic() - began_s >= 2.0 * (frames[-1].received_s - frames[0].received_s) - 0.01
 
 
-def test_a_frame_is_given_up_when_the_driver_gave_it_up(tmp_path: Path) -> None:
-    """Not when the line speaks again."""
+def test_a_frame_is_closed_when_the_driver_closed_it(tmp_path: Path) -> None:
+    """It is not delayed until the next bytes arrive."""
     path = tmp_path / "a.rec"
     with RecordingWriter(path) as writer:
         writer.on_configured(FOUR, 99.0, 99.0)
@@ -108,7 +108,7 @@ def test_a_frame_is_given_up_when_the_driver_gave_it_up(tmp_path: Path) -> None:
     assert time.monotonic() - began_s < 60.0
     stream.close()
     assert list(frames) == []
-    assert alike(list(RecordingStream(path)), list(RecordingStream(path, 1e9)))
+    assert all_equal(list(RecordingStream(path)), list(RecordingStream(path, 1e9)))
 
 
 def test_closing_ends_a_wait(tmp_path: Path) -> None:
@@ -124,13 +124,13 @@ def test_closing_ends_a_wait(tmp_path: Path) -> None:
     assert list(frames) == []
 
 
-def test_a_step_is_a_line_of_input(whole: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_step_reads_a_line_of_input(recording_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stdin", io.StringIO("\n\n\n"))
-    assert len(list(RecordingStream(whole, "step", step=wait_for_enter))) == 3
+    assert len(list(RecordingStream(recording_path, "step", step=wait_for_enter))) == 3
 
 
-def test_a_second_set_up_goes_on_where_the_first_ended(broken: Path) -> None:
-    stream = RecordingStream(broken)
+def test_a_second_configuration_continues_the_stream(damaged_path: Path) -> None:
+    stream = RecordingStream(damaged_path)
     frames = list(stream)
     received_s = np.array([frame.received_s for frame in frames])
     latest_s = np.array([np.nanmax(frame.measured_s) for frame in frames])
@@ -142,8 +142,8 @@ def test_a_second_set_up_goes_on_where_the_first_ended(broken: Path) -> None:
     assert stream.device_zero_s > 0.0
 
 
-def test_a_restart_of_the_computer_in_between_is_bridged_by_the_wall_clock(tmp_path: Path) -> None:
-    """The monotonic clock then begins anew."""
+def test_the_wall_clock_bridges_a_restart_of_the_computer(tmp_path: Path) -> None:
+    """The monotonic clock starts again after a restart."""
     path = tmp_path / "a.rec"
     for begin_s, wall_s in ((5000.0, 1e9), (7.0, 1e9 + 300.0)):
         with RecordingWriter(path) as writer:
@@ -151,65 +151,65 @@ def test_a_restart_of_the_computer_in_between_is_bridged_by_the_wall_clock(tmp_p
             for i, at_s in enumerate((STAMPS_S - STAMPS_S[0]).tolist()):
                 writer.on_received(DATA[i * RECORD : (i + 1) * RECORD], begin_s + 0.1 + at_s, wall_s + 0.1 + at_s)
     stream = RecordingStream(path)
-    walls_s, frames = [], []
+    wall_times_s, frames = [], []
     for frame in stream:
         frames.append(frame)
-        walls_s.append(stream.wall_s(frame.received_s))
+        wall_times_s.append(stream.wall_s(frame.received_s))
     assert len(frames) == 2 * ROUNDS
     gaps_s = [b.received_s - a.received_s for a, b in pairwise(frames)]
     assert max(gaps_s) == pytest.approx(300.0, abs=1.0)
     assert min(gaps_s) > 0.0
-    np.testing.assert_allclose(np.diff(walls_s), gaps_s, atol=1e-5)
+    np.testing.assert_allclose(np.diff(wall_times_s), gaps_s, atol=1e-5)
     check_stream(lambda: RecordingStream(path), rate_hz=RATE_HZ)
 
 
-def test_a_lost_block_costs_its_records_alone(whole: Path) -> None:
-    data = bytearray(whole.read_bytes())
+def test_a_damaged_block_costs_only_its_records(recording_path: Path) -> None:
+    data = bytearray(recording_path.read_bytes())
     at = data.index(DATA[40 * RECORD : 41 * RECORD])
     data[at + 5] ^= 0x55
-    whole.write_bytes(data)
-    stream = RecordingStream(whole)
+    recording_path.write_bytes(data)
+    stream = RecordingStream(recording_path)
     frames = list(stream)
     assert len(stream.recording.damage) == 1
-    clean = frames_of(received(DATA, STAMPS_S))
-    assert [i for i, (a, b) in enumerate(zip(frames, clean, strict=True)) if not same(a, b)] == [10]
+    clean = decode_frames(in_chunks(DATA, STAMPS_S))
+    assert [i for i, (a, b) in enumerate(zip(frames, clean, strict=True)) if not frames_equal(a, b)] == [10]
     assert frames[10].position_valid.tolist() == [False, True, True, True]
 
 
-def test_cut_at_any_byte_it_plays_what_is_whole_or_says_why_not(whole: Path) -> None:
-    data = whole.read_bytes()[: 2000 + len(FILE_HEADER)]
-    most = 0
+def test_a_recording_truncated_anywhere_is_replayed_or_refused(recording_path: Path) -> None:
+    data = recording_path.read_bytes()[: 2000 + len(FILE_HEADER)]
+    max_frames = 0
     for cut in range(1, len(data), 7):
-        recording = Recording(whole, data[:cut])
+        recording = Recording(recording_path, data[:cut])
         if not recording.formats:
-            with pytest.raises(BadFile, match="never set up in it"):
+            with pytest.raises(BadFile, match="never configured in it"):
                 RecordingStream(recording)
             continue
         frames = list(RecordingStream(recording))
-        blocks = sum(block.kind == RECEIVED for block in recording.blocks())
-        assert len(frames) == -(-blocks // 4)
-        most = max(most, len(frames))
-    assert most > 3
+        block_count = sum(block.kind == RECEIVED for block in recording.blocks())
+        assert len(frames) == -(-block_count // 4)
+        max_frames = max(max_frames, len(frames))
+    assert max_frames > 3
 
 
-def test_without_a_set_up_there_is_nothing_to_play(tmp_path: Path) -> None:
+def test_a_recording_without_a_configuration_is_refused(tmp_path: Path) -> None:
     with RecordingWriter(tmp_path / "a.rec") as writer:
         writer.on_received(DATA, 1.0, 2.0)
-        with pytest.raises(BadFile, match="the device was never set up in it"):
+        with pytest.raises(BadFile, match="the device was never configured in it"):
             RecordingStream(tmp_path / "a.rec")
 
 
-def test_stations_never_change(whole: Path, tmp_path: Path) -> None:
-    other = tmp_path / "other.rec"
-    record_capture(other, WireFormat(("head",), RATE_HZ), received(DATA, STAMPS_S), {})
-    both = whole.read_bytes() + other.read_bytes()[len(FILE_HEADER) :]
+def test_stations_never_change(recording_path: Path, tmp_path: Path) -> None:
+    second = tmp_path / "other.rec"
+    record_capture(second, WireFormat(("head",), RATE_HZ), in_chunks(DATA, STAMPS_S), {})
+    both = recording_path.read_bytes() + second.read_bytes()[len(FILE_HEADER) :]
     with pytest.raises(BadFile, match=r"stations head, .* become head; expected the same stations"):
-        RecordingStream(Recording(whole, both))
+        RecordingStream(Recording(recording_path, both))
 
 
-def test_reading_a_file_while_it_grows_gives_what_was_there(whole: Path) -> None:
-    stream = RecordingStream(read_recording(whole))
-    with RecordingWriter(whole) as writer:
+def test_a_growing_file_is_replayed_as_it_was_read(recording_path: Path) -> None:
+    stream = RecordingStream(read_recording(recording_path))
+    with RecordingWriter(recording_path) as writer:
         writer.on_configured(FOUR, 1e4, 1e4)
     assert len(list(stream)) == len(list(stream)) == ROUNDS
 
@@ -220,6 +220,6 @@ def test_speeds(text: str, speed: ReplaySpeed) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "fast", "0", "-1", "nan", "inf"])
-def test_what_is_no_speed_is_refused(text: str) -> None:
+def test_an_impossible_speed_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="`step`, `max`, or a positive number"):
         parse_speed(text)

@@ -1,0 +1,141 @@
+"""The state of an emulated IS-900: settings, clock, stations, logs and the messages that wait to be sent.
+
+It does no input or output; time is an argument. `device.Device` adds the commands.
+"""
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import replace
+
+from harness.stream.codec.replies import ParsedReply
+from harness.stream.codec.samples import DeviceSamples
+from harness.stream.emulator.config import EmulatorConfig
+from harness.stream.emulator.message import Message
+from harness.stream.emulator.player import SamplePlayer
+from harness.stream.emulator.round_encoder import RoundEncoder
+from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
+
+_LOG_LENGTH = 100
+"""Entries of the error log, of the command log, and replies that wait while the device is suspended."""
+
+
+class DeviceState:
+    """What a device is and does apart from reading commands: it plays samples and queues messages.
+
+    Stations beyond those of the samples are not plugged in.
+    """
+
+    def __init__(self, samples: DeviceSamples, config: EmulatorConfig | None = None, now_s: float = 0.0) -> None:
+        """Switch the device on at `now_s` [s]."""
+        self.samples, self.config = samples, config or EmulatorConfig()
+        self.firmware = self.config.firmware
+        self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
+        self.streaming = self.suspended = False
+        self.command_count = self.refused_count = 0
+        """Numbers of all commands and of the rejected ones."""
+        self.errors: deque[ParsedReply] = deque(maxlen=_LOG_LENGTH)
+        self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
+        """Commands, while the command log is open."""
+        stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
+        self._factory = DeviceSettings(stations, baud=self.config.baud)
+        self.settings: DeviceSettings = self._factory
+        self._saved = self._factory
+        self._next = 0, 0
+        """Round and station row of the next reading while streaming."""
+        self._silent_until_s = float("-inf")
+        self._out: list[Message] = []
+        self._held: deque[Message] = deque(maxlen=_LOG_LENGTH)
+        """Replies of a suspended device."""
+
+    def messages(self, now_s: float) -> list[Message]:
+        """Return all messages since the last call, in sequence, including the readings until `now_s`."""
+        self._play(now_s)
+        out, self._out = self._out, []
+        return out
+
+    def advance(self, now_s: float) -> bytes:
+        """Return the bytes of `messages`, as over an infinitely fast line."""
+        return b"".join(message.data for message in self.messages(now_s))
+
+    @property
+    def next_s(self) -> float:
+        """When the next reading is taken [s]; inf unless streaming."""
+        return self.rounds.player.time_s(*self._next) if self.streaming else float("inf")
+
+    @property
+    def active(self) -> str:
+        """Characters of the stations that report."""
+        return "".join(name for name in self.rounds.plugged if self.settings.station(name).active)
+
+    def set_lost_stations(self, stations: Iterable[str]) -> None:
+        """Lose exactly these stations from now on, in addition to what the samples say."""
+        self.rounds.set_lost_stations(stations)
+
+    def reply(self, now_s: float, *replies: ParsedReply) -> None:
+        """Send replies, or hold them while the device is suspended."""
+        messages = [Message(now_s, reply.line()) for reply in replies]
+        if self.suspended:
+            self._held.extend(messages)
+        else:
+            self._out += messages
+
+    def start_streaming(self, now_s: float) -> None:
+        """Send records from the next whole round of stations on."""
+        if not self.streaming:
+            self.streaming, self._next = True, (self.rounds.player.first_from(now_s), 0)
+
+    def stop(self, now_s: float) -> None:
+        """Stop before the next record, never inside one."""
+        self.streaming = False
+        self._out.append(Message(now_s, b"", halts=True))
+
+    def poll(self, now_s: float) -> None:
+        """Send one record of each active station, ascending, with its latest reading."""
+        for name in "" if self.suspended else self.active:
+            number = self.rounds.player.latest(now_s, STATION_NAMES.index(name))
+            self._out.append(Message(now_s, self.rounds.records(number, self.settings)[name], name))
+
+    def suspend(self, now_s: float) -> None:
+        """Hold replies and discard readings until `resume`."""
+        self.suspended = True
+        self._out.append(Message(now_s, b"", halts=True))
+
+    def resume(self, now_s: float) -> None:
+        """End a suspension and send the held replies."""
+        self.suspended = False
+        self._out += [replace(message, ready_s=now_s) for message in self._held]
+        self._held.clear()
+
+    def save(self) -> None:
+        """Save the settings for the next restart."""
+        self._saved = self.settings
+
+    def restore_factory_defaults(self) -> None:
+        """Return to factory defaults. The saved settings stay saved."""
+        self.settings = self._factory
+
+    def restart(self, now_s: float) -> None:
+        """Restart as after command 19 or a power cut.
+
+        The saved settings return, the device is polled, its clock starts anew, and it is silent at first.
+        """
+        self._play(now_s)
+        self.stop(now_s)
+        self.suspended = False
+        self.settings = self._saved
+        self._held.clear()
+        self._silent_until_s = now_s + self.config.restart_s
+        self.rounds.player.begin(self._silent_until_s)
+
+    def _play(self, now_s: float) -> None:
+        """Send the readings until now."""
+        player, rows = self.rounds.player, len(self.rounds.plugged)
+        while self.streaming:
+            number, row = self._next
+            taken_s = player.time_s(number, row)
+            if taken_s > now_s:
+                return
+            self._next = (number, row + 1) if row + 1 < rows else (number + 1, 0)
+            if self.settings.stations[row].active and not self.suspended:
+                data = self.rounds.records(number, self.settings)[STATION_NAMES[row]]
+                self._out.append(Message(taken_s + self.samples.ready_s, data, STATION_NAMES[row]))
