@@ -1,15 +1,19 @@
-"""How fast inverse kinematics converges, beside mink on the same targets and with the same rule for stopping.
+"""Speed of inverse kinematics, beside mink on the same targets and with the same stopping rule.
 
-Six trackers on the built-in performer's walk at 40 Hz, with a tracker's white noise. In every frame both start from
-the true pose of the frame before, keep the same limits, and step on until a step lowers the cost (half the squared
-residuals over their variances) by less than 1e-4, the cost itself is below that, no component of a step exceeds 1e-4
-(m, rad), or 30 steps are spent. What decides about mink is computed off its clock. They take turns, a second of
-motion each, so that whatever else the machine does meets all alike; ratios are medians over turns.
+Six stations on synthetic walking at 40 Hz, with a tracker's white noise. In every frame both solvers start from the
+true pose of the frame before and keep the same joint limits. They iterate until one of these holds:
+
+- a step lowers the cost (half the squared residuals over their variances) by less than 1e-4;
+- the cost is below 1e-4;
+- no component of a step exceeds 1e-4 (m, rad);
+- 30 steps are done.
+
+The stopping rule of mink is evaluated outside its timed part. The solvers take turns (`round_robin_timing`); ratios are
+medians over turns.
 """
 
 import copy
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import mink
@@ -22,10 +26,10 @@ from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate
 from harness.core.humanoid24 import pack
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
+from harness.experiment.round_robin_timing import MethodTimings, TimedStep, take_turns
 from harness.mocap import synthetic
 from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.hinge_limits import HingeLimits
@@ -34,51 +38,47 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
-RATE_HZ, FRAMES_PER_TURN = 40.0, 40
+RATE_HZ = 40.0
 NOISE_M, NOISE_RAD = 0.75e-3, float(np.deg2rad(0.05))
-"""White noise per record of the default levels."""
+"""Standard deviation of white noise per record, as in noise preset `default`."""
 STOPPING = Stopping(step=1e-4, decrease=1e-4, most_steps=30)
 LEAST_SQUARES = Loss(robust=False)
 MINK_DAMPING = 3.0
-"""Where mink leaves the least residual on these targets: with less it never settles on noise, with more it crawls."""
-
-TimedSolver = Callable[[TrackerFrame, Floats], tuple[Floats, float]]
-"""Takes a frame and a pose to start from to a configuration (55,) and the seconds that it took."""
+"""The damping at which mink leaves the smallest residual here: less does not settle on noise, more is slow."""
 
 
 @dataclass(frozen=True, eq=False)
 class IKBenchmarkCase:
-    """What all contenders are given. The tracker's frame is the world's."""
+    """Input of all solvers; the tracker frame is the world frame."""
 
     body: humanoid.Body
-    """With the stations as sites."""
+    """The body with the stations as sites."""
     calibration: Calibration
     frames: list[TrackerFrame]
-    starts: Floats
-    """(T, 55) for each frame the true pose of the one before."""
+    truth: Floats
+    """(T, 55) the true pose at each frame."""
     examples: tuple[BodyMotion, ...]
     """Another walk of the same performer."""
 
 
 def bench_ik(seed: int = 1, frames: int = 400) -> list[BenchmarkRow]:
-    """Throughput of `ik` as it is used; then of its solver beside mink's, prior and robust loss off."""
-    setting = make_case(seed, frames)
-    contenders = {"used": registered_ik(setting), "bare": plain_solver(setting), "mink": mink_solver(setting)}
-    seconds = {name: np.zeros(frames) for name in contenders}
-    poses = {name: np.zeros((frames, setting.starts.shape[1])) for name in contenders}
-    for turn in range(0, frames, FRAMES_PER_TURN):
-        for name, follow in contenders.items():
-            for frame in range(turn, min(turn + FRAMES_PER_TURN, frames)):
-                poses[name][frame], seconds[name][frame] = follow(setting.frames[frame], setting.starts[frame])
-    per_turn = {name: np.add.reduceat(spent, np.arange(0, frames, FRAMES_PER_TURN)) for name, spent in seconds.items()}
-    fps = {name: FRAMES_PER_TURN / float(np.median(spent)) for name, spent in per_turn.items()}
-    ratio = float(np.median(per_turn["mink"] / per_turn["bare"]))
-    ours, theirs = (residual_errors(setting, poses[name]) for name in ("bare", "mink"))
+    """Throughput of `ik` as registered; then of its solver beside mink, without prior and robust loss."""
+    case = make_case(seed, frames)
+    steps = {
+        "used": registered_ik(case),
+        "bare": plain_solver(case.body, case.calibration),
+        "mink": mink_solver(case.body, case.calibration),
+    }
+    timings, turns = {name: MethodTimings() for name in steps}, dict[str, list[Floats]]({name: [] for name in steps})
+    for turn in take_turns(steps, case.frames, case.truth):
+        timings[turn.method].add(turn)
+        turns[turn.method].append(turn.qpos)
+    ratio = timings["bare"].speed_ratio(timings["mink"])
+    ours, theirs = (residual_errors(case, np.concatenate(turns[name])) for name in ("bare", "mink"))
+    reference = f"mink {timings['mink'].fps:.0f} frames/s"
     return [
-        BenchmarkRow("ik, six trackers, converged", fps["used"], "frames/s", "", ">= 1500"),
-        BenchmarkRow(
-            "ik without prior and robust loss", fps["bare"], "frames/s", f"mink {fps['mink']:.0f} frames/s", ""
-        ),
+        BenchmarkRow("ik, six trackers, converged", timings["used"].fps, "frames/s", "", ">= 1500"),
+        BenchmarkRow("ik without prior and robust loss", timings["bare"].fps, "frames/s", reference, ""),
         BenchmarkRow("ik / mink", ratio, "x", "the same targets", ">= 3"),
         BenchmarkRow("tracker residual, cost", ours[0], "", f"mink {theirs[0]:.4f}", "<= mink"),
         BenchmarkRow("tracker residual, position", ours[1], "mm RMS", f"mink {theirs[1]:.4f} mm", "<= mink"),
@@ -87,16 +87,16 @@ def bench_ik(seed: int = 1, frames: int = 400) -> list[BenchmarkRow]:
 
 
 def make_case(seed: int, frames: int) -> IKBenchmarkCase:
-    """A walk, and readings of it in the frame of the world."""
-    who = synthetic.performer_names()[0]
-    clip = synthetic.generate("walking", who, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
-    worn = tuple(mounts.DEFAULT_MOUNTS[station] for station in STATIONS)
-    body = humanoid.build_body(clip.skeleton, worn)
-    on_bones = [mounts.locate_mount(body.skeleton, mount) for mount in worn]
+    """Make a synthetic walk and noisy readings of it in the world frame."""
+    performer = synthetic.performer_names()[0]
+    clip = synthetic.generate("walking", performer, 1, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
+    stations = tuple(mounts.DEFAULT_MOUNTS[station] for station in STATIONS)
+    body = humanoid.build_body(clip.skeleton, stations)
+    on_bones = [mounts.locate_mount(body.skeleton, mount) for mount in stations]
     calibration = Calibration(
         "exact",
         STATIONS,
-        tuple(mount.bone for mount in worn),
+        tuple(mount.bone for mount in stations),
         np.array([mount_m for mount_m, _ in on_bones]),
         np.array([bone_from_station for _, bone_from_station in on_bones]),
         rotations.IDENTITY,
@@ -106,98 +106,100 @@ def make_case(seed: int, frames: int) -> IKBenchmarkCase:
     qpos[:, 7:] = HingeLimits(body).principal(qpos[:, 7:])
     rng, kinematics = generator(seed, "bench", "ik"), Kinematics(body)
     readings = [_noisy_frame(kinematics, calibration, q, t / RATE_HZ, rng) for t, q in enumerate(qpos)]
-    other = synthetic.generate("walking", who, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
+    other = synthetic.generate("walking", performer, 2, seed=seed, rate_hz=RATE_HZ, duration_s=frames / RATE_HZ)
     example = retarget_to_own_body(other)[1]
-    return IKBenchmarkCase(body, calibration, readings, np.concatenate([qpos[:1], qpos[:-1]]), (example,))
+    return IKBenchmarkCase(body, calibration, readings, qpos, (example,))
 
 
 def _noisy_frame(
-    kinematics: Kinematics, worn: Calibration, qpos: Floats, time_s: float, rng: np.random.Generator
+    kinematics: Kinematics, calibration: Calibration, qpos: Floats, time_s: float, rng: np.random.Generator
 ) -> TrackerFrame:
     kinematics.set(qpos)
-    bones = [kinematics.body.skeleton.index(bone) for bone in worn.bones]
-    at_m, turned = kinematics.station_poses(bones, worn.mount_m, worn.bone_from_station)
-    every = np.ones(len(bones), bool)
+    bones = [kinematics.body.skeleton.index(bone) for bone in calibration.bones]
+    position_m, orientation = kinematics.station_poses(bones, calibration.mount_m, calibration.bone_from_station)
+    valid = np.ones(len(bones), bool)
     return TrackerFrame(
         received_s=time_s,
         measured_s=np.full(len(bones), time_s),
-        position_m=at_m + rng.normal(0.0, NOISE_M, at_m.shape),
-        tracker_from_station=rotations.multiply(turned, rotations.exp(rng.normal(0.0, NOISE_RAD, at_m.shape))),
-        position_valid=every,
-        orientation_valid=every,
+        position_m=position_m + rng.normal(0.0, NOISE_M, position_m.shape),
+        tracker_from_station=rotations.multiply(
+            orientation, rotations.exp(rng.normal(0.0, NOISE_RAD, position_m.shape))
+        ),
+        position_valid=valid,
+        orientation_valid=valid,
         quality=np.ones(len(bones)),
-        suspect=~every,
+        suspect=~valid,
     )
 
 
-def registered_ik(setting: IKBenchmarkCase) -> TimedSolver:
-    """The registered method: cold start, then always from its own last pose."""
-    session = Ik().fit(setting.body, setting.examples, np.random.default_rng(0)).begin(setting.calibration)
+def registered_ik(case: IKBenchmarkCase) -> TimedStep:
+    """The registered method: it starts cold and continues from its own last pose."""
+    session = Ik().fit(case.body, case.examples, np.random.default_rng(0)).begin(case.calibration)
 
-    def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
+    def timed_step(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         begin = time.perf_counter()
-        estimate: Estimate = session.step(frame)
-        return estimate.qpos, time.perf_counter() - begin
+        qpos = session.step(frame).qpos
+        return qpos, time.perf_counter() - begin
 
-    return follow
+    return timed_step
 
 
-def plain_solver(setting: IKBenchmarkCase) -> TimedSolver:
-    """Its solver alone."""
-    residuals = Residuals(setting.body, setting.calibration, LEAST_SQUARES)
-    solver = IKSolver(residuals, HingeLimits(setting.body), STOPPING)
+def plain_solver(body: humanoid.Body, calibration: Calibration) -> TimedStep:
+    """The solver of `ik` without prior and robust loss."""
+    residuals = Residuals(body, calibration, LEAST_SQUARES)
+    solver = IKSolver(residuals, HingeLimits(body), STOPPING)
 
-    def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
+    def timed_step(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         begin = time.perf_counter()
         residuals.read(frame)
         qpos = solver.solve(start, Prior(start, None)).qpos
         return qpos, time.perf_counter() - begin
 
-    return follow
+    return timed_step
 
 
-def mink_solver(setting: IKBenchmarkCase) -> TimedSolver:
-    """mink's differential inverse kinematics with daqp, one full step after another."""
-    model, limits = copy.copy(setting.body.model), HingeLimits(setting.body)
+def mink_solver(body: humanoid.Body, calibration: Calibration) -> TimedStep:
+    """mink's differential inverse kinematics with daqp, in full steps."""
+    model, limits = copy.copy(body.model), HingeLimits(body)
     model.jnt_limited[1:] = np.isfinite(limits.high_rad)
     configuration = mink.Configuration(model)
     weights = {
         "position_cost": 1.0 / LEAST_SQUARES.position_sigma_m,
         "orientation_cost": 1.0 / LEAST_SQUARES.orientation_sigma_rad,
     }
-    tasks = [mink.FrameTask(station, "site", **weights) for station in setting.calibration.stations]
-    kept = [mink.ConfigurationLimit(model, gain=1.0)]
-    judge = Residuals(setting.body, setting.calibration, LEAST_SQUARES)
+    tasks = [mink.FrameTask(station, "site", **weights) for station in calibration.stations]
+    joint_limits = [mink.ConfigurationLimit(model, gain=1.0)]
+    residuals = Residuals(body, calibration, LEAST_SQUARES)
 
-    def follow(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
+    def timed_step(frame: TrackerFrame, start: Floats) -> tuple[Floats, float]:
         configuration.update(start)
-        judge.read(frame)
-        cost = judge.evaluate(start)
+        residuals.read(frame)
+        cost = residuals.evaluate(start)
         begin = time.perf_counter()
-        for task, at_m, turned in zip(tasks, frame.position_m, frame.tracker_from_station, strict=True):
-            task.set_target(mink.SE3(np.concatenate([turned, at_m])))
+        for task, position_m, orientation in zip(tasks, frame.position_m, frame.tracker_from_station, strict=True):
+            task.set_target(mink.SE3(np.concatenate([orientation, position_m])))
         seconds = time.perf_counter() - begin
         for _ in range(STOPPING.most_steps):
             begin = time.perf_counter()
             # limits by keyword: a positional fifth argument would land in safety_break and switch them off
-            velocity = mink.solve_ik(configuration, tasks, 1.0, "daqp", damping=MINK_DAMPING, limits=kept)
+            velocity = mink.solve_ik(configuration, tasks, 1.0, "daqp", damping=MINK_DAMPING, limits=joint_limits)
             configuration.integrate_inplace(velocity, 1.0)
             seconds += time.perf_counter() - begin
-            before, cost = cost, judge.evaluate(configuration.q)
+            before, cost = cost, residuals.evaluate(configuration.q)
             if abs(velocity).max() < STOPPING.step or min(cost, abs(before - cost)) < STOPPING.decrease:
                 break
         return configuration.q.copy(), seconds
 
-    return follow
+    return timed_step
 
 
-def residual_errors(setting: IKBenchmarkCase, poses: Floats) -> tuple[float, float, float]:
-    """Mean cost; RMS distances over frames and trackers [mm], [deg]."""
-    judge, costs, distances = Residuals(setting.body, setting.calibration, LEAST_SQUARES), [], []
-    for frame, qpos in zip(setting.frames, poses, strict=True):
-        judge.read(frame)
-        costs.append(judge.evaluate(qpos))
-        distances.append(judge.distance)
+def residual_errors(case: IKBenchmarkCase, poses: Floats) -> tuple[float, float, float]:
+    """Mean cost; RMS distances over frames and stations [mm], [deg]."""
+    residuals, costs, distances = Residuals(case.body, case.calibration, LEAST_SQUARES), [], []
+    for frame, qpos in zip(case.frames[: len(poses)], poses, strict=True):
+        residuals.read(frame)
+        costs.append(residuals.evaluate(qpos))
+        distances.append(residuals.distance)
     position, orientation = np.split(np.sqrt(np.mean(np.square(distances), axis=0)), 2)
     rms_m, rms_rad = (float(np.sqrt(np.mean(part**2))) for part in (position, orientation))
     return float(np.mean(costs)), 1e3 * rms_m, float(np.rad2deg(rms_rad))

@@ -1,13 +1,13 @@
-"""How fast the methods are, how far off with these very options, and how much memory they take.
+"""Speed, error and memory of the methods with their current options.
 
-All learn from one database of built-in takes and follow held-out ones, in the setting of the accuracy tables
-(`benchmark_clips`). They take turns, a second of motion each, beside `ik` and mink, so that whatever else the machine does meets
-all alike. What memory and a larger database cost is measured in processes of their own (`alone`).
+All methods learn from one database of synthetic takes and follow held-out takes, under the conditions of the accuracy
+tables (`benchmark_clips`). They take turns with `ik` and mink (`round_robin_timing`). Memory is measured in a process
+of its own for each method (`peak_memory`).
 """
 
 import hashlib
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,16 +25,18 @@ from harness.experiment import benchmark_clips
 from harness.experiment.benchmark_clips import BenchmarkClip
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.round_robin_timing import (
-    MethodTimings,
+    REFERENCE_METHOD,
+    MethodSpeed,
     ProgressCallback,
     TimedStep,
+    measure_speed,
     time_method,
     time_round_robin,
 )
 from harness.experiment.scenario import load_scenario
 from harness.mocap import synthetic
 from harness.reconstruct import registry
-from harness.reconstruct.contract import Method, Reconstructor
+from harness.reconstruct.contract import Method
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.index import FlatIndex, make_index
 from harness.reconstruct.index.selection import AUTO
@@ -44,107 +46,102 @@ from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.stream.frame import TrackerFrame
 
 TARGET_FPS = {"dynamic_map": 1000, "local_pca": 1000, "kernel_cca": 2000, "weighted_blend": 2000}
-"""Frames a second on one core, final inverse kinematics included where the method ends with it."""
+"""Frames per second on one core that each method must reach, including its final inverse kinematics."""
 UNTARGETED_METHODS = ("kernel_ridge", "ik")
 FRAMES, LARGE_FRAMES = 66_000, 1_000_000
 CLIP_S = 9.0
-"""Of every held-out take."""
-REFERENCE_METHOD, MINK = "ik", "mink"
+"""Length of every held-out take [s]."""
+MINK = "mink"
 WORKERS = 2
 MAX_P99_RATIO, MAX_MEMORY_RATIO, MAX_LARGE_RATIO = 3.0, 1.3, 1.5
 
 
 def bench_methods(seed: int = 1, *, large: bool = False) -> list[BenchmarkRow]:
-    """Rows of each method; with `large`, also beside a database of a million frames."""
-    others: dict[str, list[BenchmarkRow]] = {name: [] for name in (*TARGET_FPS, *UNTARGETED_METHODS)}
+    """Rows of each method; with `large`, also with a database of a million frames."""
+    costs: dict[str, list[BenchmarkRow]] = {name: [] for name in (*TARGET_FPS, *UNTARGETED_METHODS)}
     recalls: list[BenchmarkRow] = []
     with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
-        small, vast = Path(folder) / "small", Path(folder) / "large"
-        with ProgressBar("takes") as bar:
-            learnt = build_synthetic_database(small, FRAMES, seed, bar)
+        small_path, large_path = Path(folder) / "small", Path(folder) / "large"
+        small = _build_database(small_path, FRAMES, seed)
+        clips = benchmark_clips.generate_held_out_clips(seed, CLIP_S)
         with ProgressBar("turns") as bar:
-            tallies = time_with_mink(
-                {name: benchmark_clips.fit_named_method(name, learnt, seed) for name in others}, seed, bar
-            )
-        nothing = measure_peak_bytes(NO_METHOD, small, seed)
+            speeds = measure_speed(tuple(costs), small, clips, seed, references={MINK: _mink_contender}, progress=bar)
+        baseline_bytes = measure_peak_bytes(NO_METHOD, small_path, seed)
         with ProgressBar("methods") as bar:
             for done, name in enumerate(TARGET_FPS):
                 bar(name, done, len(TARGET_FPS))
-                others[name].append(memory_row(name, nothing, measure_peak_bytes(name, small, seed), len(learnt)))
+                peak_bytes = measure_peak_bytes(name, small_path, seed)
+                costs[name].append(memory_row(name, baseline_bytes, peak_bytes, len(small)))
         if large:
-            with ProgressBar("takes") as bar:
-                many = build_synthetic_database(vast, LARGE_FRAMES, seed, bar)
+            many = _build_database(large_path, LARGE_FRAMES, seed)
             for name in TARGET_FPS:
                 with ProgressBar(name) as bar:
-                    others[name].append(large_database_row(name, learnt, many, seed, bar))
-                others[name].append(memory_row(name, nothing, measure_peak_bytes(name, vast, seed), len(many)))
+                    costs[name].append(large_database_row(name, small, many, seed, bar))
+                peak_bytes = measure_peak_bytes(name, large_path, seed)
+                costs[name].append(memory_row(name, baseline_bytes, peak_bytes, len(many)))
             recalls = recall_rows(many, seed)
-    rows = [row for name in others for row in (*method_rows(name, tallies, others[name]), *others[name])]
+    rows = [row for speed in speeds for row in (*method_rows(speed, costs[speed.method]), *costs[speed.method])]
     return [*rows, *recalls]
 
 
-def build_synthetic_database(folder: Path, frames: int, seed: int, progress: ProgressCallback) -> MotionDatabase:
-    """So many frames of built-in takes, on disk and memory-mapped."""
-    takes = benchmark_clips.make_take_factories(frames, seed)
-    return MotionDatabase.build(
-        benchmark_clips.build_common_body(), takes, workers=WORKERS, progress=progress, folder=folder
-    )
+def _build_database(folder: Path, frames: int, seed: int) -> MotionDatabase:
+    with ProgressBar("takes") as bar:
+        takes = benchmark_clips.make_take_factories(frames, seed)
+        return benchmark_clips.build_database(folder, takes, workers=WORKERS, progress=bar)
 
 
-def method_rows(name: str, tallies: dict[str, MethodTimings], others: Sequence[BenchmarkRow]) -> list[BenchmarkRow]:
-    """Speed and error of one method, beside the references of the same run; programs are told of the others as well."""
-    tally, to = (
-        tallies[name],
-        {other: _median_speed_ratio(tallies[other], tallies[name]) for other in (REFERENCE_METHOD, MINK)},
-    )
-    p50_ms, p99_ms = np.percentile(tally.step_ms, [50, 99]).tolist()
-    error_deg, options = float(np.mean(tally.error_deg)), config_hash(registry.resolve(name))
-    held = TARGET_FPS.get(name)
+def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkRow]) -> list[BenchmarkRow]:
+    """Rows of speed and error of one method; the first also lists its other costs in the JSON output."""
+    name, options = speed.method, config_hash(registry.resolve(speed.method))
+    target, to_ik, to_mink = TARGET_FPS.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
     more = {
         "method": name,
-        "fps": tally.fps,
-        "p50_ms": p50_ms,
-        "p99_ms": p99_ms,
-        "error_deg": error_deg,
+        "fps": speed.fps,
+        "p50_ms": speed.p50_ms,
+        "p99_ms": speed.p99_ms,
+        "error_deg": speed.error_deg,
         "config_hash": options,
-        "ratio_to_ik": to[REFERENCE_METHOD],
-        "ratio_to_mink": to[MINK],
+        "ratio_to_ik": to_ik,
+        "ratio_to_mink": to_mink,
     }
-    for other, key in zip(others, ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio"), strict=False):
-        more[key] = other.value
-    beside = f"error {error_deg:.2f} deg, options {options}; ik x {to[REFERENCE_METHOD]:.2f}, mink x {to[MINK]:.1f}"
-    rows = [BenchmarkRow(name, tally.fps, "frames/s", beside, f">= {held}" if held else "", more)]
-    if held:
-        text = f"p50 {p50_ms:.3f} ms, p99 {p99_ms:.3f} ms"
-        rows.append(BenchmarkRow(f"{name}, p99 / p50", p99_ms / p50_ms, "x", text, f"<= {MAX_P99_RATIO:g}"))
+    for cost, key in zip(costs, ("peak_memory_ratio", "large_slowdown", "large_peak_memory_ratio"), strict=False):
+        more[key] = cost.value
+    reference = f"error {speed.error_deg:.2f} deg, options {options}; ik x {to_ik:.2f}, mink x {to_mink:.1f}"
+    rows = [BenchmarkRow(name, speed.fps, "frames/s", reference, f">= {target}" if target else "", more)]
+    if target:
+        text = f"p50 {speed.p50_ms:.3f} ms, p99 {speed.p99_ms:.3f} ms"
+        ratio = speed.p99_ms / speed.p50_ms
+        rows.append(BenchmarkRow(f"{name}, p99 / p50", ratio, "x", text, f"<= {MAX_P99_RATIO:g}"))
     return rows
 
 
-def memory_row(name: str, nothing_bytes: int, peak_bytes: int, frames: int) -> BenchmarkRow:
-    """Above an empty process, over one float32 copy of poses and query vectors."""
+def memory_row(name: str, baseline_bytes: int, peak_bytes: int, frames: int) -> BenchmarkRow:
+    """Memory above that of a process without a method, relative to one float32 copy of poses and query vectors."""
     needed = 4 * frames * (POSTURE_SIZE + 3 + query_dimension(registry.resolve(name)))
-    took = peak_bytes - nothing_bytes
-    text = f"{took / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
-    return BenchmarkRow(f"{name}, peak memory, {frames:,} frames", took / needed, "x", text, f"<= {MAX_MEMORY_RATIO:g}")
+    used = peak_bytes - baseline_bytes
+    text = f"{used / 1e6:.0f} MB for {needed / 1e6:.0f} MB of poses and query vectors, {frames:,} frames"
+    return BenchmarkRow(f"{name}, peak memory, {frames:,} frames", used / needed, "x", text, f"<= {MAX_MEMORY_RATIO:g}")
 
 
 def large_database_row(
-    name: str, few: MotionDatabase, many: MotionDatabase, seed: int, progress: ProgressCallback
+    name: str, small: MotionDatabase, large: MotionDatabase, seed: int, progress: ProgressCallback
 ) -> BenchmarkRow:
-    """What a larger database costs: both take turns."""
-    both = {
-        which: time_method(benchmark_clips.fit_named_method(name, known, seed))
-        for which, known in (("few", few), ("many", many))
+    """Slowdown by a larger database: the method takes turns with itself."""
+    contenders = {
+        size: time_method(benchmark_clips.fit_named_method(name, database, seed))
+        for size, database in (("small", small), ("large", large))
     }
-    tallies = time_round_robin(both, benchmark_clips.generate_held_out_clips(seed, CLIP_S), progress)
-    few_ms, many_ms = (float(np.median(tallies[which].step_ms)) for which in ("few", "many"))
-    text = f"{many_ms:.3f} against {few_ms:.3f} ms a step, {len(many):,} against {len(few):,} frames"
-    ratio = _median_speed_ratio(tallies["many"], tallies["few"])
+    timings = time_round_robin(contenders, benchmark_clips.generate_held_out_clips(seed, CLIP_S), progress)
+    text = (
+        f"{timings['large'].p50_ms:.3f} against {timings['small'].p50_ms:.3f} ms a step, "
+        f"{len(large):,} against {len(small):,} frames"
+    )
+    ratio = timings["small"].speed_ratio(timings["large"])
     return BenchmarkRow(f"{name}, larger / smaller database", ratio, "x", text, f"<= {MAX_LARGE_RATIO:g}")
 
 
-def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[BenchmarkRow]:
-    """The share of the true neighbours that each method's index finds, for every so manyth query."""
+def recall_rows(database: MotionDatabase, seed: int, every: int = 4) -> list[BenchmarkRow]:
+    """Share of the true neighbours that each method's index finds, measured on every `every`th query."""
     held_out = benchmark_clips.generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
     rows = []
     for kind in (
@@ -152,18 +149,18 @@ def recall_rows(learnt: MotionDatabase, seed: int, every: int = 4) -> list[Bench
         neighbour_search.pose_and_reading_problem,
         neighbour_search.feature_problem,
     ):
-        search = kind(benchmark_clips.build_common_body(), learnt, held_out)
-        judge, used, shares = FlatIndex(search.vectors), make_index(AUTO, search.vectors, search.count), []
+        search = kind(benchmark_clips.build_common_body(), database, held_out)
+        exact, index, shares = FlatIndex(search.vectors), make_index(AUTO, search.vectors, search.count), []
         for query in np.concatenate(search.queries)[::every]:
-            true, found = (set(one.nearest(query, search.count)[0].tolist()) for one in (judge, used))
-            shares.append(len(true & found) / len(true))
-        what = f"recall@{search.count}, {search.name}, {len(search.vectors):,} frames"
-        rows.append(BenchmarkRow(what, float(np.mean(shares)), "", "exact search", ">= 0.95"))
+            true, approximate = (set(i.nearest(query, search.count)[0].tolist()) for i in (exact, index))
+            shares.append(len(true & approximate) / len(true))
+        label = f"recall@{search.count}, {search.name}, {len(search.vectors):,} frames"
+        rows.append(BenchmarkRow(label, float(np.mean(shares)), "", "exact search", ">= 0.95"))
     return rows
 
 
 def query_dimension(method: Method) -> int:
-    """Numbers in the vector by which a method finds examples: poses, what the stations read, or both."""
+    """Dimension of the vector by which a method finds examples: poses, station readings, or both."""
     stations = len(load_scenario(benchmark_clips.DEFAULT_SCENARIO).stations)
     if isinstance(method, LocalPca):
         return (POSTURE_SIZE + 3) * 2 - 3 + 9 * stations
@@ -175,43 +172,28 @@ def query_dimension(method: Method) -> int:
 
 
 def config_hash(method: Method) -> str:
-    """A short digest of a method's options, as `repr` tells them."""
+    """A short hash of a method's options, taken from its `repr`."""
     return hashlib.blake2b(repr(method).encode(), digest_size=6).hexdigest()
 
 
-def _median_speed_ratio(other: MethodTimings, own: MethodTimings) -> float:
-    """How many times faster than the other, turn by turn."""
-    return float(np.median(np.array(other.turn_s) / np.array(own.turn_s)))
+def _mink_contender(clip: BenchmarkClip) -> TimedStep:
+    """mink from the true pose of the frame before; readings are moved to the world frame outside the timed part."""
+    from harness.bench.ik import mink_solver
 
-
-def time_with_mink(
-    fitted: Mapping[str, Reconstructor], seed: int, progress: ProgressCallback
-) -> dict[str, MethodTimings]:
-    """The contest of these and mink on the first seconds of a held-out take of each behaviour."""
-    contenders = {name: time_method(learnt) for name, learnt in fitted.items()}
-    return time_round_robin(
-        {**contenders, MINK: _mink_contender}, benchmark_clips.generate_held_out_clips(seed, CLIP_S), progress
-    )
-
-
-def _mink_contender(trial: BenchmarkClip) -> TimedStep:
-    """mink from the true pose of the frame before, on readings brought to the world's frame off its clock."""
-    from harness.bench.ik import IKBenchmarkCase, mink_solver
-
-    worn = trial.simulation.calibration
+    calibration = clip.simulation.calibration
     body = humanoid.build_body(trackers=mounts_of(load_scenario(benchmark_clips.DEFAULT_SCENARIO)))
-    at_home = replace(worn, world_from_tracker=rotations.IDENTITY, tracker_origin_m=np.zeros(3))
-    solve = mink_solver(IKBenchmarkCase(body, at_home, [], np.zeros((0, 55)), ()))
+    in_world = replace(calibration, world_from_tracker=rotations.IDENTITY, tracker_origin_m=np.zeros(3))
+    solve = mink_solver(body, in_world)
 
-    def follow(frame: TrackerFrame, before: Floats) -> tuple[Floats, float]:
-        return solve(_to_world(frame, worn), before)
+    def timed_step(frame: TrackerFrame, previous_truth: Floats) -> tuple[Floats, float]:
+        return solve(_to_world(frame, calibration), previous_truth)
 
-    return follow
+    return timed_step
 
 
-def _to_world(frame: TrackerFrame, worn: Calibration) -> TrackerFrame:
+def _to_world(frame: TrackerFrame, calibration: Calibration) -> TrackerFrame:
     return replace(
         frame,
-        position_m=rotations.rotate(worn.world_from_tracker, frame.position_m) + worn.tracker_origin_m,
-        tracker_from_station=rotations.multiply(worn.world_from_tracker, frame.tracker_from_station),
+        position_m=rotations.rotate(calibration.world_from_tracker, frame.position_m) + calibration.tracker_origin_m,
+        tracker_from_station=rotations.multiply(calibration.world_from_tracker, frame.tracker_from_station),
     )

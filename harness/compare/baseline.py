@@ -1,8 +1,11 @@
-"""Baselines: what a run or sweep measured, small enough to be kept under version control, to compare with later.
+"""Baselines: results of a run or sweep that are small enough for version control, to compare with later.
 
-`results/baselines/NAME` has manifest.json, summary.json (counts and what each method came to) and cells.json: identity
-and comparable metrics of every cell, sorted, in a line each; of what defines cells, what all share stands once, and the
-rest once for all the cells that it is the same for. No poses and no frames. The same run gives the same bytes.
+`results/baselines/NAME` has three files. The same run gives the same bytes.
+
+- manifest.json: the manifest of the run;
+- summary.json: counts and the results of each method;
+- cells.json: identity and comparable metrics of every cell, sorted, one per line, without poses and frames. Conditions
+  that all cells share are stored once; other conditions once for all cells that have them in common.
 """
 
 import json
@@ -31,48 +34,46 @@ from harness.results.reader import BASELINES, CELLS_FILE, COUNT_METRICS, SCHEMA,
 from harness.score.metrics import DEFINITIONS
 
 _SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "methods", "groups")
-"""What is kept of a summary: a run's says what each method came to, a sweep's what each group of cells did."""
+"""Keys of summary.json that a baseline keeps: a run has `methods`, a sweep has `groups`."""
 
 
 def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool = False) -> Path:
-    """Keep what a finished run or sweep measured as baseline `name`; returns its folder.
+    """Save the results of a finished run or sweep as baseline `name`; returns its folder.
 
-    BadInput for a name that is no plain one, for a run that is not whole (a reference with holes would gate nothing
-    there) and for a baseline that exists, unless `force` replaces it. BadFile for what is no run.
+    BadInput for an invalid name, for a run with missing cells (nothing could be gated there) and for a baseline that
+    exists, unless `force` replaces it. BadFile for a folder that is no run.
     """
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_.-]*", name):
-        raise BadInput(f"{name!r} is no name of a baseline.", "Letters, digits, - _ and . make one, such as main_2.")
+        raise BadInput(f"{name!r} is not a valid name of a baseline.", "Use letters, digits, - _ and ., as in main_2.")
     if not run.is_dir():
-        raise BadInput(f"{run} is no folder.", "Name one that `harness run` or `harness sweep` wrote.")
-    judged, target = load_results(run), folder / name
-    if missing := judged.planned - len(judged.cells):
+        raise BadInput(f"{run} is not a folder.", "Name one that `harness run` or `harness sweep` wrote.")
+    results, target = load_results(run), folder / name
+    if missing := results.planned - len(results.cells):
         raise BadInput(
-            f"{run} lacks {missing} of {judged.planned} cells.", "Give its command again until all are there."
+            f"{run} lacks {missing} of {results.planned} cells.", "Repeat its command until all cells are finished."
         )
-    if not judged.cells:
-        raise BadInput(f"{run} has no cells.", "A baseline needs some.")
+    if not results.cells:
+        raise BadInput(f"{run} has no cells.", "A baseline needs at least one.")
     if target.exists() and not force:
-        raise BadInput(
-            f"There is a baseline {name} already ({target}).", "Choose another name, or replace it with --force."
-        )
-    beside = temporary_path(target)
-    shutil.rmtree(beside, ignore_errors=True)
-    beside.mkdir(parents=True)
+        raise BadInput(f"Baseline {name} exists ({target}).", "Choose another name, or replace it with --force.")
+    temporary = temporary_path(target)
+    shutil.rmtree(temporary, ignore_errors=True)
+    temporary.mkdir(parents=True)
     summary = read_json(run / "summary.json", "the summary of a run or sweep")
-    write_json(beside / "manifest.json", judged.manifest.as_dict())
-    write_json(beside / "summary.json", {kind: summary[kind] for kind in _SUMMARY_KEYS if kind in summary})
-    write_text(beside / CELLS_FILE, _cells_json(judged))
-    before = beside.with_name(f"{beside.name}-before")
+    write_json(temporary / "manifest.json", results.manifest.as_dict())
+    write_json(temporary / "summary.json", {kind: summary[kind] for kind in _SUMMARY_KEYS if kind in summary})
+    write_text(temporary / CELLS_FILE, _cells_json(results))
+    previous = temporary.with_name(f"{temporary.name}-before")
     if target.exists():
-        os.rename(target, before)
-    move_into_place(beside, target)
-    shutil.rmtree(before, ignore_errors=True)
+        os.rename(target, previous)
+    move_into_place(temporary, target)
+    shutil.rmtree(previous, ignore_errors=True)
     return target
 
 
-def _cells_json(judged: ResultSet) -> str:
-    """What `judged.read_judged` reads back."""
-    cells = sorted(judged.cells, key=lambda cell: [str(to_json_types(getattr(cell, name))) for name in PAIRING_KEYS])
+def _cells_json(results: ResultSet) -> str:
+    """The text of cells.json, which `load_results` reads."""
+    cells = sorted(results.cells, key=lambda cell: [str(to_json_types(getattr(cell, name))) for name in PAIRING_KEYS])
     definitions = [to_json_types(cell.defined_by) for cell in cells]
     first, *others = definitions
     shared = {name: first[name] for name in first if all(_shares_value(other, first, name) for other in others)}
@@ -86,10 +87,10 @@ def _cells_json(judged: ResultSet) -> str:
         parts[part] = rest
         line = {f.name: getattr(cell, f.name) for f in fields(cell) if f.name not in ("defined_by", "metrics")}
         lines.append({**line, "part": part, "metrics": [cell.metrics.get(name) for name in metrics]})
-    head = {"schema": SCHEMA, "planned": judged.planned, "shared": shared, "parts": parts, "metrics": metrics}
+    head = {"schema": SCHEMA, "planned": results.planned, "shared": shared, "parts": parts, "metrics": metrics}
     rows = ",\n  ".join(json.dumps(to_json_types(line), allow_nan=False, ensure_ascii=False) for line in lines)
     return f'{to_json(head).rstrip().removesuffix("}").rstrip()},\n "cells": [\n  {rows}\n ]\n}}\n'
 
 
-def _shares_value(one: Mapping[str, Any], other: Mapping[str, Any], name: str) -> bool:
-    return name in one and bool(one[name] == other[name])
+def _shares_value(definition: Mapping[str, Any], other: Mapping[str, Any], name: str) -> bool:
+    return name in definition and bool(definition[name] == other[name])

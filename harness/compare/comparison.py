@@ -1,4 +1,4 @@
-"""Two sides compared metric by metric on the cells that they share: A is the reference, a difference is B - A."""
+"""Comparison of two results on the cells that they share. A is the reference; differences are B - A."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -38,29 +38,29 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 @dataclass(frozen=True)
 class Comparison:
-    """What B is beside A, and whether that can be said at all."""
+    """Differences between B and the reference A, and the outcome."""
 
     a: str
     """Title of the reference."""
     b: str
     differences: tuple[Difference, ...]
-    """Gated lines first, method by method; none where inputs differ."""
+    """Gated lines first, by method; empty where inputs differ."""
     matched: int
-    """Pairs of cells."""
+    """Number of cell pairs."""
     only_a: tuple[str, ...]
-    """Names of cells without a partner."""
+    """Names of cells that have no partner in B."""
     only_b: tuple[str, ...]
     inputs_that_differ: tuple[str, ...]
-    """Such as "tracker.rate_hz: 40 against 60", but for those that were allowed."""
+    """Inputs that differ and were not allowed to, such as "tracker.rate_hz: 40 against 60"."""
     allowed: tuple[str, ...]
-    """Those that were, and other faults that were let pass."""
+    """Differing inputs and other faults that were allowed."""
     circumstances: tuple[tuple[str, str, str], ...]
-    """Name, A's and B's value, of those that differ: what the comparison is about."""
+    """Name, value in A and value in B of each circumstance that differs: the subject of the comparison."""
     outcome: Outcome
     why: str
-    """Of the outcome, in one sentence."""
+    """Reason for the outcome, in one sentence."""
     coverage: tuple[str, ...] = ()
-    """Where the sides measured different shares of what was planned, or less than 95 % of it."""
+    """Groups in which the sides cover different shares of the frames, or less than 95 %."""
     failed: tuple[str, ...] = ()
     """Planned cells that failed on either side, such as "A: ik on walking_p1_01"."""
 
@@ -73,14 +73,18 @@ def compare_results(
     metrics: Sequence[str] = GATED_METRICS,
     allow: Sequence[str] | None = None,
 ) -> Comparison:
-    """Pair the cells, refuse what is not comparable, judge every gated metric of every group.
+    """Pair the cells, check that they are comparable, and test every gated metric of every group.
 
-    `methods` compares the one of A with the other of B. `allow` names inputs that may differ (those inside them too),
-    names of `RELAXABLE_KEYS` that cells need not agree in, "coverage", "cells" (without a partner), or `EVERYTHING`.
-    The outcome: NOT_COMPARABLE when nothing matched or inputs differ; REGRESSED when a gated line is worse; INCOMPLETE
-    when planned cells failed; NOT_COMPARABLE when sides cover different things or a gated line cannot be told; PASS.
-    Times are gated where both sides were measured on the same processor, else they are for information.
-    UnknownName for metrics, methods and allowances that do not exist; BadInput for cells that are there twice.
+    `methods` compares the first of them in A with the second in B. `allow` may hold
+
+    - names of inputs that may differ, with all inputs inside them;
+    - names of `RELAXABLE_KEYS` in which the cells of a pair may differ;
+    - "coverage", "cells" (unpaired cells) or `EVERYTHING`.
+
+    The outcome is the first of these that applies: NOT_COMPARABLE when no cells pair or inputs differ; REGRESSED when a
+    gated line is worse; INCOMPLETE when planned cells failed; NOT_COMPARABLE when coverage differs, cells are unpaired
+    or a gated line is undecided; PASS. Times are gated only where both sides were measured on the same processor.
+    UnknownName for metrics, methods and allowances that do not exist; BadInput for duplicate cells.
     """
     metrics = tuple(dict.fromkeys(metrics))
     for metric in metrics:
@@ -91,14 +95,14 @@ def compare_results(
     check_allowance(allowance, a, b, differing)
     refused = summarise_differences({name: text for name, text in differing.items() if not is_allowed(allowance, name)})
     allowed = summarise_differences({name: text for name, text in differing.items() if is_allowed(allowance, name)})
-    found = [] if refused else group_pairs(matched.pairs)
+    groups = [] if refused else group_pairs(matched.pairs)
     gated = _gated_metrics(metrics, a.manifest, b.manifest)
     informed = [metric for metric in (*metrics, *INFORMATIVE_METRICS) if metric not in gated]
-    differences = compare_groups(found, gated, dict.fromkeys(informed))
-    faults = {"coverage": find_coverage_faults(found, metrics), "cells": find_unpaired_cells(matched)}
-    kept = [text for name, texts in faults.items() for text in texts if not is_allowed(allowance, name)]
+    differences = compare_groups(groups, gated, dict.fromkeys(informed))
+    faults = {"coverage": find_coverage_faults(groups, metrics), "cells": find_unpaired_cells(matched)}
+    faults_refused = [text for name, texts in faults.items() for text in texts if not is_allowed(allowance, name)]
     missing = list_failed_cells("A", a, methods and methods[0]) + list_failed_cells("B", b, methods and methods[1])
-    outcome, why = _outcome(matched, refused, differences, missing, kept)
+    outcome, why = _outcome(matched, refused, differences, missing, faults_refused)
     return Comparison(
         a=a.title,
         b=b.title,
@@ -107,7 +111,7 @@ def compare_results(
         only_a=tuple(map(format_cell_name, matched.only_a)),
         only_b=tuple(map(format_cell_name, matched.only_b)),
         inputs_that_differ=refused,
-        allowed=(*allowed, *(text for texts in faults.values() for text in texts if text not in kept)),
+        allowed=(*allowed, *(text for texts in faults.values() for text in texts if text not in faults_refused)),
         circumstances=_circumstances(a.manifest, b.manifest),
         outcome=outcome,
         why=why,
@@ -134,7 +138,7 @@ def compare_runs(
 
 
 def _gated_metrics(metrics: Sequence[str], a: Manifest, b: Manifest) -> tuple[str, ...]:
-    """All of them on one processor; on two those that are no times, for what a step costs beside other work differs."""
+    """All metrics where both sides ran on the same processor, else without times: these differ between processors."""
     same = a.circumstances.get("processor") == b.circumstances.get("processor")
     return tuple(metric for metric in metrics if same or metric not in TIME_METRICS)
 
@@ -147,25 +151,28 @@ def _outcome(
     faults: Sequence[str],
 ) -> tuple[Outcome, str]:
     gated = [line for line in differences if line.gated]
-    by = {kind: [line for line in gated if line.verdict == kind] for kind in VERDICTS}
+    by_verdict = {kind: [line for line in gated if line.verdict == kind] for kind in VERDICTS}
     if not matched.pairs and not failed:
         return Outcome.NOT_COMPARABLE, f"no cell of A has a partner in B ({matched.why_none})"
     if refused:
         return Outcome.NOT_COMPARABLE, f"inputs differ: {join_first(refused)}"
-    if by["worse"]:
-        names = [f"{line.method} {line.metric}" for line in by["worse"]]
+    if by_verdict["worse"]:
+        names = [f"{line.method} {line.metric}" for line in by_verdict["worse"]]
         return Outcome.REGRESSED, f"{len(names)} of {len(gated)} gated lines are worse: {join_first(names)}"
     if failed:
         return Outcome.INCOMPLETE, f"planned cells are missing: {join_first(failed)}"
     if not gated:
-        return Outcome.NOT_COMPARABLE, "nothing was measured on both sides that could be gated"
+        return Outcome.NOT_COMPARABLE, "no gated metric was measured on both sides"
     if faults:
         return Outcome.NOT_COMPARABLE, join_first(faults)
-    if by["cannot tell"]:
-        line, lines_ = by["cannot tell"][0], len(by["cannot tell"])
-        text = f"{lines_} of {len(gated)} gated lines cannot be told, such as {line.method} {line.metric}: {line.why}"
+    if by_verdict["cannot tell"]:
+        line, count = by_verdict["cannot tell"][0], len(by_verdict["cannot tell"])
+        text = f"{count} of {len(gated)} gated lines are undecided, such as {line.method} {line.metric}: {line.why}"
         return Outcome.NOT_COMPARABLE, text
-    return Outcome.PASS, f"of {len(gated)} gated lines {len(by['same'])} are the same, {len(by['better'])} better"
+    return (
+        Outcome.PASS,
+        f"of {len(gated)} gated lines {len(by_verdict['same'])} are the same, {len(by_verdict['better'])} better",
+    )
 
 
 def _circumstances(a: Manifest, b: Manifest) -> tuple[tuple[str, str, str], ...]:

@@ -1,4 +1,4 @@
-"""The lines of a comparison: one method, one metric, over the clips on which both sides were measured."""
+"""The lines of a comparison: one method and one metric, over the clips that were measured on both sides."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -14,38 +14,39 @@ from harness.score.metrics import DEFINITIONS
 
 @dataclass(frozen=True)
 class Difference:
-    """One method, one metric, C clips: a line of the comparison; a difference is B - A."""
+    """One line of a comparison: one method, one metric, C clips. A difference is B - A."""
 
     method: str
-    """Or "a vs b" where two methods are compared."""
+    """The method, or "a vs b" where two methods are compared."""
     group: str
-    """What is never pooled: inputs, split and whether the performer was known, as one text."""
+    """Inputs, split and whether the performer was known, as one text; these are never pooled."""
     metric: str
     unit: str
     clips: tuple[str, ...]
-    """(C,) on which both sides were measured, sorted."""
+    """(C,) clips that were measured on both sides, sorted."""
     a: tuple[float, ...]
-    """(C,) mean over the cells of each clip."""
+    """(C,) mean of A over the cells of each clip."""
     b: tuple[float, ...]
-    """(C,) likewise."""
+    """(C,) mean of B over the cells of each clip."""
     mean_a: float
     mean_b: float
     difference: float
     """Mean of b - a."""
     low: float | None
-    """End of its 95 % interval (see `paired.interval`); None with too few clips."""
+    """Lower end of its 95 % interval (see `bootstrap_interval`); None with too few clips."""
     high: float | None
     p: float | None
-    """Of a difference as large if A and B were equally good (see `significance.sign_flip_p`); None likewise."""
+    """Probability of a difference at least as large if A and B were equally good (see `significance.sign_flip_p`);
+    None with too few clips."""
     p_holm: float | None
-    """As it counts among all gated lines; None likewise, and where the line is not gated."""
+    """`p` corrected for the number of gated lines; None with too few clips and where the line is not gated."""
     margin: float
     """The largest difference without practical importance, in `unit`."""
     verdict: Verdict
     why: str
-    """Of the verdict, in a few words."""
+    """Reason for the verdict, in a few words."""
     gated: bool
-    """Whether the outcome rests on it; other lines are for information, each judged by itself."""
+    """Whether the line decides the outcome; other lines are for information and are tested individually."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,7 @@ class PairGroup:
 
     method: str
     text: str
-    """What they share besides: inputs, split, performer."""
+    """Inputs, split and performer, which all pairs share."""
     pairs: tuple[CellPair, ...]
 
     @property
@@ -63,31 +64,34 @@ class PairGroup:
 
 
 def group_pairs(pairs: Iterable[CellPair]) -> list[PairGroup]:
-    """By method, inputs, split and performer, in the order of the pairs."""
-    found: dict[tuple[str, str], list[CellPair]] = {}
+    """Group pairs by method, inputs, split and performer, in the order of the pairs."""
+    groups: dict[tuple[str, str], list[CellPair]] = {}
     for a, b in pairs:
         method = a.method if a.method == b.method else f"{a.method} vs {b.method}"
         split = b.split if a.split == "none" else a.split
         text = ", ".join(filter(None, (a.inputs, split, a.performer)))
-        found.setdefault((method, text), []).append((a, b))
-    return [PairGroup(*name, tuple(of_it)) for name, of_it in found.items()]
+        groups.setdefault((method, text), []).append((a, b))
+    return [PairGroup(*name, tuple(members)) for name, members in groups.items()]
 
 
 def compare_groups(
-    found: Sequence[PairGroup], gated: Sequence[str], informed: Iterable[str] = ()
+    groups: Sequence[PairGroup], gated: Sequence[str], informed: Iterable[str] = ()
 ) -> tuple[Difference, ...]:
-    """Every metric of every group that was measured on some clip on both sides: gated lines first, judged together."""
-    first = [sides for group in found for metric in gated if (sides := _clip_means(group, metric)).clips]
-    others = [sides for group in found for metric in informed if (sides := _clip_means(group, metric)).clips]
-    judged = decide_verdicts([sides.worsening for sides in first], [sides.margin for sides in first])
-    alone = [decide_verdicts([sides.worsening], [sides.margin])[0] for sides in others]
-    both = zip((*first, *others), (*judged, *alone), strict=True)
-    return tuple(_difference(sides, told, at < len(first)) for at, (sides, told) in enumerate(both))
+    """Compare every metric of every group that both sides measured on some clip.
+
+    Gated lines come first and are tested together; the lines in `informed` are tested individually.
+    """
+    first = [sides for group in groups for metric in gated if (sides := _clip_means(group, metric)).clips]
+    others = [sides for group in groups for metric in informed if (sides := _clip_means(group, metric)).clips]
+    gated_results = decide_verdicts([sides.worsening for sides in first], [sides.margin for sides in first])
+    other_results = [decide_verdicts([sides.worsening], [sides.margin])[0] for sides in others]
+    lines = zip((*first, *others), (*gated_results, *other_results), strict=True)
+    return tuple(_difference(sides, result, at < len(first)) for at, (sides, result) in enumerate(lines))
 
 
 @dataclass(frozen=True, eq=False)
 class _ClipMeans:
-    """What a group measured of one metric, as clip means."""
+    """Clip means of one metric of a group."""
 
     group: PairGroup
     metric: str
@@ -97,7 +101,7 @@ class _ClipMeans:
 
     @property
     def worsening(self) -> Floats:
-        """(C,) the differences, turned so that a rise is worse."""
+        """(C,) differences with their sign chosen so that an increase is worse."""
         return self.b - self.a if margin_of(self.metric).rise_is_worse else self.a - self.b
 
     @property
@@ -106,7 +110,7 @@ class _ClipMeans:
 
 
 def _clip_means(group: PairGroup, metric: str) -> _ClipMeans:
-    """Cells that either side did not measure do not count; those of a clip are averaged."""
+    """Average the cells of each clip; cells that either side did not measure are left out."""
     by_clip: dict[str, list[tuple[float, float]]] = {}
     for a, b in group.pairs:
         mine, theirs = a.metrics.get(metric), b.metrics.get(metric)
@@ -117,8 +121,8 @@ def _clip_means(group: PairGroup, metric: str) -> _ClipMeans:
     return _ClipMeans(group, metric, clips, means[:, 0], means[:, 1])
 
 
-def _difference(sides: _ClipMeans, told: SignificanceResult, gated: bool) -> Difference:
-    low, high = told.low, told.high
+def _difference(sides: _ClipMeans, result: SignificanceResult, gated: bool) -> Difference:
+    low, high = result.low, result.high
     if not margin_of(sides.metric).rise_is_worse and low is not None and high is not None:
         low, high = -high, -low
     return Difference(
@@ -134,10 +138,10 @@ def _difference(sides: _ClipMeans, told: SignificanceResult, gated: bool) -> Dif
         difference=float((sides.b - sides.a).mean()),
         low=low,
         high=high,
-        p=told.p,
-        p_holm=told.p_holm if gated else None,
+        p=result.p,
+        p_holm=result.p_holm if gated else None,
         margin=sides.margin,
-        verdict=told.verdict,
-        why=told.why,
+        verdict=result.verdict,
+        why=result.why,
         gated=gated,
     )

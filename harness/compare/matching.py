@@ -1,4 +1,4 @@
-"""Which cells of two sides belong together, and in which inputs those that do are different."""
+"""Pairing of the cells of two results, and the inputs in which paired cells differ."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from harness.results.reader import CellResult, ResultSet
 
 PAIRING_KEYS = ("scenario", "clip", "seed", "method", "inputs", "split", "noise", "varied")
 RELAXABLE_KEYS = ("scenario", "seed", "inputs", "split", "noise", "varied")
-"""Those that cells may be allowed to differ in and still pair."""
+"""Keys in which paired cells may be allowed to differ."""
 _LEARNING_INPUTS = ("examples", "withheld")
-"""Inputs of a method that learns; one that does not has none."""
+"""Inputs that only methods which learn have."""
 _MAX_CHARACTERS = 24
 
 CellPair = tuple[CellResult, CellResult]
@@ -22,24 +22,25 @@ CellPair = tuple[CellResult, CellResult]
 
 @dataclass(frozen=True)
 class CellPairing:
-    """Pairs in A's order, and the cells that found no partner."""
+    """Pairs in the order of A, and cells without a partner."""
 
     pairs: tuple[CellPair, ...]
     only_a: tuple[CellResult, ...]
     only_b: tuple[CellResult, ...]
     why_none: str = ""
-    """What keeps all of them apart when there is no pair, such as "seed: 1 against 2"."""
+    """Why no cells pair, such as "seed: 1 against 2"; "" where some do."""
 
 
-def pair_cells(a: ResultSet, b: ResultSet, methods: tuple[str, str] | None, but_for: Collection[str]) -> CellPairing:
-    """Cells that agree in all of `PAIRING_KEYS` but for the names in `but_for`.
+def pair_cells(
+    a: ResultSet, b: ResultSet, methods: tuple[str, str] | None, except_keys: Collection[str]
+) -> CellPairing:
+    """Pair cells that agree in all of `PAIRING_KEYS` except the names in `except_keys`.
 
-    With two `methods`, cells of the one in A and of the other in B, whatever their names; a method that learns nothing
-    (split "none") then pairs with any. UnknownName for a method that a side has no cell of, BadInput when two
-    cells of a side cannot be told apart.
+    With two `methods`, cells of the first in A pair with cells of the second in B; a method that does not learn (split
+    "none") then pairs with any split. UnknownName for a method that a side lacks, BadInput for duplicate cells.
     """
     cells_a, cells_b = (list(_cells_of_method(side, at, methods)) for at, side in enumerate((a, b)))
-    names = [name for name in PAIRING_KEYS if name not in but_for]
+    names = [name for name in PAIRING_KEYS if name not in except_keys]
     if methods:
         names.remove("method")
         if "none" in {c.split for c in cells_a} | {c.split for c in cells_b} and "split" in names:
@@ -57,27 +58,27 @@ def pair_cells(a: ResultSet, b: ResultSet, methods: tuple[str, str] | None, but_
 def _cells_of_method(side: ResultSet, at: int, methods: tuple[str, str] | None) -> Iterable[CellResult]:
     if methods is None:
         return side.cells
-    known = dict.fromkeys(cell.method for cell in side.cells)
-    if methods[at] not in known:
-        raise UnknownName(f"method in {side.title}", methods[at], known)
+    names = dict.fromkeys(cell.method for cell in side.cells)
+    if methods[at] not in names:
+        raise UnknownName(f"method in {side.title}", methods[at], names)
     return (cell for cell in side.cells if cell.method == methods[at])
 
 
 def _cells_by_key(cells: Iterable[CellResult], names: Sequence[str], title: str) -> dict[str, CellResult]:
-    found: dict[str, CellResult] = {}
+    keyed: dict[str, CellResult] = {}
     for cell in cells:
         key = content_key({name: getattr(cell, name) for name in names})
-        if key in found:
+        if key in keyed:
             raise BadInput(
                 f"{title} has {format_cell_name(cell)} twice.",
-                f"Cells of a side must differ in one of {', '.join(names)}.",
+                f"The cells of one side must differ in at least one of {', '.join(names)}.",
             )
-        found[key] = cell
-    return found
+        keyed[key] = cell
+    return keyed
 
 
 def _explain_no_pairs(a: Sequence[CellResult], b: Sequence[CellResult], names: Sequence[str]) -> str:
-    """The names in which no cell of A agrees with any of B; all that differ if each agrees somewhere."""
+    """Name the keys in which no cell of A agrees with any of B; if there is none, all keys that differ somewhere."""
     values = {name: (_values(a, name), _values(b, name)) for name in names}
     never = {name: both for name, both in values.items() if not set(both[0]) & set(both[1])}
     differing = never or {name: both for name, both in values.items() if both[0] != both[1]}
@@ -98,21 +99,21 @@ def _format_values(values: Sequence[str]) -> str:
 
 
 def format_cell_name(cell: CellResult) -> str:
-    """What the cell is called, such as "ik on walking_p1_01 (pos, noise=clean, demo, seed 1)"."""
+    """The displayed name of a cell, such as "ik on walking_p1_01 (pos, noise=clean, demo, seed 1)"."""
     texts = ("" if cell.inputs == "pos+ori" else cell.inputs, varied_text(cell.varied), cell.scenario)
-    besides = [text for text in texts if text]
-    return f"{cell.method} on {cell.clip} ({', '.join([*besides, f'seed {cell.seed}'])})"
+    details = [text for text in texts if text]
+    return f"{cell.method} on {cell.clip} ({', '.join([*details, f'seed {cell.seed}'])})"
 
 
 def inputs_that_differ(
-    pairs: Sequence[CellPair], metrics: Collection[str], but_for: Collection[str] = ()
+    pairs: Sequence[CellPair], metrics: Collection[str], except_keys: Collection[str] = ()
 ) -> dict[str, str]:
     """Dotted name of each input in which the cells of a pair differ -> "tracker.rate_hz: 40 against 60".
 
-    Versions count of the `metrics` that are compared. Where one of the two learns nothing, what the other learnt from
-    is no difference of inputs. `but_for` are names of `PAIRING_KEYS` in which cells were allowed to differ.
+    Of metric versions, only those of the compared `metrics` count. Where only one of two methods learns, its examples
+    are not a difference of inputs.
     """
-    found: dict[str, list[tuple[Any, Any, str]]] = {}
+    differing: dict[str, list[tuple[Any, Any, str]]] = {}
     for a, b in pairs:
         mine, theirs = (flatten(to_json_types(cell.defined_by)) for cell in (a, b))
         ignored = _LEARNING_INPUTS if "none" in (a.split, b.split) and a.split != b.split else ()
@@ -120,10 +121,10 @@ def inputs_that_differ(
             first, _, rest = name.partition(".")
             if first in ignored or (first == "metric_versions" and rest not in metrics):
                 continue
-            one, other = (None if side.get(name) == {} else side.get(name) for side in (mine, theirs))
-            if one != other:
-                found.setdefault(name, []).append((one, other, a.clip))
-    return {name: _text(name, differing, len(pairs)) for name, differing in found.items()}
+            value_a, value_b = (None if side.get(name) == {} else side.get(name) for side in (mine, theirs))
+            if value_a != value_b:
+                differing.setdefault(name, []).append((value_a, value_b, a.clip))
+    return {name: _text(name, values, len(pairs)) for name, values in differing.items()}
 
 
 def _text(name: str, differing: Sequence[tuple[Any, Any, str]], pairs: int) -> str:
@@ -136,13 +137,13 @@ def _text(name: str, differing: Sequence[tuple[Any, Any, str]], pairs: int) -> s
 
 
 def shorten_value(value: Any) -> str:
-    """In a few signs."""
+    """A value as text, cut to a few characters."""
     text = f"{value:g}" if isinstance(value, float) else format_value(value)
     return text if len(text) <= _MAX_CHARACTERS else text[: _MAX_CHARACTERS - 1] + "…"
 
 
 def format_value(value: Any) -> str:
-    """Whole."""
+    """A value as text."""
     if isinstance(value, list):
         value = ", ".join(map(str, value)) or None
     return "none" if value is None else str(value)

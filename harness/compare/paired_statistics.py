@@ -1,10 +1,12 @@
-"""Two sides compared on the same clips: the mean difference, its 95 % interval, and what it says of a claim.
+"""Paired differences over clips: the mean, its 95 % interval, and the verdict on a claim.
 
-The interval is the bias-corrected and accelerated bootstrap (BCa, Efron 1987) over clips, for these are what another
-study would draw anew; the frames of a clip are no independent witnesses. On few clips it is too narrow: nominal 95 %
-hold the truth in 83 to 91 % of simulated studies of 6 to 12 clips. Its level is therefore expanded by what a t interval
-is wider than a normal one of the 1/n variance (Hesterberg 2015, "expanded percentile"): 89 to 95 %, by how skewed and
-how heavy-tailed the differences are, 92 to 95 % for normal ones. `tests/compare/test_paired_statistics.py` (slow) measures it.
+The interval is the bias-corrected and accelerated bootstrap (BCa, Efron 1987) over clips, since another study would
+sample other clips. The frames of a clip are not independent.
+
+With few clips this interval is too narrow: nominal 95 % intervals contain the true mean in 83 to 91 % of simulated
+studies of 6 to 12 clips. Its level is therefore expanded by the ratio of a t interval to a normal interval with the 1/n
+variance (Hesterberg 2015, "expanded percentile"). The coverage is then 89 to 95 %, depending on skew and tails of the
+differences, and 92 to 95 % for normal ones. `tests/compare/test_paired_statistics.py` (slow) measures it.
 """
 
 from collections.abc import Mapping
@@ -19,25 +21,26 @@ from harness.errors import BadInput
 from harness.results.findings import ClaimVerdict
 
 MIN_CLIPS = 6
-"""With fewer there is no interval."""
+"""Least number of clips for an interval."""
 CONFIDENCE_LEVEL = 0.95
 _RESAMPLES = 9999
 
 
 @dataclass(frozen=True)
 class PairedDifference:
-    """a - b over the clips on which both were measured."""
+    """Differences a - b over the clips on which both were measured."""
 
     clips: tuple[str, ...]
     mean: float | None
-    """None without clips."""
+    """Mean difference; None without clips."""
     low: float | None = None
-    """End of the 95 % interval; None with fewer than `MIN_CLIPS`."""
+    """Lower end of the 95 % interval; None with fewer than `MIN_CLIPS` clips."""
     high: float | None = None
+    """Upper end."""
 
     @property
     def verdict(self) -> ClaimVerdict:
-        """Of the claim that a is greater than b."""
+        """Verdict on the claim that a is greater than b."""
         if not self.clips:
             return "not run"
         if self.low is None or self.high is None or self.low <= 0.0 <= self.high:
@@ -46,25 +49,27 @@ class PairedDifference:
 
     @property
     def why(self) -> str:
-        """Of a verdict that is not "reproduced"."""
+        """Reason for the verdict; "" where it is "reproduced"."""
         if not self.clips:
-            return "no clip on which both were measured"
+            return "no clip was measured on both sides"
         if self.low is None:
             return f"too few clips: {len(self.clips)}, of at least {MIN_CLIPS}"
-        return {"cannot tell": "the interval holds zero", "not reproduced": "the other way round"}.get(self.verdict, "")
+        return {"cannot tell": "the interval contains zero", "not reproduced": "the difference has the other sign"}.get(
+            self.verdict, ""
+        )
 
 
 def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None]) -> PairedDifference:
-    """Compare errors by clip; a clip that either side lacks (or has None for) does not count.
+    """Compare errors by clip; a clip that either side lacks (or has None for) is left out.
 
-    Clips must be of one kind: known and new performers, or two protocols, are never put into one mapping. BadInput for
-    a number that is not finite.
+    All clips must be of one kind: never put known and new performers, or two splits, into one mapping. BadInput for a
+    number that is not finite.
     """
     clips = tuple(sorted(clip for clip in a if a[clip] is not None and b.get(clip) is not None))
     difference = np.array([a[clip] for clip in clips], float) - np.array([b[clip] for clip in clips], float)
     if not np.isfinite(difference).all():
         wrong = clips[int(np.flatnonzero(~np.isfinite(difference))[0])]
-        raise BadInput(f"The errors on {wrong} are no finite numbers.", "What was not measured is None.")
+        raise BadInput(f"The errors on {wrong} are not finite.", "Use None for what was not measured.")
     if not clips:
         return PairedDifference((), None)
     mean = float(difference.mean())
@@ -74,13 +79,13 @@ def compare_paired(a: Mapping[str, float | None], b: Mapping[str, float | None])
 
 
 def bootstrap_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple[float, float]:
-    """Of the mean of (n,) values that were drawn independently, n >= 2; the same values give the same ends."""
+    """Interval of the mean of (n,) independent values, n >= 2; deterministic."""
     spread = float(np.ptp(values))
     if spread <= 1e-9 * float(np.abs(values).max()):  # all equal: nothing to resample, and BCa is undefined
         return float(values.mean()), float(values.mean())
     from scipy import stats  # takes a second to load, and each worker loads this file
 
-    found = stats.bootstrap(
+    interval = stats.bootstrap(
         (round_to_grid(values),),
         np.mean,
         method="BCa",
@@ -88,18 +93,20 @@ def bootstrap_interval(values: Floats, level: float = CONFIDENCE_LEVEL) -> tuple
         n_resamples=_RESAMPLES,
         rng=generator(0, "paired"),
     ).confidence_interval
-    return float(found.low), float(found.high)
+    return float(interval.low), float(interval.high)
 
 
 def round_to_grid(values: Floats) -> Floats:
-    """(n,) values, not all zero, rounded at 2^-40 of the largest: their sums are exact in any order, so that what ties
-    on paper ties here."""
-    grain = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
-    rounded: Floats = grain * np.round(values / grain)
+    """Round (n,) values, not all zero, to 2^-40 of the largest.
+
+    Sums of the rounded values are exact in any order, so that sums which are equal on paper are equal here.
+    """
+    grid = 2.0 ** (np.ceil(np.log2(np.abs(values).max())) - 40)
+    rounded: Floats = grid * np.round(values / grid)
     return rounded
 
 
 def expand_level(level: float, count: int) -> float:
-    """The bootstrap's level whose interval is as wide as the t interval of `level` on `count` even values."""
+    """The bootstrap level whose interval is as wide as the t interval of `level` for `count` values."""
     t = special.stdtrit(count - 1, 0.5 + 0.5 * level)
     return float(1.0 - 2.0 * special.ndtr(-np.sqrt(count / (count - 1)) * t))

@@ -1,9 +1,9 @@
-"""Whether differences are more than chance and whether they matter: sign flips, Holm's correction, verdicts.
+"""Verdicts on paired differences: sign-flip test, Holm's correction, practical importance.
 
-If A and B were equally good, each clip's difference could as well have the other sign. The p of a line is the share of
-all such flips whose mean is as far from zero as the one that was found (Fisher's randomisation test): exact for up to
-16 clips, by 20,000 draws of a named generator for more. Holm 1979 corrects for the number of gated lines. A line
-whose sides agree in every clip can never be found to differ and does not count among them (Tarone 1990).
+If A and B were equally good, the difference of each clip could equally have the other sign. The p of a line is the
+share of all sign flips whose mean is at least as far from zero as the observed mean (Fisher's randomisation test). It
+is exact for up to 16 clips; for more it uses 20,000 draws of a named generator. Holm 1979 corrects for the number of
+gated lines. A line whose sides agree on every clip can never differ significantly and is not counted (Tarone 1990).
 """
 
 from collections.abc import Sequence
@@ -24,74 +24,74 @@ _EXACT_CLIPS, _DRAWS = 16, 20_000
 
 @dataclass(frozen=True)
 class SignificanceResult:
-    """What paired differences come to."""
+    """Verdict on the paired differences of one line."""
 
     verdict: Verdict
     why: str
     low: float | None = None
-    """End of the 95 % interval of the mean; None with fewer clips than `MIN_CLIPS`, as all that follows."""
+    """Lower end of the 95 % interval of the mean; this and the following are None with fewer than `MIN_CLIPS` clips."""
     high: float | None = None
     p: float | None = None
     p_holm: float | None = None
-    """As it counts among all lines."""
+    """`p` corrected for the number of lines."""
 
 
 def decide_verdicts(lines: Sequence[Floats], margins: Sequence[float]) -> list[SignificanceResult]:
-    """Of lines that are judged together, each (clips,) differences and the margin in their unit; a rise is worse.
+    """Decide on lines that are tested together; each has (clips,) differences and a margin; an increase is worse.
 
-    *Worse* and *better*: p after Holm at most 0.05, the interval excludes zero, and the mean is beyond the margin.
-    *Same*: the whole interval lies within the margin. Anything else cannot be told.
+    *Worse* and *better*: p after Holm is at most 0.05, the interval excludes zero, and the mean exceeds the margin.
+    *Same*: the whole interval lies within the margin. Anything else is undecided ("cannot tell").
     """
     tested = [at for at, line in enumerate(lines) if len(line) >= MIN_CLIPS]
     p = {at: sign_flip_p(lines[at]) for at in tested}
-    counting = [at for at in tested if np.any(lines[at])]
-    corrected = dict(zip(counting, holm([p[at] for at in counting]), strict=True))
-    found = []
+    counted = [at for at in tested if np.any(lines[at])]
+    corrected = dict(zip(counted, holm([p[at] for at in counted]), strict=True))
+    results = []
     for at, (line, margin) in enumerate(zip(lines, margins, strict=True)):
         if at not in p:
-            found.append(SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}"))
+            results.append(SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}"))
             continue
         low, high = bootstrap_interval(line)
         p_holm = corrected.get(at, 1.0)
-        told = _verdict(line, low, high, p_holm, margin, len(counting))
-        found.append(SignificanceResult(*told, low, high, p[at], p_holm))
-    return found
+        verdict = _verdict(line, low, high, p_holm, margin, len(counted))
+        results.append(SignificanceResult(*verdict, low, high, p[at], p_holm))
+    return results
 
 
 def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lines: int) -> tuple[Verdict, str]:
-    mean, apart = float(line.mean()), low > 0.0 or high < 0.0
-    if p <= SIGNIFICANCE and apart and abs(mean) > margin:
-        return ("worse" if mean > 0.0 else "better"), "more than chance, and more than the margin"
+    mean, excludes_zero = float(line.mean()), low > 0.0 or high < 0.0
+    if p <= SIGNIFICANCE and excludes_zero and abs(mean) > margin:
+        return ("worse" if mean > 0.0 else "better"), "significant and larger than the margin"
     if -margin <= low and high <= margin:
         return "same", "the whole interval lies within the margin"
     if lines * smallest_possible_p(line) > SIGNIFICANCE:
-        return "cannot tell", f"too few clips: {len(line)} can show nothing among {lines} lines"
-    if p > SIGNIFICANCE and apart:
-        return "cannot tell", f"among {lines} lines it may be chance"
-    if apart:
-        return "cannot tell", "they differ, perhaps by more than the margin"
-    return "cannot tell", "the interval holds zero and reaches beyond the margin"
+        return "cannot tell", f"too few clips: {len(line)} cannot show a difference among {lines} lines"
+    if p > SIGNIFICANCE and excludes_zero:
+        return "cannot tell", f"the difference is not significant among {lines} lines"
+    if excludes_zero:
+        return "cannot tell", "the sides differ, perhaps by more than the margin"
+    return "cannot tell", "the interval contains zero and exceeds the margin"
 
 
 def sign_flip_p(difference: Floats) -> float:
-    """Two-sided p of the mean of (n,) differences; 1 if all are zero."""
+    """Two-sided p of the mean of (n,) differences; 1 where all are zero."""
     if not np.any(difference):
         return 1.0
     values = round_to_grid(difference)
     extreme = int(np.count_nonzero(np.abs(_sign_flips(len(values)) @ values) >= abs(values.sum())))
     if len(values) <= _EXACT_CLIPS:
         return extreme / float(2 ** (len(values) - 1))
-    return (1 + extreme) / (1 + _DRAWS)  # what was found is one of the flips
+    return (1 + extreme) / (1 + _DRAWS)  # the observed signs are one of the flips
 
 
 def smallest_possible_p(difference: Floats) -> float:
-    """The smallest p that differences of these sizes could have had: that of all on one side."""
+    """The smallest p that differences of these sizes can have: that of equal signs."""
     return sign_flip_p(np.abs(difference))
 
 
 @lru_cache(maxsize=32)
 def _sign_flips(count: int) -> Floats:
-    """(F, count) of -1 and 1; where all are asked for the last is never flipped, for the other half mirrors this."""
+    """(F, count) signs -1 and 1. Where all are enumerated, the last is never flipped; the other half is symmetric."""
     if count <= _EXACT_CLIPS:
         flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1
     else:
@@ -100,7 +100,7 @@ def _sign_flips(count: int) -> Floats:
 
 
 def holm(p: Sequence[float]) -> list[float]:
-    """Each p as it counts among all of them (Holm 1979): the least times their number, the next times one less, …"""
+    """Correct p values for their number (Holm 1979): the smallest times n, the next times n - 1, and so on."""
     order = sorted(range(len(p)), key=lambda at: p[at])
     corrected, highest = [0.0] * len(p), 0.0
     for rank, at in enumerate(order):

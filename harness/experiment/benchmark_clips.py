@@ -1,11 +1,13 @@
-"""What methods are timed on: built-in takes to learn from, however many, and held-out ones as trackers see them.
+"""Databases and held-out clips that methods are timed on: synthetic motion of any length.
 
-The setting is that of the accuracy tables: their body, stations and mounts, 40 Hz, exact calibration, level `clean`.
+The conditions are those of the accuracy tables: common body, the same stations and mounts, 40 Hz, exact calibration,
+noise preset `clean`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -27,105 +29,119 @@ from harness.simulate.simulation import Simulation, simulate_tracker
 RATE_HZ, TAKE_S = 40.0, 20.0
 FRAMES_PER_TAKE = round(TAKE_S * RATE_HZ) + 1
 HELD_OUT_SEED_OFFSET = 1_000_000
-"""Seeds of held-out takes start so much higher."""
+"""Added to the seed of a database to obtain that of its held-out takes."""
 WARM_UP_FRAMES = round(1.0 * RATE_HZ)
-"""Frames at the start of every take that count neither for time nor for error, as in the tables."""
+"""Frames at the start of every take that are left out of times and errors, as in the accuracy tables."""
 DEFAULT_SCENARIO = "walking"
-"""The scenario whose stations and tracker are taken, where no other is named."""
+"""The scenario whose stations and tracker are used by default."""
 
 
 @dataclass(frozen=True, eq=False)
 class BenchmarkClip:
-    """A held-out take as the trackers read it, and its truth."""
+    """A held-out take as the stations read it, and its truth."""
 
     take: str
     simulation: Simulation
     truth: Floats
-    """(F, 55) at each frame."""
+    """(F, 55) true configuration at each tracker frame."""
+
+    @classmethod
+    def from_simulation(cls, take: str, simulation: Simulation) -> "BenchmarkClip":
+        """A simulated take with the true poses at its frames."""
+        return cls(take, simulation, simulation.truth_qpos[simulation.frame_index])
 
 
 def build_common_body() -> Body:
-    """The common body."""
+    """Build the body that all benchmark takes move on."""
     return humanoid.build_body()
 
 
 def load_clean_scenario(name: str = DEFAULT_SCENARIO) -> Scenario:
-    """One of the project's own, as good as it can be: level `clean`."""
+    """Load a shipped scenario with the noise preset `clean` and no error components."""
     return replace(load_scenario(name), noise="clean", components={})
 
 
 def generate_take(
-    which: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS, frames: int = FRAMES_PER_TAKE
+    index: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS, frames: int = FRAMES_PER_TAKE
 ) -> BodyMotion:
-    """One of endlessly many takes: behaviours and performers in turn, then a new seed; the angles as they are."""
-    people = synthetic.performer_names()
-    again, which = divmod(which, len(behaviours) * len(people))
-    behaviour, who = behaviours[which % len(behaviours)], people[which // len(behaviours)]
-    clip = synthetic.generate(behaviour, who, 1, seed=seed + again, duration_s=TAKE_S, rate_hz=RATE_HZ)
+    """Generate the take of an index >= 0; the sequence of takes has no end.
+
+    Behaviours and performers alternate; after all combinations the seed is increased. Angles are not clipped.
+    """
+    performers = synthetic.performer_names()
+    round_index, index = divmod(index, len(behaviours) * len(performers))
+    behaviour, performer = behaviours[index % len(behaviours)], performers[index // len(behaviours)]
+    clip = synthetic.generate(behaviour, performer, 1, seed=seed + round_index, duration_s=TAKE_S, rate_hz=RATE_HZ)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad)[:frames]
-    return BodyMotion(f"{clip.name}_{seed + again}", clip.subject, clip.source, clip.behaviour, RATE_HZ, qpos)
+    return BodyMotion(f"{clip.name}_{seed + round_index}", clip.subject, clip.source, clip.behaviour, RATE_HZ, qpos)
 
 
 def make_take_factories(
     frames: int, seed: int, behaviours: Sequence[str] = synthetic.BEHAVIOURS
 ) -> list[Callable[[], BodyMotion]]:
-    """Functions that make takes of exactly so many frames together, all with names of their own; the last is cut."""
-    whole, rest = divmod(frames, FRAMES_PER_TAKE)
-    counts = [FRAMES_PER_TAKE] * whole + [rest] * (rest > 0)
-    return [partial(generate_take, which, seed, behaviours, count) for which, count in enumerate(counts)]
+    """Picklable functions that generate takes with distinct names and `frames` frames in total; the last is cut."""
+    complete, rest = divmod(frames, FRAMES_PER_TAKE)
+    counts = [FRAMES_PER_TAKE] * complete + [rest] * (rest > 0)
+    return [partial(generate_take, index, seed, behaviours, count) for index, count in enumerate(counts)]
+
+
+def build_database(
+    folder: Path,
+    takes: Iterable[BodyMotion | Callable[[], BodyMotion]],
+    *,
+    workers: int = 1,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> MotionDatabase:
+    """Build the database of takes on the common body in `folder`, memory-mapped; a folder that exists is opened."""
+    if folder.is_dir():
+        return MotionDatabase.open(folder)
+    return MotionDatabase.build(build_common_body(), takes, workers=workers, progress=progress, folder=folder)
 
 
 def generate_held_out_takes(
     count: int, seed: int, seconds: float, behaviours: Sequence[str] = synthetic.BEHAVIOURS
 ) -> list[BodyMotion]:
-    """The first seconds of takes that are in no database of this seed."""
-    return [
-        generate_take(w, seed + HELD_OUT_SEED_OFFSET, behaviours, round(seconds * RATE_HZ) + 1) for w in range(count)
-    ]
+    """Generate the first seconds of takes that no database of this seed contains."""
+    frames = round(seconds * RATE_HZ) + 1
+    return [generate_take(index, seed + HELD_OUT_SEED_OFFSET, behaviours, frames) for index in range(count)]
 
 
 def generate_held_out_clips(seed: int, seconds: float) -> list[BenchmarkClip]:
-    """The first seconds of one held-out take of each behaviour."""
-    return simulate_clips(
-        generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, seconds), seed, load_clean_scenario()
-    )
+    """Generate and simulate the first seconds of one held-out take of each behaviour."""
+    takes = generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, seconds)
+    return simulate_clips(takes, seed, load_clean_scenario())
 
 
-def simulate_clips(takes: Sequence[BodyMotion], seed: int, worn: Scenario) -> list[BenchmarkClip]:
-    """Takes as the stations of a scenario read them."""
-    on, found = build_common_body(), []
-    for take in takes:
-        seen = simulate_tracker(on, take, mounts_of(worn), tracker_of(worn), noise_of(worn), seed=seed)
-        found.append(BenchmarkClip(take.name, seen, seen.truth_qpos[seen.frame_index]))
-    return found
+def simulate_clips(takes: Sequence[BodyMotion], seed: int, scenario: Scenario) -> list[BenchmarkClip]:
+    """Simulate takes as the stations of a scenario read them."""
+    body, sensors = build_common_body(), (mounts_of(scenario), tracker_of(scenario), noise_of(scenario))
+    return [BenchmarkClip.from_simulation(t.name, simulate_tracker(body, t, *sensors, seed=seed)) for t in takes]
 
 
-def fit_named_method(name: str, learnt: MotionDatabase, seed: int) -> Reconstructor:
-    """The method of that name, which has learnt from a database."""
-    return fit_method(registry.resolve(name), build_common_body(), learnt, generator(seed, "method", name))
+def fit_named_method(name: str, database: MotionDatabase, seed: int) -> Reconstructor:
+    """Fit a registered method to a database."""
+    return fit_method(registry.resolve(name), build_common_body(), database, generator(seed, "method", name))
 
 
-def fit_method(method: Method, on: Body, learnt: MotionDatabase, rng: np.random.Generator) -> Reconstructor:
-    """Trained on a database; a method that asks for takes is given them."""
+def fit_method(method: Method, body: Body, database: MotionDatabase, rng: np.random.Generator) -> Reconstructor:
+    """Fit a method to a database; a method that takes examples instead receives its runs as takes."""
     if isinstance(method, DatabaseMethod):
-        return method.fit_database(on, learnt, rng)
-    return method.fit(on, extract_takes(learnt) if method.needs_examples else [], rng)
+        return method.fit_database(body, database, rng)
+    return method.fit(body, extract_takes(database) if method.needs_examples else [], rng)
 
 
-def extract_takes(learnt: MotionDatabase) -> list[BodyMotion]:
+def extract_takes(database: MotionDatabase) -> list[BodyMotion]:
     """The runs of a database as takes that start at the origin."""
-    found = []
-    for run in learnt.segments:
+    takes = []
+    for run in database.segments:
         rows = slice(run.start, run.stop)
-        ground = integrate_steps(np.asarray(learnt.step[rows], float))
-        found.append(
-            BodyMotion(run.take, run.subject, run.source, run.behaviour, learnt.rate_hz, learnt.qpos(rows, ground))
-        )
-    return found
+        qpos = database.qpos(rows, integrate_steps(np.asarray(database.step[rows], float)))
+        takes.append(BodyMotion(run.take, run.subject, run.source, run.behaviour, database.rate_hz, qpos))
+    return takes
 
 
 def integrate_steps(step: Floats) -> Floats:
-    """(T, 3) ground frames (x, y, yaw) that steps (T, 3) lead through, from the origin."""
+    """Integrate steps (T, 3) (forward, left [m], turn [rad]) to ground frames (T, 3) (x, y, yaw) from the origin."""
     yaw = np.cumsum(step[:, 2])
     before = yaw - step[:, 2]
     forward, left = step[:, 0], step[:, 1]
@@ -135,5 +151,5 @@ def integrate_steps(step: Floats) -> Floats:
 
 
 def joint_angle_error_deg(estimate: Floats, truth: Floats) -> float:
-    """Joint angle error (D1) of configurations (F, 55)."""
+    """Joint angle error (D1) between configurations (F, 55), averaged over frames and joints [deg]."""
     return float(np.rad2deg(np.abs(wrap_angle(estimate[:, 7:] - truth[:, 7:])).mean()))

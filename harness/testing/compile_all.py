@@ -1,7 +1,8 @@
-"""Compile everything that is compiled, once and for all: `python -m harness.testing.compile_all`.
+"""Compile all compiled functions in advance: `python -m harness.testing.compile_all`.
 
-Functions are compiled when they are first called and kept on disk (`core.compiled`), which takes about a minute in all.
-Here every method follows a few frames, with all stations and with some missing, so that no first run has to wait.
+A function is compiled when it is first called and then cached on disk (`core.compiled`). All of them take about a
+minute. Here every method follows a few frames, with full and with partial readings, so that the first run need not
+wait.
 """
 
 import numpy as np
@@ -15,16 +16,16 @@ _FRAMES = 8
 
 
 def compile_all() -> None:
-    """Let every registered method follow a few frames; HarnessError when one cannot."""
+    """Run every registered method on a few frames; HarnessError when an estimate is not finite."""
     for name in registry.methods():
-        if ":" in name:  # a preset, of the same code
+        if ":" in name:  # a preset of the same code
             continue
-        trial = make_case(registry.resolve(name))
-        frames: list[TrackerFrame] = list(trial.frames[:_FRAMES])
-        for seen in (frames, [keep_positions(frame) for frame in frames]):
-            answers = run_session(trial.reconstructor.begin(trial.calibration), seen)
-            if not all(np.isfinite(answer.qpos).all() for answer in answers):
-                raise HarnessError(f"{name} gave an answer that is not finite.")
+        case = make_case(registry.resolve(name))
+        frames: list[TrackerFrame] = list(case.frames[:_FRAMES])
+        for readings in (frames, [keep_positions(frame) for frame in frames]):
+            estimates = run_session(case.reconstructor.begin(case.calibration), readings)
+            if not all(np.isfinite(estimate.qpos).all() for estimate in estimates):
+                raise HarnessError(f"{name} returned an estimate that is not finite.")
 
 
 if __name__ == "__main__":

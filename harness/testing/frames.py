@@ -1,4 +1,4 @@
-"""Frames without a device: what exact trackers would read of a known motion, for tests and contract suites."""
+"""Frames without a device: exact readings of a known motion, for tests and contract suites."""
 
 from collections.abc import Sequence
 
@@ -17,45 +17,45 @@ SIX_STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso
 
 
 def exact_calibration(body: Body, stations: Sequence[str] = SIX_STATIONS) -> Calibration:
-    """Default mounts of these stations, known exactly, in a room whose tracker frame is not the world's."""
-    placed = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in stations]
+    """Exact calibration of the default mounts of these stations, with a tracker frame that is not the world frame."""
+    mount_poses = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in stations]
     return Calibration(
         kind="exact",
         stations=tuple(stations),
         bones=tuple(mounts.DEFAULT_MOUNTS[station].bone for station in stations),
-        mount_m=np.array([mount_m for mount_m, _ in placed]),
-        bone_from_station=np.array([turn for _, turn in placed]),
+        mount_m=np.array([mount_m for mount_m, _ in mount_poses]),
+        bone_from_station=np.array([bone_from_station for _, bone_from_station in mount_poses]),
         world_from_tracker=rotations.exp(np.array([np.pi, 0.0, 0.3])),
         tracker_origin_m=np.array([1.0, -2.0, 2.5]),
     )
 
 
 def exact_frames(body: Body, calibration: Calibration, qpos: Floats, rate_hz: float = 40.0) -> list[TrackerFrame]:
-    """Noiseless frames of configurations (T, 55), evenly spaced in time."""
+    """Noiseless readings of configurations (T, 55), evenly spaced in time."""
     kinematics = Kinematics(body)
     bones = [body.skeleton.index(bone) for bone in calibration.bones]
     tracker_from_world = rotations.inverse(calibration.world_from_tracker)
-    every, frames = np.ones(len(bones), bool), []
+    valid, frames = np.ones(len(bones), bool), []
     for index, configuration in enumerate(qpos):
         kinematics.set(configuration)
-        at_m, turned = kinematics.station_poses(bones, calibration.mount_m, calibration.bone_from_station)
+        position_m, orientation = kinematics.station_poses(bones, calibration.mount_m, calibration.bone_from_station)
         frames.append(
             TrackerFrame(
                 received_s=index / rate_hz,
                 measured_s=np.full(len(bones), index / rate_hz),
-                position_m=rotations.rotate(tracker_from_world, at_m - calibration.tracker_origin_m),
-                tracker_from_station=rotations.multiply(tracker_from_world, turned),
-                position_valid=every,
-                orientation_valid=every,
-                quality=every,
-                suspect=~every,
+                position_m=rotations.rotate(tracker_from_world, position_m - calibration.tracker_origin_m),
+                tracker_from_station=rotations.multiply(tracker_from_world, orientation),
+                position_valid=valid,
+                orientation_valid=valid,
+                quality=valid,
+                suspect=~valid,
             )
         )
     return frames
 
 
 def drop_stations(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
-    """The frame as if these stations had not reported."""
+    """Remove the readings of stations, given by index, from a frame."""
     kept = np.ones(len(frame.quality), bool)
     kept[list(lost)] = False
     return TrackerFrame(
@@ -71,7 +71,7 @@ def drop_stations(frame: TrackerFrame, lost: Sequence[int]) -> TrackerFrame:
 
 
 def swaying_motion(body: Body, frames: int, seed: int = 1, rate_hz: float = 40.0) -> Floats:
-    """(T, 55) a performer who strolls along a curve while every hinge swings gently: no behaviour, but smooth."""
+    """(T, 55) a smooth motion: the root moves along a curve while every hinge swings."""
     rng = generator(seed, "swaying")
     t = np.arange(frames)[:, None] / rate_hz
     low, high = body.model.jnt_range[1:].T

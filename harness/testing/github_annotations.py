@@ -1,4 +1,4 @@
-"""What GitHub shows beside the code, from the properties that a gate gave a test's report.
+"""GitHub annotations beside the code, made of the properties that the regression gate adds to a test report.
 
 https://docs.github.com/actions/reference/workflow-commands-for-github-actions: `::error file=F,line=N,title=T::text`.
 """
@@ -9,20 +9,20 @@ _LEVELS = {"worse": "error", "cannot tell": "warning"}
 
 
 def format_annotations(properties: Mapping[str, str], file: str, line: int) -> Iterator[str]:
-    """A line for each metric that is worse or cannot be told; for what could not be compared at all, one that says why.
+    """Yield a line for each metric that is worse or undecided, or one line that says why nothing could be compared.
 
-    `properties` as `gate.Checked.properties` names them; none of them, no line.
+    `properties` are named as in `GateResult.properties`.
     """
-    told = False
+    annotated = False
     for name, verdict in properties.items():
         metric = name.removeprefix("harness.").removesuffix(".verdict")
         if name.endswith(".verdict") and verdict in _LEVELS:
-            difference, interval = (properties[f"harness.{metric}.{what}"] for what in ("difference", "interval"))
+            difference, interval = (properties[f"harness.{metric}.{key}"] for key in ("difference", "interval"))
             yield _annotation(
                 _LEVELS[verdict], file, line, f"{metric} {verdict}", f"{difference}, 95 % interval {interval}"
             )
-            told = True
-    if not told and properties.get("harness.outcome", "pass") != "pass":
+            annotated = True
+    if not annotated and properties.get("harness.outcome", "pass") != "pass":
         yield _annotation("error", file, line, properties["harness.outcome"], properties["harness.why"])
 
 

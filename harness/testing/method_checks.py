@@ -1,4 +1,4 @@
-"""What every reconstructor must do: `check_method(MyMethod())` in your tests, or `harness check my_module:MyMethod`."""
+"""The contract suite for methods: `check_method(MyMethod())` in your tests, or `harness check my_module:MyMethod`."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -12,44 +12,45 @@ from harness.testing.rules.assertions import RuleViolation
 
 
 class MethodContractError(HarnessError):
-    """A rule of the contract that a method does not keep."""
+    """A method violates a rule of the contract."""
 
     def __init__(self, method: str, rule: str, seen: str) -> None:
         super().__init__(method, rule, seen)
         self.method, self.rule, self.seen = self.args
 
     def __str__(self) -> str:
-        return f"{self.method} breaks the rule that {self.rule}: {self.seen}."
+        return f"{self.method} violates the rule '{self.rule}': {self.seen}."
 
 
 @dataclass(frozen=True)
 class RuleResult:
-    """One rule, whether the method keeps it, and what was seen."""
+    """The result of one rule."""
 
     rule: str
     ok: bool
     seen: str
+    """What was measured, or the fault."""
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
 
 
 def check_method(method: Method) -> None:
-    """Every rule; MethodBroken at the first that does not hold."""
-    for finding in check_rules(method):
-        if not finding.ok:
-            raise MethodContractError(method.name, finding.rule, finding.seen)
+    """Check all rules; MethodContractError at the first that the method violates."""
+    for result in check_rules(method):
+        if not result.ok:
+            raise MethodContractError(method.name, result.rule, result.seen)
 
 
 def check_rules(method: Method) -> Iterator[RuleResult]:
-    """Every rule, one after another, whatever the method raises."""
-    trial = make_case(method)
+    """Check all rules in turn; an exception in the method counts as a violation."""
+    case = make_case(method)
     for rule, check in RULES.items():
         try:
-            yield RuleResult(rule, True, check(trial))
-        except RuleViolation as broken:
-            yield RuleResult(rule, False, str(broken))
-        except (Exception, SystemExit) as error:  # a method may raise anything: that is the finding
+            yield RuleResult(rule, True, check(case))
+        except RuleViolation as violation:
+            yield RuleResult(rule, False, str(violation))
+        except (Exception, SystemExit) as error:  # a method may raise anything
             if was_interrupted(error):
                 raise
             yield RuleResult(rule, False, f"raised {type(error).__name__}: {error}")

@@ -1,10 +1,10 @@
-"""The pytest plugin: a project's own test may hold its method to a baseline.
+"""The pytest plugin: the fixture `harness_gate` compares a method with a baseline in a project's own tests.
 
     def test_my_method(harness_gate):
         harness_gate("my_module:MyMethod", baseline="mine")
 
-pytest loads this file in every project of an environment that has the harness; nothing more is imported until a test
-asks for it.
+pytest loads this file in every project of an environment that has the harness. Nothing else is imported until a test
+uses the fixture.
 """
 
 import os
@@ -17,22 +17,22 @@ import pytest
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    group = parser.getgroup("harness", "gates of body-motion methods (fixture harness_gate)")
-    text = "where baselines are, below the root of the tests unless absolute (default: results/baselines)"
+    group = parser.getgroup("harness", "regression gates of body-motion methods (fixture harness_gate)")
+    text = "folder of the baselines, relative to the root of the tests (default: results/baselines)"
     group.addoption("--harness-baselines", metavar="DIR", default="results/baselines", help=text)
-    text = "keep the runs of gates there and go on with what is finished (default: with the other temporary files)"
+    text = "folder of the runs, resumed when the tests run again (default: a temporary folder)"
     group.addoption("--harness-out", metavar="DIR", help=text)
-    text = "keep what each gated method measures now as its baseline; compares nothing"
+    text = "save the current result of each method as its baseline instead of comparing"
     group.addoption("--harness-save", action="store_true", help=text)
 
 
 @pytest.fixture
 def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., None]:
-    """`harness_gate("my_module:MyMethod", baseline="NAME")` fails unless the method is as good as it was.
+    """`harness_gate("my_module:MyMethod", baseline="NAME")` fails when the method is worse than the baseline.
 
-    It is run where the baseline was measured and compared with what the baseline has of the method, or of
-    `baseline_method`; `metrics` names what must not be worse. With --harness-save it becomes the baseline instead, on
-    `scenario` (a shipped one or a file) where there is none yet.
+    The method is run on the baseline's scenario and compared with the same method of the baseline, or with
+    `baseline_method`. `metrics` names what must not become worse. With --harness-save the result becomes the baseline
+    instead; a new baseline is measured on `scenario` (a shipped one or a file).
     """
     from harness.compare.margins import GATED_METRICS
     from harness.errors import HarnessError
@@ -42,7 +42,7 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     out = root / options.harness_out if options.harness_out else tmp_path_factory.getbasetemp() / "harness"
     gate = RegressionGate(out, root / options.harness_baselines, command=f"pytest {request.node.nodeid}")
 
-    def held(
+    def gate_method(
         method: str,
         baseline: str,
         *,
@@ -52,23 +52,23 @@ def harness_gate(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPa
     ) -> None:
         __tracebackhide__ = True
         if str(root) not in sys.path:
-            sys.path.append(str(root))  # methods may lie there, as where the command line is used
+            sys.path.append(str(root))  # as on the command line, methods may lie there
         try:
             if options.harness_save:
-                kept = gate.save_baseline(method, baseline, scenario=scenario)
-                pytest.skip(f"kept as baseline {kept}: nothing was compared")
-            checked = gate.check(method, baseline, against=baseline_method, metrics=metrics)
+                folder = gate.save_baseline(method, baseline, scenario=scenario)
+                pytest.skip(f"saved as baseline {folder}; nothing was compared")
+            result = gate.check(method, baseline, against=baseline_method, metrics=metrics)
         except HarnessError as error:
             raise pytest.fail.Exception(f"harness: {error}", pytrace=False) from None
-        request.node.user_properties += checked.properties()  # as `record_property`, which warns where it need not
-        if not checked.passed:
-            pytest.fail(str(checked), pytrace=False)
+        request.node.user_properties += result.properties()  # `record_property` would warn without need
+        if not result.passed:
+            pytest.fail(str(result), pytrace=False)
 
-    return held
+    return gate_method
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
-    """On GitHub, what gates found, where a reader of the change sees it."""
+    """On GitHub, print the results of regression gates as annotations beside the tests."""
     if os.environ.get("GITHUB_ACTIONS") != "true":
         return
     for report in (*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")):

@@ -1,6 +1,6 @@
-"""A method of one's own held to a baseline: run where the baseline was measured, and compared with it.
+"""The regression gate for users' methods: run a method on a baseline's scenario and compare it with the baseline.
 
-`harness.testing.plugin` does this in a project's own tests.
+`harness.testing.plugin` offers it as a fixture for pytest.
 """
 
 import os
@@ -24,13 +24,13 @@ from harness.results.reader import BASELINES, ResultSet, load_results
 from harness.results.storage import read_summary
 
 DEFAULT_SCENARIO = "gate"
-"""What a method is measured on when its first baseline is made, unless told otherwise."""
+"""Scenario on which a new baseline is measured by default."""
 _THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True)
 class GateResult:
-    """What a comparison with a baseline came to."""
+    """Result of a comparison with a baseline."""
 
     comparison: Comparison
     first_traceback: str = ""
@@ -41,69 +41,69 @@ class GateResult:
         return self.comparison.outcome is Outcome.PASS
 
     def __str__(self) -> str:
-        """As `harness compare` prints it."""
+        """The text that `harness compare` prints, and the traceback."""
         return "\n\n".join(filter(None, (text(self.comparison), self.first_traceback)))
 
     def properties(self) -> Iterator[tuple[str, str]]:
-        """For a test report: the outcome, then the difference, interval and verdict of each gated line."""
+        """Properties for a test report: the outcome, then difference, interval and verdict of each gated line."""
         yield "harness.outcome", self.comparison.outcome.word
         yield "harness.why", self.comparison.why
         for line in self.comparison.differences:
             if line.gated:
-                of = f"[{line.group}]" if groups_vary(self.comparison) else ""
-                yield f"harness.{line.metric}{of}.difference", f"{format_signed(line, line.difference)} {line.unit}"
-                yield f"harness.{line.metric}{of}.interval", format_interval(line)
-                yield f"harness.{line.metric}{of}.verdict", line.verdict
+                group = f"[{line.group}]" if groups_vary(self.comparison) else ""
+                yield f"harness.{line.metric}{group}.difference", f"{format_signed(line, line.difference)} {line.unit}"
+                yield f"harness.{line.metric}{group}.interval", format_interval(line)
+                yield f"harness.{line.metric}{group}.verdict", line.verdict
 
 
 @dataclass(frozen=True)
 class RegressionGate:
-    """Where baselines are and runs go; what a caller runs twice into one folder is resumed."""
+    """Folders of baselines and runs; a run that is repeated in the same folder is resumed."""
 
     out: Path
-    """Each run has a folder of its own there."""
+    """Folder of the runs, with a folder for each."""
     baselines: Path = BASELINES
     command: str = ""
-    """That reproduces the run."""
+    """The command that reproduces the run, for its manifest."""
 
     def check(
         self, method: str, name: str, *, against: str | None = None, metrics: Sequence[str] = GATED_METRICS
     ) -> GateResult:
         """Run `method` (such as "my_module:MyMethod") on the scenario of baseline `name`, and compare.
 
-        `against` is the method of the baseline that it is held to: by default the one of the same name, or the only
-        one. BadInput when there is no such baseline or it does not say which, UnknownName for methods and metrics;
-        whatever a run refuses.
+        `against` is the method of the baseline to compare with: by default the one of the same name, or the only one.
+        BadInput when the baseline does not exist or has several other methods; UnknownName for unknown methods and
+        metrics; also raises what `engine.run` raises.
         """
         reference = self._read(name)
-        known = list(dict.fromkeys(cell.method for cell in reference.cells))
+        methods = list(dict.fromkeys(cell.method for cell in reference.cells))
         for metric in metrics:
-            margin_of(metric)  # before the run
-        held_to = against or (method if method in known else known[0] if len(known) == 1 else None)
-        if held_to is None:
+            margin_of(metric)  # refuses an unknown metric before the run
+        baseline_method = against or (method if method in methods else methods[0] if len(methods) == 1 else None)
+        if baseline_method is None:
             raise BadInput(
-                f"Baseline {name} has no {method}, and several others: {', '.join(known)}.",
-                'Say which one it is held to with baseline_method="NAME", or keep one of its own.',
+                f"Baseline {name} has no {method} but several others: {', '.join(methods)}.",
+                'Name the one to compare with by baseline_method="NAME", or save a baseline of the method.',
             )
-        if held_to not in known:
-            raise UnknownName(f"method in baseline {name}", held_to, known)
+        if baseline_method not in methods:
+            raise UnknownName(f"method in baseline {name}", baseline_method, methods)
         run = self._run(replace(scenario_from_manifest(reference.manifest), methods=(method,)))
-        now = replace(load_results(run), title=f"{method} now")
-        comparison = compare_results(reference, now, methods=(held_to, method), metrics=metrics)
+        current = replace(load_results(run), title=f"{method} now")
+        comparison = compare_results(reference, current, methods=(baseline_method, method), metrics=metrics)
         return GateResult(comparison, next(iter(read_summary(run)["failures"].values()), ""))
 
     def save_baseline(self, method: str, name: str, *, scenario: str | None = None) -> Path:
-        """Run `method` and keep what it measures as baseline `name`; returns its folder.
+        """Run `method` and save its result as baseline `name`; returns the baseline's folder.
 
-        On the `scenario`, a shipped one or a file; by default that of the baseline which is replaced, or `DEFAULT_SCENARIO`.
+        `scenario` is a shipped one or a file; by default that of the baseline which is replaced, or `DEFAULT_SCENARIO`.
         BadInput when the baseline also has other methods, which would be lost.
         """
         exists = (self.baselines / name).is_dir()
-        held = {cell.method for cell in self._read(name).cells} - {method} if exists else set()
-        if held:
+        others = {cell.method for cell in self._read(name).cells} - {method} if exists else set()
+        if others:
             raise BadInput(
-                f"Baseline {name} also has {', '.join(sorted(held))}, which would be lost.",
-                "Choose another name, or keep a run of all of them with `harness baseline save --force`.",
+                f"Baseline {name} also has {', '.join(sorted(others))}, which would be lost.",
+                "Choose another name, or save a run of all of them with `harness baseline save --force`.",
             )
         if scenario is None and exists:
             planned = scenario_from_manifest(self._read(name).manifest)
@@ -118,8 +118,8 @@ class RegressionGate:
         if not folder.is_dir():
             raise BadInput(
                 f"There is no baseline {name} in {self.baselines}.",
-                "The test with `--harness-save` makes it of what the method measures now; "
-                f"so does `harness baseline save {name} RUN` of a run.",
+                "Run the test with `--harness-save` to save the method's current result as that baseline, "
+                f"or save a finished run with `harness baseline save {name} RUN`.",
             )
         return load_results(folder)
 
@@ -132,8 +132,10 @@ class RegressionGate:
 
 @contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Processes that are started meanwhile compute as the command line does, whatever this one has loaded: threads that
-    wait for each other cost CPU time, and steps would seem many times as expensive."""
+    """Let processes that are started meanwhile use one thread for linear algebra, as the command line does.
+
+    Threads that wait for each other cost CPU time, and steps would appear many times as expensive.
+    """
     before = {name: os.environ.get(name) for name in _THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(_THREAD_VARIABLES, "1"))
     try:
@@ -153,6 +155,6 @@ def scenario_from_manifest(manifest: Manifest) -> Scenario:
         return build(Scenario, {**content, "methods": []}, "manifest")
     except (TypeError, ValueError, HarnessError) as error:
         raise BadInput(
-            f"The baseline's scenario cannot be read off its manifest ({error}).",
-            "Save one of `harness run` with this version; those of sweeps are compared with `harness compare`.",
+            f"The baseline's scenario cannot be read from its manifest ({error}).",
+            "Save a baseline of a `harness run` with this version. Compare baselines of sweeps with `harness compare`.",
         ) from error

@@ -1,4 +1,4 @@
-"""The bench of methods: it says what was measured, on a database small enough for a test."""
+"""The benchmark of methods reports what was measured, on a database small enough for a test."""
 
 import sys
 from pathlib import Path
@@ -11,6 +11,7 @@ pytest.importorskip("mink", reason="the bench compares with mink, an extra")
 from harness.bench import methods, peak_memory
 from harness.bench.peak_memory import NO_METHOD
 from harness.experiment import benchmark_clips
+from harness.experiment.round_robin_timing import measure_speed
 from harness.reconstruct import registry
 from harness.reconstruct.database import MotionDatabase
 
@@ -25,23 +26,28 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
-def test_contenders_meet_the_same_frames_and_say_how_far_off(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(methods, "CLIP_S", 2.0)
+def test_methods_and_mink_are_timed_on_the_same_clips(folder: Path) -> None:
     learnt = MotionDatabase.open(folder)
-    fitted = {name: benchmark_clips.fit_named_method(name, learnt, 1) for name in ("weighted_blend", "ik")}
-    tallies = methods.time_with_mink(fitted, 1, lambda *_: None)
-    assert set(tallies) == {"weighted_blend", "ik", "mink"}
-    assert {len(tally.turn_s) for tally in tallies.values()} == {5}
+    clips = benchmark_clips.generate_held_out_clips(1, 2.0)
+    mink = {methods.MINK: methods._mink_contender}
+    speeds = measure_speed(("weighted_blend", "ik"), learnt, clips, 1, references=mink)
+    assert [speed.steps for speed in speeds] == [5 * 40] * 2
+    assert all(set(speed.ratios) == {"ik", "mink"} for speed in speeds)
     memory = methods.memory_row("weighted_blend", 0, 1_000_000, 1_000)
     assert memory.value == pytest.approx(1e6 / (4 * 1_000 * (55 + 60)))
-    row, tail = methods.method_rows("weighted_blend", tallies, [memory])
-    said = row.as_dict()
-    assert said["method"] == "weighted_blend"
-    assert said["fps"] == row.value > 0.0
-    assert 0.0 < float(said["p50_ms"]) <= float(said["p99_ms"]) == pytest.approx(tail.value * float(said["p50_ms"]))
-    assert 0.1 < float(said["error_deg"]) < 10.0
-    assert said["peak_memory_ratio"] == memory.value
-    assert float(said["ratio_to_mink"]) > float(said["ratio_to_ik"]) > 0.0
+    row, tail = methods.method_rows(speeds[0], [memory])
+    entries = row.as_dict()
+    assert entries["method"] == "weighted_blend"
+    assert entries["fps"] == row.value > 0.0
+    assert (
+        0.0
+        < float(entries["p50_ms"])
+        <= float(entries["p99_ms"])
+        == pytest.approx(tail.value * float(entries["p50_ms"]))
+    )
+    assert 0.1 < float(entries["error_deg"]) < 10.0
+    assert entries["peak_memory_ratio"] == memory.value
+    assert float(entries["ratio_to_mink"]) > float(entries["ratio_to_ik"]) > 0.0
 
 
 def test_a_database_is_as_fast_as_itself(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,7 +46,7 @@ def here(runs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("main again", 0, "pass", "B is not worse than A"),
         ("main worse", 1, "regressed", "B is worse than A"),
         ("worse main", 0, "pass", "better"),
-        ("main torn", 3, "not comparable", "the interval holds zero"),
+        ("main torn", 3, "not comparable", "the interval contains zero"),
         ("few few", 3, "not comparable", "too few clips: 5, of at least 6"),
         ("main other", 3, "not comparable", "scenario: demo against other"),
         ("main empty", 3, "not comparable", "no cell of A has a partner in B"),

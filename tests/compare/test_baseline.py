@@ -97,7 +97,7 @@ def test_a_sweep_is_a_side_and_makes_a_baseline(run: Path, baselines: Path) -> N
 @pytest.mark.parametrize("name", ["", ".", "..", "../out", "a/b", "/elsewhere", ".hidden", "a b", "-f", "a\n", "a\\b"])
 def test_a_name_never_leaves_its_folder(name: str, run: Path, baselines: Path, tmp_path: Path) -> None:
     before = sorted(tmp_path.rglob("*"))
-    with pytest.raises(BadInput, match="no name of a baseline"):
+    with pytest.raises(BadInput, match="not a valid name of a baseline"):
         write_baseline(run, name, force=True)
     assert sorted(tmp_path.rglob("*")) == before
 
@@ -106,7 +106,7 @@ def test_a_baseline_is_replaced_only_by_force(run: Path, baselines: Path, tmp_pa
     target = write_baseline(run, "main")
     before = (target / "cells.json").read_text()
     worse = write_run(tmp_path / "worse", side(methods={"ik": 1.5}))
-    with pytest.raises(BadInput, match=r"There is a baseline main already.*--force"):
+    with pytest.raises(BadInput, match=r"Baseline main exists.*--force"):
         write_baseline(worse, "main")
     assert (target / "cells.json").read_text() == before
     write_baseline(worse, "main", force=True)
@@ -121,7 +121,7 @@ def test_runs_with_holes_make_no_baseline(baselines: Path, tmp_path: Path) -> No
     empty = write_run(tmp_path / "empty", replace(side(), cells=(), planned=0))
     with pytest.raises(BadInput, match="no cells"):
         write_baseline(empty, "main")
-    with pytest.raises(BadInput, match="no folder"):
+    with pytest.raises(BadInput, match="not a folder"):
         write_baseline(tmp_path / "nowhere", "main")
     assert not baselines.exists()
 

@@ -29,11 +29,11 @@ def found(b: ResultSet, a: ResultSet | None = None, **options: Any) -> Compariso
         (side(), Outcome.PASS, "of 1 gated lines 1 are the same, 0 better"),
         (side(methods={"ik": [1.0 - (t - 1.0) for t in STEADY]}), Outcome.PASS, "0 are the same, 1 better"),
         (side(methods={"ik": STEADY}), Outcome.REGRESSED, f"1 of 1 gated lines are worse: ik {ANGLE}"),
-        (side(methods={"ik": TORN}), Outcome.NOT_COMPARABLE, "reaches beyond the margin"),
+        (side(methods={"ik": TORN}), Outcome.NOT_COMPARABLE, "exceeds the margin"),
         (side(clips=5), Outcome.NOT_COMPARABLE, "cells are only in A"),
         (side(scenario="other"), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (scenario: demo against"),
         (ResultSet("B", manifest(), (), 0), Outcome.NOT_COMPARABLE, "no cell of A has a partner in B (a side has no"),
-        (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, "nothing was measured on both sides"),
+        (side(metrics={ANGLE: None}), Outcome.NOT_COMPARABLE, "no gated metric was measured on both sides"),
         (side(defined_by={"calibration": "poses"}), Outcome.NOT_COMPARABLE, "inputs differ: calibration: none against"),
         (side(failed=["ik on walk_99"]), Outcome.INCOMPLETE, "planned cells are missing: B: ik on walk_99"),
         (replace(side(), planned=11), Outcome.INCOMPLETE, "B: 3 cells are not finished"),
@@ -172,7 +172,7 @@ def test_what_one_side_alone_measured_is_told() -> None:
     b = replace(side(), cells=(replace(cells[0], metrics={**cells[0].metrics, ANGLE: None}), *cells[1:]))
     comparison = found(b)
     assert comparison.outcome == Outcome.NOT_COMPARABLE
-    assert comparison.why == f"ik (pos+ori, sequence, known): {ANGLE} on one side alone in 1 of 8 cells"
+    assert comparison.why == f"ik (pos+ori, sequence, known): {ANGLE} was measured on one side only in 1 of 8 cells"
     assert comparison.differences[0].clips == tuple(f"walk_{n:02}" for n in range(1, 8))
 
 

@@ -94,13 +94,13 @@ def told(difference: Floats, margin: float, beside: int = 0) -> SignificanceResu
 @pytest.mark.parametrize(
     ("difference", "verdict", "why"),
     [
-        (0.5 + 0.1 * SCATTER, "worse", "more than the margin"),
-        (-0.5 + 0.1 * SCATTER, "better", "more than the margin"),
+        (0.5 + 0.1 * SCATTER, "worse", "larger than the margin"),
+        (-0.5 + 0.1 * SCATTER, "better", "larger than the margin"),
         (0.02 * SCATTER, "same", "within the margin"),
         (np.zeros(12), "same", "within the margin"),
         (0.1 + 0.01 * SCATTER, "same", "within the margin"),  # surely a difference, of no importance
         (0.18 + 0.1 * SCATTER, "cannot tell", "perhaps by more"),
-        (0.5 * SCATTER, "cannot tell", "holds zero"),
+        (0.5 * SCATTER, "cannot tell", "contains zero"),
         (0.5 + 0.01 * SCATTER[:5], "cannot tell", "too few clips: 5, of at least 6"),
         (np.zeros(0), "cannot tell", "too few clips: 0"),
     ],
@@ -116,7 +116,7 @@ def test_six_clips_can_show_nothing_among_many_lines() -> None:
     assert told(clear, 0.1).verdict == "worse"
     found = told(clear, 0.1, beside=1)
     assert (found.verdict, found.p_holm) == ("cannot tell", 2 * 2 / 64)
-    assert "6 can show nothing among 2 lines" in found.why
+    assert "6 cannot show a difference among 2 lines" in found.why
 
 
 def test_lines_without_any_difference_do_not_count_for_the_others() -> None:

@@ -8,7 +8,7 @@ from harness.core.humanoid24 import standard_skeleton
 from harness.core.motion import BodyMotion
 from harness.score.metrics import FRAME_METRICS
 from harness.score.null_methods import NULL_METHODS, score_null_methods
-from harness.testing import score_checks
+from harness.testing import doctor
 from tests.scored_run import RATE_HZ
 
 
@@ -33,12 +33,12 @@ def test_null_methods_bound_the_scale(truth_qpos: Floats) -> None:
 @pytest.fixture
 def _without_evo(monkeypatch: pytest.MonkeyPatch) -> None:
     """Which takes seconds to start and has a test of its own."""
-    monkeypatch.setattr(score_checks, "find_evo", lambda: None)
+    monkeypatch.setattr(doctor, "find_evo", lambda: None)
 
 
 @pytest.mark.usefixtures("_without_evo")
 def test_the_doctor_finds_these_scores_sound(take: BodyMotion) -> None:
-    checks = score_checks.check_scores([take])
+    checks = doctor.check_scores([take])
     assert all(check.ok for check in checks), [c for c in checks if not c.ok]
     assert len({check.name for check in checks}) == len(checks) >= 6
     assert set(checks[0].as_dict()) == {"name", "ok", "detail"}
@@ -61,20 +61,20 @@ def test_the_doctor_finds_a_wrong_metric(
     right = FRAME_METRICS[name]
     wrong = {"mpjpe_mm": lambda p: 1.01 * right(p), "joint_angle_mean_deg": lambda p: 0.0 * right(p)}
     monkeypatch.setitem(FRAME_METRICS, name, wrong.get(name, lambda p: right(p) + 1e-3))
-    failed = [check.name for check in score_checks.check_scores([take]) if not check.ok]
+    failed = [check.name for check in doctor.check_scores([take]) if not check.ok]
     assert any(fails in failure for failure in failed), failed
 
 
 @pytest.mark.usefixtures("_without_evo")
 def test_evo_is_asked_only_where_it_is_installed(take: BodyMotion) -> None:
-    (check,) = [c for c in score_checks.check_scores([take]) if "evo" in c.name]
+    (check,) = [c for c in doctor.check_scores([take]) if "evo" in c.name]
     assert check.ok
     assert "not installed" in check.detail
 
 
 def test_evo_and_the_root_position_agree(take: BodyMotion) -> None:
-    if score_checks.find_evo() is None:
+    if doctor.find_evo() is None:
         pytest.skip("evo is not installed (extra dev)")
-    (check,) = [c for c in score_checks.check_scores([take]) if "evo" in c.name]
+    (check,) = [c for c in doctor.check_scores([take]) if "evo" in c.name]
     assert check.ok, check.detail
     assert np.isfinite(float(check.detail.split()[1]))

@@ -9,15 +9,15 @@ from harness.core.humanoid24 import pack, standard_skeleton
 from harness.core.motion import BodyMotion
 from harness.mocap.library import MotionLibrary
 from harness.score.null_methods import score_null_methods
-from harness.testing import score_checks
-from harness.testing.score_checks import check_scores
+from harness.testing import doctor
+from harness.testing.doctor import check_scores
 
 
 @pytest.mark.parametrize("name", ["16_15", "64_01", "13_39"])
 def test_a_real_clip_is_scored_soundly(mocap: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """By evo too, for one of them: it takes seconds to start."""
     if name != "64_01":
-        monkeypatch.setattr(score_checks, "find_evo", lambda: None)
+        monkeypatch.setattr(doctor, "find_evo", lambda: None)
     clip = MotionLibrary(mocap).load(name)
     skeleton, dofs = clip.skeleton.subset(standard_skeleton().names)
     qpos = pack(clip.root_m, clip.world_from_root, clip.angles_rad[:, dofs])[::3]

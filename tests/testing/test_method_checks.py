@@ -1,4 +1,4 @@
-"""The contract suite passes sound methods, and each of its rules alone catches one broken on purpose."""
+"""The contract suite passes correct methods, and each rule alone detects a method with one fault."""
 
 import json
 import os
@@ -29,19 +29,19 @@ from harness.testing.rules import RULES
 
 @dataclass(frozen=True)
 class Standing:
-    """A sound method that always answers with the T-pose; the broken ones each spoil one thing."""
+    """A correct method that always returns the T-pose; each faulty session below has one fault."""
 
     session: type["StandingSession"]
     name: str = "standing"
-    summary: str = "the T-pose, always"
+    summary: str = "always the T-pose"
     needs_examples: bool = False
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "Stood":
-        return Stood(self.session, body)
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedTPose":
+        return FittedTPose(self.session, body)
 
 
-class Stood:
-    """Something to share, for those that share what they should not."""
+class FittedTPose:
+    """The fitted method; `memory` is for sessions that share what they should not."""
 
     def __init__(self, session: type["StandingSession"], body: Body) -> None:
         self.session, self.body = session, body
@@ -54,13 +54,13 @@ class Stood:
 
 
 class StandingSession:
-    def __init__(self, fitted: Stood, calibration: Calibration) -> None:
+    def __init__(self, fitted: FittedTPose, calibration: Calibration) -> None:
         self.fitted, self.known = fitted, calibration
         self.qpos, self.coverage = fitted.standing.copy(), StatusMonitor()
         self.start()
 
     @classmethod
-    def fitted_once(cls, fitted: Stood) -> None: ...
+    def fitted_once(cls, fitted: FittedTPose) -> None: ...
 
     def start(self) -> None: ...
 
@@ -77,8 +77,8 @@ class StandingSession:
         return out
 
 
-class Drifting(StandingSession):
-    """A quaternion that is not normed again: after 1.4 s of good frames it is off."""
+class DriftingQuaternion(StandingSession):
+    """Never normalises its quaternion, which is wrong after 1.4 s of good frames."""
 
     def start(self) -> None:
         self.length = 1.0
@@ -91,8 +91,8 @@ class Drifting(StandingSession):
         return out
 
 
-class Lopsided(StandingSession):
-    """Takes the middle of the positions, though there may be orientations alone."""
+class NeedsPositions(StandingSession):
+    """Averages the positions, even where there are only orientations."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         out = self.qpos.copy()
@@ -101,7 +101,7 @@ class Lopsided(StandingSession):
         return out
 
 
-class Swallowing(StandingSession):
+class DividesByStations(StandingSession):
     """Divides by the number of stations that report."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
@@ -109,8 +109,8 @@ class Swallowing(StandingSession):
         return self.bent(0.0 if reporting else np.nan)
 
 
-class ZeroFed(StandingSession):
-    """Takes lost stations for stations at the origin of a far-away tracker frame."""
+class LostAtOrigin(StandingSession):
+    """Takes a lost station for one at the origin of a distant tracker frame."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         out, lost = self.qpos.copy(), np.count_nonzero(frame.quality == 0.0)
@@ -118,8 +118,8 @@ class ZeroFed(StandingSession):
         return out
 
 
-class Ticking(StandingSession):
-    """Divides by how much longer a period was than usual."""
+class NeedsPeriod(StandingSession):
+    """Works only at the nominal period."""
 
     def start(self) -> None:
         self.last_s = -0.025
@@ -129,34 +129,34 @@ class Ticking(StandingSession):
         return self.bent(0.0 if abs(gap_s - 0.025) < 1e-9 or gap_s > 0.1 or gap_s < 0.0 else np.nan)
 
 
-class Fastidious(StandingSession):
-    """Takes the logarithm of what quality is left above a fifth."""
+class NeedsQuality(StandingSession):
+    """Takes the logarithm of the quality above 0.2."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         poor = (frame.quality > 0.0) & (frame.quality < 0.2)
         return self.bent(np.nan if poor.any() else 0.0)
 
 
-class Liuist(StandingSession):
-    """Knows of six stations and no other number."""
+class NeedsSixStations(StandingSession):
+    """Works with six stations only."""
 
     def start(self) -> None:
         self.head = self.known.stations[5]
 
 
-class Dicing(StandingSession):
-    """Fits with chance of its own."""
+class Unseeded(StandingSession):
+    """Fits with an unseeded random generator."""
 
     @classmethod
-    def fitted_once(cls, fitted: Stood) -> None:
+    def fitted_once(cls, fitted: FittedTPose) -> None:
         fitted.memory["bend"] = 1e-3 * np.random.default_rng().random()
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         return self.bent(self.fitted.memory["bend"])
 
 
-class Remembering(StandingSession):
-    """Begins where the session before it ended."""
+class Continuing(StandingSession):
+    """Begins where the previous session ended."""
 
     def start(self) -> None:
         self.bend = self.fitted.memory.get("bend", 0.0)
@@ -167,8 +167,8 @@ class Remembering(StandingSession):
         return self.bent(self.bend)
 
 
-class Entangled(StandingSession):
-    """Keeps the time of the last frame where another session finds it."""
+class SharesTime(StandingSession):
+    """Keeps the time of the last frame where other sessions overwrite it."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         last_s = self.fitted.memory.get("last_s", 0.0) if frame.received_s > 0.0 else 0.0
@@ -176,8 +176,8 @@ class Entangled(StandingSession):
         return self.bent(1e-3 if frame.received_s < last_s else 0.0)
 
 
-class Racing(StandingSession):
-    """Works in an array that all sessions share; long enough for another to come in between."""
+class SharesBuffer(StandingSession):
+    """Works in an array that all sessions share, for long enough that another session interferes."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         self.fitted.memory["mine"] = id(self)
@@ -185,16 +185,16 @@ class Racing(StandingSession):
         return self.bent(0.0 if self.fitted.memory["mine"] == id(self) else 1e-3)
 
 
-class Rooted(StandingSession):
-    """Holds what cannot leave its process."""
+class Unpicklable(StandingSession):
+    """Holds a lock, which cannot be sent to another process."""
 
     @classmethod
-    def fitted_once(cls, fitted: Stood) -> None:
+    def fitted_once(cls, fitted: FittedTPose) -> None:
         fitted.memory["lock"] = threading.Lock()
 
 
-class Rewriting(StandingSession):
-    """Smooths what it has already said."""
+class ModifiesEstimates(StandingSession):
+    """Modifies estimates that it has already returned."""
 
     def start(self) -> None:
         self.live = self.qpos.copy()
@@ -204,20 +204,20 @@ class Rewriting(StandingSession):
         return SimpleNamespace(qpos=self.live, status=self.coverage.update(frame)[0])
 
 
-class Foreseeing(StandingSession):
-    """Answers late, when the next frame is known."""
+class LooksAhead(StandingSession):
+    """Computes its estimate after it has received the next frame."""
 
     def start(self) -> None:
         self.seen: list[TrackerFrame] = []
 
     def step(self, frame: TrackerFrame) -> Any:
         self.seen.append(frame)
-        return Late(self, len(self.seen), self.coverage.update(frame)[0])
+        return DelayedEstimate(self, len(self.seen), self.coverage.update(frame)[0])
 
 
 @dataclass
-class Late:
-    session: Foreseeing
+class DelayedEstimate:
+    session: LooksAhead
     frame: int
     status: Status
 
@@ -228,49 +228,49 @@ class Late:
 
 
 @dataclass(frozen=True)
-class Tampering(Standing):
-    """Thinks the examples are its own."""
+class ModifiesExamples(Standing):
+    """Modifies its examples."""
 
     needs_examples: bool = True
 
-    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> Stood:
+    def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> FittedTPose:
         for take in examples:
             take.qpos.flags.writeable = True
             take.qpos[:, :3] = 0.0
-        return Stood(self.session, body)
+        return FittedTPose(self.session, body)
 
 
-class Seeding(StandingSession):
-    """Makes everybody's chance its own."""
+class SeedsNumpy(StandingSession):
+    """Seeds numpy's global generator."""
 
     def start(self) -> None:
         np.random.seed(1)  # noqa: NPY002  # the fault that its rule is there for
 
 
-class Shuffling(StandingSession):
-    """The same with Python's."""
+class SeedsPython(StandingSession):
+    """Seeds Python's global generator."""
 
     def start(self) -> None:
         random.seed(1)
 
 
-class Boasting(StandingSession):
-    """Never admits anything."""
+class AlwaysSolved(StandingSession):
+    """Always reports SOLVED."""
 
     def step(self, frame: TrackerFrame) -> Any:
         return Estimate(self.qpos, Status.SOLVED)
 
 
-class Hasty(StandingSession):
-    """Gives up at once."""
+class LostAtOnce(StandingSession):
+    """Reports LOST where HELD is right."""
 
     def step(self, frame: TrackerFrame) -> Any:
         status, _ = self.coverage.update(frame)
         return Estimate(self.qpos, Status.LOST if status is Status.HELD else status)
 
 
-class Despairing(StandingSession):
-    """Once lost, always lost."""
+class LostForever(StandingSession):
+    """Stays LOST when the stations report again."""
 
     def start(self) -> None:
         self.worst = Status.SOLVED
@@ -280,16 +280,16 @@ class Despairing(StandingSession):
         return Estimate(self.qpos, self.worst)
 
 
-class Undemanding(StandingSession):
-    """One station is enough for it."""
+class SolvedWithOne(StandingSession):
+    """Reports SOLVED with a single station."""
 
     def step(self, frame: TrackerFrame) -> Any:
         some = frame.position_valid.any() or frame.orientation_valid.any()
         return Estimate(self.qpos, Status.SOLVED if some else self.coverage.update(frame)[0])
 
 
-class Offended(StandingSession):
-    """Never gets over a jump of its first station."""
+class NeverRecovers(StandingSession):
+    """Keeps an error for ever after a jump of its first station."""
 
     def start(self) -> None:
         self.last_m, self.away_m = np.zeros(3), 0.0
@@ -304,99 +304,103 @@ class Offended(StandingSession):
         return out
 
 
-class Homesick(StandingSession):
-    """Bends the more, the farther it is from where it was fitted."""
+class DependsOnPosition(StandingSession):
+    """Bends its hinges with the distance from the origin."""
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         where_m = rotations.rotate(self.known.world_from_tracker, np.nan_to_num(frame.position_m[0]))
         return self.bent(0.05 * float(np.tanh(where_m[0] + self.known.tracker_origin_m[0])))
 
 
-ELSEWHERE = "what was fitted may go to another process"
-BROKEN: tuple[tuple[type[StandingSession], str], ...] = (
-    (Drifting, "every answer is a pose"),
-    (Lopsided, "poor input is borne"),
-    (Swallowing, "losses are borne"),
-    (ZeroFed, "losses are borne"),
-    (Ticking, "irregular time is borne"),
-    (Fastidious, "any quality is borne"),
-    (Liuist, "any set of stations is borne"),
-    (Dicing, "equal input gives equal answers"),
-    (Remembering, "a session starts from nothing"),
-    (Entangled, "sessions do not meet"),
-    (Racing, "sessions may run in threads"),
-    (Rooted, ELSEWHERE),
-    (Rewriting, "an answer rests on no later frame"),
-    (Foreseeing, "an answer rests on no later frame"),
-    (Seeding, "chance is the generator given"),
-    (Shuffling, "chance is the generator given"),
-    (Boasting, "the status tells what the answer rests on"),
-    (Hasty, "the status tells what the answer rests on"),
-    (Despairing, "the status tells what the answer rests on"),
-    (Undemanding, "the status tells what the answer rests on"),
-    (Offended, "the error comes back to what it was"),
-    (Homesick, "the posture does not depend on the place"),
+PROCESS_RULE = "a fitted method works in another process"
+FAULTY: tuple[tuple[type[StandingSession], str], ...] = (
+    (DriftingQuaternion, "every estimate is a valid pose"),
+    (NeedsPositions, "partial readings are tolerated"),
+    (DividesByStations, "lost stations are tolerated"),
+    (LostAtOrigin, "lost stations are tolerated"),
+    (NeedsPeriod, "irregular frame times are tolerated"),
+    (NeedsQuality, "any reading quality is tolerated"),
+    (NeedsSixStations, "any set of stations is supported"),
+    (Unseeded, "equal input gives equal estimates"),
+    (Continuing, "a session does not depend on earlier sessions"),
+    (SharesTime, "simultaneous sessions do not affect each other"),
+    (SharesBuffer, "sessions are thread-safe"),
+    (Unpicklable, PROCESS_RULE),
+    (ModifiesEstimates, "estimates are causal"),
+    (LooksAhead, "estimates are causal"),
+    (SeedsNumpy, "global random generators are not used"),
+    (SeedsPython, "global random generators are not used"),
+    (AlwaysSolved, "the status reports lost stations"),
+    (LostAtOnce, "the status reports lost stations"),
+    (LostForever, "the status reports lost stations"),
+    (SolvedWithOne, "the status reports lost stations"),
+    (NeverRecovers, "the error recovers after a disturbance"),
+    (DependsOnPosition, "the posture does not depend on position and heading"),
 )
 
 
-def amiss(method: Standing) -> dict[str, str]:
-    return {finding.rule: finding.seen for finding in check_rules(method) if not finding.ok}
+def violations(method: Standing) -> dict[str, str]:
+    return {result.rule: result.seen for result in check_rules(method) if not result.ok}
 
 
 @pytest.fixture
-def _stays_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A process takes seconds to start, so only those that may not or cannot go to another are sent there."""
-    monkeypatch.setattr(method_checks, "RULES", {name: RULES[name] for name in RULES if name != ELSEWHERE})
+def _without_process_rule(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Skip the rule that starts a process, which takes seconds; it has tests of its own."""
+    monkeypatch.setattr(method_checks, "RULES", {name: RULES[name] for name in RULES if name != PROCESS_RULE})
 
 
-def test_the_sound_one_passes() -> None:
+def test_a_correct_method_passes() -> None:
     check_method(Standing(StandingSession))
 
 
-@pytest.mark.usefixtures("_stays_here")
-def test_nothing_is_amiss_with_the_sound_one() -> None:
-    assert amiss(Standing(StandingSession)) == {}
+@pytest.mark.usefixtures("_without_process_rule")
+def test_a_correct_method_has_no_violations() -> None:
+    assert violations(Standing(StandingSession)) == {}
 
 
-@pytest.mark.usefixtures("_stays_here")
+@pytest.mark.usefixtures("_without_process_rule")
 @pytest.mark.parametrize(
-    ("session", "rule"), [b for b in BROKEN if b[1] != ELSEWHERE], ids=lambda value: getattr(value, "__name__", None)
+    ("session", "rule"), [b for b in FAULTY if b[1] != PROCESS_RULE], ids=lambda value: getattr(value, "__name__", None)
 )
-def test_one_rule_alone_catches_each_broken_one(session: type[StandingSession], rule: str) -> None:
-    assert list(amiss(Standing(session))) == [rule]
+def test_each_fault_violates_one_rule(session: type[StandingSession], rule: str) -> None:
+    assert list(violations(Standing(session))) == [rule]
 
 
-def test_what_cannot_leave_its_process_is_caught_by_its_rule_alone() -> None:
-    assert list(amiss(Standing(Rooted))) == [ELSEWHERE]
+def test_a_method_that_cannot_be_sent_to_a_process_violates_one_rule() -> None:
+    assert list(violations(Standing(Unpicklable))) == [PROCESS_RULE]
 
 
-class Settled(StandingSession):
-    """Answers by the process that it was fitted in."""
+class DependsOnProcess(StandingSession):
+    """Gives another estimate in another process."""
 
     @classmethod
-    def fitted_once(cls, fitted: Stood) -> None:
+    def fitted_once(cls, fitted: FittedTPose) -> None:
         fitted.memory["process"] = os.getpid()
 
     def answer(self, frame: TrackerFrame) -> np.ndarray:
         return self.bent(0.0 if self.fitted.memory["process"] == os.getpid() else 1e-3)
 
 
-def test_what_answers_otherwise_in_another_process_is_caught_there() -> None:
-    assert amiss(Standing(Settled)) == {ELSEWHERE: "60 answers differ, the first in frame 0, by up to 0.001"}
+def test_other_estimates_in_another_process_are_detected() -> None:
+    assert violations(Standing(DependsOnProcess)) == {
+        PROCESS_RULE: "60 estimates differ, the first in frame 0, by up to 0.001"
+    }
 
 
-@pytest.mark.usefixtures("_stays_here")
-def test_tampering_with_the_examples_is_caught_by_its_rule_alone() -> None:
-    assert list(amiss(Tampering(StandingSession))) == ["examples stay as they are"]
+@pytest.mark.usefixtures("_without_process_rule")
+def test_modified_examples_violate_one_rule() -> None:
+    assert list(violations(ModifiesExamples(StandingSession))) == ["examples are not modified"]
 
 
-def test_every_rule_has_its_broken_one() -> None:
-    assert {rule for _, rule in BROKEN} | {"examples stay as they are"} == set(RULES)
+def test_every_rule_has_a_faulty_method() -> None:
+    assert {rule for _, rule in FAULTY} | {"examples are not modified"} == set(RULES)
 
 
-def test_the_first_rule_that_is_broken_is_raised_by_name() -> None:
-    with pytest.raises(MethodContractError, match="standing breaks the rule that losses are borne: ") as caught:
-        check_method(Standing(ZeroFed))
+def test_the_first_violation_is_raised_with_its_rule() -> None:
+    with pytest.raises(
+        MethodContractError, match="standing violates the rule 'lost stations are tolerated': "
+    ) as caught:
+        check_method(Standing(LostAtOrigin))
     assert "far from every station" in caught.value.seen
 
 
@@ -408,20 +412,20 @@ def test_the_verb_prints_a_line_for_each_rule(capsys: pytest.CaptureFixture[str]
     assert all(line.split(": ", 1)[1] for line in lines[1:-1])
 
 
-@pytest.mark.usefixtures("_stays_here")
-def test_the_verb_tells_what_anyones_own_method_breaks(
+@pytest.mark.usefixtures("_without_process_rule")
+def test_the_verb_reports_violations_of_a_users_method(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """`module:Class` from the folder where one works; a broken one regresses, one that does not exist is refused."""
-    (tmp_path / "boaster.py").write_text(
-        "from tests.testing.test_method_checks import Boasting, Standing\n\n\n"
-        "def Mine():\n    print('hello')\n    return Standing(Boasting)\n"
+    """`module:Class` is imported from the working folder; a violation is `regressed`, an unknown class is refused."""
+    (tmp_path / "always_solved.py").write_text(
+        "from tests.testing.test_method_checks import AlwaysSolved, Standing\n\n\n"
+        "def Mine():\n    print('hello')\n    return Standing(AlwaysSolved)\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    assert main(["check", "boaster:Mine", "--json"]) == 1
+    assert main(["check", "always_solved:Mine", "--json"]) == 1
     content = json.loads(capsys.readouterr().out)
     assert content["outcome"] == "regressed"
-    (broken,) = [finding for finding in content["methods"]["boaster:Mine"] if not finding["ok"]]
-    assert broken["rule"] == "the status tells what the answer rests on"
-    assert "SOLVED while 4 of 6 stations were silent" in broken["seen"]
-    assert main(["check", "boaster:Yours"]) == 2
+    (violation,) = [result for result in content["methods"]["always_solved:Mine"] if not result["ok"]]
+    assert violation["rule"] == "the status reports lost stations"
+    assert "the status was SOLVED while 4 of 6 stations reported nothing" in violation["seen"]
+    assert main(["check", "always_solved:Yours"]) == 2

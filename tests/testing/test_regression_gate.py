@@ -135,7 +135,7 @@ def test_cells_that_failed_are_told_with_their_traceback(
     ("call", "told"),
     [
         ("'mine:Mine', baseline='other'", "There is no baseline other in *results/baselines*--harness-save*"),
-        ("'new:New', baseline='main'", "Baseline main has no new:New, and several others: *ik*baseline_method=*"),
+        ("'new:New', baseline='main'", "Baseline main has no new:New but several others: *ik*baseline_method=*"),
         ("'mine:Mine', baseline='main', baseline_method='ikk'", "*Did you mean 'ik'*"),
         ("'mine:Mine', baseline='main', metrics=('mpjpe',)", "*Did you mean 'mpjpe_mm'*"),
     ],
@@ -151,7 +151,7 @@ def test_a_first_baseline_is_kept_and_then_held_to(project: pytest.Pytester) -> 
     source = ONE.format(", scenario='demo'").replace("'main'", "'fresh'")
     result = gated(project, source, "--harness-save", "-rs")
     result.assert_outcomes(skipped=1)
-    result.stdout.fnmatch_lines(["SKIPPED*kept as baseline *results/baselines/fresh: nothing was compared"])
+    result.stdout.fnmatch_lines(["SKIPPED*saved as baseline *results/baselines/fresh; nothing was compared"])
     kept = load_results(project.path / "results/baselines/fresh")
     assert {cell.method for cell in kept.cells} == {"mine:Mine"}
     assert kept.manifest.inputs["name"] == "demo"

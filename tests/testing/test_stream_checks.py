@@ -1,4 +1,4 @@
-"""The suite passes a sound stream and names what is wrong with broken ones."""
+"""The contract suite passes a correct stream and names the faults of others."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -60,7 +60,7 @@ class Listed:
 
 
 def changed(at: int, **fields: Any) -> Frames:
-    """Sound frames but for one."""
+    """Correct frames, one of them changed."""
     frames = sound_frames()
     frames[at] = replace(frames[at], **fields)
     return frames
@@ -104,25 +104,28 @@ BROKEN: dict[str, tuple[Callable[[], Frames], str]] = {
         lambda: changed(5, measured_s=np.array([5.09, 5.129, 5.133])),
         "measured_s of station 0 steps back",
     ),
-    "a frame is sent twice": (repeated, "repeats station 0"),
+    "a frame is sent twice": (repeated, "repeats the reading of station 0"),
     "a frame is too long": (lambda: changed(11, measured_s=5.275 + np.array([0.0, 0.02, 0.04])), "spans 40.0 ms"),
     "a station is missing": (without_a_station, "2 rows for 3 stations"),
-    "frames can be changed": (writable, "position_m can be written to"),
+    "frames can be changed": (writable, "position_m is writable"),
     "a valid position is NaN": (lambda: changed(0, position_m=filled(NAN, 3, 3)), "valid position is not finite"),
     "a valid position is infinite": (
         lambda: changed(0, position_m=filled(np.inf, 3, 3)),
         "valid position is not finite",
     ),
-    "an invalid position is told": (lambda: changed(3, position_m=filled(0.1, 3, 3)), "invalid position is not NaN"),
+    "an invalid position has numbers": (
+        lambda: changed(3, position_m=filled(0.1, 3, 3)),
+        "invalid position is not NaN",
+    ),
     "a quaternion is long": (lambda: changed(0, tracker_from_station=filled(0.6, 3, 4)), "not of unit length"),
     "a valid quaternion is NaN": (lambda: changed(0, tracker_from_station=filled(NAN, 3, 4)), "not of unit length"),
-    "an invalid quaternion is told": (
+    "an invalid quaternion has numbers": (
         lambda: changed(3, tracker_from_station=filled(0.5, 3, 4)),
         "invalid orientation is not NaN",
     ),
     "quality is 255": (lambda: changed(0, quality=filled(255.0, 3)), "quality is outside 0 to 1"),
     "quality is NaN": (lambda: changed(0, quality=filled(NAN, 3)), "quality is outside 0 to 1"),
-    "a lost station is valid": (lambda: changed(0, quality=np.array([1.0, 0.0, 1.0])), "quality 0 is called valid"),
+    "a lost station is valid": (lambda: changed(0, quality=np.array([1.0, 0.0, 1.0])), "quality 0 is marked valid"),
     "a valid row has no time": (lambda: changed(0, measured_s=np.array([NAN, 5.004, 5.008])), "has no time"),
     "a frame of silence": (
         lambda: changed(
@@ -134,7 +137,7 @@ BROKEN: dict[str, tuple[Callable[[], Frames], str]] = {
             orientation_valid=NO,
             quality=filled(0.0, 3),
         ),
-        "no station said anything",
+        "no station reported anything",
     ),
 }
 
@@ -177,24 +180,24 @@ class Once(Listed):
     ("kind", "complaint"),
     [
         (Renaming, "stations were"),
-        (Deaf, "after closing at 0 frames, 2 more came"),
+        (Deaf, "2 more frames came after the stream was closed at frame 0"),
         (Loud, "closing after 1 frames raised OSError"),
         (Once, "closing after 0 frames raised ValueError"),
     ],
 )
-def test_streams_that_misbehave_are_found(kind: type[Listed], complaint: str) -> None:
+def test_faults_of_closing_are_found(kind: type[Listed], complaint: str) -> None:
     with pytest.raises(StreamContractError, match=complaint):
         check_stream(lambda: kind(sound_frames()), rate_hz=RATE_HZ)
 
 
-def test_stations_of_one_name_are_found() -> None:
+def test_stations_of_the_same_name_are_found() -> None:
     with pytest.raises(StreamContractError, match="distinct"):
         check_stream(lambda: Listed(sound_frames(), ("head", "head", "torso")), rate_hz=RATE_HZ)
 
 
-def test_everything_that_is_wrong_is_told_at_once() -> None:
-    def opened() -> TrackerStream:
+def test_all_faults_are_reported_at_once() -> None:
+    def open_stream() -> TrackerStream:
         return Deaf(changed(5, received_s=0.0, quality=filled(2.0, 3)))
 
-    with pytest.raises(StreamContractError, match=r"(?s)received_s.*frame 5: quality.*after closing"):
-        check_stream(opened, rate_hz=RATE_HZ)
+    with pytest.raises(StreamContractError, match=r"(?s)received_s.*frame 5: quality.*after the stream was closed"):
+        check_stream(open_stream, rate_hz=RATE_HZ)

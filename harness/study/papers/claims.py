@@ -1,4 +1,4 @@
-"""Claims of a paper held against errors by clip."""
+"""Evaluation of a paper's claims with errors by clip."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,29 +7,32 @@ from harness.compare.paired_statistics import compare_paired
 from harness.results.findings import Claim
 
 Errors = Mapping[str, float]
-"""Clip -> error, of clips of one kind."""
+"""Clip -> error; all clips are of one kind."""
 TOLERANCE = 0.25
-"""Within which share of a published figure ours counts as the same."""
+"""Largest relative difference to a published figure that counts as reproduced."""
 
 
 def claim_lower_error(
     text: str, less: Errors, more: Errors, *, published: str = "order", unit: str = "deg", why: str = ""
 ) -> Claim:
-    """That `less` is below `more`, by the paired interval of their difference; `why` says what is known where not."""
-    found = compare_paired(more, less)
-    if found.mean is None:
-        return Claim(text, published, "not measured", "not run", found.why, unit=unit)
-    means = [sum(side[clip] for clip in found.clips) / len(found.clips) for side in (less, more)]
+    """Claim that `less` is below `more`, tested by the paired interval.
+
+    `why` explains a claim that is not reproduced.
+    """
+    difference = compare_paired(more, less)
+    if difference.mean is None:
+        return Claim(text, published, "not measured", "not run", difference.why, unit=unit)
+    means = [sum(side[clip] for clip in difference.clips) / len(difference.clips) for side in (less, more)]
     return Claim(
         text=text,
         published=published,
         ours=f"{means[0]:.2f} against {means[1]:.2f} {unit}",
-        verdict=found.verdict,
-        why="" if found.verdict == "reproduced" else "; ".join(filter(None, (found.why, why))),
-        clips=len(found.clips),
-        difference=found.mean,
-        low=found.low,
-        high=found.high,
+        verdict=difference.verdict,
+        why="" if difference.verdict == "reproduced" else "; ".join(filter(None, (difference.why, why))),
+        clips=len(difference.clips),
+        difference=difference.mean,
+        low=difference.low,
+        high=difference.high,
         unit=unit,
     )
 
@@ -37,9 +40,9 @@ def claim_lower_error(
 def claim_published_value(
     text: str, published: float, errors: Errors, *, comparable: bool, why: str, unit: str = "deg"
 ) -> Claim:
-    """That the mean of errors is the published figure, within a quarter of it; `why` it is not `comparable`.
+    """Claim that the mean error is the published figure, within `TOLERANCE`; `why` says why it is not `comparable`.
 
-    What is judged is the mean itself: two figures from two libraries have no paired difference.
+    The means are compared directly, since figures from two motion libraries have no paired difference.
     """
     claim = Claim(text, f"{published:g} {unit}", "not measured", "not run", "no clip was measured", unit=unit)
     if not errors:

@@ -1,4 +1,4 @@
-"""Kim et al. 2012 with five trackers and whole databases; and what all of its experiments have in common."""
+"""Kim et al. 2012 with five stations and full databases; also helpers that all of its experiments share."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
@@ -13,38 +13,36 @@ from harness.study.papers.tables import CellRow, errors_by_clip, mean_table
 KERNEL_CCA, WEIGHTED_BLEND = "kernel_cca", "weighted_blend"
 METHODS = (KERNEL_CCA, WEIGHTED_BLEND, "ik", "ik:previous")
 WORLD_METRICS = {METRIC: "deg", "mpjpe_mm": "mm"}
-"""Metrics that tables show, with their unit."""
+"""Metric -> unit, for tables."""
 _ROOT_RELATIVE_METRICS = {METRIC: "deg", "mpjpe_root_mm": "mm from the root"}
-"""Where the room is calibrated too, and a heading that is off counts the more the farther somebody walks."""
+"""Metric -> unit where the room is calibrated too: there a heading error adds an error that grows with the distance."""
 _TRACKER_NOTE = (
-    "Clean simulated trackers at 40 Hz on one standard skeleton that is known to the methods, with known mounts unless "
-    "said otherwise; the paper wore an IS-900."
+    "Stations are simulated without noise at 40 Hz, on one standard skeleton that the methods know, with known mounts "
+    "unless stated otherwise. The paper used an IS-900."
 )
-_CONSTANTS_NOTE = (
-    "The methods' constants are ours, chosen on other clips: the paper's k = 8 is 12 and 16 neighbours here."
-)
+_CONSTANTS_NOTE = "The constants were chosen here, on other clips: 12 and 16 neighbours instead of the paper's k = 8."
 _SYNTHETIC_NOTES = (
-    "The motion is a procedure's, not people's: eight performers with one judged take each.",
+    "The motion is synthetic: eight performers with one test take each.",
     "Databases are cut to the paper's size: 7,200 frames of boxing, 4,272 of table tennis, 1,320 of walking, from "
-    "other takes of everyone who is judged.",
+    "other takes of all tested performers.",
 )
 _REAL_NOTES = (
-    "The paper's recordings are not public: these are other clips. Walking is learnt from 1,314 frames of two people "
-    "and judged on other takes of them, new people apart; several judged takes were learnt from, never judged, while "
-    "constants were chosen.",
-    "Boxing is judged on eight blocks of two bouts, of which the rest is learnt from: about 4,000 frames, for the "
-    "library has no 7,233. Blocks of one bout are no independent witnesses.",
+    "The paper's recordings are not public; other clips are used. Walking is learnt from 1,314 frames of two people "
+    "and tested on other takes of them; new people are listed separately. Several test takes were examples, never test "
+    "takes, while constants were chosen.",
+    "Boxing is tested on eight blocks of two bouts; the rest of the bouts are the examples. These are about 4,000 "
+    "frames instead of 7,233, which the library lacks. Blocks of one bout are not independent.",
 )
-_SYNTHETIC_ONLY = "built-in performer only: the library has no table tennis"
+_SYNTHETIC_ONLY = "the library has no table tennis; use synthetic motion"
 
 
 def differences(study: PaperStudy) -> tuple[str, ...]:
-    """In which all of these experiments are others than the paper's."""
+    """Differences to the paper that all of its experiments share."""
     return (*(_SYNTHETIC_NOTES if study.motion == "builtin" else _REAL_NOTES), _TRACKER_NOTE, _CONSTANTS_NOTE)
 
 
 def five_stations(study: PaperStudy) -> PaperExperiment:
-    """The whole system on whole databases."""
+    """Compare the methods with five stations and full databases."""
     runs = [f"five_{b}" for b in ("boxing", "table_tennis", "walking") if f"five_{b}" in study.runs]
     tables: list[FindingsTable] = []
     gains: list[tuple[str, ...]] = []
@@ -54,54 +52,57 @@ def five_stations(study: PaperStudy) -> PaperExperiment:
             continue
         tables += method_tables(shown, rows, _ROOT_RELATIVE_METRICS)
         gains += list(_gains(shown, rows))
-    columns = ("behaviour", "performers", "calibration", "against", "kernel_cca errs less by [deg]", "95 %", "clips")
+    columns = ("behaviour", "performers", "calibration", "against", "gain of kernel_cca [deg]", "95 %", "clips")
     return PaperExperiment(
         name="five_trackers",
-        title="Five trackers, whole databases",
+        title="Five stations, full databases",
         question=(
-            "The system as it is played: five trackers, calibrated by a T-pose, and the databases of boxing (7,233 "
-            "frames), table tennis (4,271) and walking (1,317). The paper shows it live (Figs. 6, 7) and prints no "
-            "figures, so there is nothing to hold these against."
+            "How accurate is the complete system: five stations, calibrated by a T-pose, and databases of boxing "
+            "(7,233 frames), table tennis (4,271) and walking (1,317)? The paper shows it live (Figs. 6, 7) without "
+            "numbers, so there is no figure to compare with."
         ),
         differences=(
-            "Calibration `exact` knows where the trackers sit; `tpose` finds it out from a performer who misses the "
-            "T-pose a little (2.5 degrees in every hinge), as the paper does. Proportions are known to both.",
-            "Joint centres are compared as seen from the root: `tpose` also has to find the room's heading and place.",
+            "Calibration `exact` knows the mounts. `tpose` estimates them, as in the paper, from a performer whose "
+            "T-pose is off by 2.5 degrees in every hinge. Both know the body proportions.",
+            "Joint centres are compared relative to the root, since `tpose` also estimates heading and position of "
+            "the room.",
             *differences(study),
         ),
-        tables=(*tables, FindingsTable("What kernel CCA gains", columns, tuple(gains))) if gains else (),
+        tables=(*tables, FindingsTable("Gain of kernel CCA over other methods", columns, tuple(gains)))
+        if gains
+        else (),
         runs=tuple(runs),
     )
 
 
 def claim_in_run(study: PaperStudy, run: str, text: str, less: Errors, more: Errors, published: str = "order") -> Claim:
-    """That one errs less than the other in a run that this motion may lack."""
+    """Claim that `less` is below `more` in a run; "not run" where this motion lacks the run."""
     if run not in study.runs:
         return Claim(text, published, "not measured", "not run", _SYNTHETIC_ONLY, unit="deg")
     return claim_lower_error(text, less, more, published=published)
 
 
 def performers(rows: Iterable[CellRow]) -> tuple[str, ...]:
-    """Known ones first; they are never pooled."""
+    """The kinds of performers, "known" first; they are never pooled."""
     return tuple(sorted({row["performer"] for row in rows}))
 
 
 def errors_by_method(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, dict[str, float]]:
     """Method -> clip -> error, of rows that differ in nothing else."""
-    found: dict[str, list[CellRow]] = {}
+    by_method: dict[str, list[CellRow]] = {}
     for row in rows:
-        found.setdefault(row["method"], []).append(row)
-    return {method: errors_by_clip(each, metric) for method, each in found.items()}
+        by_method.setdefault(row["method"], []).append(row)
+    return {method: errors_by_clip(each, metric) for method, each in by_method.items()}
 
 
 def method_tables(title: str, rows: Sequence[CellRow], metrics: Mapping[str, str]) -> Iterator[FindingsTable]:
-    """Methods against performers and calibrations, a table for each metric."""
+    """Tables of methods by performers and calibrations, one for each metric."""
     for metric, unit in metrics.items():
         groups: dict[str, dict[str, Errors]] = {}
-        for who, calibration in product(performers(rows), _calibrations(rows)):
-            alike = [row for row in rows if (row["performer"], row["calibration"]) == (who, calibration)]
-            for method, errors in errors_by_method(alike, metric).items():
-                groups.setdefault(method, {})[f"{who}, {calibration}"] = errors
+        for performer, calibration in product(performers(rows), _calibrations(rows)):
+            selected = [row for row in rows if (row["performer"], row["calibration"]) == (performer, calibration)]
+            for method, errors in errors_by_method(selected, metric).items():
+                groups.setdefault(method, {})[f"{performer}, {calibration}"] = errors
         yield mean_table(f"{title} [{unit}]", "method", groups)
 
 
@@ -110,11 +111,11 @@ def _calibrations(rows: Iterable[CellRow]) -> tuple[str, ...]:
 
 
 def _gains(behaviour: str, rows: Sequence[CellRow]) -> Iterator[tuple[str, ...]]:
-    for who, calibration in product(performers(rows), _calibrations(rows)):
-        alike = [row for row in rows if (row["performer"], row["calibration"]) == (who, calibration)]
-        errors = errors_by_method(alike)
+    for performer, calibration in product(performers(rows), _calibrations(rows)):
+        selected = [row for row in rows if (row["performer"], row["calibration"]) == (performer, calibration)]
+        errors = errors_by_method(selected)
         for other in METHODS[1:]:
-            found = compare_paired(errors.get(other, {}), errors.get(KERNEL_CCA, {}))
-            mean = "not measured" if found.mean is None else f"{found.mean:+.2f}"
-            ends = "" if found.low is None else f"{found.low:+.2f} to {found.high:+.2f}"
-            yield behaviour, who, calibration, other, mean, ends, str(len(found.clips))
+            gain = compare_paired(errors.get(other, {}), errors.get(KERNEL_CCA, {}))
+            mean = "not measured" if gain.mean is None else f"{gain.mean:+.2f}"
+            ends = "" if gain.low is None else f"{gain.low:+.2f} to {gain.high:+.2f}"
+            yield behaviour, performer, calibration, other, mean, ends, str(len(gain.clips))

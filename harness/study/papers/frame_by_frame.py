@@ -16,7 +16,7 @@ _COMPARED_METHODS = (DYNAMIC_MAP, "local_pca", "ik")
 
 
 def frame_by_frame(study: PaperStudy) -> PaperExperiment:
-    """Of the first walk and the first jump that the scenario lists: fixed before anything was run."""
+    """Errors over time of the first walk and the first jump that the scenario lists, chosen before any run."""
     claims: list[Claim] = []
     rows: list[tuple[str, ...]] = []
     figures: list[LineChart] = []
@@ -26,8 +26,8 @@ def frame_by_frame(study: PaperStudy) -> PaperExperiment:
         title = f"{behaviour}, {where['clip']}"
         errors = {method: errors_by_clip(study.rows(RUN, method=method, **where)) for method in METHODS}
         claims += [
-            claim_lower_error(f"{title}: {less} errs less than {more}", errors[less], errors[more])
-            for less, more in pairwise(_COMPARED_METHODS)
+            claim_lower_error(f"{title}: {lower} errs less than {higher}", errors[lower], errors[higher])
+            for lower, higher in pairwise(_COMPARED_METHODS)
         ]
         cells = {cell.method: cell for cell in study.cells(RUN, **where)}
         if cells:
@@ -40,12 +40,12 @@ def frame_by_frame(study: PaperStudy) -> PaperExperiment:
         name="frame_by_frame",
         title="Frame by frame: one walk and one jump (Fig. 7)",
         question=(
-            "How do errors run over time? The paper draws the error of each frame of one walking and one jumping "
-            "sequence for its method, local PCA and IK, without figures."
+            "How do errors change over time? The paper plots the error of each frame of one walking and one jumping "
+            "sequence for its method, local PCA and IK, without numbers."
         ),
         differences=(
-            "The sequences are the first walk and the first jump of the list of clips; the paper's are its own. Both "
-            "positions and orientations are used; the paper's choice is not known.",
+            "The sequences are the first walk and the first jump of the list of clips, not those of the paper. "
+            "Positions and orientations are used; the paper's choice is not known.",
             *differences(study),
         ),
         claims=tuple(claims),
@@ -65,15 +65,15 @@ def frame_by_frame(study: PaperStudy) -> PaperExperiment:
         ),
         figures=tuple(figures),
         runs=(RUN,),
-        notes=("One sequence tells nothing of others: the order is judged over clips in the experiments before.",),
+        notes=("One sequence says nothing about others. The experiments above test the order over clips.",),
     )
 
 
 def _statistics(title: str, series: Mapping[str, tuple[float | None, ...]]) -> Iterator[tuple[str, ...]]:
     values = {method: np.array(column, dtype=float) for method, column in series.items()}
     for method, column in values.items():
-        known = column[np.isfinite(column)]
-        figures = known.mean(), np.quantile(known, 0.95), known.max()
+        measured = column[np.isfinite(column)]
+        figures = measured.mean(), np.quantile(measured, 0.95), measured.max()
         ours = values.get(DYNAMIC_MAP)
         both = np.isfinite(column) & np.isfinite(ours) if ours is not None and method != DYNAMIC_MAP else None
         below = "" if both is None or ours is None else f"{np.mean(ours[both] < column[both]):.0%}"

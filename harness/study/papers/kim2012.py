@@ -1,7 +1,7 @@
-"""Kim, Seol and Lee 2012, every experiment rerun (docs/methods.md B; scenarios/papers/kim2012).
+"""Reproduction of Kim, Seol and Lee 2012: every experiment (docs/methods.md B; scenarios/papers/kim2012).
 
-What claims are judged by was written down before anything was run. The paper prints no error as a number: its orders,
-and what it calls suitable, are held against intervals over clips.
+The criteria of the claims were fixed before any run. The paper prints no errors as numbers. Its orders, and the sets
+that it calls suitable, are tested by intervals over clips.
 """
 
 from functools import partial

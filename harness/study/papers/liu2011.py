@@ -1,4 +1,4 @@
-"""Liu et al. 2011, rerun: every experiment of docs/methods.md A6, and the speed that the paper states."""
+"""Reproduction of Liu et al. 2011: every experiment of docs/methods.md A6, and the speed that the paper states."""
 
 from functools import partial
 from itertools import pairwise
@@ -24,13 +24,13 @@ from harness.study.papers.tables import errors_by_clip, errors_by_joint_group, m
 
 PUBLISHED_DEG = {"pos+ori": 1.25, "pos+torso_ori": 2.25, "pos": 2.52, "mixed": 3.27}
 _SYNTHETIC_PEOPLE = 20
-"""As many as skeletons of CMU are behind the spread that they are drawn from."""
+"""Number of synthetic skeletons: as many CMU skeletons define the spread that they are drawn from."""
 
 
 def boxing_inputs(study: PaperStudy) -> PaperExperiment:
-    """Four combinations of inputs, the one experiment for which the paper prints errors."""
+    """Four combinations of inputs, the only experiment for which the paper prints errors."""
     real = study.motion == "cmu"
-    first = "blocks" if real else "leave_one_out"  # which has two of the four on the same clips
+    first = "blocks" if real else "leave_one_out"  # has two of the four combinations, on the same clips
     runs = {inputs: first if inputs in ("pos+ori", "pos") else "boxing_inputs" for inputs in PUBLISHED_DEG}
     errors = {
         method: {
@@ -40,15 +40,15 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
     }
     orders = [
         claim_lower_error(
-            f"{method}: {INPUTS[less]} err less than {INPUTS[more]}",
-            each[less],
-            each[more],
-            published=f"{PUBLISHED_DEG[less]:.2f} < {PUBLISHED_DEG[more]:.2f} deg",
+            f"{method}: {INPUTS[lower]} err less than {INPUTS[higher]}",
+            each[lower],
+            each[higher],
+            published=f"{PUBLISHED_DEG[lower]:.2f} < {PUBLISHED_DEG[higher]:.2f} deg",
         )
         for method, each in errors.items()
-        for less, more in pairwise(PUBLISHED_DEG)
+        for lower, higher in pairwise(PUBLISHED_DEG)
     ]
-    why = "other clips and fewer examples" if real else "a procedure's motion, of which no paper has a figure"
+    why = "other clips and fewer examples" if real else "synthetic motion, for which no paper has a figure"
     figures = [
         claim_published_value(f"{method}: {INPUTS[inputs]}", published, each[inputs], comparable=real, why=why)
         for method, each in errors.items()
@@ -66,20 +66,22 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
         caption="Mean joint-angle error over clips.",
         published={DYNAMIC_MAP: tuple(PUBLISHED_DEG.values())},
     )
-    parts = "A fifth of a bout is left out with 1 s around it; the rest of it is in the database: nearest to the paper."
+    blocks = (
+        "A fifth of a bout is left out, with 1 s around it; the rest is in the database. This is closest to the paper."
+    )
     return PaperExperiment(
         name="boxing_inputs",
         title="Four combinations of inputs on boxing",
         question=(
-            "What does it cost to leave readings out? The paper prints 1.25 degrees for positions and orientations of "
-            "all six trackers, 2.25 for all positions and the torso's orientation, 2.52 for all positions, and 3.27 "
-            "for positions of torso and ankles with orientations of torso, head and hands."
+            "How does the error grow when readings are left out? The paper prints 1.25 degrees for positions and "
+            "orientations of all six trackers, 2.25 for all positions and the torso's orientation, 2.52 for all "
+            "positions, and 3.27 for positions of torso and ankles with orientations of torso, head and hands."
         ),
-        differences=(*((parts,) if real else ()), *differences(study)),
+        differences=(*((blocks,) if real else ()), *differences(study)),
         claims=(*orders, *figures),
         tables=(
             mean_table("Joint-angle error [deg]", "inputs", groups),
-            mean_table(f"Where {DYNAMIC_MAP} errs [deg]", "inputs", joints),
+            mean_table(f"Error of {DYNAMIC_MAP} by joint group [deg]", "inputs", joints),
         ),
         figures=(bars,),
         runs=(first, "boxing_inputs"),
@@ -87,13 +89,15 @@ def boxing_inputs(study: PaperStudy) -> PaperExperiment:
 
 
 def eigenmodes(study: PaperStudy) -> PaperExperiment:
-    """Fig. 4."""
+    """Fig. 4: principal modes of bone lengths."""
     if study.library:
         return evaluate_bone_modes(
             read_skeletons(study.library), "those of the library", measured=True, seed=study.seed
         )
     people = {f"person {n}": person for n, person in enumerate(sample_skeletons(_SYNTHETIC_PEOPLE, study.seed), 1)}
-    return evaluate_bone_modes(people, "drawn from the spread of CMU's", measured=False, seed=study.seed)
+    return evaluate_bone_modes(
+        people, "drawn from the distribution of the CMU skeletons", measured=False, seed=study.seed
+    )
 
 
 PAPER = Paper(

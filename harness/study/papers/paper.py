@@ -1,4 +1,4 @@
-"""A paper, rerun: its runs, then its experiments one by one, and findings.json of them all."""
+"""Reproduction of a paper: its runs, then its experiments in turn, then findings.json."""
 
 import traceback
 from collections.abc import Callable, Mapping
@@ -17,34 +17,34 @@ from harness.study.papers.paper_study import PaperStudy, count_cells, open_study
 from harness.study.papers.provenance import provenance_tables
 
 PAPERS = ("liu2011", "kim2012")
-"""Each a module of this folder with a `PAPER`."""
+"""Names of modules of this folder, each with a `PAPER`."""
 Motion = Literal["builtin", "cmu"]
 
 
 @dataclass(frozen=True)
 class Paper:
-    """One paper and how its experiments are judged."""
+    """One paper and its experiments."""
 
     name: str
     reference: str
     """Authors, title, venue, year."""
     experiments: Mapping[str, Callable[[PaperStudy], PaperExperiment]]
-    """In the order in which they are told."""
+    """Name -> experiment, in the order of the report."""
 
     def plan(self, motion: Motion, seed: int) -> dict[str, Scenario]:
-        """Run -> scenario, from the files of that motion."""
+        """Name of a run -> its scenario, from the files for this motion."""
         folder = data_folder("scenarios") / "papers" / self.name
         files = sorted(folder.glob(f"{motion}_*.toml"))
-        found = {path.stem.removeprefix(f"{motion}_"): load_scenario(path) for path in files}
-        return {name: replace(scenario, name=name, seed=seed) for name, scenario in found.items()}
+        scenarios = {path.stem.removeprefix(f"{motion}_"): load_scenario(path) for path in files}
+        return {name: replace(scenario, name=name, seed=seed) for name, scenario in scenarios.items()}
 
 
 def load_paper(name: str) -> Paper:
-    """The paper of that name; UnknownName."""
+    """Load a paper by name; UnknownName."""
     if name not in PAPERS:
         raise UnknownName("paper", name, PAPERS)
-    found: Paper = import_module(f"harness.study.papers.{name}").PAPER
-    return found
+    paper: Paper = import_module(f"harness.study.papers.{name}").PAPER
+    return paper
 
 
 def reproduce(
@@ -57,11 +57,11 @@ def reproduce(
     command: str = "",
     progress: ProgressCallback = lambda last, done, planned: None,
 ) -> tuple[PaperFindings, Outcome]:
-    """Run what is not finished yet, judge, and write findings.json into `out`.
+    """Run what is not finished, evaluate the experiments, and write findings.json into `out`.
 
-    On the built-in performer, or on the real motion in `library`. `out` is made, or resumed when it holds this very
-    study, else refused (BadInput). INCOMPLETE when a cell or a whole experiment failed; what is not reproduced is a
-    result like any other.
+    The motion is synthetic, or that of `library`. `out` is created, or resumed when it holds the same study, else
+    refused (BadInput). The outcome is INCOMPLETE when a cell or an experiment failed, else PASS: a claim that is not
+    reproduced is a result.
     """
     motion: Motion = "cmu" if library else "builtin"
     runs = paper.plan(motion, seed)
@@ -81,19 +81,17 @@ def reproduce(
         progress=lambda last, done, _: progress(last, done, planned),
     )
     study = PaperStudy(out, motion, seed, runs, library, failures)
-    experiments, broken = [], False
-    for done, (name, ask) in enumerate(paper.experiments.items()):
+    experiments, failed = [], False
+    for done, (name, evaluate) in enumerate(paper.experiments.items()):
         progress(name, cells + done, planned)
         try:
-            experiments.append(_with_failures(ask(study), study))
-        except Exception as error:  # one experiment that cannot be judged leaves the others as they are
+            experiments.append(_with_failures(evaluate(study), study))
+        except Exception as error:  # the other experiments are still evaluated
             if was_interrupted(error):
                 raise
-            broken = True
+            failed = True
             last = traceback.format_exc().strip().splitlines()[-1]
-            experiments.append(
-                PaperExperiment(name, name, "", (), notes=(f"This experiment could not be judged: {last}",))
-            )
+            experiments.append(PaperExperiment(name, name, "", (), notes=(f"This experiment failed: {last}",)))
     progress("findings", planned, planned)
     findings = PaperFindings(
         paper=paper.name,
@@ -106,11 +104,11 @@ def reproduce(
         tables=provenance_tables(study),
     )
     write_findings(out / "findings.json", findings)
-    return findings, Outcome.INCOMPLETE if failures or broken else Outcome.PASS
+    return findings, Outcome.INCOMPLETE if failures or failed else Outcome.PASS
 
 
 def _with_failures(experiment: PaperExperiment, study: PaperStudy) -> PaperExperiment:
-    """With a note for each failure of the runs that it rests on."""
+    """Add a note for each failed cell of the runs that an experiment uses."""
     failed = [
         f"FAILED {cell}: {text.strip().splitlines()[-1]}"
         for cell, text in study.failures.items()

@@ -1,6 +1,6 @@
-"""A study: named runs in one folder, made by `engine.run`, resumed where they were, and read back.
+"""A paper study: named runs in one folder, which are run by `engine.run`, resumed, and read back.
 
-The folder holds study.json, which says whose it is, a folder for each run, and measured/ for what no run measures.
+The folder has study.json (the identity of the study), a folder for each run, and measured/ for other measurements.
 """
 
 import traceback
@@ -24,22 +24,22 @@ _IDENTITY_FILE = "study.json"
 
 @dataclass(frozen=True)
 class PaperStudy:
-    """What an experiment reads its results from."""
+    """The results that experiments read."""
 
     out: Path
     motion: Literal["builtin", "cmu"]
     seed: int
     runs: Mapping[str, Scenario]
-    """Name -> what ran in the folder of that name."""
+    """Name of a run and of its folder -> its scenario."""
     library: Path | None = None
-    """The folder of real motion."""
+    """Folder of the motion library; None for synthetic motion."""
     failures: Mapping[str, str] = field(default_factory=dict)
-    """"run: cell" -> what went wrong there."""
+    """"run: cell" -> traceback or message of its failure."""
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
-        """The run's finished cells, as rows of its summary, whose columns are as `where` says; [] where nothing ran.
+        """Rows of the summary for finished cells of a run; [] where nothing ran.
 
-        Columns are those of `summary.csv`, such as method, inputs, behaviour, performer, clip and varied.
+        `where` selects rows by columns of `summary.csv`, such as method, inputs, behaviour, performer, clip, varied.
         """
         summary, wanted = self.out / run / "summary.json", to_json_types(where)
         if run not in self.runs or not summary.is_file():
@@ -48,30 +48,30 @@ class PaperStudy:
         return [row for row in rows if all(row[name] == value for name, value in wanted.items())]
 
     def cells(self, run: str, **where: Any) -> Iterator[Cell]:
-        """The same as whole cells, with the errors of every frame and joint, one at a time."""
+        """Finished cells selected as in `rows`, with the errors of every frame and joint, read one at a time."""
         return (read_cell(cell_folder(self.out / run, row["key"])) for row in self.rows(run, **where))
 
     def cached_measurement(self, name: str, measure: Callable[[], Any]) -> Any:
-        """What `measure` gave, in JSON's types: it is asked once, and again when the package's source has changed."""
+        """Result of `measure` in JSON types, cached on disk until the source of the package changes."""
         path = self.out / "measured" / f"{name}.json"
         if path.is_file():
-            found = read_json(path, "what a study measured")
-            if found.get("source_hash") == manifest.source_hash() and "value" in found:
-                return found["value"]
+            cached = read_json(path, "a cached measurement of a study")
+            if cached.get("source_hash") == manifest.source_hash() and "value" in cached:
+                return cached["value"]
         path.parent.mkdir(exist_ok=True)
         write_json(path, {"value": measure(), "source_hash": manifest.source_hash()})
-        return read_json(path, "what a study measured")["value"]
+        return read_json(path, "a cached measurement of a study")["value"]
 
 
 @lru_cache(maxsize=16)
 def _summary_rows(run: Path, written_ns: int) -> list[dict[str, Any]]:
-    """Of a summary as it was written then; experiments ask for it again and again."""
+    """Rows of a summary, cached by its time of writing, since experiments read it many times."""
     rows: list[dict[str, Any]] = read_summary(run)["cells"]
     return rows
 
 
 def open_study(out: Path, identity: Mapping[str, Any]) -> None:
-    """Create a study's folder, or open it to resume; BadInput when it holds another study or other files."""
+    """Create the folder of a study, or open it to resume; BadInput when it holds another study or other files."""
 
     def difference(path: Path) -> str:
         stored, given = read_json(path, "the identity of a study"), to_json_types(identity)
@@ -89,19 +89,19 @@ def run_scenarios(
     command: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,
 ) -> dict[str, str]:
-    """Run each scenario into the folder of its name below `out`; what is finished is kept. "run: cell" -> failure.
+    """Run or resume each scenario in the folder of its name below `out`; returns "run: cell" -> failure.
 
-    A cell that fails stops no other, a run that is refused no other run.
+    After a failed cell or a refused run, the others still run.
     """
     planned, before, failures = count_cells(runs), 0, dict[str, str]()
     for name, scenario in runs.items():
 
-        def told(cell: str, done: int, _: int, name: str = name, before: int = before) -> None:
+        def report(cell: str, done: int, _: int, name: str = name, before: int = before) -> None:
             progress(f"{name}: {cell}", before + done, planned)
 
-        place = out / name
+        run_folder = out / name
         try:
-            engine.run(scenario, place, folder=folder, jobs=jobs, command=command, progress=told)
+            engine.run(scenario, run_folder, folder=folder, jobs=jobs, command=command, progress=report)
         except HarnessError as error:
             failures[name] = str(error)
         except Exception as error:
@@ -109,16 +109,16 @@ def run_scenarios(
                 raise
             failures[name] = traceback.format_exc()
         if name not in failures:
-            failed: Mapping[str, str] = read_summary(place)["failures"]
+            failed: Mapping[str, str] = read_summary(run_folder)["failures"]
             failures |= {f"{name}: {cell}": text for cell, text in failed.items()}
         before += count_cells({name: scenario})
     return failures
 
 
 def count_cells(runs: Mapping[str, Scenario]) -> int:
-    """How many cells all runs have."""
+    """Number of cells of all runs."""
     return sum(
-        len(made.motion.test) * len(made.methods) * len(made.inputs)
+        len(variant.motion.test) * len(variant.methods) * len(variant.inputs)
         for scenario in runs.values()
-        for _, made in variants(scenario)
+        for _, variant in variants(scenario)
     )

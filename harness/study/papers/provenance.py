@@ -1,4 +1,4 @@
-"""What a study rests on, as tables: runs, databases and test clips, what was left out and why, and every constant."""
+"""Provenance of a paper study as tables: runs, databases and test clips, omissions with reasons, constants."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
@@ -12,18 +12,18 @@ from harness.results.cell import varied_text
 from harness.results.findings import FindingsTable
 from harness.study.papers.paper_study import PaperStudy
 
-TUNING_SCENARIOS = "scenarios/tune_*.toml and validate_*.toml, on the real clips that stand there as tests"
+TUNING_SCENARIOS = "scenarios/tune_*.toml and validate_*.toml, on the real test clips that they list"
 
 
 def provenance_tables(study: PaperStudy) -> tuple[FindingsTable, ...]:
-    """Of the whole study."""
+    """Tables of the provenance of a study."""
     return (
         FindingsTable(
             "Runs", ("run", "setting", "methods", "inputs", "varied"), tuple(map(_run_row, study.runs.values()))
         ),
         FindingsTable(
-            "Clips: judged, and learnt from",
-            ("run", "behaviour", "judged", "learnt from, the judged clip left out", "frames learnt from, at most"),
+            "Test clips and examples",
+            ("run", "behaviour", "test clips", "examples (without the test clip)", "frames of examples, at most"),
             tuple(chain.from_iterable(_database_rows(study, scenario) for scenario in study.runs.values())),
         ),
         FindingsTable(
@@ -53,7 +53,7 @@ def _run_row(scenario: Scenario) -> tuple[str, ...]:
 
 
 def _varied_value_text(key: str, value: Any) -> str:
-    """A varied value alone, as tables have it."""
+    """A varied value without its key."""
     return varied_text({key: value}).removeprefix(f"{key}=")
 
 
@@ -62,16 +62,16 @@ def _database_rows(study: PaperStudy, scenario: Scenario) -> Iterator[tuple[str,
     shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
     source = open_scenario_motion(motion, study.library, scenario.seed)
     for behaviour in dict.fromkeys(shown):
-        judged = [clip for clip, what in zip(motion.test, shown, strict=True) if what == behaviour]
-        own = motion.database == "behaviour"
-        learnt = [name for name in motion.examples if not own or source.behaviour(name) == behaviour]
-        frames = (round(_example_duration_s(study, scenario, name) * scenario.tracker.rate_hz) for name in learnt)
+        tested = [clip for clip, what in zip(motion.test, shown, strict=True) if what == behaviour]
+        same_behaviour = motion.database == "behaviour"
+        examples = [name for name in motion.examples if not same_behaviour or source.behaviour(name) == behaviour]
+        frames = (round(_example_duration_s(study, scenario, name) * scenario.tracker.rate_hz) for name in examples)
         count = motion.thin_to or sum(frames)
-        yield scenario.name, behaviour, ", ".join(judged), f"{len(learnt)}: {', '.join(learnt)}", f"{count:,}"
+        yield scenario.name, behaviour, ", ".join(tested), f"{len(examples)}: {', '.join(examples)}", f"{count:,}"
 
 
 def _example_duration_s(study: PaperStudy, scenario: Scenario, name: str) -> float:
-    """Of an example, without what is withheld."""
+    """Duration of an example without its withheld parts [s]."""
     clip = open_scenario_motion(scenario.motion, study.library, scenario.seed).load(ClipPart.parse(name).clip)
     withheld = map(ClipPart.parse, scenario.motion.withheld)
     return sum(map(len, allowed_frames(withheld, clip.name, len(clip), clip.rate_hz))) / clip.rate_hz

@@ -1,6 +1,6 @@
-"""The speed that a paper states, beside that of the same methods here with databases as large.
+"""The speed that a paper states, beside the speed of the same methods here with databases of the same size.
 
-What the papers state was measured on machines of their own, and what it includes they do not say.
+The papers measured on machines of their own and do not say what their figures include.
 """
 
 import shutil
@@ -11,33 +11,34 @@ from pathlib import Path
 from typing import Any
 
 from harness.experiment import benchmark_clips
+from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed, measure_speed
+from harness.results import manifest
 from harness.results.findings import BarChart, Claim, FindingsTable, PaperExperiment
-from harness.study.papers.method_speed import REFERENCE_METHOD, MethodSpeed, measure_speed, processor_name
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.speed_dataset import MAX_TEST_S, build_speed_dataset, missing_clips
 
 _REAL_NOTE = (
-    "Clips of the library, as many frames as there are. The longest judged clip of each behaviour is followed, and not "
-    "learnt from; what is all together has clips of every kind."
+    "Clips of the library, as many frames as there are. The longest test clip of each behaviour is followed and is not "
+    "learnt from. The database 'all together' has clips of every behaviour."
 )
 _SYNTHETIC_NOTE = (
-    "Takes of the built-in performer, exactly as many frames as the paper's; none of the takes that are followed."
+    "Synthetic takes with exactly as many frames as the paper's. None of them is among the takes that are followed."
 )
 
 
 @dataclass(frozen=True)
 class PublishedSpeed:
-    """What a paper says of its speed, and on what."""
+    """What a paper states about its speed, and the databases that it names."""
 
     statement: str
-    """In words."""
+    """The statement in words."""
     scenario: str
-    """Whose stations are worn."""
+    """Name of the scenario whose stations are used."""
     databases: Mapping[str, Mapping[str, int]]
     """Name -> behaviour -> frames."""
     methods: tuple[str, ...]
     paper_methods: tuple[str, ...]
-    """Those that stand for the paper's own."""
+    """The methods that reproduce the paper's own."""
     fps: float
     latency_ms: float | None = None
 
@@ -66,121 +67,125 @@ KIM2012 = PublishedSpeed(
 
 
 def compare_speed(study: PaperStudy, published: PublishedSpeed) -> PaperExperiment:
-    """Each database in turn, measured once and kept."""
-    folder, found, absent = study.out / "measured" / "databases", dict[str, list[MethodSpeed]](), []
+    """Compare the published speed with each database in turn; each is measured once and cached."""
+    folder, speeds, absent = study.out / "measured" / "databases", dict[str, list[MethodSpeed]](), []
     for database, frames in published.databases.items():
-        kept = study.cached_measurement(
+        measured = study.cached_measurement(
             f"speed_{database}".replace(" ", "_"), partial(_measure, study, published, frames, folder)
         )
-        if "absent" in kept:
-            absent.append(f"{database}: {kept['absent']}")
+        if "absent" in measured:
+            absent.append(f"{database}: {measured['absent']}")
         else:
-            found[database] = [MethodSpeed(**row) for row in kept["paces"]]
-    shutil.rmtree(folder, ignore_errors=True)  # measured now
-    return make_speed_experiment(published, found, on=kept["machine"], real=study.library is not None, absent=absent)
+            speeds[database] = [MethodSpeed(**row) for row in measured["speeds"]]
+    shutil.rmtree(folder, ignore_errors=True)  # the databases are no longer needed
+    return make_speed_experiment(
+        published, speeds, machine=measured["machine"], real=study.library is not None, absent=absent
+    )
 
 
 def _measure(study: PaperStudy, published: PublishedSpeed, frames: Mapping[str, int], folder: Path) -> dict[str, Any]:
-    """For the study to keep: paces, or why there are none."""
+    """Measure the methods with one database: their speeds, or the reason why there are none."""
+    circumstances = manifest.current_circumstances()
+    machine = f"{circumstances['processor']}, {circumstances['cpu_count']} cores"
     if absent := missing_clips(study, frames):
-        return {"absent": absent, "machine": processor_name()}
-    motion = build_speed_dataset(study, frames, benchmark_clips.load_clean_scenario(published.scenario), folder)
-    return {
-        "paces": [asdict(pace) for pace in measure_speed(published.methods, motion, study.seed)],
-        "machine": processor_name(),
-    }
+        return {"absent": absent, "machine": machine}
+    dataset = build_speed_dataset(study, frames, benchmark_clips.load_clean_scenario(published.scenario), folder)
+    speeds = measure_speed(published.methods, dataset.database, dataset.test_clips, study.seed)
+    return {"speeds": [asdict(speed) for speed in speeds], "machine": machine}
 
 
 def make_speed_experiment(
     published: PublishedSpeed,
-    found: Mapping[str, Sequence[MethodSpeed]],
+    speeds: Mapping[str, Sequence[MethodSpeed]],
     *,
-    on: str,
+    machine: str,
     real: bool,
     absent: Sequence[str] = (),
 ) -> PaperExperiment:
-    """The experiment of what was measured: database -> paces."""
-    claims = [_frame_rate_claim(published, found, own) for own in published.paper_methods]
+    """Make the experiment of measured speeds: database -> methods."""
+    claims = [_frame_rate_claim(published, speeds, method) for method in published.paper_methods]
     if published.latency_ms is not None:
-        claims += [_latency_claim(published, published.latency_ms, found, own) for own in published.paper_methods]
+        claims += [
+            _latency_claim(published, published.latency_ms, speeds, method) for method in published.paper_methods
+        ]
     return PaperExperiment(
         name="speed",
         title="Frame rate and latency",
         question=f"{published.statement} How fast are its methods here, with databases as large?",
         differences=(
             _REAL_NOTE if real else _SYNTHETIC_NOTE,
-            f"Another machine: {on}. An absolute speed says as much of it as of a method; beside each stands how "
-            f"many times as fast as `{REFERENCE_METHOD}` it is in the same turns.",
-            "What the published figures contain (device, line, drawing) is not known. Here it is the step of the "
-            "method alone; `harness bench wire` measures the whole way from a device through a line to the answer.",
+            f"Another machine: {machine}. An absolute speed depends on the machine as much as on the method. The table "
+            f"therefore also gives the speed relative to `{REFERENCE_METHOD}`, measured in the same turns.",
+            "It is not known what the published figures include (device, line, drawing). Here only the step of the "
+            "method is timed. `harness bench wire` measures the whole path from a device over a line to the estimate.",
         ),
         claims=tuple(claims),
-        tables=(_speed_table(found),),
-        figures=(_speed_bars(published, found),),
+        tables=(_speed_table(speeds),),
+        figures=(_speed_bars(published, speeds),),
         notes=(
-            f"Held-out takes of {MAX_TEST_S:g} s or less; the first second of each is not counted, and its first frame "
-            "stands apart: a session has no history yet. Errors are mean joint angles on clean trackers: what this "
-            "speed buys.",
-            *(f"Not measured, {why}" for why in absent),
+            f"Held-out takes last at most {MAX_TEST_S:g} s. The first second of each is left out. Its first frame is "
+            "listed separately, because a session has no history yet. Errors are mean joint angles with noise preset "
+            "clean.",
+            *(f"Not measured: {reason}" for reason in absent),
         ),
     )
 
 
-def _frame_rate_claim(published: PublishedSpeed, found: Mapping[str, Sequence[MethodSpeed]], own: str) -> Claim:
-    text = f"{own} follows {published.fps:g} frames a second with databases of the paper's size, the slowest of them"
-    said, unit = f"{published.fps:g} frames/s", "frames/s"
-    paces = _speeds_of_method(found, own)
-    if not paces:
-        return Claim(text, said, "not measured", "not run", "there is no such motion", unit=unit)
-    database, slowest = min(paces.items(), key=lambda pace: pace[1].fps)
-    small = _undersized_databases(published, paces)
+def _frame_rate_claim(published: PublishedSpeed, speeds: Mapping[str, Sequence[MethodSpeed]], method: str) -> Claim:
+    text = f"{method} runs at {published.fps:g} frames/s or more with the slowest of the databases of the paper's size"
+    stated, unit = f"{published.fps:g} frames/s", "frames/s"
+    by_database = _speeds_of_method(speeds, method)
+    if not by_database:
+        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit=unit)
+    database, slowest = min(by_database.items(), key=lambda item: item[1].fps)
+    small = _undersized_databases(published, by_database)
     return Claim(
         text=text,
-        published=said,
+        published=stated,
         ours=f"{slowest.fps:,.0f} frames/s ({database}, {slowest.frames:,} frames)",
         verdict="not comparable" if small else "reproduced" if slowest.fps >= published.fps else "not reproduced",
-        why=small or ("" if slowest.fps >= published.fps else "another machine, and other code"),
+        why=small or ("" if slowest.fps >= published.fps else "another machine and other code"),
         difference=slowest.fps,
         unit=unit,
     )
 
 
 def _latency_claim(
-    published: PublishedSpeed, latency_ms: float, found: Mapping[str, Sequence[MethodSpeed]], own: str
+    published: PublishedSpeed, latency_ms: float, speeds: Mapping[str, Sequence[MethodSpeed]], method: str
 ) -> Claim:
-    text = f"99 of 100 steps of {own} end within the published latency, with the slowest database"
-    said = f"{latency_ms:g} ms"
-    paces = _speeds_of_method(found, own)
-    if not paces:
-        return Claim(text, said, "not measured", "not run", "there is no such motion", unit="ms")
-    database, slowest = max(paces.items(), key=lambda pace: pace[1].p99_ms)
-    small, within = _undersized_databases(published, paces), slowest.p99_ms <= latency_ms
+    text = f"99 % of the steps of {method} take at most the published latency, with the slowest database"
+    stated = f"{latency_ms:g} ms"
+    by_database = _speeds_of_method(speeds, method)
+    if not by_database:
+        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit="ms")
+    database, slowest = max(by_database.items(), key=lambda item: item[1].p99_ms)
+    small, within = _undersized_databases(published, by_database), slowest.p99_ms <= latency_ms
     return Claim(
         text=text,
-        published=said,
+        published=stated,
         ours=f"p99 {slowest.p99_ms:.2f} ms, p50 {slowest.p50_ms:.2f} ms ({database}, {slowest.frames:,} frames)",
         verdict="not comparable" if small else "reproduced" if within else "not reproduced",
-        why=small or ("" if within else "another machine, and other code"),
+        why=small or ("" if within else "another machine and other code"),
         difference=slowest.p99_ms,
         unit="ms",
     )
 
 
-def _speeds_of_method(found: Mapping[str, Sequence[MethodSpeed]], method: str) -> dict[str, MethodSpeed]:
-    """Database -> pace of a method."""
-    return {database: pace for database, paces in found.items() for pace in paces if pace.method == method}
+def _speeds_of_method(speeds: Mapping[str, Sequence[MethodSpeed]], method: str) -> dict[str, MethodSpeed]:
+    """Database -> speed of one method."""
+    return {database: speed for database, rows in speeds.items() for speed in rows if speed.method == method}
 
 
-def _undersized_databases(published: PublishedSpeed, paces: Mapping[str, MethodSpeed]) -> str:
-    """Which databases have fewer frames than the paper's, or ""."""
-    wanted = {database: sum(published.databases[database].values()) for database in paces}
-    short = [f"{d} {paces[d].frames:,} of {count:,}" for d, count in wanted.items() if paces[d].frames < count]
+def _undersized_databases(published: PublishedSpeed, by_database: Mapping[str, MethodSpeed]) -> str:
+    """Name the databases that have fewer frames than the paper's; "" where there is none."""
+    wanted = {database: sum(published.databases[database].values()) for database in by_database}
+    short = [f"{d} {by_database[d].frames:,} of {n:,}" for d, n in wanted.items() if by_database[d].frames < n]
     return f"the library has fewer frames than the paper: {', '.join(short)}" if short else ""
 
 
-def _speed_table(found: Mapping[str, Sequence[MethodSpeed]]) -> FindingsTable:
+def _speed_table(speeds: Mapping[str, Sequence[MethodSpeed]]) -> FindingsTable:
     times = "frames/s", "p50 [ms]", "p99 [ms]", "first [ms]", "ready [s]", f"times {REFERENCE_METHOD}"
-    rows = [
+    table = [
         (
             database,
             f"{p.frames:,}",
@@ -188,24 +193,24 @@ def _speed_table(found: Mapping[str, Sequence[MethodSpeed]]) -> FindingsTable:
             f"{p.fps:,.0f}",
             *(f"{ms:.2f}" for ms in (p.p50_ms, p.p99_ms, p.first_ms)),
             f"{p.ready_s:.1f}",
-            f"{p.to_ik:.2f}",
+            f"{p.ratios[REFERENCE_METHOD]:.2f}",
             f"{p.error_deg:.2f}",
         )
-        for database, paces in found.items()
-        for p in paces
+        for database, rows in speeds.items()
+        for p in rows
     ]
-    return FindingsTable("Speed", ("database", "frames", "method", *times, "error [deg]"), tuple(rows))
+    return FindingsTable("Speed", ("database", "frames", "method", *times, "error [deg]"), tuple(table))
 
 
-def _speed_bars(published: PublishedSpeed, found: Mapping[str, Sequence[MethodSpeed]]) -> BarChart:
+def _speed_bars(published: PublishedSpeed, speeds: Mapping[str, Sequence[MethodSpeed]]) -> BarChart:
     rates: dict[str, tuple[float | None, ...]] = {
-        method: tuple(pace.fps for pace in _speeds_of_method(found, method).values()) for method in published.methods
+        method: tuple(speed.fps for speed in _speeds_of_method(speeds, method).values()) for method in published.methods
     }
     return BarChart(
-        title="Frames a second",
+        title="Frames per second",
         unit="frames/s",
-        groups=tuple(f"{database}, {paces[0].frames:,}" for database, paces in found.items()),
+        groups=tuple(f"{database}, {rows[0].frames:,}" for database, rows in speeds.items()),
         series=rates,
-        published={own: (published.fps,) * len(found) for own in published.paper_methods},
-        caption="1 / mean step, warm; groups are databases with their frames.",
+        published={method: (published.fps,) * len(speeds) for method in published.paper_methods},
+        caption="1 / mean step after the first second. A group is a database with its number of frames.",
     )

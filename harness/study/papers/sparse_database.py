@@ -1,4 +1,4 @@
-"""Kim et al. 2012, Figs. 4 and 5: hardly any examples, and poses that none of them shows."""
+"""Kim et al. 2012, Figs. 4 and 5: very small databases, and poses that no example shows."""
 
 from harness.results.findings import Claim, FindingsTable, LineChart, PaperExperiment
 from harness.study.papers.five_stations import (
@@ -23,51 +23,51 @@ ARM_AND_SPINE = {
     "head and neck": ("lowerneck", "upperneck", "head"),
     "legs": ("lfemur", "ltibia", "lfoot", "rfemur", "rtibia", "rfoot"),
 }
-"""Bones whose hinges are taken together where the paper's pictures show the right arm and the spine."""
+"""Group -> bones, for the body parts that the paper's pictures show."""
 
 
 def sparse(study: PaperStudy) -> PaperExperiment:
-    """Fig. 4."""
+    """Fig. 4: methods compared with very small databases."""
     claims: list[Claim] = []
     figures: list[LineChart] = []
     tables: list[FindingsTable] = []
     for behaviour, count in DATABASE_FRAMES.items():
-        run, shown = f"sparse_{behaviour}", behaviour.replace("_", " ")
+        run, label = f"sparse_{behaviour}", behaviour.replace("_", " ")
         rows = study.rows(run)
-        for who in performers(rows) or ("known",):
-            errors = errors_by_method(row for row in rows if row["performer"] == who)
-            told = f"{shown}, {count} frames, {who} performers" if who == "new" else f"{shown}, {count} frames"
-            for less, more in (
+        for performer in performers(rows) or ("known",):
+            errors = errors_by_method(row for row in rows if row["performer"] == performer)
+            title = f"{label}, {count} frames" + (", new performers" if performer == "new" else "")
+            for lower, higher in (
                 (KERNEL_CCA, WEIGHTED_BLEND),
                 (KERNEL_CCA, "ik"),
                 (KERNEL_CCA, "ik:previous"),
                 (f"{KERNEL_CCA}[solve=limbs]", f"{WEIGHTED_BLEND}[solve=limbs]"),
                 (f"{KERNEL_CCA}[final_ik=false]", f"{WEIGHTED_BLEND}[final_ik=false]"),
             ):
-                text = f"{told}: {less} errs less than {more}"
-                claims.append(claim_in_run(study, run, text, errors.get(less, {}), errors.get(more, {})))
+                text = f"{title}: {lower} errs less than {higher}"
+                claims.append(claim_in_run(study, run, text, errors.get(lower, {}), errors.get(higher, {})))
         if rows:
-            tables += method_tables(f"{shown}, {count} frames", rows, WORLD_METRICS)
+            tables += method_tables(f"{label}, {count} frames", rows, WORLD_METRICS)
             known = [row for row in rows if row["performer"] == performers(rows)[0]]
             longest = max(known, key=lambda row: int(row["frames_matched"]))["clip"]
             cells = study.cells(run, clip=longest)
             curves = {cell.method: cell for cell in cells if cell.method in METHODS}
-            title = f"{shown}, {count} frames: error over time in {longest}, the longest take"
+            title = f"{label}, {count} frames: error over time in {longest}, the longest take"
             figures.append(error_lines(title, curves, caption="Mean error of the 48 hinges in every frame."))
     return PaperExperiment(
         name="sparse",
         title="Extremely sparse databases, frame by frame",
         question=(
-            "With 31 frames of table tennis or 43 of walking to learn from, and other motion put in, does kernel CCA "
-            "err less than a weighted blend of neighbours and than inverse kinematics? The paper shows the error of "
-            "every frame (Fig. 4), lowest for kernel CCA."
+            "With 31 frames of table tennis or 43 of walking as examples, does kernel CCA err less on other motion "
+            "than a weighted blend of neighbours and than inverse kinematics? The paper shows the error of every frame "
+            "(Fig. 4); it is lowest for kernel CCA."
         ),
         differences=(
-            "Frames are evenly spaced over the whole database; the paper does not say how it chose them.",
-            "The paper's inverse kinematics is unknown: `ik` is the strongest that was found, `ik:previous` the "
-            "plainest.",
-            "kernel_cca and weighted_blend end in a solve for the whole body, with [solve=limbs] limb by limb, in "
-            "closed form as in the paper, with [final_ik=false] in neither.",
+            "The frames are evenly spaced over the full database. The paper does not say how it chose them.",
+            "The paper's inverse kinematics is unknown: `ik` is the most accurate variant here, `ik:previous` the "
+            "simplest.",
+            "kernel_cca and weighted_blend end with inverse kinematics of the whole body. With [solve=limbs] it is "
+            "solved limb by limb in closed form, as in the paper; [final_ik=false] leaves it out.",
             *differences(study),
         ),
         claims=tuple(claims),
@@ -78,13 +78,14 @@ def sparse(study: PaperStudy) -> PaperExperiment:
 
 
 def extrapolation(study: PaperStudy) -> PaperExperiment:
-    """Fig. 5."""
-    run, ends = "extrapolation", "[final_ik=false]"
+    """Fig. 5: poses outside the examples, by body part."""
+    run, option = "extrapolation", "[final_ik=false]"
     errors = {
-        m: errors_by_joint_group(study.cells(run, method=m + ends), ARM_AND_SPINE) for m in (KERNEL_CCA, WEIGHTED_BLEND)
+        m: errors_by_joint_group(study.cells(run, method=m + option), ARM_AND_SPINE)
+        for m in (KERNEL_CCA, WEIGHTED_BLEND)
     }
     for method in errors:
-        errors[method]["whole body"] = errors_by_clip(study.rows(run, method=method + ends))
+        errors[method]["whole body"] = errors_by_clip(study.rows(run, method=method + option))
     claims = [
         claim_in_run(
             *(study, run, f"{group}: kernel_cca errs less than weighted_blend"),
@@ -93,19 +94,19 @@ def extrapolation(study: PaperStudy) -> PaperExperiment:
         for group in ("right arm", "spine", "whole body")
     ]
     groups = {group: {method: errors[method][group] for method in errors} for group in errors[KERNEL_CCA]}
-    title = "Three trackers, 31 frames of table tennis, no final inverse kinematics"
+    title = "Three stations, 31 frames of table tennis, no final inverse kinematics"
     caption = "Mean error of the hinges of each group."
     return PaperExperiment(
         name="extrapolation",
         title="Beyond the examples: right arm and spine",
         question=(
-            "From 31 frames of table tennis, three trackers (RH, LH, PEL) and no final inverse kinematics, does kernel "
-            "CCA reach poses that no example shows? The paper's pictures (Fig. 5) have it better than the blend at the "
-            "right arm and the spine."
+            "With 31 frames of table tennis, three stations (RH, LH, PEL) and no final inverse kinematics, does kernel "
+            "CCA reach poses that no example shows? In the paper's pictures (Fig. 5) it is better than the blend at "
+            "the right arm and the spine."
         ),
         differences=(
-            "Judged by errors of joint groups over eight takes; the paper shows single frames.",
-            "Two of the eight performers (p3, p6) are left-handed: their bat is not in the right hand.",
+            "Errors of joint groups over eight takes are compared; the paper shows single frames.",
+            "Two of the eight performers (p3, p6) are left-handed and hold the bat in the left hand.",
             *differences(study),
         ),
         claims=tuple(claims),

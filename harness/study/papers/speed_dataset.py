@@ -1,7 +1,7 @@
-"""Databases of so many frames, and takes that are not in them: of the built-in performer, or of a library.
+"""Databases of the papers' sizes and held-out takes for the speed experiment: synthetic motion, or a library's.
 
-The setting is that of the accuracy tables at level `clean` (`harness.experiment.benchmark_clips`). A database is built once, in a folder of
-the study's, and opened again by whoever goes on.
+The conditions are those of `harness.experiment.benchmark_clips`. A database is built once, in a folder of the study; a
+resumed study opens it again.
 """
 
 import hashlib
@@ -23,41 +23,39 @@ from harness.results import manifest
 from harness.study.papers.paper_study import PaperStudy
 
 MAX_TEST_S = 12.0
-"""Of each held-out take, at most."""
+"""Longest part of a held-out take that is followed [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class SpeedDataset:
-    """What to learn from, and what to follow."""
+    """A database to learn from, and held-out clips to follow."""
 
     database: MotionDatabase
     test_clips: list[BenchmarkClip]
 
 
 def missing_clips(study: PaperStudy, frames: Mapping[str, int]) -> str:
-    """Why there is no database of these behaviours, or ""; the built-in performer shows them all."""
+    """Explain why the library has no clips for these behaviours; "" where it has, and always for synthetic motion."""
     if study.library is None:
         return ""
-    source, test = (
-        open_scenario_motion(benchmark_clips.load_clean_scenario().motion, study.library, study.seed),
-        list_test_clips(study),
-    )
+    source = open_scenario_motion(benchmark_clips.load_clean_scenario().motion, study.library, study.seed)
+    test = list_test_clips(study)
     names = {
         behaviour: [name for name in source.names() if source.behaviour(name) == behaviour] for behaviour in frames
     }
     if any(set(names[behaviour]) & test.get(behaviour, set()) and len(names[behaviour]) > 1 for behaviour in frames):
         return ""
-    return f"the library lacks one clip to follow and another to learn from of {', '.join(frames)}"
+    return f"the library lacks one clip to follow and another to learn from for {', '.join(frames)}"
 
 
-def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], worn: Scenario, folder: Path) -> SpeedDataset:
-    """So many frames of each behaviour, and a held-out take of each, as the stations of `worn` read it.
+def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], scenario: Scenario, folder: Path) -> SpeedDataset:
+    """Build a database with `frames` of each behaviour; simulate a held-out take of each as `scenario` reads it.
 
-    On real motion as many as there are, of clips of every kind where several behaviours are asked for together. Not
-    of what is `missing_clips`.
+    A library may have fewer frames. Where several behaviours are asked for together, its clips of every behaviour are
+    used. Call `missing_clips` first.
     """
     if study.library is None:
-        makers = [
+        factories = [
             take
             for behaviour, count in frames.items()
             for take in benchmark_clips.make_take_factories(count, study.seed, [behaviour])
@@ -65,27 +63,26 @@ def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], worn: Scen
         takes = [
             benchmark_clips.generate_held_out_takes(1, study.seed, MAX_TEST_S, [behaviour])[0] for behaviour in frames
         ]
-        learnt = build_database(folder, {"seed": study.seed, "frames": frames}, lambda: makers)
-        return SpeedDataset(learnt, benchmark_clips.simulate_clips(takes, study.seed, worn))
-    settings, wanted = _test_clip_settings(study, study.library, frames, worn), sum(frames.values())
+        database = build_database(folder, {"seed": study.seed, "frames": frames}, lambda: factories)
+        return SpeedDataset(database, benchmark_clips.simulate_clips(takes, study.seed, scenario))
+    evaluations, wanted = _test_clip_evaluations(study, study.library, frames, scenario), sum(frames.values())
     files = {entry.name: _digest(entry.path) for entry in MotionLibrary(study.library).entries()}
-    content = {"files": files, "examples": settings[0].scenario.motion.examples, "frames": wanted}
-    learnt = build_database(folder, content, lambda: truncate_motions(settings[0].examples, wanted))
-    return SpeedDataset(learnt, [_benchmark_clip(setting) for setting in settings])
+    content = {"files": files, "examples": evaluations[0].scenario.motion.examples, "frames": wanted}
+    database = build_database(folder, content, lambda: truncate_motions(evaluations[0].examples, wanted))
+    clips = [BenchmarkClip.from_simulation(e.part.clip, e.simulation) for e in evaluations]
+    return SpeedDataset(database, clips)
 
 
 def build_database(
     folder: Path, defined_by: object, takes: Callable[[], Iterable[BodyMotion | Callable[[], BodyMotion]]]
 ) -> MotionDatabase:
-    """The database of takes on the common body, in a folder below this one that is named after what defines it."""
-    own = folder / content_key({"source": manifest.source_hash(), "defined_by": defined_by})
-    if own.is_dir():
-        return MotionDatabase.open(own)
-    return MotionDatabase.build(benchmark_clips.build_common_body(), takes(), folder=own)
+    """Build or open the database below `folder` that is named by a hash of the source code and of `defined_by`."""
+    path = folder / content_key({"source": manifest.source_hash(), "defined_by": defined_by})
+    return benchmark_clips.build_database(path, () if path.is_dir() else takes())
 
 
 def truncate_motions(takes: Iterable[BodyMotion], count: int) -> Iterator[BodyMotion]:
-    """Takes up to so many frames together; the last is cut."""
+    """Yield takes until they have `count` frames in total; the last is cut."""
     for take in takes:
         if count <= 0:
             return
@@ -94,20 +91,20 @@ def truncate_motions(takes: Iterable[BodyMotion], count: int) -> Iterator[BodyMo
 
 
 def list_test_clips(study: PaperStudy) -> dict[str, set[str]]:
-    """Behaviour -> clips that runs of the study judge."""
-    found: dict[str, set[str]] = {}
+    """Behaviour -> test clips of the study's runs."""
+    clips: dict[str, set[str]] = {}
     for scenario in study.runs.values():
         motion = scenario.motion
         shown = motion.behaviours * (len(motion.test) if len(motion.behaviours) == 1 else 1)
         for text, behaviour in zip(motion.test, shown, strict=True):
-            found.setdefault(behaviour, set()).add(ClipPart.parse(text).clip)
-    return found
+            clips.setdefault(behaviour, set()).add(ClipPart.parse(text).clip)
+    return clips
 
 
-def _test_clip_settings(
-    study: PaperStudy, library: Path, frames: Mapping[str, int], worn: Scenario
+def _test_clip_evaluations(
+    study: PaperStudy, library: Path, frames: Mapping[str, int], scenario: Scenario
 ) -> list[ClipEvaluation]:
-    """Of the longest judged clip of each behaviour; none of these is an example."""
+    """Evaluations of the longest test clip of each behaviour; none of these clips is an example."""
     tables = benchmark_clips.load_clean_scenario().motion
     source = open_scenario_motion(tables, library, study.seed)
     longest = {
@@ -118,16 +115,11 @@ def _test_clip_settings(
     others = [name for name in source.names() if name not in longest.values()]
     examples = tuple(name for name in others if len(frames) > 1 or source.behaviour(name) in frames)
     motion = replace(tables, examples=examples, withheld=(), database="all", longest_s=MAX_TEST_S)
-    found = []
+    evaluations = []
     for behaviour, clip in longest.items():
-        shown = replace(worn, seed=study.seed, motion=replace(motion, test=(clip,), behaviours=(behaviour,)))
-        found.append(ClipEvaluation(shown, source, ClipPart(clip), behaviour))
-    return found
-
-
-def _benchmark_clip(setting: ClipEvaluation) -> BenchmarkClip:
-    seen = setting.simulation
-    return BenchmarkClip(setting.part.clip, seen, seen.truth_qpos[seen.frame_index])
+        tested = replace(scenario, seed=study.seed, motion=replace(motion, test=(clip,), behaviours=(behaviour,)))
+        evaluations.append(ClipEvaluation(tested, source, ClipPart(clip), behaviour))
+    return evaluations
 
 
 def _digest(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""Rows and cells of runs as errors by clip, tables and figures."""
+"""Conversion of rows and cells of runs to errors by clip, tables and figures."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -21,35 +21,37 @@ HINGE_GROUPS = {
     "legs": ("lfemur", "ltibia", "rfemur", "rtibia"),
     "feet": ("lfoot", "rfoot"),
 }
-"""The 48 hinges by the bones they turn."""
+"""Group -> bones; together they have the 48 hinges."""
 
 
 def errors_by_clip(rows: Iterable[CellRow], metric: str = METRIC) -> dict[str, float]:
-    """Clip -> error, of rows that differ in nothing but the clip; what was not measured is left out.
+    """Clip -> error, of rows that differ only in the clip; clips without a measurement are left out.
 
-    BadInput for rows of which two are of one clip, or that are never pooled (see `summary.GROUP`).
+    BadInput for two rows of one clip, and for rows that must not be pooled (see `summary.GROUP_KEYS`).
     """
-    found: dict[str, float] = {}
+    errors: dict[str, float] = {}
     kinds: dict[str, Any] = {}
     for row in rows:
         for name in (*GROUP_KEYS, "behaviour"):
             if kinds.setdefault(name, row[name]) != row[name]:
-                raise BadInput(f"Errors of {name} {kinds[name]!r} and {row[name]!r} are not pooled.", "Ask for one.")
-        if row["clip"] in found:
-            raise BadInput(f"Two errors on {row['clip']} are not pooled.", "Ask for one of what varies.")
+                raise BadInput(
+                    f"Errors of {name} {kinds[name]!r} and {row[name]!r} cannot be pooled.", "Select one of them."
+                )
+        if row["clip"] in errors:
+            raise BadInput(f"Two errors on {row['clip']} cannot be pooled.", "Select one value of what varies.")
         if row[metric] is not None:
-            found[row["clip"]] = float(row[metric])
-    return found
+            errors[row["clip"]] = float(row[metric])
+    return errors
 
 
 def mean_sd(errors: Mapping[str, float]) -> tuple[float | None, float | None]:
-    """Over clips; None of none, and no deviation of one."""
+    """Mean and standard deviation over clips; None without clips, and no deviation for one clip."""
     values = np.array(list(errors.values()))
     return float(values.mean()) if len(values) else None, float(values.std(ddof=1)) if len(values) > 1 else None
 
 
 def format_mean(errors: Mapping[str, float], decimals: int = 2) -> str:
-    """ "1.23 ± 0.45 (8)": mean, standard deviation over clips, how many."""
+    """Format mean, standard deviation over clips and number of clips, such as "1.23 ± 0.45 (8)"."""
     mean, sd = mean_sd(errors)
     if mean is None:
         return "not measured"
@@ -57,11 +59,11 @@ def format_mean(errors: Mapping[str, float], decimals: int = 2) -> str:
     return f"{mean:.{decimals}f}{spread} ({len(errors)})"
 
 
-def mean_table(title: str, what: str, groups: Mapping[str, Mapping[str, Mapping[str, float]]]) -> FindingsTable:
-    """Group -> column -> errors by clip, as a row for each group; `what` names the first column."""
+def mean_table(title: str, first_column: str, groups: Mapping[str, Mapping[str, Mapping[str, float]]]) -> FindingsTable:
+    """Table of group -> column -> errors by clip, with a row for each group."""
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
     rows = [(group, *(format_mean(each.get(column, {})) for column in columns)) for group, each in groups.items()]
-    return FindingsTable(f"{title}: mean ± sd over clips (clips)", (what, *columns), tuple(rows))
+    return FindingsTable(f"{title}: mean ± sd over clips (clips)", (first_column, *columns), tuple(rows))
 
 
 def mean_bars(
@@ -73,7 +75,10 @@ def mean_bars(
     horizontal: bool = False,
     published: Mapping[str, tuple[float | None, ...]] | None = None,
 ) -> BarChart:
-    """The same as bars: a group for each, a series for each column, standard deviations over clips as spread."""
+    """Bar chart of group -> column -> errors by clip.
+
+    A column is a series, the spread a standard deviation over clips.
+    """
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
     figures = {column: [mean_sd(each.get(column, {})) for each in groups.values()] for column in columns}
     return BarChart(
@@ -89,13 +94,13 @@ def mean_bars(
 
 
 def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, caption: str = "") -> LineChart:
-    """Series -> cell of one and the same clip, as error over time; frames that one has and another has not are gaps."""
-    every = sorted({int(k) for cell in cells.values() for k in cell.frame_index[cell.scores.scored]})
-    place = {k: i for i, k in enumerate(every)}
-    series, time_s = {}, np.full(len(every), np.nan)
+    """Line chart of errors over time; `cells` maps series to cells of one clip. Frames that a series lacks are gaps."""
+    frames = sorted({int(k) for cell in cells.values() for k in cell.frame_index[cell.scores.scored]})
+    position = {k: i for i, k in enumerate(frames)}
+    series, time_s = {}, np.full(len(frames), np.nan)
     for name, cell in cells.items():
-        values: Floats = np.full(len(every), np.nan)
-        at = [place[int(k)] for k in cell.frame_index[cell.scores.scored]]
+        values: Floats = np.full(len(frames), np.nan)
+        at = [position[int(k)] for k in cell.frame_index[cell.scores.scored]]
         values[at] = cell.errors[metric][cell.scores.scored]
         time_s[at] = cell.time_s[cell.scores.scored]
         series[name] = tuple(float(v) if np.isfinite(v) else None for v in values)
@@ -107,12 +112,12 @@ def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, cap
 def errors_by_joint_group(
     cells: Iterable[Cell], groups: Mapping[str, Sequence[str]] = HINGE_GROUPS
 ) -> dict[str, dict[str, float]]:
-    """Group of hinges -> clip -> mean error [deg], of cells that differ in nothing but the clip."""
-    found: dict[str, dict[str, float]] = {name: {} for name in groups}
+    """Group of hinges -> clip -> mean error [deg], of cells that differ only in the clip."""
+    by_group: dict[str, dict[str, float]] = {name: {} for name in groups}
     for cell in cells:
         errors = cell.scores.per_joint.get(METRIC, {})
         for group, bones in groups.items():
             values = [error for hinge, error in errors.items() if hinge.partition(".")[0] in bones]
             if values:
-                found[group][cell.clip] = float(np.mean(values))
-    return found
+                by_group[group][cell.clip] = float(np.mean(values))
+    return by_group

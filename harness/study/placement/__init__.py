@@ -1,1 +1,1 @@
-"""Where trackers go: candidates on the body, tried in sets, ranked with their ties."""
+"""Placement of stations: candidate places on the body are evaluated in sets and ranked, with statistical ties."""

@@ -1,8 +1,8 @@
-"""Sets of trackers tried: each becomes cells like any other, which the next question finds again.
+"""Cells of sets of stations: each set is run once and cached in the folder of the study.
 
-A set is the same scenario with other stations, so that motion and what was learnt are shared; on a line of so many bits
-per second it also has a rate of its own. A cell's key holds where every station sits, so that no set is tried twice,
-whichever mode asks, in this run or the next.
+A set is a variant of the scenario with other stations, so that motion and fitted methods are shared. Where the serial
+line limits the rate, the set also has a rate of its own. The key of a cell contains the places of all stations. So no
+set is run twice, in whichever mode, in this run or a later one.
 """
 
 import json
@@ -23,28 +23,28 @@ from harness.experiment.scenario import Scenario, variants
 from harness.study.placement.candidates import StationSet, station_name
 
 MAX_RATE_HZ = 180.0
-"""Of an IS-900 (docs/is900.md)."""
+"""Highest rate of an IS-900 (docs/is900.md)."""
 
 
 def link_rate_hz(scenario: Scenario, stations: int, link: bool) -> float:
-    """At which so many stations run: the scenario's, and no more than the line carries when that is a constraint.
+    """Rate of a number of stations: the scenario's, with `link` at most what the serial line carries.
 
-    BadInput when the line cannot carry so many once a second.
+    BadInput when the line cannot carry them once a second.
     """
     tracker = scenario.tracker
     if not link:
         return tracker.rate_hz
-    carried_hz = 1.0 / (tracker.record_s * stations)
-    if carried_hz < 1.0:
+    link_hz = 1.0 / (tracker.record_s * stations)
+    if link_hz < 1.0:
         raise BadInput(
-            f"A line of {tracker.baud} baud carries {stations} stations at {carried_hz:.2f} Hz.", "Wear fewer."
+            f"A line of {tracker.baud} baud carries {stations} stations at {link_hz:.2f} Hz.", "Use fewer stations."
         )
-    return min(tracker.rate_hz, MAX_RATE_HZ, carried_hz)
+    return min(tracker.rate_hz, MAX_RATE_HZ, link_hz)
 
 
 @dataclass(frozen=True)
 class SetRequest:
-    """Sets of trackers in one scenario, whose stations are all the candidates."""
+    """Sets of stations to measure in one scenario, whose stations are all candidates."""
 
     scenario: Scenario
     sets: tuple[StationSet, ...]
@@ -56,12 +56,12 @@ RunCells = Callable[..., CellResults]
 
 @dataclass
 class CellCache:
-    """Runs what was not tried yet, and remembers what came of it."""
+    """Runs sets that were not measured yet, and caches their results."""
 
     out: Path
-    """An opened folder of a study."""
+    """Folder of the study, as made by `open_study`."""
     folder: Path | None
-    """The library of real motion."""
+    """Motion library; None for synthetic motion."""
     executor: TaskExecutor
     command: str
     progress: ProgressCallback
@@ -69,50 +69,52 @@ class CellCache:
     failures: dict[str, str] = field(default_factory=dict)
     """Cell -> why it has no result."""
     planned: int = 0
-    """Cells that were asked for."""
+    """Number of cells that were requested."""
     _rows: dict[tuple[str, str, str, str], Mapping[str, Any]] = field(default_factory=dict)
-    """(scenario, what is varied, method, clip) -> row."""
-    _known: dict[str, set[str]] = field(default_factory=dict)
-    """Scenario -> what was varied."""
+    """(scenario, variant, method, clip) -> row."""
+    _variants: dict[str, set[str]] = field(default_factory=dict)
+    """Scenario -> variants that were run."""
 
-    def run_missing(self, asked: Iterable[SetRequest]) -> None:
-        """All at once, so that they share the workers."""
+    def run_missing(self, requests: Iterable[SetRequest]) -> None:
+        """Run all sets that were not run yet, together, so that they share the workers."""
         todo: dict[str, Scenario] = {}
         values: dict[str, dict[str, Any]] = {}
-        for one in asked:
-            for worn in one.sets:
-                scenario, varied = self._as_varied(one, worn)
-                if _variant_key(varied) not in self._known.get(scenario.name, ()):
+        for request in requests:
+            for stations in request.sets:
+                scenario, varied = self._variant(request, stations)
+                if _variant_key(varied) not in self._variants.get(scenario.name, ()):
                     todo[scenario.name] = scenario
                     values.setdefault(scenario.name, {})[_variant_key(varied)] = next(iter(varied.values()))
         scenarios = []
         for name, scenario in todo.items():
             key = "worn" if not scenario.worn else "stations"
             scenarios.append(replace(scenario, vary={key: list(values[name].values())}))
-            self._known.setdefault(name, set()).update(values[name])
+            self._variants.setdefault(name, set()).update(values[name])
         if not scenarios:
             return
         before = self.planned
 
-        def told(last: str, done: int, planned: int) -> None:
+        def report(last: str, done: int, planned: int) -> None:
             self.progress(last, before + done, before + planned)
 
-        asked_for = {"folder": self.folder, "executor": self.executor, "command": self.command, "progress": told}
-        self._take(scenarios, self.run(scenarios, self.out, **asked_for))
+        options = {"folder": self.folder, "executor": self.executor, "command": self.command, "progress": report}
+        self._add(scenarios, self.run(scenarios, self.out, **options))
 
     def errors(
-        self, asked: SetRequest, metric: str, methods: tuple[str, ...] = ()
+        self, request: SetRequest, metric: str, methods: tuple[str, ...] = ()
     ) -> dict[StationSet, dict[str, float | None]]:
-        """Of each set, by clip: the mean over the scenario's methods, or over some of them; None where one of them was
-        not measured."""
-        self.run_missing([asked])
-        return {worn: self._errors(asked, worn, metric, methods) for worn in asked.sets}
+        """Set -> clip -> mean error over `methods`, by default those of the scenario.
+
+        The error is None where one of the methods was not measured. Sets are run where necessary.
+        """
+        self.run_missing([request])
+        return {stations: self._errors(request, stations, metric, methods) for stations in request.sets}
 
     def _errors(
-        self, asked: SetRequest, worn: StationSet, metric: str, methods: tuple[str, ...]
+        self, request: SetRequest, stations: StationSet, metric: str, methods: tuple[str, ...]
     ) -> dict[str, float | None]:
-        scenario, varied = self._as_varied(asked, worn)
-        found: dict[str, float | None] = {}
+        scenario, varied = self._variant(request, stations)
+        by_clip: dict[str, float | None] = {}
         for clip in scenario.motion.test:
             rows = [
                 self._rows.get((scenario.name, _variant_key(varied), method, clip))
@@ -120,38 +122,39 @@ class CellCache:
             ]
             values = [row[metric] if row is not None else None for row in rows]
             measured = [float(value) for value in values if value is not None]
-            found[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
-        return found
+            by_clip[clip] = float(np.mean(measured)) if len(measured) == len(values) else None
+        return by_clip
 
-    def _take(self, scenarios: Iterable[Scenario], cells: CellResults) -> None:
-        """Rows come in planned order, without those of cells that failed."""
+    def _add(self, scenarios: Iterable[Scenario], cells: CellResults) -> None:
+        """Add results; rows are in planned order, without those of failed cells."""
         rows = iter(cells.rows)
         for scenario in scenarios:
-            each = [
+            planned = [
                 (scenario.name, _variant_key(varied), method, clip)
-                for varied, made in variants(scenario)
-                for clip in made.motion.test
-                for method in made.methods
+                for varied, variant in variants(scenario)
+                for clip in variant.motion.test
+                for method in variant.methods
             ]
-            for cell, called in zip(each, cell_names(scenario), strict=True):
-                if called not in cells.failures:
+            for cell, name in zip(planned, cell_names(scenario), strict=True):
+                if name not in cells.failures:
                     self._rows[cell] = next(rows)
         self.planned += cells.planned
         self.failures |= cells.failures
 
-    def _as_varied(self, asked: SetRequest, worn: StationSet) -> tuple[Scenario, dict[str, Any]]:
-        """The scenario that the set is a variant of, and what makes it that: which candidates are worn, or, for places
-        that were moved, also where."""
-        rate = link_rate_hz(asked.scenario, len(worn), asked.link)
-        scenario = replace(asked.scenario, tracker=replace(asked.scenario.tracker, rate_hz=rate), vary={})
-        names = [station_name(one) for one in worn]
+    def _variant(self, request: SetRequest, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
+        """The scenario that a set is a variant of, and its varied values: the stations, or the places of moved stations."""
+        rate = link_rate_hz(request.scenario, len(stations), request.link)
+        scenario = replace(request.scenario, tracker=replace(request.scenario.tracker, rate_hz=rate), vary={})
+        names = [station_name(place) for place in stations]
         moved = {
-            station_name(one): {"along": one.along, "around_deg": one.around_deg} for one in worn if one.moved_from
+            station_name(place): {"along": place.along, "around_deg": place.around_deg}
+            for place in stations
+            if place.moved_from
         }
         if moved:
             scenario = replace(scenario, worn=tuple(names))
-        called = f"{scenario.name}_{content_key(asdict(scenario))[:8]}"  # no two of other content may have one name
-        return replace(scenario, name=called), {"stations": moved} if moved else {"worn": names}
+        name = f"{scenario.name}_{content_key(asdict(scenario))[:8]}"  # names are unique by content
+        return replace(scenario, name=name), {"stations": moved} if moved else {"worn": names}
 
 
 def _variant_key(varied: Mapping[str, Any]) -> str:

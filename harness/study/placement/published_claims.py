@@ -1,8 +1,10 @@
-"""What a paper says of a set of trackers, held against ours: that it suffices.
+"""A paper's claim that a set of stations suffices, tested on our results.
 
-To suffice is taken apart into two claims. No other set of as many of the paper's trackers errs less: held against
-the one that errs least among them, chosen on other clips than those it is judged on where there are such. And all of
-the paper's trackers together err hardly less: the set's error is within a margin of theirs.
+The claim is split into two:
+
+- no other set of the same size, from the paper's stations, errs less. It is tested against the best of these, which is
+  chosen on other clips where there are held-out clips;
+- all of the paper's stations together err hardly less: the error of the set is within a margin of theirs.
 """
 
 import itertools
@@ -19,46 +21,46 @@ from harness.study.placement.ranking import Costs, complete_sets, join_names, so
 def sets_of_claim(
     claim: PublishedClaim, units: Sequence[CandidateGroup]
 ) -> tuple[StationSet, list[StationSet], StationSet]:
-    """The set that suffices, the others of as many stations, and all of the paper's trackers."""
+    """The claimed set, the other sets of the same size, and the set of all of the paper's stations."""
     where = f"the claim {claim.text!r}"
-    of = select_groups(claim.among, units, where)
-    suited, whole = station_set(select_groups(claim.set, units, where), units), station_set(of, units)
-    alike = [
-        station_set(each, units)
-        for n in range(1, len(suited) + 1)
-        for each in itertools.combinations(of, n)
-        if sum(map(len, each)) == len(suited)
+    groups = select_groups(claim.among, units, where)
+    claimed, full = station_set(select_groups(claim.set, units, where), units), station_set(groups, units)
+    same_size = [
+        station_set(combination, units)
+        for n in range(1, len(claimed) + 1)
+        for combination in itertools.combinations(groups, n)
+        if sum(map(len, combination)) == len(claimed)
     ]
-    return suited, [one for one in alike if one != suited], whole
+    return claimed, [stations for stations in same_size if stations != claimed], full
 
 
 def best_alternative(others: Sequence[StationNames], costs: Mapping[StationNames, Costs]) -> StationNames:
-    """The one that errs least; () of none that was measured."""
-    whole, _ = complete_sets({one: costs[one] for one in others})
-    return next(iter(sort_by_cost(whole)), ())
+    """The set with the least cost; () if none was measured."""
+    complete, _ = complete_sets({names: costs[names] for names in others})
+    return next(iter(sort_by_cost(complete)), ())
 
 
 def evaluate_claim(
     claim: PublishedClaim,
-    suited: StationNames,
+    claimed: StationNames,
     other: StationNames,
-    whole: StationNames,
+    full: StationNames,
     costs: Mapping[StationNames, Costs],
     *,
     unit: str,
-    judged_on: str,
+    basis: str,
 ) -> tuple[Claim, Claim]:
-    """Both claims, by costs on the clips that they are judged on, in the words of `judged_on`."""
-    found = {
-        one: {clip: value for clip, value in costs.get(one, {}).items() if value is not None}
-        for one in (suited, other, whole)
+    """Evaluate both claims by costs on the test clips, which `basis` describes in words."""
+    measured = {
+        names: {clip: value for clip, value in costs.get(names, {}).items() if value is not None}
+        for names in (claimed, other, full)
     }
-    allowed = {clip: (1.0 + claim.margin) * value for clip, value in found[whole].items()}
-    of_its_size = f"{claim.text}: no other {len(suited)} of them err less (against the best other, {join_names(other)})"
-    within = f"{claim.text}: {join_names(suited)} err at most {claim.margin:.0%} more than all {len(whole)}"
-    published = f"said by {claim.source}"
-    why = "; ".join(filter(None, (claim.why_not, judged_on)))
+    allowed = {clip: (1.0 + claim.margin) * value for clip, value in measured[full].items()}
+    best_of_size = f"{claim.text}: no other {len(claimed)} stations err less (against the best, {join_names(other)})"
+    within = f"{claim.text}: {join_names(claimed)} err at most {claim.margin:.0%} more than all {len(full)}"
+    published = f"stated by {claim.source}"
+    why = "; ".join(filter(None, (claim.why_not, basis)))
     return (
-        claim_lower_error(of_its_size, found[suited], found[other], published=published, unit=unit, why=why),
-        claim_lower_error(within, found[suited], allowed, published=published, unit=unit, why=why),
+        claim_lower_error(best_of_size, measured[claimed], measured[other], published=published, unit=unit, why=why),
+        claim_lower_error(within, measured[claimed], allowed, published=published, unit=unit, why=why),
     )

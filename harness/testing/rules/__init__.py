@@ -1,7 +1,8 @@
-"""The rules that every reconstructor must keep, by kind.
+"""The rules of the contract suite, which every reconstructor must satisfy.
 
-They judge conduct, not accuracy: a method that always answers with the T-pose keeps them all. Each is a function that
-returns what was seen where the rule holds, and raises `seen.Broken` with what was seen where it does not.
+They test behaviour, not accuracy: a method that always returns the T-pose satisfies all of them. Each rule is a
+function. It returns a description of what it measured, or raises `assertions.RuleViolation` with a description of
+the fault.
 """
 
 from collections.abc import Callable
@@ -11,22 +12,22 @@ from harness.testing.rules import degraded_input, reproducibility, semantics, si
 
 Rule = Callable[[ContractCase], str]
 RULES: dict[str, Rule] = {
-    "every answer is a pose": degraded_input.gives_valid_poses,
-    "poor input is borne": degraded_input.tolerates_partial_readings,
-    "losses are borne": degraded_input.tolerates_dropouts,
-    "irregular time is borne": degraded_input.tolerates_irregular_timing,
-    "any quality is borne": degraded_input.tolerates_any_quality,
-    "any set of stations is borne": degraded_input.supports_other_stations,
-    "equal input gives equal answers": reproducibility.is_deterministic,
-    "a session starts from nothing": reproducibility.starts_without_history,
-    "sessions do not meet": reproducibility.isolates_sessions,
-    "sessions may run in threads": reproducibility.is_thread_safe,
-    "what was fitted may go to another process": reproducibility.works_in_another_process,
-    "an answer rests on no later frame": reproducibility.is_causal,
-    "examples stay as they are": side_effects.preserves_examples,
-    "chance is the generator given": side_effects.preserves_global_random_state,
-    "the status tells what the answer rests on": semantics.reports_tracking_loss,
-    "the error comes back to what it was": semantics.recovers_from_disturbances,
-    "the posture does not depend on the place": semantics.is_invariant_to_placement,
+    "every estimate is a valid pose": degraded_input.gives_valid_poses,
+    "partial readings are tolerated": degraded_input.tolerates_partial_readings,
+    "lost stations are tolerated": degraded_input.tolerates_dropouts,
+    "irregular frame times are tolerated": degraded_input.tolerates_irregular_timing,
+    "any reading quality is tolerated": degraded_input.tolerates_any_quality,
+    "any set of stations is supported": degraded_input.supports_other_stations,
+    "equal input gives equal estimates": reproducibility.is_deterministic,
+    "a session does not depend on earlier sessions": reproducibility.starts_without_history,
+    "simultaneous sessions do not affect each other": reproducibility.isolates_sessions,
+    "sessions are thread-safe": reproducibility.is_thread_safe,
+    "a fitted method works in another process": reproducibility.works_in_another_process,
+    "estimates are causal": reproducibility.is_causal,
+    "examples are not modified": side_effects.preserves_examples,
+    "global random generators are not used": side_effects.preserves_global_random_state,
+    "the status reports lost stations": semantics.reports_tracking_loss,
+    "the error recovers after a disturbance": semantics.recovers_from_disturbances,
+    "the posture does not depend on position and heading": semantics.is_invariant_to_placement,
 }
-"""What they are called, in the order in which they are tried."""
+"""Name -> rule, in the order in which they are checked."""

@@ -1,4 +1,4 @@
-"""What a rule sees: `RuleViolation` where it is not kept, and the two things that many of them look for."""
+"""Assertions that the rules share; they raise `RuleViolation`."""
 
 import numpy as np
 
@@ -8,34 +8,36 @@ from harness.testing.contract_case import ContractCase, Frames
 
 
 class RuleViolation(Exception):
-    """What was seen of a rule that is not kept."""
+    """A rule does not hold; the message describes the fault."""
 
 
-def require_poses(trial: ContractCase, frames: Frames) -> str:
-    """Every answer of a new session is a pose, and how many there were."""
-    for index, estimate in enumerate(trial.run(frames)):
-        require_pose(trial, index, estimate)
+def require_poses(case: ContractCase, frames: Frames) -> str:
+    """Require valid poses of a new session; returns the number of frames as text."""
+    for index, estimate in enumerate(case.run(frames)):
+        require_pose(case, index, estimate)
     return f"{len(frames)} frames"
 
 
-def require_pose(trial: ContractCase, index: int, estimate: Estimate) -> None:
-    """Finite, of unit quaternion, near the stations, with a status."""
+def require_pose(case: ContractCase, index: int, estimate: Estimate) -> None:
+    """Require a finite configuration (55,) with a unit root quaternion near the stations, and a status."""
     qpos = np.asarray(estimate.qpos)
     if qpos.shape != (55,) or not np.all(np.isfinite(qpos)):
-        wrong = np.count_nonzero(~np.isfinite(qpos))
-        raise RuleViolation(f"frame {index} has {wrong} numbers that are not finite, of {qpos.shape}")
+        count = np.count_nonzero(~np.isfinite(qpos))
+        raise RuleViolation(f"qpos in frame {index} has shape {qpos.shape} and {count} non-finite numbers")
     if abs(float(np.linalg.norm(qpos[3:7])) - 1.0) > 1e-6:
-        raise RuleViolation(f"frame {index} has a root quaternion of length {np.linalg.norm(qpos[3:7]):.6f}")
-    if np.any(qpos[:3] < trial.bounds[0]) or np.any(qpos[:3] > trial.bounds[1]):
-        raise RuleViolation(f"frame {index} puts the root at {np.round(qpos[:3], 2)}, far from every station")
+        raise RuleViolation(f"the root quaternion in frame {index} has length {np.linalg.norm(qpos[3:7]):.6f}")
+    if np.any(qpos[:3] < case.bounds[0]) or np.any(qpos[:3] > case.bounds[1]):
+        raise RuleViolation(f"the root in frame {index} is at {np.round(qpos[:3], 2)}, far from every station")
     if not isinstance(estimate.status, Status):
-        raise RuleViolation(f"frame {index} has the status {estimate.status!r}")
+        raise RuleViolation(f"the status in frame {index} is {estimate.status!r}, not a Status")
 
 
-def require_identical(one: Floats, other: Floats, how: str = "differ") -> str:
-    """(F, 55) answers and those that should be the same, to the bit."""
-    differing = np.flatnonzero(np.any(one != other, axis=1))
+def require_identical(qpos: Floats, expected_qpos: Floats, verb: str = "differ") -> str:
+    """Require two sets of estimates (F, 55) to be identical to the bit; `verb` describes the fault."""
+    differing = np.flatnonzero(np.any(qpos != expected_qpos, axis=1))
     if len(differing):
-        most = float(np.max(np.abs(one - other)))
-        raise RuleViolation(f"{len(differing)} answers {how}, the first in frame {differing[0]}, by up to {most:.3g}")
-    return f"{len(one)} answers to the bit"
+        most = float(np.max(np.abs(qpos - expected_qpos)))
+        raise RuleViolation(
+            f"{len(differing)} estimates {verb}, the first in frame {differing[0]}, by up to {most:.3g}"
+        )
+    return f"{len(qpos)} estimates are identical to the bit"

@@ -1,4 +1,4 @@
-"""Rules about answers that must be the same to the bit: again, beside another session, elsewhere, whatever follows."""
+"""Rules about estimates that must be identical to the bit: repeated, in parallel, in another process, causal."""
 
 import threading
 from dataclasses import replace
@@ -22,47 +22,47 @@ from harness.testing.contract_case import (
 from harness.testing.rules.assertions import require_identical
 
 
-def is_deterministic(trial: ContractCase) -> str:
-    """The same examples and frames give the same answers."""
-    once, again = (stack_qpos(run_session(trial.begin_sessions(1)[0], trial.frames)) for _ in range(2))
-    return require_identical(once, again)
+def is_deterministic(case: ContractCase) -> str:
+    """The same examples and frames give the same estimates."""
+    first, second = (stack_qpos(run_session(case.begin_sessions(1)[0], case.frames)) for _ in range(2))
+    return require_identical(first, second)
 
 
-def starts_without_history(trial: ContractCase) -> str:
-    """A session knows nothing of the one before it."""
-    reconstructor = trial.fit()
-    once, again = (stack_qpos(run_session(reconstructor.begin(trial.calibration), trial.frames)) for _ in range(2))
-    return require_identical(once, again)
+def starts_without_history(case: ContractCase) -> str:
+    """A session is not affected by the session before it."""
+    reconstructor = case.fit()
+    first, second = (stack_qpos(run_session(reconstructor.begin(case.calibration), case.frames)) for _ in range(2))
+    return require_identical(first, second)
 
 
-def isolates_sessions(trial: ContractCase) -> str:
-    """A session knows nothing of one beside it, whose frames run backwards."""
-    alone, ours, other = trial.begin_sessions(3)
-    plain, beside = stack_qpos(run_session(alone, trial.frames)), []
-    for mine, theirs in zip(trial.frames, reversed(trial.frames), strict=True):
-        beside.append(ours.step(mine))
-        other.step(theirs)
-    return require_identical(plain, stack_qpos(beside))
+def isolates_sessions(case: ContractCase) -> str:
+    """A session is not affected by a simultaneous one whose frames run backwards."""
+    alone, tested, other = case.begin_sessions(3)
+    expected, interleaved = stack_qpos(run_session(alone, case.frames)), []
+    for frame, other_frame in zip(case.frames, reversed(case.frames), strict=True):
+        interleaved.append(tested.step(frame))
+        other.step(other_frame)
+    return require_identical(expected, stack_qpos(interleaved))
 
 
-def is_thread_safe(trial: ContractCase) -> str:
-    """Two sessions step at the same moment, each in a thread of its own."""
-    alone, *both = trial.begin_sessions(3)
-    plain = stack_qpos(run_session(alone, trial.frames))
-    together = threading.Barrier(len(both))
-    answers: list[list[Estimate]] = [[] for _ in both]
+def is_thread_safe(case: ContractCase) -> str:
+    """Two sessions step at the same time, each in a thread of its own."""
+    alone, *sessions = case.begin_sessions(3)
+    expected = stack_qpos(run_session(alone, case.frames))
+    barrier = threading.Barrier(len(sessions))
+    estimates: list[list[Estimate]] = [[] for _ in sessions]
     errors: list[BaseException] = []
 
-    def follow(session: Session, into: list[Estimate]) -> None:
+    def follow(session: Session, output: list[Estimate]) -> None:
         try:
-            for frame in trial.frames:
-                together.wait()
-                into.append(session.step(frame))
-        except BaseException as error:  # told by the caller's thread
+            for frame in case.frames:
+                barrier.wait()
+                output.append(session.step(frame))
+        except BaseException as error:  # raised again in the caller's thread
             errors.append(error)
-            together.abort()
+            barrier.abort()
 
-    threads = [threading.Thread(target=follow, args=pair) for pair in zip(both, answers, strict=True)]
+    threads = [threading.Thread(target=follow, args=pair) for pair in zip(sessions, estimates, strict=True)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -70,40 +70,40 @@ def is_thread_safe(trial: ContractCase) -> str:
     for error in errors:
         if not isinstance(error, threading.BrokenBarrierError):
             raise error
-    for said in answers:
-        require_identical(plain, stack_qpos(said))
-    return "2 threads"
+    for output in estimates:
+        require_identical(expected, stack_qpos(output))
+    return "2 sessions in 2 threads"
 
 
-def works_in_another_process(trial: ContractCase) -> str:
-    """What was fitted is sent to another process, where it answers as it does here."""
-    task = trial.fit(), trial.calibration, trial.frames
-    ((_, there),) = run_in_workers(estimate_qpos, [task], 1)
-    return require_identical(estimate_qpos(*task), there.result())
+def works_in_another_process(case: ContractCase) -> str:
+    """The fitted method can be sent to another process and gives the same estimates there."""
+    task = case.fit(), case.calibration, case.frames
+    ((_, future),) = run_in_workers(estimate_qpos, [task], 1)
+    return require_identical(estimate_qpos(*task), future.result())
 
 
-def is_causal(trial: ContractCase) -> str:
-    """What comes later changes nothing that was said before; answers are read again once all is over."""
+def is_causal(case: ContractCase) -> str:
+    """Later frames do not change earlier estimates, and an estimate does not change after it was returned."""
     half = FRAMES // 2
-    later = [
+    perturbed_frames = [
         replace(
             rotate_orientations(offset_positions(frame, np.array([0.3, 0.3, 0.3])), 0.5),
             received_s=frame.received_s + 0.1,
             measured_s=frame.measured_s + 0.1,
         )
-        for frame in trial.frames[half:]
+        for frame in case.frames[half:]
     ]
-    one, other = trial.begin_sessions(2)
-    spoken, estimates = [], []
-    for frame in trial.frames:
-        estimates.append(one.step(frame))
-        spoken.append(np.array(estimates[-1].qpos))
-    perturbed = stack_qpos(run_session(other, [*trial.frames[:half], *later]))
-    plain = stack_qpos(estimates)
-    require_identical(plain[:half], perturbed[:half], "changed by later frames")
-    return require_identical(np.array(spoken), plain, "changed after they were given")
+    session, other = case.begin_sessions(2)
+    copies, estimates = [], []
+    for frame in case.frames:
+        estimates.append(session.step(frame))
+        copies.append(np.array(estimates[-1].qpos))
+    perturbed = stack_qpos(run_session(other, [*case.frames[:half], *perturbed_frames]))
+    final = stack_qpos(estimates)
+    require_identical(final[:half], perturbed[:half], "depend on later frames")
+    return require_identical(np.array(copies), final, "changed after they were returned")
 
 
 def estimate_qpos(fitted: Reconstructor, calibration: Calibration, frames: Frames) -> Floats:
-    """(F, 55) of a new session."""
+    """(F, 55) estimates of a new session."""
     return stack_qpos(run_session(fitted.begin(calibration), frames))

@@ -1,4 +1,4 @@
-"""Rules about what is not a method's own: examples, and the generators that everyone draws from."""
+"""Rules about side effects: on the examples, and on the global random generators."""
 
 import random
 
@@ -9,29 +9,29 @@ from harness.testing.contract_case import ContractCase, hash_motions, run_sessio
 from harness.testing.rules.assertions import RuleViolation
 
 
-def preserves_examples(trial: ContractCase) -> str:
-    """Fitting and following change none of the examples."""
-    examples = trial.examples()
+def preserves_examples(case: ContractCase) -> str:
+    """Fitting and stepping do not modify the examples."""
+    examples = case.examples()
     before = hash_motions(examples)
-    reconstructor = trial.method.fit(trial.body, examples, generator(1, "fit"))
-    run_session(reconstructor.begin(trial.calibration), trial.frames[:5])
+    reconstructor = case.method.fit(case.body, examples, generator(1, "fit"))
+    run_session(reconstructor.begin(case.calibration), case.frames[:5])
     if hash_motions(examples) != before:
-        raise RuleViolation("the examples are others than before")
-    return f"{len(examples)} takes"
+        raise RuleViolation("the examples were modified")
+    return f"{len(examples)} takes are unchanged"
 
 
-def preserves_global_random_state(trial: ContractCase) -> str:
-    """Chance comes from the generator that `fit` is given: numpy's and Python's own are left alone."""
-    numpys = np.random.mtrand._rand
-    kept = numpys.get_state(), random.getstate()
+def preserves_global_random_state(case: ContractCase) -> str:
+    """Random numbers come from the generator that `fit` receives, not from those of numpy and Python."""
+    global_generator = np.random.mtrand._rand
+    saved = global_generator.get_state(), random.getstate()
     try:
-        numpys.seed(20_110_218)
+        global_generator.seed(20_110_218)
         random.seed(20_110_218)
-        before = repr(numpys.get_state(legacy=False)), random.getstate()
-        run_session(trial.begin_sessions(1)[0], trial.frames[:5])
-        if (repr(numpys.get_state(legacy=False)), random.getstate()) != before:
-            raise RuleViolation("a global generator was seeded or drawn from")
+        before = repr(global_generator.get_state(legacy=False)), random.getstate()
+        run_session(case.begin_sessions(1)[0], case.frames[:5])
+        if (repr(global_generator.get_state(legacy=False)), random.getstate()) != before:
+            raise RuleViolation("a global random generator of numpy or Python was seeded or drawn from")
     finally:
-        numpys.set_state(kept[0])
-        random.setstate(kept[1])
-    return "numpy's and Python's own untouched"
+        global_generator.set_state(saved[0])
+        random.setstate(saved[1])
+    return "those of numpy and Python are unchanged"

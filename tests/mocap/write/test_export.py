@@ -21,7 +21,7 @@ from harness.mocap.write.export import FORMATS, export
 from harness.mocap.write.tum import POINTS
 from harness.score.pair import Pair, compute_poses
 from harness.score.positions import root_position_mm
-from harness.testing.score_checks import find_evo, run_evo_ape_m
+from harness.testing.doctor import find_evo, run_evo_ape_m
 
 FRAMES, RATE_HZ = 50, 40.0
 SKELETON = standard_skeleton().with_bones(standard_skeleton().bone_m * 1.1)

@@ -68,7 +68,10 @@ def test_the_first_line_is_the_verdict() -> None:
         (comparison(methods=("ik", "dynamic_map")), "B is not worse than A: of 4 gated lines on 24 clips"),
         (comparison(3), "It cannot be decided whether B is worse than A: 7 lines were judged."),
         (told([], outcome=Outcome.INCOMPLETE, why="planned cells are missing: A: ik"), "missing: A: ik."),
-        (told([], why="no cell of A has a partner in B"), "It cannot be decided whether B is worse than A: no cell of A has a partner in B."),
+        (
+            told([], why="no cell of A has a partner in B"),
+            "It cannot be decided whether B is worse than A: no cell of A has a partner in B.",
+        ),
     ],
 )
 def test_one_sentence_says_what_came_of_it(shown: Comparison, said: str, tmp_path: Path) -> None:

@@ -24,8 +24,8 @@ def test_modes_of_a_plane_are_two_and_find_its_axes(rng: np.random.Generator) ->
     axes = np.linalg.qr(rng.normal(size=(9, 2)))[0].T
     weights = rng.normal(size=(4_000, 2)) * [3.0, 0.5]
     found = fit_eigenmodes(7.0 + weights @ axes)
-    assert found.kept[0] == pytest.approx(9.0 / 9.25, abs=0.01)
-    assert found.kept[1] == pytest.approx(1.0, abs=1e-12)
+    assert found.explained[0] == pytest.approx(9.0 / 9.25, abs=0.01)
+    assert found.explained[1] == pytest.approx(1.0, abs=1e-12)
     np.testing.assert_allclose(found.spread[:2], [3.0, 0.5], rtol=0.05)
     assert np.abs(np.vecdot(found.modes[:2], axes)).min() > 0.99
 
@@ -34,9 +34,9 @@ def test_modes_of_a_plane_are_two_and_find_its_axes(rng: np.random.Generator) ->
 def test_shares_grow_to_one_and_units_do_not_matter(people: int) -> None:
     length_m = _lengths_m(people)
     found = fit_eigenmodes(length_m)
-    assert np.all(np.diff(found.kept) >= -1e-12)
-    assert found.kept[-1] == pytest.approx(1.0)
-    np.testing.assert_allclose(fit_eigenmodes(1e3 * length_m).kept, found.kept, atol=1e-12)
+    assert np.all(np.diff(found.explained) >= -1e-12)
+    assert found.explained[-1] == pytest.approx(1.0)
+    np.testing.assert_allclose(fit_eigenmodes(1e3 * length_m).explained, found.explained, atol=1e-12)
     np.testing.assert_allclose(found.modes @ found.modes.T, np.eye(len(found.modes)), atol=1e-10)
     largest = np.take_along_axis(found.modes, np.abs(found.modes).argmax(axis=1, keepdims=True), axis=1)
     assert np.all(largest > 0.0)
@@ -70,4 +70,4 @@ def test_fewer_people_leave_less_to_lose() -> None:
     assert np.all(np.diff(shares, axis=1) >= 0.0)
     np.testing.assert_allclose(shares[0], 1.0, atol=1e-9)
     assert np.all(np.diff(shares[:, 1]) < 0.005)
-    np.testing.assert_allclose(shares[-1], fit_eigenmodes(length_m).kept[MODES - 1], atol=1e-9)
+    np.testing.assert_allclose(shares[-1], fit_eigenmodes(length_m).explained[MODES - 1], atol=1e-9)

@@ -91,7 +91,7 @@ def test_what_did_not_run_is_said_not_to_have_run(tmp_path: Path) -> None:
         assert set(experiment.runs) <= set(study.runs)
     told = [claim for claim in PAPER.experiments["sparse"](study).claims if "table tennis" in claim.text]
     assert told
-    assert all("built-in performer only" in claim.why for claim in told)
+    assert all("use synthetic motion" in claim.why for claim in told)
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ def test_on_real_motion_known_and_new_performers_stand_apart_and_what_is_absent_
     assert verdicts(found, "golf") == {"cannot tell": 6}  # one
     (absent,) = [claim for claim in found.claims if claim.verdict == "not run"]
     assert absent.text.startswith("table tennis")
-    assert "built-in performer only" in absent.why
+    assert "use synthetic motion" in absent.why
 
 
 def test_what_failed_is_not_run() -> None:

@@ -59,7 +59,7 @@ def test_the_study_says_what_it_rests_on(finished: Path) -> None:
     tables = {table.title.split(" (")[0]: table for table in read_findings(finished / "findings.json").tables}
     (left_out,) = {row[1:] for row in tables["Left out"].rows}
     assert left_out == ("walking_p3_01", "two clips are enough")
-    databases = {row[0]: row for row in tables["Clips: judged, and learnt from"].rows}
+    databases = {row[0]: row for row in tables["Test clips and examples"].rows}
     assert databases["walks"][2:] == ("walking_p1_01, walking_p2_01", "2: walking_p1_02, walking_p2_02", "1,600")
     constants = {row[0]: row[1] for row in tables["Constants of the methods"].rows}
     assert set(constants) == set(WALKS.methods)

@@ -1,4 +1,4 @@
-"""docs/papers.md says what there is."""
+"""docs/papers.md agrees with the experiments and their scenarios."""
 
 import importlib.util
 import re
@@ -35,11 +35,12 @@ def test_every_file_that_is_named_is_there() -> None:
 
 
 def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
-    """Where nothing ran it says so."""
+    """The experiment in the text runs; without results its claim is "not run"."""
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     imports = (
-        "from harness.results.findings import Experiment\nfrom harness.study.papers.claims import errs_less\n"
-        "from harness.study.papers.paper_study import Study\nfrom harness.study.papers.tables import by_clip, mean_bars\n\n\n"
+        "from harness.results.findings import PaperExperiment\nfrom harness.study.papers.claims import claim_lower_error\n"
+        "from harness.study.papers.paper_study import PaperStudy\n"
+        "from harness.study.papers.tables import errors_by_clip, mean_bars\n\n\n"
     )
     file = tmp_path / "swords.py"
     file.write_text(imports + code)

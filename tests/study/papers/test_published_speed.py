@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from harness.experiment.round_robin_timing import MethodSpeed
 from harness.results.findings import BarChart
 from harness.study.papers import published_speed as module
-from harness.study.papers.method_speed import MethodSpeed
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.published_speed import KIM2012, LIU2011, PublishedSpeed, compare_speed, make_speed_experiment
 
@@ -17,7 +17,7 @@ TINY = PublishedSpeed(
 
 
 def pace(method: str, frames: int, fps: float, p99_ms: float = 1.0) -> MethodSpeed:
-    return MethodSpeed(method, frames, 700, fps, 1e3 / fps, p99_ms, 5.0, 1.0, 0.5, 2.0)
+    return MethodSpeed(method, frames, 700, fps, 1e3 / fps, p99_ms, 5.0, 1.0, {"ik": 0.5}, 2.0)
 
 
 def paces(
@@ -47,8 +47,8 @@ def test_the_papers_databases_have_the_frames_that_they_state() -> None:
 @pytest.mark.parametrize(("published", "claims"), [(LIU2011, 4), (KIM2012, 1)])
 def test_the_slowest_database_decides(published: PublishedSpeed, claims: int) -> None:
     last = list(published.databases)[-1]
-    fast = make_speed_experiment(published, paces(published, published.fps + 1.0), on="this machine", real=False)
-    slow = make_speed_experiment(published, paces(published, published.fps, 26.0), on="this machine", real=False)
+    fast = make_speed_experiment(published, paces(published, published.fps + 1.0), machine="this machine", real=False)
+    slow = make_speed_experiment(published, paces(published, published.fps, 26.0), machine="this machine", real=False)
     assert len(fast.claims) == len(slow.claims) == claims
     assert {claim.verdict for claim in fast.claims} == {"reproduced"}
     assert {claim.verdict for claim in slow.claims} == {"not reproduced"}
@@ -58,16 +58,16 @@ def test_the_slowest_database_decides(published: PublishedSpeed, claims: int) ->
 
 
 def test_a_smaller_database_is_not_comparable_and_none_not_run() -> None:
-    small = make_speed_experiment(LIU2011, paces(LIU2011, 1_000.0, share=0.5), on="this machine", real=False)
+    small = make_speed_experiment(LIU2011, paces(LIU2011, 1_000.0, share=0.5), machine="this machine", real=False)
     assert {claim.verdict for claim in small.claims} == {"not comparable"}
     assert "walking 9,080 of 18,160" in small.claims[0].why
-    none = make_speed_experiment(LIU2011, {}, on="this machine", real=True, absent=["golf: there is none"])
+    none = make_speed_experiment(LIU2011, {}, machine="this machine", real=True, absent=["golf: there is none"])
     assert {claim.verdict for claim in none.claims} == {"not run"}
     assert "golf: there is none" in none.notes[-1]
 
 
 def test_tables_and_bars_have_every_pace() -> None:
-    told = make_speed_experiment(LIU2011, paces(LIU2011, 500.0), on="this machine", real=False)
+    told = make_speed_experiment(LIU2011, paces(LIU2011, 500.0), machine="this machine", real=False)
     (table,), (bars,) = told.tables, told.figures
     assert len(table.rows) == len(LIU2011.databases) * len(LIU2011.methods)
     assert all(len(row) == len(table.columns) for row in table.rows)
