@@ -164,7 +164,11 @@ class CalibrationAccuracy:
             found = np.rad2deg([errors.miss_rad for errors in self.done])
             lines[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
         table = Table(TABLE_HEADER, [spread.row() for spread in self.spreads()])
-        return [*lines, *(table.lines() if self.done else []), *(f"{name}: {why}" for name, why in self.refused.items())]
+        return [
+            *lines,
+            *(table.lines() if self.done else []),
+            *(f"{name}: {why}" for name, why in self.refused.items()),
+        ]
 
 
 def measure_calibration_accuracy(
