@@ -1,4 +1,4 @@
-"""One line of `harness bench`: what was measured, beside what it is held to."""
+"""Rows of `harness bench`: a measured value, its reference and its target."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -6,28 +6,29 @@ from dataclasses import dataclass, field, fields
 
 @dataclass(frozen=True)
 class BenchmarkRow:
-    """A figure of one run; figures of different runs or machines are compared through `reference` only."""
+    """A value of one run. Compare runs or machines only by values that are relative to a reference of the same run."""
 
     name: str
-    """What was measured, such as "ik, six trackers, converged"."""
+    """Name of the quantity, such as "ik, six trackers, converged"."""
     value: float
-    """The figure itself, in `unit`."""
+    """The value, in `unit`."""
     unit: str
-    """Such as "frames/s"."""
+    """The unit, such as "frames/s"."""
     reference: str
-    """What it was measured against in the same run, or "" when it stands alone."""
+    """The reference that was measured in the same run; "" without one."""
     target: str
-    """What it is held to, such as ">= 1500"; "" when it is for information."""
+    """The target, such as ">= 1500"; "" where the value is for information."""
     more: Mapping[str, str | float] = field(default_factory=dict)
-    """What else there is to say, for programs: further entries of `as_dict`."""
+    """Further entries of `as_dict`, for programs."""
 
     def as_dict(self) -> dict[str, str | float]:
+        """The entries of the JSON output."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "more"} | dict(self.more)
 
 
 def format_rows(rows: Sequence[BenchmarkRow]) -> str:
-    """A table of rows, one a line."""
-    lines = [("what", "measured", "", "held to", "measured against, in the same run")]
+    """Format rows as a text table."""
+    lines = [("quantity", "measured", "", "target", "reference, in the same run")]
     lines += [
         (r.name, f"{r.value:,.3g}" if r.value < 100 else f"{r.value:,.0f}", r.unit, r.target, r.reference) for r in rows
     ]

@@ -31,7 +31,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # what a method prints is talk
         each = process_executor(args.jobs)
         findings, outcome = run_placement(
-            args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
+            args.study, out, folder=args.mocap, executor=each, command=this_command(), progress=bar
         )
     page = write_placement_page(out)
     content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}
