@@ -1,10 +1,10 @@
 """False alarms and detections of the regression gate, measured by simulated comparisons with known truth.
 
-A comparison is drawn from stored errors of two equally good sides (see `null_errors`). Clips are drawn with replacement,
-the same for all methods and metrics. For each method and clip, a random swap decides which side is A, so that neither
-is better, while methods, metrics and clips keep their dependence. Fifteen lines (five methods, three metrics) are tested
-as in a comparison, with its margins. A false alarm is any line called worse. For detections, one metric of one side B is
-also multiplied by 1.03; it is detected if that line is called worse.
+A comparison is drawn from stored errors of two equally good sides (see `null_errors`). Clips are drawn with
+replacement, the same for all methods and metrics. For each method and clip, a random swap decides which side is A, so
+that neither is better, while methods, metrics and clips keep their dependence. Fifteen lines (five methods, three
+metrics) are tested as in a comparison, with its margins. A false alarm is any line called worse. For detections, one
+metric of one side B is also multiplied by 1.03; it is detected if that line is called worse.
 """
 
 from collections.abc import Callable
@@ -63,7 +63,7 @@ def exchanged(population: ErrorPopulation, clips: int, rng: np.random.Generator)
 
 
 def heavy(population: ErrorPopulation, clips: int, rng: np.random.Generator) -> Floats:
-    """As `exchanged`, with differences multiplied by |Student's t with 2 degrees of freedom|: some clips are outliers."""
+    """As `exchanged`, with differences multiplied by |Student's t, 2 degrees of freedom|: some clips are outliers."""
     errors = exchanged(population, clips, rng)
     stretch = np.abs(rng.standard_t(2, (len(population.methods), 1, clips)))
     return np.stack([errors[..., 0], errors[..., 0] + stretch * (errors[..., 1] - errors[..., 0])], axis=-1)

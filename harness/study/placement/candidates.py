@@ -118,7 +118,7 @@ def mirror_place(place: StationPlacement) -> StationPlacement:
     if not place.side:
         return moved
     other = _OPPOSITE_SIDE[place.side]
-    return replace(moved, name=f"{other}_{one.name.removeprefix(f'{place.side}_')}", side=other)
+    return replace(moved, name=f"{other}_{place.name.removeprefix(f'{place.side}_')}", side=other)
 
 
 def make_candidate_groups(
