@@ -139,10 +139,10 @@ def test_exhaustive_counts_before_it_begins() -> None:
     for most in (1, 2, 3, 6):
         sets = len(exhaustive_sets(ExhaustiveOptions(most=most), UNITS))
         check_cell_count(ExhaustiveOptions(most=most, most_cells=8 * sets), UNITS, 8)
-        with pytest.raises(BadInput, match=f"{sets:,} sets of up to {most} of 6 trackers are {8 * sets:,} cells"):
+        with pytest.raises(BadInput, match=f"{sets:,} sets of up to {most} of 6 stations are {8 * sets:,} cells"):
             check_cell_count(ExhaustiveOptions(most=most, most_cells=8 * sets - 1), UNITS, 8)
     many = make_candidate_groups([Candidate(f"c{n}", "thorax", 0.5, float(n)) for n in range(60)])
-    with pytest.raises(BadInput, match=r"cells, about [\d,]+ days of one worker") as refusal:
+    with pytest.raises(BadInput, match=r"cells, about [\d,]+ days for one worker") as refusal:
         check_cell_count(ExhaustiveOptions(most=12), many, 12)
     assert "greedy" in str(refusal.value)
 
