@@ -85,7 +85,7 @@ class ClipEvaluation:
             other._fitted = {}
             other._retargeted = {name: r for name, r in self._retargeted.items() if name == self.clip.name}
             other.__dict__.pop("examples", None)
-        for own in ("session", "calibrated", "simulation", "_worn", "_same_for_all"):
+        for own in ("session", "performer_calibration", "simulation", "_worn", "_same_for_all"):
             other.__dict__.pop(own, None)
         return other
 
@@ -93,7 +93,7 @@ class ClipEvaluation:
         """The same with methods told this of trackers, room and body; what was learnt on another body is not shared."""
         other = copy.copy(self)
         other.__dict__.pop("examples", None)
-        other.__dict__["calibrated"] = calibrated
+        other.__dict__["performer_calibration"] = calibrated
         other._fitted, other._retargeted = {}, {}
         return other
 
