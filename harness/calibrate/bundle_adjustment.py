@@ -1,4 +1,4 @@
-"""Bundle adjustment of calibration poses: eq. 1 of Liu et al. 2011 (docs/methods.md A3, H15).
+"""Bundle adjustment of calibration poses: eq. 1 of Liu et al. 2011 (docs/papers.md A3; docs/calibration.md).
 
 Residuals are in units of their standard deviation. Poses are coupled only by the shared unknowns, so each pose is
 eliminated alone (Schur complement). The reduced system is also the information about the shared unknowns when

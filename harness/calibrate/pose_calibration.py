@@ -1,4 +1,4 @@
-"""Calibration of skeleton and mounts from eight poses (Liu et al. 2011, eq. 1; docs/methods.md A3, H15).
+"""Calibration of skeleton and mounts from eight poses (Liu et al. 2011, eq. 1; docs/papers.md A3; docs/calibration.md).
 
 Differences from eq. 1:
 

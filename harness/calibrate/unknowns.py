@@ -1,6 +1,6 @@
 """The unknowns of the eight-pose calibration and their prior (Liu et al. 2011, eq. 1, its last term).
 
-All poses share bones, mode weights and mounts; each pose has a root and hinges of its own (docs/methods.md H15).
+All poses share bones, mode weights and mounts; each pose has a root and hinges of its own (docs/calibration.md).
 """
 
 from collections.abc import Sequence

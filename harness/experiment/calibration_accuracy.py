@@ -1,4 +1,4 @@
-"""Accuracy of the calibration from eight poses, on simulated performers (docs/methods.md H15).
+"""Accuracy of the calibration from eight poses, on simulated performers (docs/calibration.md).
 
 Errors against the truth stand next to the Cramér-Rao bound and to the errors of the mean skeleton.
 """

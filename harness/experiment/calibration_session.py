@@ -105,7 +105,7 @@ class CalibrationSession:
         return collector
 
     def solve(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:
-        """Solve for the calibration; `source` describes where the frames come from. NotStanding, BadInput."""
+        """Solve for the calibration; `source` describes where the frames come from. UnusableHold, BadInput."""
         if self.kind == "poses":
             eight = calibrate_poses(held, self.space, self.mounts)
             calibration, skeleton, (words, lines) = (

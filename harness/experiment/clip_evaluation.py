@@ -231,7 +231,7 @@ class Observation:
 
     @cached_property
     def calibration(self) -> PerformerCalibration:
-        """The calibration that methods receive; NotStanding when the held poses do not suffice for one."""
+        """The calibration that methods receive; UnusableHold when the held poses do not suffice for one."""
         settings = self.scenario.calibrating
         model = {"miss_rad": float(np.deg2rad(settings.miss_deg)), "hold_s": settings.hold_s}
         match self.scenario.calibration:

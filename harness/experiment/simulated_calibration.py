@@ -97,7 +97,7 @@ def use_exact_calibration(session: TrackerSession) -> PerformerCalibration:
 
 
 def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
-    """Estimate mounts and room from a simulated T-pose; bone lengths are known. NotStanding if the pose is unusable."""
+    """Estimate mounts and room from a simulated T-pose; bone lengths are known. UnusableHold if the pose is unusable."""
     pose = tpose(session.body.skeleton)
     frames = session.observe_poses([pose], miss_rad=miss_rad, hold_s=hold_s)
     found = calibrate_tpose(frames, session.body, session.nominal)
@@ -112,7 +112,7 @@ def simulate_poses_calibration(
 ) -> PerformerCalibration:
     """Estimate bone lengths, mounts and room from eight simulated poses and a prior on bone lengths of other people.
 
-    Only the stream is known of the performer. NotStanding when the poses cannot be found in it, or are unusable.
+    Only the stream is known of the performer. UnusableHold when the poses cannot be found in it, or are unusable.
     """
     poses = [configuration(pose, session.body.skeleton) for pose in POSES]
     frames = session.observe_poses(poses, miss_rad=miss_rad, hold_s=hold_s)

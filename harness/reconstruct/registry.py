@@ -57,7 +57,7 @@ def methods() -> dict[str, Callable[[], Method]]:
 
 
 _ORIGINS = {
-    "ik": "docs/methods.md C1",
+    "ik": "docs/papers.md C1",
     "best_match": "Slyper & Hodgins 2008, who play the nearest example",
     "kernel_ridge": "kernel ridge regression, Saunders et al. 1998",
     "local_pca": "Chai & Hodgins 2005, as Liu et al. 2011 compare with it",

@@ -22,7 +22,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A fault of limited duration; sizes and lengths are those of docs/methods.md H ("recovery")."""
+    """A fault of limited duration; sizes and lengths are those of docs/metrics.md ("recovery")."""
 
     kind: Kind = "none"
     """Kind of fault.

@@ -31,7 +31,7 @@ def found_of(model: Model) -> PoseCalibration:
 
 
 def elbow_off_m(found: PoseCalibration, model: Model) -> Floats:
-    """(S,) errors of mounts; of a tracker on a wrist from the elbow, see docs/methods.md H15."""
+    """(S,) errors of mounts; of a tracker on a wrist from the elbow, see docs/calibration.md."""
     off_m = found.calibration.mount_m - model.truth.mount_m
     for row, bone in enumerate(found.calibration.bones):
         if bone.endswith("wrist"):

@@ -52,7 +52,7 @@ BOUNDS = {
     "ik:mean": Bound(4.0, 8.0),
     "ik:previous": Bound(4.0, 8.0),
     "ik:gaussian": Bound(4.0, 8.0),
-    "dynamic_map:literal": Bound(4.0, 12.0),  # it loses lock and begins anew by inverse kinematics (docs/methods.md F2)
+    "dynamic_map:literal": Bound(4.0, 12.0),  # it loses lock and restarts by IK (docs/notes/traps.md F2)
 }
 
 

@@ -1,4 +1,4 @@
-"""Windows of the last m poses, as vectors for a search: E, "world invariance" (docs/methods.md).
+"""Windows of the last m poses, as vectors for a search: E, "world invariance" (docs/papers.md).
 
 The window of frame k holds the poses k, k-1, ... k-m+1, newest first: the posture of k, then for every older pose its
 ground frame relative to that of k (forward, left, turn) and its posture, in metres and radians. These

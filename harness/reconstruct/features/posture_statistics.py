@@ -42,7 +42,7 @@ def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, cent
 def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
     """Principal hinge angles (T, 48) [rad], take by take, since a database may be larger than memory."""
     if isinstance(examples, MotionDatabase):
-        for run in examples.runs:
+        for run in examples.segments:
             yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
         examples.release_memory()
     else:

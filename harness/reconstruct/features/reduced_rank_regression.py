@@ -1,7 +1,7 @@
 """Reduced-rank regression of postures on history and readings; its leading directions are search features.
 
 Predictors of a frame are the window of the last m estimates (Liu et al. 2011, eq. 6 and 8) and the readings of the
-trackers (docs/methods.md G3). A ridge regression over the whole database maps them to the posture of the frame. The
+trackers (docs/notes/ideas.md G3). A ridge regression over the whole database maps them to the posture of the frame. The
 leading directions of its predictions are the features z, in which neighbours are searched and on which local models
 regress. So D_w of eq. 6 is learnt instead of the identity: what does not predict the posture does not count.
 

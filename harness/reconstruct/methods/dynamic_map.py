@@ -1,4 +1,4 @@
-"""Local dynamic model (`dynamic_map`): maximum a posteriori poses (docs/methods.md A4, A5, E, G3).
+"""Local dynamic model (`dynamic_map`): maximum a posteriori poses (docs/papers.md A4, A5, E).
 
 For every frame:
 

@@ -1,4 +1,4 @@
-"""Inverse kinematics (`ik`): the whole body is fitted to the trackers, frame by frame (docs/methods.md C1).
+"""Inverse kinematics (`ik`): the whole body is fitted to the trackers, frame by frame (docs/papers.md C1).
 
 Each frame is a robust least-squares problem in the 54 degrees of freedom, solved by Levenberg-Marquardt from the last
 estimate, within the hinges' limits. A weak Gaussian prior of the hinges settles what the trackers leave open. The root

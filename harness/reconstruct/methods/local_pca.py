@@ -1,4 +1,4 @@
-"""Local PCA (`local_pca`): the pose within a local linear model of similar examples (docs/methods.md C2).
+"""Local PCA (`local_pca`): the pose within a local linear model of similar examples (docs/papers.md C2).
 
 For every frame:
 

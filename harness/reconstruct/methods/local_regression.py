@@ -1,4 +1,4 @@
-"""Local regression: the steps that `kernel_cca` and `weighted_blend` have in common (docs/methods.md B).
+"""Local regression: the steps that `kernel_cca` and `weighted_blend` have in common (docs/papers.md B).
 
 For every frame (Kim et al. 2012):
 

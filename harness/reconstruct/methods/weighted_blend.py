@@ -1,4 +1,4 @@
-"""Weighted blend (`weighted_blend`): neighbours weighted by their closeness (docs/methods.md C3).
+"""Weighted blend (`weighted_blend`): neighbours weighted by their closeness (docs/papers.md C3).
 
 Weights fall with a power of the distance in feature space. All other steps are those of `local_regression`: neighbours,
 smoothing and inverse kinematics.

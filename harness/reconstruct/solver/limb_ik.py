@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics of arms and legs: the analytic final step of Kim et al. 2012 (docs/methods.md B5).
+"""Closed-form inverse kinematics of arms and legs: the analytic final step of Kim et al. 2012 (docs/papers.md B5).
 
 A limb is a ball joint (three hinges), one hinge, and an end of two or three hinges. The distance from shoulder or hip
 to a point beyond the elbow or knee depends on that one hinge alone, and the law of cosines gives its angle. The upper

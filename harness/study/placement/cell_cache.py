@@ -142,7 +142,7 @@ class CellCache:
         self.failures |= cells.failures
 
     def _variant(self, request: SetRequest, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
-        """The scenario that a set is a variant of, and its varied values: the stations, or the places of moved stations."""
+        """The scenario that a set is a variant of, and its varied values: stations, or places of moved stations."""
         rate = link_rate_hz(request.scenario, len(stations), request.link)
         scenario = replace(request.scenario, tracker=replace(request.scenario.tracker, rate_hz=rate), vary={})
         names = [station_name(place) for place in stations]

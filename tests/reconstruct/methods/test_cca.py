@@ -19,7 +19,7 @@ def planted(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
 
 
 def grams(x: Floats, y: Floats, new: Floats, width: float = 0.7) -> tuple[Floats, Floats, Floats]:
-    """Gaussian kernels of both sides (docs/methods.md E), and the query's."""
+    """Gaussian kernels of both sides (docs/papers.md E), and the query's."""
     sharpness = [0.5 / (width**2 * scipy.spatial.distance.pdist(side, "sqeuclidean").mean()) for side in (x, y)]
     far = [np.sum((side[:, None] - side) ** 2, axis=2) for side in (x, y)]
     kernels = [np.exp(-sharp * squared) for sharp, squared in zip(sharpness, far, strict=True)]

@@ -121,7 +121,7 @@ def test_what_is_far_from_all_examples_is_believed_less(walk: Scene) -> None:
 
 
 def test_with_positions_alone_the_heading_of_the_last_answers_does_not_matter(walk: Scene) -> None:
-    """A heading from the last estimate would feed its error back (docs/methods.md F5)."""
+    """A heading from the last estimate would feed its error back (docs/notes/traps.md F5)."""
     for inputs in ("pos", "pos+ori"):
         session = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).begin(walk.calibration)
         for frame in walk.only(inputs)[:20]:
