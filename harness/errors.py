@@ -65,7 +65,7 @@ class RenamedKey(HarnessError):
         self.where, self.old, self.new = self.args
 
     def __str__(self) -> str:
-        return f"{self.where}: the key {self.old!r} is now called {self.new!r}. Rename it in the file."
+        return f"{self.where}: the key {self.old!r} is now called {self.new!r}. Use the new name."
 
 
 class ShapeError(HarnessError):

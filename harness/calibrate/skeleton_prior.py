@@ -1,8 +1,8 @@
 """Prior of people's bones: PCA of bone lengths over a population of skeletons (Liu et al. 2011, section 3).
 
-See docs/papers.md A2 and docs/calibration.md. Lengths are in metres, not divided by the left tibia as in the paper's figure. Every
-skeleton counts twice, as it is and mirrored, so the prior is symmetric. The residual of the modes is normal and
-independent for each bone. The directions of bones in the rest pose have a normal distribution as well.
+See docs/papers.md A2 and docs/calibration.md. Lengths are in metres, not divided by the left tibia as in the paper's
+figure. Every skeleton counts twice, as it is and mirrored, so the prior is symmetric. The residual of the modes is
+normal and independent for each bone. The directions of bones in the rest pose have a normal distribution as well.
 """
 
 from collections.abc import Sequence

@@ -97,7 +97,7 @@ def use_exact_calibration(session: TrackerSession) -> PerformerCalibration:
 
 
 def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
-    """Estimate mounts and room from a simulated T-pose; bone lengths are known. UnusableHold if the pose is unusable."""
+    """Estimate mounts and room from a simulated T-pose; bone lengths are known. UnusableHold for a bad pose."""
     pose = tpose(session.body.skeleton)
     frames = session.observe_poses([pose], miss_rad=miss_rad, hold_s=hold_s)
     found = calibrate_tpose(frames, session.body, session.nominal)
