@@ -185,11 +185,11 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     number = np.round(_row_medians(np.where(sound, since, np.nan)))
     timed = number >= 0.0
     lap, index = np.divmod(np.where(timed, number, 0.0).astype(np.int64), len(samples))
-    judged = timed & (index < samples.take_frames)
+    in_take = timed & (index < samples.take_frames)
     position_m = np.array([f.position_m for f in frames]).reshape(*shape, 3)
     off_m = _row_medians(np.where(sound, np.linalg.norm(position_m - samples.position_m[index], axis=2), np.nan))
-    played = judged & ~(off_m > POSITION_TOLERANCE_M)  # NaN: no positions are sent, or all stations are lost
-    if not played.any() or played.sum() < MIN_MATCHED_SHARE * judged.sum():
+    played = in_take & ~(off_m > POSITION_TOLERANCE_M)  # NaN: no positions are sent, or all stations are lost
+    if not played.any() or played.sum() < MIN_MATCHED_SHARE * in_take.sum():
         raise BadInput(
             f"The recording is of another motion: {played.sum()} of {len(frames)} frames belong to this one.",
             "Name the scenario, clip, seed, noise and rate that it was played with.",
