@@ -83,9 +83,10 @@ def shipped_sweeps() -> list[Path]:
 
 
 def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None, folder: Path | None = None) -> list[Scenario]:
-    """A scenario for each one named and each seed, whose variants, clips, inputs and methods are the sweep's cells.
+    """One scenario for each scenario of the sweep and each seed. Their variants, clips and methods are its cells.
 
-    `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName say what does not fit.
+    `seed` replaces all seeds. `folder` is the library whose clips match patterns. BadFile, BadInput and UnknownName say
+    what does not fit.
     """
     found = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
     clips = dict.fromkeys(clip for scenario in found for clip in scenario.motion.test)
