@@ -68,7 +68,7 @@ def build_speed_dataset(study: PaperStudy, frames: Mapping[str, int], scenario: 
     evaluations, wanted = _test_clip_evaluations(study, study.library, frames, scenario), sum(frames.values())
     files = {entry.name: _digest(entry.path) for entry in MotionLibrary(study.library).entries()}
     content = {"files": files, "examples": evaluations[0].scenario.motion.examples, "frames": wanted}
-    database = build_database(folder, content, lambda: truncate_motions(evaluations[0].examples, wanted))
+    database = build_database(folder, content, lambda: truncate_motions(evaluations[0].training.examples, wanted))
     clips = [BenchmarkClip.from_simulation(e.part.clip, e.simulation) for e in evaluations]
     return SpeedDataset(database, clips)
 

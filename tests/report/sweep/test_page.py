@@ -24,12 +24,13 @@ from harness.report.sweep.charts import (
     scenarios_varying,
     select_curves,
 )
-from harness.report.sweep.data import METRICS, PRIMARY_METRIC, Statistic, VariedKey
+from harness.report.sweep.data import METRICS, Statistic, VariedKey
 from harness.report.sweep.page import write_sweep_page
 from harness.report.sweep.reader import collect_cells, read_sweep
 from harness.report.sweep.text import text
 from harness.report.sweep.wording import describe_effect, group_failures, sentence
 from harness.results.index import CellIndex
+from harness.results.reported_metrics import PRIMARY_METRIC
 from tests.report.drawing import texts_apart
 from tests.report.fabricate_sweep import COMMAND, Plan, fabricate_sweep
 from tests.report.reading import read, text_of
