@@ -159,7 +159,7 @@ def test_a_set_that_does_not_suffice_is_said_so(done: tuple[Path, Path, Placemen
     _, _, findings = done
     assert [claim.verdict for claim in findings.claims] == ["not reproduced", "not reproduced"]
     assert "pelvis" in findings.claims[0].text
-    assert all("judged on the clips on which the best other was chosen" in claim.why for claim in findings.claims)
+    assert all("tested on the clips on which the best other set was chosen" in claim.why for claim in findings.claims)
 
 
 def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings]) -> None:
