@@ -6,7 +6,6 @@ Errors against the truth stand next to the Cramér-Rao bound and to the errors o
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.text_table import Table
 from harness.experiment.simulated_calibration import TrackerSession
+from harness.mocap.library import LibraryFolders
 from harness.mocap.skeletons import read_skeletons
 from harness.mocap.sources import POPULATION_SIZE
 from harness.mocap.synthetic import sample_skeletons
@@ -177,7 +177,7 @@ def measure_calibration_accuracy(
     miss_rad: float = float(np.deg2rad(2.5)),
     noise: str = "default",
     seed: int = 1,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     own_directions: bool = True,
     beside_m: float = MOUNT_OFFSET_SD_M,
     stations: Sequence[str] = STATIONS,
@@ -213,7 +213,7 @@ def simulate_pose_holds(session: TrackerSession, miss_rad: float) -> list[list[T
     return [[f for f in seen.frames if a + HOLD_MARGIN_S <= f.received_s <= b - HOLD_MARGIN_S + 0.1] for a, b in holds]
 
 
-def _performers(count: int, folder: Path | None) -> list[tuple[str, Skeleton, SkeletonPrior]]:
+def _performers(count: int, folder: LibraryFolders | None) -> list[tuple[str, Skeleton, SkeletonPrior]]:
     """Name, skeleton and prior from other people, for each of `count` performers."""
     if folder is None:
         everyone = sample_skeletons(POPULATION_SIZE + count, seed=0)

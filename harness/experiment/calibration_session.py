@@ -25,6 +25,7 @@ from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.playback import prepare_playback, select_stations
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
+from harness.mocap.library import LibraryFolders
 from harness.stream.frame import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
@@ -52,7 +53,7 @@ class CalibrationSession:
 
     None stands for the scenario's first clip, or for a performer whom the prior does not contain.
     """
-    folder: Path | None = None
+    folder: LibraryFolders | None = None
     """Library of real motion, if the scenario needs one."""
 
     @cached_property

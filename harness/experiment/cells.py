@@ -25,6 +25,7 @@ from harness.errors import BadInput, HarnessError, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.reference_workload import FRAMES_PER_TIMING, ReferenceWorkload
 from harness.experiment.scenario import Scenario, ScenarioMotion, variants
+from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
@@ -68,7 +69,7 @@ class ClipTask:
     scenario: Scenario
     part: ClipPart
     behaviour: str
-    folder: Path | None
+    folder: LibraryFolders | None
     """The library of real motion."""
     command: str
     """The command that reproduces the run."""
@@ -245,7 +246,7 @@ def run_method(
     return np.array(qpos), np.array(status), times_ms[0], (times_ms[1], times_ms[2])
 
 
-def open_scenario_motion(motion: ScenarioMotion, folder: Path | None, seed: int) -> MotionSource:
+def open_scenario_motion(motion: ScenarioMotion, folder: LibraryFolders | None, seed: int) -> MotionSource:
     """The motion that a scenario names; BadInput when it needs a library and none is named."""
     return _cached_source(motion.source, folder, seed, motion.rate_hz or None)
 
@@ -258,12 +259,12 @@ def clear_caches() -> None:
 
 
 @lru_cache(maxsize=2)
-def _cached_source(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
+def _cached_source(kind: str, folder: LibraryFolders | None, seed: int, rate_hz: float | None) -> MotionSource:
     """One source for all clips of a run, which share examples."""
     return open_motion_source(kind, folder, seed=seed, rate_hz=rate_hz)
 
 
-def check_names(scenarios: Iterable[Scenario], folder: Path | None) -> None:
+def check_names(scenarios: Iterable[Scenario], folder: LibraryFolders | None) -> None:
     """Check that everything exists which the scenarios and their variants name, before hours of work begin.
 
     These are clips, methods, inputs, bones and components. UnknownName, BadInput.

@@ -328,7 +328,7 @@ class ClipEvaluation:
         return object.__new__(ClipEvaluation)._set(scenario, self.subject, observation)
 
     def with_calibration(self, calibration: PerformerCalibration) -> "ClipEvaluation":
-        """The same evaluation with another calibration given to methods."""
+        """A copy of the evaluation in which methods receive another calibration."""
         return object.__new__(ClipEvaluation)._set(self.scenario, self.subject, self.observation, calibration)
 
     @property

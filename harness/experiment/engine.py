@@ -32,6 +32,7 @@ from harness.experiment.interruption import graceful_stop
 from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep
+from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.results import storage
 from harness.results.index import CellIndex
@@ -57,7 +58,7 @@ def run(
     scenario: Scenario,
     out: Path,
     *,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     jobs: int = 1,
     command: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,
@@ -83,7 +84,7 @@ def run_sweep(
     scenarios: Sequence[Scenario],
     out: Path,
     *,
-    folder: Path | None,
+    folder: LibraryFolders | None,
     executor: TaskExecutor,
     workers: int,
     command: str,
@@ -109,7 +110,7 @@ def run_cells(
     scenarios: Sequence[Scenario],
     out: Path,
     *,
-    folder: Path | None,
+    folder: LibraryFolders | None,
     executor: TaskExecutor,
     command: str,
     progress: ProgressCallback = lambda cell, done, planned: None,
@@ -135,7 +136,7 @@ def _run_folder(
     content: Mapping[str, Any],
     scenarios: Sequence[Scenario],
     out: Path,
-    folder: Path | None,
+    folder: LibraryFolders | None,
     executor: TaskExecutor,
     workers: int,
     command: str,
@@ -177,7 +178,9 @@ def _run_folder(
         return next(outcome for outcome in Outcome if outcome.word == summary["outcome"])
 
 
-def _describe(content: Mapping[str, Any], scenarios: Sequence[Scenario], folder: Path | None, command: str) -> Manifest:
+def _describe(
+    content: Mapping[str, Any], scenarios: Sequence[Scenario], folder: LibraryFolders | None, command: str
+) -> Manifest:
     sources = list(dict.fromkeys(open_scenario_motion(s.motion, folder, s.seed).title for s in scenarios))
     constants = {name: repr(registry.resolve(name)) for name in content["methods"]}
     source = sources if "sweep" in content else sources[0]

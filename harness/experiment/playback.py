@@ -21,6 +21,7 @@ from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
+from harness.mocap.library import LibraryFolders
 from harness.simulate.loop import simulate_loop
 from harness.simulate.simulation import Simulation, TrackerConfig
 from harness.stream.codec.samples import DeviceSamples
@@ -65,7 +66,7 @@ class Playback:
         return self.performer_calibration.calibration
 
     def with_calibration(self, kept: CalibrationFile) -> "Playback":
-        """The same playback with a stored calibration; BadInput when it lacks one of the stations.
+        """A copy of the playback with a stored calibration; BadInput when it lacks one of the stations.
 
         If it has no skeleton, the body is the scenario's.
         """
@@ -109,7 +110,7 @@ def prepare_playback(
     rate_hz: float | None = None,
     noise: str | None = None,
     seed: int | None = None,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     posing: bool = False,
 ) -> Playback:
     """Prepare the playback of a clip of a scenario, by default its first test clip.

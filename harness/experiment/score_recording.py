@@ -20,6 +20,7 @@ from harness.core.text_table import Table
 from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.scenario import load_scenario
+from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
 from harness.results.reported_metrics import TABLE_COLUMNS
@@ -63,7 +64,7 @@ def find_playback(
     rate_hz: float | None = None,
     noise: str | None = None,
     seed: int | None = None,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
 ) -> Playback:
     """The playback that a recording was made of.
 

@@ -19,6 +19,7 @@ from harness.experiment.scenario import (
     find_scenario,
     load_scenario,
 )
+from harness.mocap.library import LibraryFolders
 
 _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
 
@@ -82,7 +83,9 @@ def shipped_sweeps() -> list[Path]:
     return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
 
-def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None, folder: Path | None = None) -> list[Scenario]:
+def expand_sweep(
+    sweep: Sweep, path: Path, seed: int | None = None, folder: LibraryFolders | None = None
+) -> list[Scenario]:
     """Scenarios of a sweep, one for each named scenario and seed, whose cells are the sweep's cells.
 
     `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName

@@ -168,7 +168,7 @@ class BestSet:
 
 @dataclass(frozen=True)
 class PlacementCondition:
-    """The same sets under another condition: another behaviour, method or noise."""
+    """Station sets under another condition: another behaviour, method or noise."""
 
     name: str
     """Name, such as "boxing" or "ik"; the first condition is the study's own."""

@@ -262,6 +262,7 @@ def query_while_streaming(port: str, binary: bool, seconds: float) -> None:
     terminal.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("binary", [True, False])
 def test_queries_never_split_a_record(port: str, binary: bool) -> None:
     query_while_streaming(port, binary, 2.0)

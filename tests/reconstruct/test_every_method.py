@@ -112,6 +112,7 @@ def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> N
     assert found == pytest.approx(at_home(name), rel=0.02, abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*NAMES, *ALSO])
 def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every rule but the one of the next test."""
@@ -121,6 +122,7 @@ def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> Non
     check_method(registry.resolve(name))
 
 
+@pytest.mark.long
 def test_what_was_fitted_may_go_to_another_process() -> None:
     """One process for all methods, since starting one takes seconds."""
     trials = [make_case(registry.resolve(name)) for name in (*NAMES, *ALSO)]

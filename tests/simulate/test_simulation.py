@@ -98,6 +98,7 @@ def test_the_tracker_looks_forward_right_and_down(boxer: Boxer) -> None:
     np.testing.assert_allclose(known.tracker_origin_m, TrackerConfig().origin_m)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", NOISE_PRESETS)
 @pytest.mark.parametrize("tracker", [TrackerConfig(), OVERLOADED], ids=["40 Hz", "overload"])
 def test_bytes_in_any_pieces_give_the_same_frames(

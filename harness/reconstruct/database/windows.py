@@ -75,7 +75,7 @@ class Windows:
         return out if self.scale is None else out * self.scale
 
     def scaled(self, scale: Floats) -> "Windows":
-        """The same windows with every vector multiplied by `scale` (D,)."""
+        """A copy of the windows with every vector multiplied by `scale` (D,)."""
         return Windows(self.database, self.length, self.frames, np.asarray(scale, np.float32).reshape(self.size))
 
 

@@ -35,7 +35,7 @@ class CleanUp:
     """Options of the final inverse kinematics, a `Method` around another."""
 
     method: Method
-    """The other method."""
+    """The method whose answers are fitted."""
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
     stopping: Stopping = field(default_factory=Stopping)

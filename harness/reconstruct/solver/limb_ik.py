@@ -239,7 +239,7 @@ def _euler(axes: Floats, rotation: Floats) -> Floats:
 
 @compiled
 def _nearest_euler(angles: Floats, before: Floats) -> Floats:
-    """Of the two representations of three hinges' rotation, the one nearest to `before` (3,)."""
+    """Representation of three hinges' rotation that is nearest to `before` (3,)."""
     first, second = np.empty(3), np.empty(3)
     for k in range(3):
         first[k] = _nearest_equivalent_angle(angles[k], before[k])

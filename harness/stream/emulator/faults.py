@@ -58,7 +58,7 @@ class Fault:
     station: str = ""
     """Name of the station that is out of sight; "" is the first."""
     firmware: str = ""
-    """The other version, such as 4.1105, which has no item 40."""
+    """Firmware version, such as 4.1105, which has no item 40."""
 
     def __post_init__(self) -> None:
         keys = {

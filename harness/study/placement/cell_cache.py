@@ -20,6 +20,7 @@ from harness.experiment.engine import CellResults, run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, variants
+from harness.mocap.library import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name
 
 MAX_RATE_HZ = 180.0
@@ -60,7 +61,7 @@ class CellCache:
 
     out: Path
     """Folder of the study, as made by `open_study`."""
-    folder: Path | None
+    folder: LibraryFolders | None
     """Motion library; None for synthetic motion."""
     executor: TaskExecutor
     command: str

@@ -16,6 +16,7 @@ from harness.errors import Outcome
 from harness.experiment.cells import ProgressCallback, clear_caches
 from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.scenario import Scenario
+from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import Claim
 from harness.results.placement_findings import (
@@ -44,7 +45,7 @@ def run_placement(
     path: Path | str,
     out: Path,
     *,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     executor: TaskExecutor = run_in_process,
     command: str = "",
     progress: ProgressCallback = lambda last, done, planned: None,

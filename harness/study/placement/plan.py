@@ -11,6 +11,7 @@ from harness.compare.margins import margin_of
 from harness.errors import BadInput
 from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, expand_clips
+from harness.mocap.library import LibraryFolders
 from harness.results.placement_findings import StationPlacement
 from harness.study.placement import published_claims, search
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
@@ -102,7 +103,7 @@ def is_refined(stations: StationSet) -> bool:
     return any(place.moved_from for place in stations)
 
 
-def plan_placement(path: Path | str, folder: Path | None) -> PlacementPlan:
+def plan_placement(path: Path | str, folder: LibraryFolders | None) -> PlacementPlan:
     """Plan the study of a TOML file; BadFile, BadInput, UnknownName."""
     file = find_placement_study(path)
     study = load_placement_study(file)

@@ -89,6 +89,7 @@ def test_when_all_are_lost_it_says_so_and_goes_on_by_itself(walk: Scene, method:
     assert walk.off_m(estimates, walk.take.qpos)[72:].max() < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", METHODS, ids=IDS)
 def test_the_closed_form_meets_every_limb_tracker(walk: Scene, method: LocalRegression) -> None:
     estimates = walk.run(replace(method, solve="limbs"))

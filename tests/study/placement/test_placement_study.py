@@ -173,7 +173,9 @@ def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings
 
 
 def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
-    changes = '[exhaustive]\nmost = 1\n[changes.components]\nslip = [{ station = "pelvis" }]'  # nobody else has it
+    changes = (
+        '[exhaustive]\nmost = 1\n[changes.components]\nmount_slip = [{ station = "pelvis" }]'  # nobody else has it
+    )
     findings, outcome = run_placement(written(tmp_path, changes), tmp_path / "out")
     assert outcome is Outcome.INCOMPLETE
     assert len(findings.failures) == 2 * 2  # sets without a pelvis
