@@ -16,11 +16,11 @@ from harness.core.arrays import Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.features.anchor_frame import anchor_of, twist_rad
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import make_index
 from harness.reconstruct.index.partial_search import nearest_partial
 from harness.reconstruct.index.selection import AUTO, KD_TREE_MAX_NEIGHBOURS
+from harness.reconstruct.solver.anchor_frame import anchor_of, twist_rad
 from harness.reconstruct.solver.ground_frame import relative_ground
 
 Codes = NDArray[np.int16]

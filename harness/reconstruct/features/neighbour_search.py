@@ -11,9 +11,9 @@ import numpy as np
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.reconstruct.database import Windows
-from harness.reconstruct.features.anchor_frame import AnchorFrame, twist_rad
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankRegression, ReducedRankSearch
 from harness.reconstruct.index import Index, Neighbours
+from harness.reconstruct.solver.anchor_frame import AnchorFrame, twist_rad
 from harness.reconstruct.solver.residuals import Residuals
 
 

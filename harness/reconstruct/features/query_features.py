@@ -13,8 +13,8 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
-from harness.reconstruct.features.anchor_frame import AnchorFrame
 from harness.reconstruct.features.example_features import ExampleFeatures
+from harness.reconstruct.solver.anchor_frame import AnchorFrame
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
 from harness.stream.frame import TrackerFrame

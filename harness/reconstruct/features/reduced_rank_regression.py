@@ -22,10 +22,10 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.reconstruct.database import Windows
-from harness.reconstruct.features.anchor_frame import AnchorFrame, HeadingEstimator, anchor_of, twist_rad
 from harness.reconstruct.features.ground_step import features_from_readings
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import Index, Neighbours, make_index
+from harness.reconstruct.solver.anchor_frame import AnchorFrame, HeadingEstimator, anchor_of, twist_rad
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 _CHUNK = 256

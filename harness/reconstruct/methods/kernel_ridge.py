@@ -25,9 +25,9 @@ from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
-from harness.reconstruct.features.anchor_frame import anchor_of
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
+from harness.reconstruct.solver.anchor_frame import anchor_of
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root

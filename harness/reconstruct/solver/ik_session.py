@@ -13,7 +13,7 @@ from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate, Status
-from harness.reconstruct.features.device_time import DeviceTime
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M, PATIENCE_S, OutlierGate

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.core.arrays import Bools, Floats
 from harness.core.compiled import compiled
-from harness.reconstruct.features.device_time import DeviceTime
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.residuals import Residuals
 from harness.stream.frame import TrackerFrame
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.estimate import Status
-from harness.reconstruct.features.device_time import DeviceTime
+from harness.reconstruct.solver.device_time import DeviceTime
 from harness.stream.frame import TrackerFrame
 
 LOST_AFTER_S = 0.5
