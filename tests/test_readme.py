@@ -143,3 +143,15 @@ def test_the_results_format_names_every_column(tmp_path: Path) -> None:
         names = [name for name in arrays.files if not name.startswith("error.")]
     keys = [*json.loads((cell / "cell.json").read_text(encoding="utf-8")), *read_summary(out)]
     assert [name for name in (*header, *names, *keys) if f"`{name}`" not in text] == []
+
+
+def test_the_api_reference_has_a_page_for_every_folder() -> None:
+    """mkdocstrings then lists every public name below it: `show_submodules` and `show_if_no_docstring` are on."""
+    folders = {path.parent.name for path in (ROOT / "harness").glob("*/__init__.py")}
+    pages = {path.stem: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "api").glob("*.md")}
+    assert pages.keys() == {*folders, "index"}
+    assert all(f"::: harness.{folder}\n" in pages[folder] for folder in folders)
+    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "show_submodules: true" in config
+    assert "show_if_no_docstring: true" in config
+    assert all(f"api/{page}.md" in config for page in pages)
