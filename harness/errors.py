@@ -4,7 +4,6 @@ There is a type for each thing that the reader can do about it. A message names 
 `super().__init__` gets the fields instead of the text, so that an error can be pickled out of a worker process.
 """
 
-import difflib
 from collections.abc import Iterable
 from enum import Enum
 from pathlib import Path
@@ -52,6 +51,8 @@ class UnknownName(HarnessError):
         self.kind, self.name, self.known = self.args
 
     def __str__(self) -> str:
+        import difflib  # only for a message: the pytest plugin is loaded by every pytest
+
         near = difflib.get_close_matches(self.name, self.known, n=1)
         hint = f" Did you mean {near[0]!r}?" if near else ""
         return f"no {self.kind} called {self.name!r}.{hint} Known: {', '.join(self.known) or 'none'}."
@@ -65,7 +66,7 @@ class RenamedKey(HarnessError):
         self.where, self.old, self.new = self.args
 
     def __str__(self) -> str:
-        return f"{self.where}: the key {self.old!r} is now called {self.new!r}. Rename it in the file."
+        return f"{self.where}: the key {self.old!r} is now called {self.new!r}. Use the new name."
 
 
 class ShapeError(HarnessError):

@@ -63,6 +63,7 @@ def test_errors_are_json_when_json_is_asked_for(tmp_path: Path) -> None:
     assert "boxing" in said["error"]
 
 
+@pytest.mark.long
 def test_what_a_method_prints_is_talk_and_its_interrupt_an_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

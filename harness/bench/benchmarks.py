@@ -1,4 +1,4 @@
-"""What `harness bench` runs."""
+"""The benchmarks of `harness bench`, by name."""
 
 from collections.abc import Callable, Sequence
 from importlib.util import find_spec
@@ -30,7 +30,7 @@ def _methods(seed: int, large: bool) -> list[BenchmarkRow]:
 
 def _require_mink() -> None:
     if find_spec("mink") is None:
-        raise MissingExtra("The reference of inverse kinematics", "mink", "bench")
+        raise MissingExtra("The reference for inverse kinematics", "mink", "bench")
 
 
 BENCHMARKS: dict[str, Callable[[int, bool], list[BenchmarkRow]]] = {
@@ -47,25 +47,26 @@ BENCHMARKS: dict[str, Callable[[int, bool], list[BenchmarkRow]]] = {
 
 
 def run_benchmarks(
-    what: Sequence[str], *, seed: int, large: bool = False, progress: Callable[[str, int, int], None]
+    names: Sequence[str], *, seed: int, large: bool = False, progress: Callable[[str, int, int], None]
 ) -> tuple[list[BenchmarkRow], list[str]]:
-    """The rows of the named benchmarks, or of all, and why some of all could not be run; UnknownName, MissingExtra.
+    """Run the named benchmarks, or all; returns their rows, and the reasons why some of all could not run.
 
-    `large` has `methods` learn from a million frames as well, and `wire` keep each line busy for ten minutes.
+    With `large`, `methods` also uses a database of a million frames, and `wire` runs each line for ten minutes.
+    UnknownName for an unknown benchmark, MissingExtra for a named one whose package is not installed.
     """
-    for name in what:
+    for name in names:
         if name not in BENCHMARKS:
             raise UnknownName("benchmark", name, BENCHMARKS)
-    chosen = [name for name in BENCHMARKS if name in what or not what]
+    chosen = [name for name in BENCHMARKS if name in names or not names]
     rows: list[BenchmarkRow] = []
-    left_out: list[str] = []
+    skipped: list[str] = []
     for done, name in enumerate(chosen):
         progress(name, done, len(chosen))
         try:
             rows += BENCHMARKS[name](seed, large)
         except MissingExtra as missing:
-            if what:
+            if names:
                 raise
-            left_out.append(f"{name} was not run. {missing}")
+            skipped.append(f"{name} was not run. {missing}")
     progress("", len(chosen), len(chosen))
-    return rows, left_out
+    return rows, skipped

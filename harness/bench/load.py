@@ -1,4 +1,4 @@
-"""How long a motion file of 5,000 frames takes to load, beside the mere splitting of its text into numbers."""
+"""Time to load a motion file of 5,000 frames, beside the time to split its text into numbers."""
 
 import tempfile
 import time
@@ -16,7 +16,7 @@ FRAMES = 5000
 
 
 def bench_load(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
-    """Medians over `repeats` of reading one file of random angles, written for the purpose."""
+    """Medians over `repeats` of reading a temporary file of random angles."""
     skeleton = standard_skeleton()
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "bench.amc"
@@ -30,7 +30,7 @@ def bench_load(seed: int = 1, repeats: int = 5) -> list[BenchmarkRow]:
 
 
 def amc_text(skeleton: Skeleton, rng: np.random.Generator) -> str:
-    """An AMC of random angles with as many digits as CMU's files have."""
+    """Text of an AMC file of random angles, with as many digits as CMU's files."""
     bones = [(n, len(c)) for n, c in zip(skeleton.names, skeleton.hinges, strict=True) if c]
     rows = [":FULLY-SPECIFIED", ":DEGREES"]
     for frame in range(1, FRAMES + 1):

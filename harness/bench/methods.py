@@ -94,7 +94,7 @@ def method_rows(speed: MethodSpeed, costs: Sequence[BenchmarkRow]) -> list[Bench
     """Rows of speed and error of one method; the first also lists its other costs in the JSON output."""
     name, options = speed.method, config_hash(registry.resolve(speed.method))
     target, to_ik, to_mink = TARGET_FPS.get(name), speed.ratios[REFERENCE_METHOD], speed.ratios[MINK]
-    more = {
+    more: dict[str, str | float] = {
         "method": name,
         "fps": speed.fps,
         "p50_ms": speed.p50_ms,

@@ -1,9 +1,9 @@
-"""How long a search for neighbours takes, and how many of the true ones it finds, for each index and kind of query.
+"""Time and recall of the search for neighbours, for each index and kind of query.
 
-The sets are built-in takes as each method sees them: the last two poses (what Liu et al. 2011 look for), what six
-stations read (eq. 2 of Kim et al. 2012), both, and the evidence of `dynamic_map`. The queries follow held-out takes
-frame by frame, as a method's do. The contenders take turns, a second of motion each, so that whatever else the machine
-does meets all alike; exact search is the judge, and faiss's own inverted file stands beside ours.
+The vectors are those of the methods, for synthetic takes: the last two poses (Liu et al. 2011), the readings of six
+stations (eq. 2 of Kim et al. 2012), both, and the evidence of `dynamic_map`. The queries follow held-out takes frame by
+frame, as those of a method do. The indexes take turns of one second of motion, so that load on the machine affects all
+equally. Exact search is the reference for recall; faiss's inverted file is measured for comparison.
 """
 
 import time
@@ -35,27 +35,27 @@ from harness.reconstruct.methods.local_pca import LocalPca
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 SIZES = (6_600, 66_000)
 QUERIES_PER_TURN, TURNS_PER_CLIP = 40, 2
-"""Queries in a row, and how often, in each of five held-out takes."""
+"""Consecutive queries of a turn, and turns in each of five held-out takes."""
 POSES, EXAMPLES, NEIGHBOURS = 2, 100, 8
 EXACT_INDEX = "flat"
 
 
 @dataclass(frozen=True, eq=False)
 class SearchProblem:
-    """Something to search in, and queries in the order in which they come."""
+    """Vectors to search, and queries in their order in time."""
 
     name: str
     vectors: Vectors
     queries: list[Singles]
-    """(Q, D) of each held-out take."""
+    """(Q, D) queries of each held-out take."""
     count: int
-    """Neighbours asked for."""
+    """Number of neighbours to find."""
     follows: Bools | None
-    """(N,) whether the next vector is that of the next moment; None where nobody follows."""
+    """(N,) whether the next vector is that of the next frame; None where no index uses this."""
 
 
 def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[BenchmarkRow]:
-    """Medians over the queries, for sets of so many frames of every kind."""
+    """Medians over the queries, for all kinds of vectors and databases of `sizes` frames."""
     body = humanoid.build_body()
     held_out = benchmark_clips.generate_held_out_takes(len(synthetic.BEHAVIOURS), seed, benchmark_clips.TAKE_S)
     rows: list[BenchmarkRow] = []
@@ -67,7 +67,7 @@ def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[BenchmarkRo
 
 
 def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
-    """The last answers, as windows: `dynamic_map:window`."""
+    """The last poses, as windows: `dynamic_map:window`."""
     windows = database.windows(POSES, with_successor=True)
     queries = [
         _single_motion_database(body, take).windows(POSES, with_successor=True).gather(_QUERY_FRAMES)
@@ -77,47 +77,48 @@ def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMo
 
 
 def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
-    """What six stations read: `kernel_cca`, `weighted_blend`."""
-    worn, queries = _exact_calibration(body), list[Singles]()
-    examples = ExampleFeatures(body, database, worn, FeatureWeights(), "flat", NEIGHBOURS)
+    """The readings of six stations: `kernel_cca`, `weighted_blend`."""
+    calibration, queries = _exact_calibration(body), list[Singles]()
+    examples = ExampleFeatures(body, database, calibration, FeatureWeights(), "flat", NEIGHBOURS)
     for take in held_out:
-        asked = ExampleFeatures(
-            body, _single_motion_database(body, take), worn, FeatureWeights(), "flat", NEIGHBOURS
+        vectors = ExampleFeatures(
+            body, _single_motion_database(body, take), calibration, FeatureWeights(), "flat", NEIGHBOURS
         ).gather(_QUERY_FRAMES)
-        turned = asked[:, 3 * len(STATIONS) : 7 * len(STATIONS)].reshape(len(asked), -1, 4)
-        turned *= np.copysign(1.0, np.vecdot(turned, examples.hemisphere * turned.dtype.type(1.0)))[..., None]
-        queries.append(asked)
+        orientations = vectors[:, 3 * len(STATIONS) : 7 * len(STATIONS)].reshape(len(vectors), -1, 4)
+        signs = np.copysign(1.0, np.vecdot(orientations, examples.hemisphere * orientations.dtype.type(1.0)))
+        orientations *= signs[..., None]
+        queries.append(vectors)
     return SearchProblem(
         f"{len(STATIONS)} stations", ArrayVectors(examples.gather(slice(None))), queries, NEIGHBOURS, None
     )
 
 
 def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
-    """The last answers beside what six stations read: `local_pca`."""
-    method, worn = LocalPca(), _exact_calibration(body)
+    """The last poses and the readings of six stations: `local_pca`."""
+    method, calibration = LocalPca(), _exact_calibration(body)
 
-    def vectors(learnt: MotionDatabase) -> Vectors:
-        return method.fit_database(body, learnt, generator(0, "bench")).station_features(worn)[1]
+    def vectors(source: MotionDatabase) -> Vectors:
+        return method.fit_database(body, source, generator(0, "bench")).station_features(calibration)[1]
 
     queries = [vectors(_single_motion_database(body, take)).gather(_QUERY_FRAMES) for take in held_out]
     return SearchProblem("poses and stations", vectors(database), queries, method.neighbours, None)
 
 
 def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
-    """What both lead to expect: `dynamic_map`."""
+    """Features of poses and readings: `dynamic_map`."""
     method = DynamicMap()
-    known = method.fit_database(body, database, generator(0, "bench")).regression(_exact_calibration(body))
-    vectors = known.search(np.ones(known.size, bool), method.index, method.neighbours).vectors
-    asked = [
+    regression = method.fit_database(body, database, generator(0, "bench")).regression(_exact_calibration(body))
+    vectors = regression.search(np.ones(regression.size, bool), method.index, method.neighbours).vectors
+    queries = [
         replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, with_successor=True))
         for take in held_out
     ]
-    return SearchProblem("evidence", vectors, [z.gather(_QUERY_FRAMES) for z in asked], method.neighbours, None)
+    return SearchProblem("evidence", vectors, [z.gather(_QUERY_FRAMES) for z in queries], method.neighbours, None)
 
 
 PROBLEMS = (pose_problem, reading_problem, pose_and_reading_problem, feature_problem)
 _QUERY_FRAMES = np.arange(1, 1 + QUERIES_PER_TURN * TURNS_PER_CLIP)
-"""Frames of a held-out take that are asked for."""
+"""Frames of a held-out take that are used as queries."""
 
 
 def _single_motion_database(body: Body, take: BodyMotion) -> MotionDatabase:
@@ -125,20 +126,20 @@ def _single_motion_database(body: Body, take: BodyMotion) -> MotionDatabase:
 
 
 def _exact_calibration(body: Body) -> Calibration:
-    places = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in STATIONS]
+    mount_poses = [mounts.locate_mount(body.skeleton, mounts.DEFAULT_MOUNTS[station]) for station in STATIONS]
     return Calibration(
         "exact",
         STATIONS,
         tuple(mounts.DEFAULT_MOUNTS[station].bone for station in STATIONS),
-        np.array([mount_m for mount_m, _ in places]),
-        np.array([turned for _, turned in places]),
+        np.array([mount_m for mount_m, _ in mount_poses]),
+        np.array([bone_from_station for _, bone_from_station in mount_poses]),
         rotations.IDENTITY,
         np.zeros(3),
     )
 
 
 def _compare_indexes(search: SearchProblem) -> list[BenchmarkRow]:
-    """Exact search is the judge, and the reference for speed."""
+    """Compare all indexes; exact search is the reference for recall and speed."""
     indexes = {name: kind(search.vectors, search.count) for name, kind in INDEXES.items()}
     begin: dict[str, Callable[[], Lookup]] = {
         name: partial(_stateless_lookup, index) for name, index in indexes.items()
@@ -152,30 +153,32 @@ def _compare_indexes(search: SearchProblem) -> list[BenchmarkRow]:
     for queries in search.queries:
         sessions = {name: start() for name, start in begin.items()}
         for turn in range(0, len(queries), QUERIES_PER_TURN):
-            some = queries[turn : turn + QUERIES_PER_TURN]
-            true = [set(indexes[EXACT_INDEX].nearest(query, search.count)[0].tolist()) for query in some]
+            block = queries[turn : turn + QUERIES_PER_TURN]
+            true = [set(indexes[EXACT_INDEX].nearest(query, search.count)[0].tolist()) for query in block]
             for name, session in sessions.items():
-                for query, wanted in zip(some, true, strict=True):
+                for query, wanted in zip(block, true, strict=True):
                     start_s = time.perf_counter()
                     rows, _ = session.nearest(query, search.count)
                     seconds[name].append(time.perf_counter() - start_s)
                     hits[name].append(len(wanted.intersection(rows.tolist())) / len(wanted))
     best, out = best_index(len(search.vectors), search.vectors.size, search.count), []
-    judge_us = 1e6 * float(np.median(seconds[EXACT_INDEX]))
+    exact_us = 1e6 * float(np.median(seconds[EXACT_INDEX]))
     for name in begin:
-        what = f"{name}, {search.name}, {len(search.vectors):,} frames"
-        held = name == best
-        beside = f"all looked at {judge_us:,.0f} us"
+        label = f"{name}, {search.name}, {len(search.vectors):,} frames"
+        gated = name == best
+        reference = f"exact search {exact_us:,.0f} us"
         out.append(
-            BenchmarkRow(what, 1e6 * float(np.median(seconds[name])), "us/query", beside, "<= 200" if held else "")
+            BenchmarkRow(label, 1e6 * float(np.median(seconds[name])), "us/query", reference, "<= 200" if gated else "")
         )
         share = float(np.mean(hits[name]))
-        out.append(BenchmarkRow(f"{what}, recall@{search.count}", share, "", "exact search", ">= 0.95" if held else ""))
+        out.append(
+            BenchmarkRow(f"{label}, recall@{search.count}", share, "", "exact search", ">= 0.95" if gated else "")
+        )
     return out
 
 
 class FaissInvertedFile:
-    """faiss's inverted file of as many cells, all numbers of each vector in half precision: a `Lookup`."""
+    """faiss's inverted file with the same number of cells and vectors in half precision; a `Lookup`."""
 
     def __init__(self, vectors: Vectors, wanted: int) -> None:
         import faiss
@@ -189,10 +192,11 @@ class FaissInvertedFile:
         self._file.nprobe = min(probes_for(wanted, count), cells)
 
     def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """Rows and squared distances of the nearest vectors."""
         squared, rows = self._file.search(query[None], count)
         return rows[0], squared[0]
 
 
 def _stateless_lookup(index: Lookup) -> Lookup:
-    """One without memory is its own session."""
+    """An index without state is its own session."""
     return index

@@ -1,13 +1,13 @@
-"""Errors of equally good sides, clip by clip, on the built-in performer: what simulated studies are drawn from.
+"""Errors of pairs of equally good methods by clip, on synthetic motion: the population of simulated comparisons.
 
-`gate_errors.json` holds two kinds. In *settings* B is the same method as A with one constant moved a little, on the
-same readings; in *draws* it is the very same method under another draw of the same noise. It was made by
+`null_errors.json` has two kinds. In *settings*, B is the method A with one constant changed slightly, on the same
+readings. In *draws*, B is the same method with another draw of the same noise. It was made by
 
     harness run scenarios/gate/equally_good.toml --no-report
     harness run scenarios/gate/equally_good_again.toml --no-report
     python -m harness.bench.null_errors results/equally_good results/equally_good_again
 
-where the second run was stopped after 26 of the 30 takes.
+The second run was stopped after 26 of the 30 takes.
 """
 
 import sys
@@ -26,22 +26,22 @@ METRICS = ("joint_angle_mean_deg", "mpjpe_mm", "jitter_m_s3")
 KINDS = ("settings", "draws")
 FILE = Path(__file__).with_suffix(".json")
 CellsByClip = Mapping[str, CellResult]
-"""By clip."""
+"""Clip -> cell."""
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorPopulation:
-    """M methods, K metrics, C clips."""
+    """Errors of M methods, K metrics and C clips."""
 
     methods: tuple[str, ...]
     clips: tuple[str, ...]
     errors: Floats
-    """(M, K, C, 2) of A and of B."""
+    """(M, K, C, 2) errors of A and of B."""
 
 
 def load_population(kind: str) -> ErrorPopulation:
-    """One of `KINDS`, as stored."""
-    content = read_json(FILE, "errors of equally good sides")[kind]
+    """Load one of the `KINDS` of errors."""
+    content = read_json(FILE, "errors of equally good methods")[kind]
     errors = [
         [np.array([sides["a"].split(), sides["b"].split()], float).T for sides in metrics.values()]
         for metrics in content["errors"].values()
@@ -49,27 +49,27 @@ def load_population(kind: str) -> ErrorPopulation:
     return ErrorPopulation(tuple(content["errors"]), tuple(content["clips"]), np.array(errors))
 
 
-def main(run: str, again: str) -> None:
-    """Store what two runs measured; BadFile for what is no run."""
-    one, other = _cells_by_method(load_results(run)), _cells_by_method(load_results(again))
-    moved = {method.partition("[")[0]: method for method in one if "[" in method}
+def main(run: str, other_run: str) -> None:
+    """Store the errors of two runs; BadFile for a folder that is no run."""
+    cells, other_cells = _cells_by_method(load_results(run)), _cells_by_method(load_results(other_run))
+    variants = {method.partition("[")[0]: method for method in cells if "[" in method}
     content = {
-        "settings": _pair_errors({method: (one[method], one[by]) for method, by in moved.items()}),
-        "draws": _pair_errors({method: (one[method], other[method]) for method in moved}),
+        "settings": _pair_errors({method: (cells[method], cells[variant]) for method, variant in variants.items()}),
+        "draws": _pair_errors({method: (cells[method], other_cells[method]) for method in variants}),
     }
     write_json(FILE, content)
 
 
 def _cells_by_method(side: ResultSet) -> dict[str, dict[str, CellResult]]:
     """Method -> clip -> cell."""
-    found: dict[str, dict[str, CellResult]] = {}
+    by_method: dict[str, dict[str, CellResult]] = {}
     for cell in side.cells:
-        found.setdefault(cell.method, {})[cell.clip] = cell
-    return found
+        by_method.setdefault(cell.method, {})[cell.clip] = cell
+    return by_method
 
 
 def _pair_errors(sides: Mapping[str, tuple[CellsByClip, CellsByClip]]) -> dict[str, Any]:
-    """Six digits of every error on the clips that all have, a text for each side, method and metric."""
+    """Format errors on the common clips with six digits, as one text for each side, method and metric."""
     clips = [
         clip for clip in next(iter(sides.values()))[0] if all(clip in one for pair in sides.values() for one in pair)
     ]

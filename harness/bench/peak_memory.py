@@ -1,9 +1,9 @@
-"""One method in a process of its own: the memory that it takes.
+"""Peak memory of one method in a process of its own.
 
     python -m harness.bench.peak_memory METHOD FOLDER SEED
 
-prints the peak in bytes. With METHOD "nothing" the process does all that is not learning: it has loaded everything,
-libraries of linear algebra with their work space too, made the frames, and followed them with plain inverse kinematics.
+prints the peak in bytes. With METHOD "nothing" the process is a baseline without a learning method: it loads all
+libraries (linear algebra with its work space, faiss), makes the frames, and follows them with plain inverse kinematics.
 """
 
 import subprocess
@@ -21,50 +21,50 @@ from harness.reconstruct.database import MotionDatabase
 
 NO_METHOD = "nothing"
 CLIP_S = 4.0
-"""Of every held-out take."""
+"""Length of every held-out take [s]."""
 _STATUS = Path("/proc/self/status")
 
 
 def measure_peak_bytes(method: str, folder: Path, seed: int) -> int:
-    """The largest resident memory of a fresh process [bytes]; RuntimeError when it fails."""
+    """Peak resident memory of a new process that runs the method [bytes]; RuntimeError when it fails."""
     command = [sys.executable, "-m", "harness.bench.peak_memory", method, str(folder), str(seed)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
-        raise RuntimeError(f"{method} alone: {done.stderr.strip()[-2000:]}")
+        raise RuntimeError(f"{method} in its own process: {done.stderr.strip()[-2000:]}")
     return int(done.stdout)
 
 
 def run_method(name: str, folder: Path, seed: int) -> int:
-    """The same of this process."""
+    """Run the method in this process; returns its peak resident memory [bytes]."""
     _load_libraries()
-    body, shown = benchmark_clips.build_common_body(), benchmark_clips.generate_held_out_clips(seed, CLIP_S)
-    _run_sessions(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), shown)
+    body, clips = benchmark_clips.build_common_body(), benchmark_clips.generate_held_out_clips(seed, CLIP_S)
+    _run_sessions(registry.resolve("ik:previous").fit(body, [], generator(seed, "bench", "alone")), clips)
     if name != NO_METHOD:
         database = MotionDatabase.open(folder)
-        _run_sessions(benchmark_clips.fit_named_method(name, database, seed), shown)
+        _run_sessions(benchmark_clips.fit_named_method(name, database, seed), clips)
     return peak_bytes()
 
 
 def _load_libraries() -> None:
-    """What any program that multiplies matrices and searches holds, whatever it learns from."""
+    """Load the libraries that every method uses, with their work space."""
     import faiss
 
     matrix = np.eye(160)
-    for some in (matrix, matrix.astype(np.float32)):
-        solve(some @ some, some, assume_a="pos")
+    for typed in (matrix, matrix.astype(np.float32)):
+        solve(typed @ typed, typed, assume_a="pos")
     np.linalg.eigh(matrix)
     faiss.IndexFlatL2(8).add(np.zeros((1, 8), np.float32))
 
 
-def _run_sessions(fitted: Reconstructor, shown: list[benchmark_clips.BenchmarkClip]) -> None:
-    for trial in shown:
-        session = fitted.begin(trial.simulation.calibration)
-        for frame in trial.simulation.frames:
+def _run_sessions(fitted: Reconstructor, clips: list[benchmark_clips.BenchmarkClip]) -> None:
+    for clip in clips:
+        session = fitted.begin(clip.simulation.calibration)
+        for frame in clip.simulation.frames:
             session.step(frame)
 
 
 def peak_bytes() -> int:
-    """Of this program; `getrusage` would count what the parent held when it started this one."""
+    """Peak resident memory of this process [bytes]; `getrusage` would include that of the parent when it forked."""
     if _STATUS.is_file():
         line = next(line for line in _STATUS.read_text().splitlines() if line.startswith("VmHWM:"))
         return 1024 * int(line.split()[1])

@@ -1,4 +1,4 @@
-"""One line of `harness bench`: what was measured, beside what it is held to."""
+"""Rows of `harness bench`: a measured value, its reference and its target."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -8,28 +8,29 @@ from harness.core.text_table import Table
 
 @dataclass(frozen=True)
 class BenchmarkRow:
-    """A figure of one run; figures of different runs or machines are compared through `reference` only."""
+    """A value of one run. Compare runs or machines only by values that are relative to a reference of the same run."""
 
     name: str
-    """What was measured, such as "ik, six trackers, converged"."""
+    """Name of the quantity, such as "ik, six trackers, converged"."""
     value: float
-    """The figure itself, in `unit`."""
+    """The value, in `unit`."""
     unit: str
-    """Such as "frames/s"."""
+    """The unit, such as "frames/s"."""
     reference: str
-    """What it was measured against in the same run, or "" when it stands alone."""
+    """The reference that was measured in the same run; "" without one."""
     target: str
-    """What it is held to, such as ">= 1500"; "" when it is for information."""
+    """The target, such as ">= 1500"; "" where the value is for information."""
     more: Mapping[str, str | float] = field(default_factory=dict)
-    """What else there is to say, for programs: further entries of `as_dict`."""
+    """Further entries of `as_dict`, for programs."""
 
     def as_dict(self) -> dict[str, str | float]:
+        """The entries of the JSON output."""
         return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "more"} | dict(self.more)
 
 
 def format_rows(rows: Sequence[BenchmarkRow]) -> str:
-    """A text table with one line for each row."""
-    head = ["what", "measured", "target", "measured against, in the same run"]
+    """Format rows as a text table."""
+    head = ["quantity", "measured", "target", "reference, in the same run"]
     cells = [[row.name, f"{_format_value(row.value)} {row.unit}".rstrip(), row.target, row.reference] for row in rows]
     return "\n".join(Table(head, cells, text_columns=len(head)).lines())
 

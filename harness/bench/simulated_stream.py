@@ -1,9 +1,8 @@
-"""How fast a take becomes tracker frames: replay, statistical noise, the device's bytes and their decoder.
+"""Throughput of the simulated stream: replay, statistical noise, encoding to device bytes, decoding to frames.
 
-Six trackers at level `default` on a take of the built-in performer, at the tracker's default rate. The frames are
-those that a method is given, so making them is part of what is timed; motion and body are made beforehand. Beside
-it, parts of the way alone, and MuJoCo's bare kinematics of as many poses. The contenders take turns, so that
-whatever else the machine does meets all alike.
+Six stations with noise preset `default` on a synthetic take, at the tracker's default rate. Motion and body are made
+in advance; making the frames is timed. Parts of the path and MuJoCo's kinematics of as many poses are timed separately.
+The parts take turns, so that load on the machine affects all equally.
 """
 
 import time
@@ -28,36 +27,36 @@ def bench_stream(seed: int = 1, repeats: int = 7) -> list[BenchmarkRow]:
     """Medians over `repeats` turns; each turn is one take of 20 s for each contender."""
     clip = synthetic.generate("boxing", synthetic.performer_names()[0], 1, seed=seed)
     body, take = retargeting.retarget_to_own_body(clip)
-    worn = [mounts.DEFAULT_MOUNTS[station] for station in STATIONS]
+    stations = [mounts.DEFAULT_MOUNTS[station] for station in STATIONS]
 
-    def replayed(level: str) -> Simulation:
-        return simulate_tracker(body, take, worn, TrackerConfig(), noise.noise_preset(level), seed=seed)
+    def simulate(preset: str) -> Simulation:
+        return simulate_tracker(body, take, stations, TrackerConfig(), noise.noise_preset(preset), seed=seed)
 
-    seen = replayed("default")
-    contenders: tuple[Callable[[], object], ...] = (
-        lambda: replayed("default"),
-        lambda: replayed("clean"),
-        lambda: list(CaptureStream(seen.wire_format, seen.wire)),
-        lambda: _decode_capture(seen),
-        lambda: _pose_all(Kinematics(body), seen.truth_qpos),
+    simulation = simulate("default")
+    parts: tuple[Callable[[], object], ...] = (
+        lambda: simulate("default"),
+        lambda: simulate("clean"),
+        lambda: list(CaptureStream(simulation.wire_format, simulation.wire)),
+        lambda: _decode_capture(simulation),
+        lambda: _pose_all(Kinematics(body), simulation.truth_qpos),
     )
-    seconds = np.array([[_time_call(contender) for contender in contenders] for _ in range(repeats)])
-    whole_s, clean_s, frames_s, records_s, poses_s = np.median(seconds, axis=0).tolist()
-    frames = len(seen.frames)
+    seconds = np.array([[_time_call(part) for part in parts] for _ in range(repeats)])
+    total_s, clean_s, frames_s, records_s, poses_s = np.median(seconds, axis=0).tolist()
+    frames = len(simulation.frames)
     return [
         BenchmarkRow(
             "replay + noise + codec, six trackers",
-            frames / whole_s,
+            frames / total_s,
             "frames/s",
             f"without noise {frames / clean_s:.0f} frames/s",
             ">= 5000",
         ),
         BenchmarkRow(
-            "bytes into frames", frames / frames_s, "frames/s", f"{frames_s / whole_s:.0%} of the whole way", ""
+            "bytes into frames", frames / frames_s, "frames/s", f"{frames_s / total_s:.0%} of the total time", ""
         ),
         BenchmarkRow("bytes into records", frames * len(STATIONS) / records_s, "records/s", "the same bytes", ""),
         BenchmarkRow(
-            "a frame / bare kinematics of a pose", whole_s / poses_s, "x", f"{frames / poses_s:.0f} poses/s", ""
+            "a frame / bare kinematics of a pose", total_s / poses_s, "x", f"{frames / poses_s:.0f} poses/s", ""
         ),
     ]
 
@@ -68,8 +67,9 @@ def _time_call(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def _decode_capture(seen: Simulation) -> None:
-    Decoder(dict.fromkeys(seen.wire_format.characters, seen.wire_format.items)).feed(seen.wire.data)
+def _decode_capture(simulation: Simulation) -> None:
+    wire_format = simulation.wire_format
+    Decoder(dict.fromkeys(wire_format.characters, wire_format.items)).feed(simulation.wire.data)
 
 
 def _pose_all(kinematics: Kinematics, poses: Floats) -> None:

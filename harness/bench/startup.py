@@ -10,7 +10,7 @@ from harness.bench.rows import BenchmarkRow
 
 
 def bench_startup(repeats: int = 7) -> list[BenchmarkRow]:
-    """Medians of interleaved runs, so that a busy moment hits both alike."""
+    """Medians of interleaved runs, so that load on the machine affects both equally."""
     bare = [sys.executable, "-c", "pass"]
     help_text = [sys.executable, "-m", "harness.cli", "--help"]
     seconds = np.array([[_time_command(bare), _time_command(help_text)] for _ in range(repeats)])

@@ -1,8 +1,8 @@
-"""Sweeps: what the machinery costs a cell, what a second worker is worth, and how long 100,000 cells take to read.
+"""Cost of sweeps: overhead for each cell, gain of a second worker, and time to read 100,000 cells.
 
-The command line does the work, in processes of its own, as a user's would. What a cell costs without it is measured
-beside: the same cells judged one after another in this process, and written nowhere. The 100,000 are made up: real
-rows of one small sweep in the index, each with a folder that holds links to the files of a real cell.
+Sweeps run by the command line in processes of their own. For comparison the same cells are evaluated one after another
+in this process, without writing results. The 100,000 cells are fabricated: the index has rows of a small real sweep,
+each with a folder of links to the files of a real cell.
 """
 
 import csv
@@ -33,9 +33,9 @@ from harness.results.table import TIME_COLUMNS, compute_group_statistics, write_
 
 MANY_CELLS = 100_000
 SMALL_SWEEP, TINY_SWEEP = 200, 20
-"""Cells of the two sweeps between which the overhead is measured: either draws its page."""
+"""Cells of the two sweeps whose difference gives the overhead; both write a report page."""
 REPEATS = 3
-"""The quickest counts: whatever else the computer does only ever adds."""
+"""Number of repeats; the shortest time counts, since other load only adds to it."""
 CLIPS = ("walking_p1_01", "boxing_p1_01", "jumping_p1_01", "golf_p1_01")
 PARALLEL_SWEEP = f"""
 schema = 1
@@ -46,10 +46,11 @@ methods = ["ik", "local_pca", "dynamic_map"]
 [vary]
 components.echo.share = {[0.01 * n for n in range(16)]}
 """
-"""What one worker and two do: two minutes' work for one, beside which starting and the page are little."""
+"""The sweep for one and two workers: two minutes for one, so that start-up and report page hardly count."""
 
 
 def bench_sweep(seed: int = 1, *, cells: int = SMALL_SWEEP, many: int = MANY_CELLS) -> list[BenchmarkRow]:
+    """Measure overhead, parallel speed-up and the reading of large folders."""
     with tempfile.TemporaryDirectory(prefix="harness-sweep-") as folder:
         return [
             *_overhead_rows(Path(folder), seed, cells),
@@ -59,26 +60,26 @@ def bench_sweep(seed: int = 1, *, cells: int = SMALL_SWEEP, many: int = MANY_CEL
 
 
 def _overhead_rows(folder: Path, seed: int, cells: int) -> list[BenchmarkRow]:
-    """A sweep of many small cells beside one of a few, and beside judging them."""
-    some, all_of_them = _write_sweep(folder, TINY_SWEEP), _write_sweep(folder, cells)
+    """Overhead of a cell: difference of a large and a small sweep, minus the evaluation itself."""
+    small, large = _write_sweep(folder, TINY_SWEEP), _write_sweep(folder, cells)
     scenario = replace(_small_scenario(cells), seed=seed)
-    took: dict[str, list[Floats]] = {"few": [], "again": [], "all": [], "judged": []}
+    times: dict[str, list[Floats]] = {"few": [], "again": [], "all": [], "evaluated": []}
     for repeat in range(REPEATS):
-        took["few"].append(_time_sweep(some, folder / f"few-{repeat}", seed))
-        took["again"].append(_time_sweep(some, folder / f"few-{repeat}", seed))
-        took["all"].append(_time_sweep(all_of_them, folder / f"all-{repeat}", seed))
-        took["judged"].append(_time_scoring(scenario) / (cells - 1))
-    quickest = {name: np.min(of, axis=0) for name, of in took.items()}
-    more = cells - TINY_SWEEP
-    each_ms = 1e3 * ((quickest["all"] - quickest["few"]) / more - quickest["judged"])
-    again_ms = 1e3 * (_time_sweep(all_of_them, folder / "all-0", seed) - quickest["again"]) / more
-    judged_ms, (few_s, _) = 1e3 * quickest["judged"][0], quickest["few"]
-    beside = (
-        f"{each_ms[1]:.1f} ms of it CPU; {judged_ms:.0f} ms to judge one, {few_s:.1f} s for a sweep of {TINY_SWEEP}"
+        times["few"].append(_time_sweep(small, folder / f"few-{repeat}", seed))
+        times["again"].append(_time_sweep(small, folder / f"few-{repeat}", seed))
+        times["all"].append(_time_sweep(large, folder / f"all-{repeat}", seed))
+        times["evaluated"].append(_time_scoring(scenario) / (cells - 1))
+    shortest = {name: np.min(repeats, axis=0) for name, repeats in times.items()}
+    extra = cells - TINY_SWEEP
+    each_ms = 1e3 * ((shortest["all"] - shortest["few"]) / extra - shortest["evaluated"])
+    again_ms = 1e3 * (_time_sweep(large, folder / "all-0", seed) - shortest["again"]) / extra
+    evaluated_ms, (few_s, _) = 1e3 * shortest["evaluated"][0], shortest["few"]
+    reference = (
+        f"{each_ms[1]:.1f} ms of it CPU; {evaluated_ms:.0f} ms to evaluate a cell, {few_s:.1f} s for {TINY_SWEEP} cells"
     )
     return [
-        BenchmarkRow("a sweep's overhead for each cell", float(each_ms[0]), "ms", beside, "<= 20"),
-        BenchmarkRow("going on with a sweep, for each finished cell", float(again_ms[0]), "ms", f"{cells} cells", ""),
+        BenchmarkRow("overhead of a sweep, for each cell", float(each_ms[0]), "ms", reference, "<= 20"),
+        BenchmarkRow("resuming a sweep, for each finished cell", float(again_ms[0]), "ms", f"{cells} cells", ""),
     ]
 
 
@@ -97,38 +98,38 @@ def _shares(cells: int) -> list[float]:
 
 
 def _small_scenario(cells: int) -> Scenario:
-    """What the study of so many cells comes to."""
+    """The scenario of the sweep with this number of cells."""
     scenario = load_scenario("demo")
     motion = replace(scenario.motion, test=CLIPS[:1], behaviours=("walking",), longest_s=2.0)
     return replace(scenario, motion=motion, methods=("mean_pose",), vary={"components.echo.share": _shares(cells)})
 
 
 def _time_scoring(scenario: Scenario) -> Floats:
-    """All cells but the first, which also makes what the others share; as `_time_call`."""
-    job = ClipTask(scenario, ClipPart.parse(scenario.motion.test[0]), scenario.motion.behaviours[0], None, "")
-    method, setting, start = registry.resolve(scenario.methods[0]), None, _process_times()
-    for place, cell in enumerate(job.cells()):
-        if setting is None:
+    """Time to evaluate all cells but the first, which also makes what they share; as in `_time_call`."""
+    task = ClipTask(scenario, ClipPart.parse(scenario.motion.test[0]), scenario.motion.behaviours[0], None, "")
+    method, evaluation, start = registry.resolve(scenario.methods[0]), None, _process_times()
+    for index, cell in enumerate(task.cells()):
+        if evaluation is None:
             source = open_scenario_motion(cell.scenario.motion, None, scenario.seed)
-            setting = ClipEvaluation(cell.scenario, source, job.part, job.behaviour)
-        setting = setting.with_conditions(cell.scenario) or setting
-        evaluate_cell(setting, method, cell, "key", "")
-        if place == 0:
+            evaluation = ClipEvaluation(cell.scenario, source, task.part, task.behaviour)
+        evaluation = evaluation.with_conditions(cell.scenario) or evaluation
+        evaluate_cell(evaluation, method, cell, "key", "")
+        if index == 0:
             start = _process_times()
     return _process_times() - start
 
 
 def _parallel_rows(folder: Path, seed: int) -> list[BenchmarkRow]:
-    """The same sweep by one worker and by two."""
-    study = folder / "shared.toml"
-    study.write_text(PARALLEL_SWEEP)
-    one, two = (float(_time_sweep(study, folder / f"jobs-{jobs}", seed, jobs)[0]) for jobs in (1, 2))
+    """Run the same sweep with one and two workers."""
+    sweep = folder / "shared.toml"
+    sweep.write_text(PARALLEL_SWEEP)
+    one, two = (float(_time_sweep(sweep, folder / f"jobs-{jobs}", seed, jobs)[0]) for jobs in (1, 2))
     differing = _count_differing_lines(folder / "jobs-1" / "summary.csv", folder / "jobs-2" / "summary.csv")
     return [
         BenchmarkRow(
-            "two jobs against one", one / two, "x", f"{one:.1f} s by one, on {os.cpu_count()} cores", ">= 1.7"
+            "speed-up by a second job", one / two, "x", f"{one:.1f} s with one, on {os.cpu_count()} cores", ">= 1.7"
         ),
-        BenchmarkRow("lines of the table that differ between them", float(differing), "", "times apart", "0"),
+        BenchmarkRow("lines of the table that differ between them", float(differing), "", "without times", "0"),
     ]
 
 
@@ -144,7 +145,7 @@ def _untimed_lines(table: Path) -> Iterator[Mapping[str, str]]:
 
 
 def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
-    """How far such a folder is, what is in it, and its page."""
+    """Time for status, table with summary, and report page of a folder with many cells."""
     out = folder / "many"
     _fabricate_cells(folder / "jobs-1", out, count)
     work: dict[str, Callable[[], Any]] = {
@@ -153,10 +154,10 @@ def _large_folder_rows(folder: Path, count: int) -> list[BenchmarkRow]:
         "harness report": lambda: _run_harness("report", str(out), "--json"),
     }
     rows = []
-    for name, todo in work.items():
-        wall_s, cpu_s = _time_call(todo).tolist()
-        beside = f"{cpu_s:.1f} s CPU; made up of a real sweep's rows, a folder of linked files for each"
-        rows.append(BenchmarkRow(f"{count:,} finished cells: {name}", wall_s, "s", beside, "<= 10"))
+    for name, call in work.items():
+        wall_s, cpu_s = _time_call(call).tolist()
+        reference = f"{cpu_s:.1f} s CPU; rows of a real sweep, each with a folder of linked files"
+        rows.append(BenchmarkRow(f"{count:,} finished cells: {name}", wall_s, "s", reference, "<= 10"))
     return rows
 
 
@@ -167,7 +168,7 @@ def _write_summary(out: Path) -> None:
 
 
 def _fabricate_cells(real: Path, out: Path, count: int) -> None:
-    """Every row of a real sweep again and again, under other latencies and as other seeds."""
+    """Repeat the rows of a real sweep with other latencies and seeds."""
     (out / "cells").mkdir(parents=True)
     for name in ("manifest.json", "summary.json"):
         shutil.copyfile(real / name, out / name)
@@ -175,26 +176,26 @@ def _fabricate_cells(real: Path, out: Path, count: int) -> None:
         rows, facts = list(index.rows()), index.facts()
     rows = [row for row in rows if row["method"] != "ik"]
     files = [list((real / "cells" / row["key"]).iterdir()) for row in rows]
-    made = [(f"{n:032x}", _fabricate_row(rows[n % len(rows)], *divmod(n // len(rows), 20))) for n in range(count)]
+    fabricated = [(f"{n:032x}", _fabricate_row(rows[n % len(rows)], *divmod(n // len(rows), 20))) for n in range(count)]
     with CellIndex(out) as index:
         index.note(**facts)
-        index.expect([key for key, _ in made])
-        index.add({**row, "key": key} for key, row in made)
-        index.record_outcomes((key, key, "") for key, _ in made)
-    for n, (key, _) in enumerate(made):
+        index.expect([key for key, _ in fabricated])
+        index.add({**row, "key": key} for key, row in fabricated)
+        index.record_outcomes((key, key, "") for key, _ in fabricated)
+    for n, (key, _) in enumerate(fabricated):
         folder = out / "cells" / key
         folder.mkdir()
         for file in files[n % len(rows)]:
-            os.link(file, folder / file.name)  # of many, for a file has no more than some 65,000 names
+            os.link(file, folder / file.name)  # links to several cells, since a file has at most about 65,000 links
 
 
 def _fabricate_row(row: Mapping[str, Any], seed: int, latency_ms: int) -> dict[str, Any]:
     return {**row, "seed": seed, "varied": {**row["varied"], "tracker.latency_s": 0.001 * latency_ms}}
 
 
-def _time_sweep(study: Path, out: Path, seed: int, jobs: int = 1) -> Floats:
-    asked = ("sweep", str(study), "--out", str(out), "--jobs", str(jobs), "--seed", str(seed), "--json")
-    return _time_call(lambda: _run_harness(*asked))
+def _time_sweep(sweep: Path, out: Path, seed: int, jobs: int = 1) -> Floats:
+    words = ("sweep", str(sweep), "--out", str(out), "--jobs", str(jobs), "--seed", str(seed), "--json")
+    return _time_call(lambda: _run_harness(*words))
 
 
 def _run_harness(*words: str) -> None:
@@ -204,12 +205,12 @@ def _run_harness(*words: str) -> None:
 
 
 def _time_call(work: Callable[[], Any]) -> Floats:
-    """(2,) wall time, and CPU time of this process and those that it waited for [s]."""
+    """(2,) wall time, and CPU time of this process and its finished children [s]."""
     start = _process_times()
     work()
     return _process_times() - start
 
 
 def _process_times() -> Floats:
-    theirs = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return np.array([time.perf_counter(), time.process_time() + theirs.ru_utime + theirs.ru_stime])
+    children = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return np.array([time.perf_counter(), time.process_time() + children.ru_utime + children.ru_stime])

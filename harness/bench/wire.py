@@ -1,8 +1,8 @@
-"""The wire in real time: an emulator in one process, `harness live` in another, a line between them.
+"""Latency over a line in real time: an emulator in one process, `harness live` in another.
 
-The emulator notes when each record was due and when its last byte was written, the live session when each pose was
-ready; what lies between is the whole way, the system's pipes and both programs' waits included. Beside it stands how
-late this computer wakes a program that only sleeps, at the same time.
+The emulator records when each record was due and when its last byte was written. The live session records when each
+pose was ready. The difference is the latency of the whole path, with the system's pipes and the waits of both programs.
+The operating system's scheduling jitter is measured at the same time.
 """
 
 import csv
@@ -29,12 +29,12 @@ from harness.stream.codec.records import RecordFormat
 
 METHOD = "dynamic_map"
 SECONDS, LONG_S = 15.0, 600.0
-"""Of each line; ten minutes of it with --large."""
+"""Duration of the measurement of each line, and with --large [s]."""
 _TICK_S = RecordFormat().seconds_per_tick
 
 
 def bench_wire(seed: int = 1, *, large: bool = False, repeats: int = 7) -> list[BenchmarkRow]:
-    """Decoding, then each line for its time."""
+    """Measure decoding, then each line in real time."""
     rows = _decoding_rows(seed, repeats)
     for case in CASES:
         with tempfile.TemporaryDirectory(prefix="harness-wire-") as folder:
@@ -43,35 +43,35 @@ def bench_wire(seed: int = 1, *, large: bool = False, repeats: int = 7) -> list[
 
 
 def _decoding_rows(seed: int, repeats: int) -> list[BenchmarkRow]:
-    """Records per second of one core: runs of them in both formats, and one at a time as a port gives them."""
-    played = prepare_playback(SCENARIO, clip=CLIP, seed=seed).simulation
-    wire, items = played.wire_format, played.wire_format.items
-    binary = played.wire.data * 10
+    """Decoding rates of one core: blocks of records in both formats, and single records as from a port."""
+    playback = prepare_playback(SCENARIO, clip=CLIP, seed=seed).simulation
+    wire, items = playback.wire_format, playback.wire_format.items
+    binary = playback.wire.data * 10
     table = np.frombuffer(binary, record_type(items))
     text = ascii_records.format_records(items, table)
-    one = [played.wire.data[at : at + table.itemsize] for at in range(0, len(played.wire.data), table.itemsize)]
+    records = [playback.wire.data[at : at + table.itemsize] for at in range(0, len(playback.wire.data), table.itemsize)]
     lists = dict.fromkeys(wire.characters, items)
 
-    def singly() -> None:
+    def decode_singly() -> None:
         reader = FrameReader(wire)
-        for data, received_s in zip(one, played.wire.received_s.tolist(), strict=True):
+        for data, received_s in zip(records, playback.wire.received_s.tolist(), strict=True):
             reader.feed(data, received_s)
 
     contenders: tuple[tuple[Callable[[], object], int], ...] = (
         (lambda: Decoder(lists).feed(binary), len(table)),
         (lambda: Decoder(lists, RecordFormat(binary=False)).feed(text), len(table)),
-        (lambda: FrameReader(wire).feed_all(played.wire), len(one)),
-        (singly, len(one)),
+        (lambda: FrameReader(wire).feed_all(playback.wire), len(records)),
+        (decode_singly, len(records)),
     )
     seconds = np.array([[_time_call(work) for work, _ in contenders] for _ in range(repeats)])
     rate = [count / s for (_, count), s in zip(contenders, np.median(seconds, axis=0).tolist(), strict=True)]
     return [
-        BenchmarkRow("decoding binary records", rate[0], "records/s", "38 bytes, in runs", ">= 200000"),
+        BenchmarkRow("decoding binary records", rate[0], "records/s", "38 bytes, in blocks", ">= 200000"),
         BenchmarkRow(
-            "decoding ASCII records", rate[1], "records/s", f"{len(text) // len(table)} bytes, in runs", ">= 200000"
+            "decoding ASCII records", rate[1], "records/s", f"{len(text) // len(table)} bytes, in blocks", ">= 200000"
         ),
-        BenchmarkRow("binary records into frames", rate[2], "records/s", "in runs", ""),
-        BenchmarkRow("the same, one record at a time", 1e6 / rate[3], "us/record", "as a port gives them", ""),
+        BenchmarkRow("binary records into frames", rate[2], "records/s", "in blocks", ""),
+        BenchmarkRow("binary records into frames, one at a time", 1e6 / rate[3], "us/record", "as from a port", ""),
     ]
 
 
@@ -84,21 +84,21 @@ def _time_call(work: Callable[[], object]) -> float:
 def _bench_line(case: WireCase, seconds: float, seed: int, folder: Path) -> list[BenchmarkRow]:
     port = str(folder / "tracker") if case.kind == "pty" else "127.0.0.1:0"
     pace = "paced" if case.kind == "pty" else "unpaced"
-    asked = [str(folder / "sent.npz"), str(seed), str(case.stations), str(case.rate_hz), case.kind, pace, port]
+    arguments = [str(folder / "sent.npz"), str(seed), str(case.stations), str(case.rate_hz), case.kind, pace, port]
     device = subprocess.Popen(
-        [sys.executable, "-m", "harness.bench.wire_device", *asked],
+        [sys.executable, "-m", "harness.bench.wire_device", *arguments],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
     try:
         name = device.stdout.readline().strip() if device.stdout else ""
-        said = _run_live(name, case, seconds, seed, folder / "poses.csv")
+        report = _run_live(name, case, seconds, seed, folder / "poses.csv")
     finally:
         device.communicate()
     if device.returncode:
         raise RuntimeError(f"the emulator ended with {device.returncode}")
-    return _line_rows(case, seconds, said, np.load(folder / "sent.npz"), folder / "poses.csv")
+    return _line_rows(case, seconds, report, np.load(folder / "sent.npz"), folder / "poses.csv")
 
 
 def _run_live(port: str, case: WireCase, seconds: float, seed: int, poses: Path) -> dict[str, Any]:
@@ -111,37 +111,37 @@ def _run_live(port: str, case: WireCase, seconds: float, seed: int, poses: Path)
     return dict(json.loads(done.stdout))
 
 
-def _line_rows(case: WireCase, seconds: float, said: dict[str, Any], sent: Any, poses: Path) -> list[BenchmarkRow]:
+def _line_rows(case: WireCase, seconds: float, report: dict[str, Any], sent: Any, poses: Path) -> list[BenchmarkRow]:
     table = np.frombuffer(sent["data"].tobytes(), record_type(case.items))
-    begin = _last_clock_reset(table["time"])  # before it the driver measured the device's rate
+    begin = _last_clock_reset(table["time"])  # earlier records served to measure the device's rate
     table, due_s, written_s = table[begin:], sent["due_s"][begin:], sent["written_s"][begin:]
     station = np.frombuffer(STATION_CHARACTERS, np.uint8).searchsorted(table["station"])
     stamp_s = table["time"].astype(float) * _TICK_S
     posed_s = _pose_times(poses, case.stations)
     ready_s = np.array([posed_s[s].get(t, np.nan) for s, t in zip(station.tolist(), stamp_s.tolist(), strict=True)])
-    lost, way_s = _losses_and_latency(written_s, ready_s)
+    lost, latency_s = _losses_and_latency(written_s, ready_s)
     late_ms = 1e3 * (written_s - due_s)[~np.isnan(written_s)]
-    floor = said["floor"]
-    beside = f"timer p99 {floor['timer']['p99_ms']:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
-    p50, p99, most = (1e3 * float(np.quantile(way_s, share)) for share in (0.5, 0.99, 1.0))
-    heard = f"of {int(np.sum(~np.isnan(ready_s)))} in {seconds:g} s"
+    floor = report["floor"]
+    jitter = f"timer p99 {floor['timer']['p99_ms']:.2f} ms late, max {floor['timer']['max_ms']:.1f}"
+    p50, p99, most = (1e3 * float(np.quantile(latency_s, share)) for share in (0.5, 0.99, 1.0))
+    count = f"of {int(np.sum(~np.isnan(ready_s)))} in {seconds:g} s"
     return [
-        BenchmarkRow(f"{case.name}: records without a pose", float(lost.sum()), "", heard, "0"),
-        BenchmarkRow(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", beside, ""),
+        BenchmarkRow(f"{case.name}: records without a pose", float(lost.sum()), "", count, "0"),
+        BenchmarkRow(f"{case.name}: pacing error p99", float(np.quantile(late_ms, 0.99)), "ms", jitter, ""),
         BenchmarkRow(
-            f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {beside}", "<= 10"
+            f"{case.name}: last byte to pose p99", p99, "ms", f"p50 {p50:.2f}, max {most:.1f} ms; {jitter}", "<= 10"
         ),
     ]
 
 
 def _last_clock_reset(time: Floats) -> int:
-    """The first record after the device's clock was set to zero last."""
-    back = np.flatnonzero(np.diff(time) < 0.0)
-    return int(back[-1]) + 1 if len(back) else 0
+    """Index of the first record after the last reset of the device's clock."""
+    resets = np.flatnonzero(np.diff(time) < 0.0)
+    return int(resets[-1]) + 1 if len(resets) else 0
 
 
 def _pose_times(poses: Path, stations: int) -> list[dict[float, float]]:
-    """For each station, when the pose was ready [s] that a stamp of the device's went into."""
+    """For each station: device time stamp -> time when its pose was ready [s]."""
     out: list[dict[float, float]] = [{} for _ in range(stations)]
     with poses.open(newline="") as file:
         rows = csv.DictReader(file)
@@ -153,14 +153,16 @@ def _pose_times(poses: Path, stations: int) -> list[dict[float, float]]:
 
 
 def _losses_and_latency(written_s: Floats, ready_s: Floats) -> tuple[Bools, Floats]:
-    """Which records between the first and the last that were posed were not (N,), and from the last byte of each
-    frame to its pose [s]."""
+    """Records (N,) without a pose, between the first and the last with one; and the latency of each frame [s].
+
+    The latency is the time from the last byte of a frame to its pose.
+    """
     posed = np.flatnonzero(~np.isnan(ready_s))
     if len(posed) == 0:
-        raise RuntimeError("no record of the emulator made a pose")
+        raise RuntimeError("no record of the emulator led to a pose")
     lost = np.isnan(ready_s)
     lost[: posed[0]] = lost[posed[-1] :] = False
-    frames, of = np.unique(ready_s[posed], return_inverse=True)
-    complete_s = np.full(len(frames), -np.inf)
-    np.maximum.at(complete_s, of, written_s[posed])
-    return lost, frames - complete_s
+    pose_s, frame = np.unique(ready_s[posed], return_inverse=True)
+    complete_s = np.full(len(pose_s), -np.inf)
+    np.maximum.at(complete_s, frame, written_s[posed])
+    return lost, pose_s - complete_s

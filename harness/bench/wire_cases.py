@@ -1,4 +1,4 @@
-"""The lines that `harness bench wire` tries, and the motion that goes over them."""
+"""The serial and TCP lines that `harness bench wire` measures, and the motion that is sent."""
 
 from dataclasses import dataclass
 
@@ -9,16 +9,17 @@ SCENARIO, CLIP = "demo", "boxing_p1_01"
 
 @dataclass(frozen=True)
 class WireCase:
-    """Stations at a rate on a line."""
+    """Number of stations and rate on one kind of line."""
 
     stations: int
     rate_hz: float
     items: tuple[int, ...]
     kind: str
-    """pty, or tcp; a pty is paced at 115200 baud, TCP is not."""
+    """"pty" or "tcp"; a pty is paced at 115200 baud, TCP is not."""
 
     @property
     def name(self) -> str:
+        """The name in the table."""
         line = "pty at 115200" if self.kind == "pty" else "TCP, unpaced"
         return f"{self.rate_hz:g} Hz x {self.stations}, {record_size(self.items)} bytes, {line}"
 

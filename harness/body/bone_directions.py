@@ -45,7 +45,7 @@ def _shortest_rotation(a: Floats, b: Floats) -> Floats:
 
 
 def _nearest_euler_angles(axes: Floats, angle_rad: Floats, near_rad: Floats) -> Floats:
-    """Of the equivalent angles (T, N) of the same rotations, those nearest to `near_rad` [rad]."""
+    """Angles (T, N) of the same rotations that are nearest to `near_rad` [rad]."""
     first = _nearest_turn(angle_rad, near_rad)
     if not are_gimbal(axes):
         return first
@@ -56,6 +56,6 @@ def _nearest_euler_angles(axes: Floats, angle_rad: Floats, near_rad: Floats) -> 
 
 
 def _nearest_turn(angle_rad: Floats, near_rad: Floats) -> Floats:
-    """The same angles with whole turns added, within half a turn of `near_rad` [rad]."""
+    """Angles with whole turns added, so that they lie within half a turn of `near_rad` [rad]."""
     out: Floats = angle_rad - 2 * np.pi * np.round((angle_rad - near_rad) / (2 * np.pi))
     return out

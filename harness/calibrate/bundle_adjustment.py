@@ -1,7 +1,7 @@
-"""Bundle adjustment of calibration poses: eq. 1 of Liu et al. 2011 (docs/methods.md A3, H15).
+"""Bundle adjustment of calibration poses: eq. 1 of Liu et al. 2011 (docs/papers.md A3; docs/calibration.md).
 
 Residuals are in units of their standard deviation. Poses are coupled only by the shared unknowns, so each pose is
-eliminated on its own (Schur complement). The reduced system is also the information about the shared unknowns when
+eliminated alone (Schur complement). The reduced system is also the information about the shared unknowns when
 the poses are unknown. `bundle_fit` takes the Levenberg-Marquardt steps.
 """
 
@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.station_kinematics import StationKinematics, StationPoses
 from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns, apply_step
 from harness.core import rotations
@@ -22,7 +23,7 @@ class ResidualScales:
     pose_error_rad: float
     """Error of each hinge, and of the lean of the body, against the nominal pose [rad]."""
     mount_spread: float
-    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_*_SD_M`."""
+    """Spread of trackers about their nominal mounts, in units of `held_pose_model.MOUNT_*_SD_M`."""
     skin_offset_m: Floats
     """(S, 3) offset of the nominal mounts from the bones, an argument of `SharedUnknowns.nominal_m` [m]."""
     position_sd_m: float
@@ -37,9 +38,9 @@ class NormalEquations:
 
     shared: Floats
     """(X, X) block of the shared unknowns."""
-    across: Floats
+    coupling: Floats
     """(P, Y, X) blocks that couple each pose with the shared unknowns."""
-    own: Floats
+    pose_blocks: Floats
     """(P, Y, Y) block of each pose."""
     shared_gradient: Floats
     """(X,) right-hand side of the shared unknowns."""
@@ -48,27 +49,27 @@ class NormalEquations:
 
     def step(self, damping: float) -> tuple[Floats, Floats]:
         """Solve with Marquardt damping: steps of the shared unknowns (X,) and of the poses (P, Y)."""
-        own: Floats = self.own * (1.0 + damping * np.eye(self.own.shape[1]))
-        solved = _solve(own, np.concatenate([self.across, self.pose_gradient[..., None]], axis=2))
+        pose_blocks: Floats = self.pose_blocks * (1.0 + damping * np.eye(self.pose_blocks.shape[1]))
+        solved = _solve(pose_blocks, np.concatenate([self.coupling, self.pose_gradient[..., None]], axis=2))
         reduced = self.shared * (1.0 + damping * np.eye(len(self.shared))) - _summed_product(
-            self.across, solved[..., :-1]
+            self.coupling, solved[..., :-1]
         )
-        slope = self.shared_gradient - _summed_product(self.across, solved[..., -1:])[:, 0]
+        slope = self.shared_gradient - _summed_product(self.coupling, solved[..., -1:])[:, 0]
         shared = _solve(reduced, slope)
         return shared, solved[..., -1] - solved[..., :-1] @ shared
 
     def information(self) -> Floats:
         """(X, X) information about the shared unknowns with the poses marginalised."""
-        out = self.shared - _summed_product(self.across, _solve(self.own, self.across))
+        out = self.shared - _summed_product(self.coupling, _solve(self.pose_blocks, self.coupling))
         return 0.5 * (out + out.T)
 
     def variances(self) -> tuple[Floats, Floats]:
         """Covariance (X, X) of the shared unknowns, and variances (P, Y) of the poses' unknowns."""
         covariance = _solve(self.information(), np.eye(len(self.shared)))
-        inverse = _solve(self.own, np.eye(self.own.shape[1])[None])
-        gain = inverse @ self.across
-        own = np.diagonal(inverse, axis1=1, axis2=2) + np.sum((gain @ covariance) * gain, axis=2)
-        return covariance, own
+        inverse = _solve(self.pose_blocks, np.eye(self.pose_blocks.shape[1])[None])
+        gain = inverse @ self.coupling
+        pose_variance = np.diagonal(inverse, axis1=1, axis2=2) + np.sum((gain @ covariance) * gain, axis=2)
+        return covariance, pose_variance
 
 
 class BundleAdjustment:
@@ -134,19 +135,21 @@ class BundleAdjustment:
 
     def normal_equations(self, at: CalibrationSolution, scales: ResidualScales, weight: Floats) -> NormalEquations:
         """Normal equations at a solution; the arguments are those of `cost`."""
-        residual, shared, own = self._readings(at, np.sqrt(weight) / [scales.position_sd_m, scales.orientation_sd_rad])
+        residual, by_shared, by_pose = self._readings(
+            at, np.sqrt(weight) / [scales.position_sd_m, scales.orientation_sd_rad]
+        )
         expected, slope = self.shared.prior_residuals(at, scales.mount_spread, scales.skin_offset_m)
         pose_error, pose_jacobian = (
             self.pose_errors(at) / scales.pose_error_rad,
             self._pose_error_jacobian(at) / scales.pose_error_rad,
         )
-        poses_t, pose_jacobian_t = np.swapaxes(own, 1, 2), np.swapaxes(pose_jacobian, 1, 2)
+        by_pose_t, pose_jacobian_t = np.swapaxes(by_pose, 1, 2), np.swapaxes(pose_jacobian, 1, 2)
         return NormalEquations(
-            shared=_summed_product(shared, shared) + slope.T @ slope,
-            across=poses_t @ shared,
-            own=poses_t @ own + pose_jacobian_t @ pose_jacobian,
-            shared_gradient=_summed_product(shared, residual[..., None])[:, 0] - slope.T @ expected,
-            pose_gradient=(poses_t @ residual[..., None] - pose_jacobian_t @ pose_error[..., None])[..., 0],
+            shared=_summed_product(by_shared, by_shared) + slope.T @ slope,
+            coupling=by_pose_t @ by_shared,
+            pose_blocks=by_pose_t @ by_pose + pose_jacobian_t @ pose_jacobian,
+            shared_gradient=_summed_product(by_shared, residual[..., None])[:, 0] - slope.T @ expected,
+            pose_gradient=(by_pose_t @ residual[..., None] - pose_jacobian_t @ pose_error[..., None])[..., 0],
         )
 
     def _readings(self, at: CalibrationSolution, scale: Floats) -> tuple[Floats, Floats, Floats]:
@@ -160,11 +163,11 @@ class BundleAdjustment:
         shared[:, :, 0, :, layout.bones] = self.kinematics.bone_jacobian(reached, layout.bone_of, layout.vector)
         mounts = self.kinematics.mount_jacobian(reached)
         for j in range(residual.shape[1]):
-            own_three = slice(3 * j, 3 * j + 3)
-            shared[:, j, 0, :, layout.mount][..., own_three] = mounts[:, j]
-            shared[:, j, 1, :, layout.turn][..., own_three] = reached.world_from_station[:, j]
+            columns = slice(3 * j, 3 * j + 3)
+            shared[:, j, 0, :, layout.mount][..., columns] = mounts[:, j]
+            shared[:, j, 1, :, layout.turn][..., columns] = reached.world_from_station[:, j]
         roots, hinges = self.kinematics.root_jacobian(reached), self.kinematics.hinge_jacobian(reached)
-        own = np.stack(
+        by_pose = np.stack(
             [np.concatenate([r, h[..., self.hinges]], axis=3) for r, h in zip(roots, hinges, strict=True)], axis=2
         )
         rows = (len(residual), -1)
@@ -172,7 +175,7 @@ class BundleAdjustment:
         return (
             (residual * scale).reshape(rows),
             (shared * scale[..., None]).reshape(*rows, layout.count),
-            (own * scale[..., None]).reshape(*rows, own.shape[-1]),
+            (by_pose * scale[..., None]).reshape(*rows, by_pose.shape[-1]),
         )
 
     def _pose_error_jacobian(self, at: CalibrationSolution) -> Floats:
@@ -182,12 +185,6 @@ class BundleAdjustment:
         slope[:, :2, 3:6] = _tilt(at)[1]
         slope[:, 2:, 6:] = np.eye(count)
         return slope
-
-
-def heading_between_rad(from_m: Floats, to_m: Floats) -> float:
-    """Rotation about the vertical that fits points (S, 3) to others best, each about its mean [rad]."""
-    a, b = ((points - points.mean(axis=0))[:, :2] @ [1.0, 1.0j] for points in (from_m, to_m))
-    return float(np.angle(np.vdot(a, b)))
 
 
 def mean_rotations(turns: Floats) -> Floats:

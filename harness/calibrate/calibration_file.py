@@ -49,20 +49,20 @@ class CalibrationFile:
 
     def select(self, stations: Sequence[str]) -> "CalibrationFile":
         """A copy with these stations only, in this order; BadInput names the first that is missing."""
-        known = self.calibration
+        calibration = self.calibration
         for name in stations:
-            if name not in known.stations:
+            if name not in calibration.stations:
                 raise BadInput(
-                    f"Station {name!r} is not in the calibration, which has {', '.join(known.stations)}.",
+                    f"Station {name!r} is not in the calibration, which has {', '.join(calibration.stations)}.",
                     "Wear the calibrated stations, use the names they had then, or calibrate again.",
                 )
-        rows = [known.stations.index(name) for name in stations]
+        rows = [calibration.stations.index(name) for name in stations]
         chosen = replace(
-            known,
+            calibration,
             stations=tuple(stations),
-            bones=tuple(known.bones[row] for row in rows),
-            mount_m=known.mount_m[rows],
-            bone_from_station=known.bone_from_station[rows],
+            bones=tuple(calibration.bones[row] for row in rows),
+            mount_m=calibration.mount_m[rows],
+            bone_from_station=calibration.bone_from_station[rows],
         )
         return replace(self, calibration=chosen)
 

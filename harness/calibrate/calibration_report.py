@@ -58,10 +58,10 @@ def _bone_lines(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
     head = ["bone [mm]", "estimate", "sd", "mean skeleton", "bound alone", "from trackers", ""]
     rows = [
         [
-            *(name, f"{1e3 * one['length_m']:.1f}", f"{1e3 * one['sd_m']:.1f}", f"{1e3 * one['mean_m']:.1f}"),
-            *(_mm(one["bound_m"]), f"{one['known']:.0%}", "from the prior" if one["from_prior"] else ""),
+            *(name, f"{1e3 * row['length_m']:.1f}", f"{1e3 * row['sd_m']:.1f}", f"{1e3 * row['mean_m']:.1f}"),
+            *(_mm(row["bound_m"]), f"{row['known']:.0%}", "from the prior" if row["from_prior"] else ""),
         ]
-        for name, one in lengths.items()
+        for name, row in lengths.items()
     ]
     return Table(head, rows).lines()
 
@@ -71,9 +71,9 @@ def _mount_lines(mounts: Mapping[str, Mapping[str, float]]) -> list[str]:
     rows = [
         [
             name,
-            *(word for key in _MOUNT_FIELDS for word in (_mm(one[f"{key}_m"]), f"{one[f'{key}_deg']:.2f}")),
+            *(word for key in _MOUNT_FIELDS for word in (_mm(row[f"{key}_m"]), f"{row[f'{key}_deg']:.2f}")),
         ]
-        for name, one in mounts.items()
+        for name, row in mounts.items()
     ]
     return Table(head, rows).lines()
 
@@ -91,16 +91,17 @@ def _fit_lines(result: PoseCalibration, miss_deg: Mapping[str, float]) -> list[s
 
 
 def report_tpose_calibration(result: TPoseCalibration) -> CalibrationReport:
+    """Report of a T-pose calibration: a row for each station, and the uncertainty of the heading."""
     names = result.calibration.stations
     stations = {
         name: {"residual_m": residual_m, "moved_m": moved_m}
         for name, residual_m, moved_m in zip(names, result.residual_m.tolist(), result.moved_m.tolist(), strict=True)
     }
-    rows = [[name, _mm(one["residual_m"]), _mm(one["moved_m"])] for name, one in stations.items()]
+    rows = [[name, _mm(row["residual_m"]), _mm(row["moved_m"])] for name, row in stations.items()]
     heading_deg = float(np.rad2deg(result.heading_sd_rad))
     lines = [
         *Table(["station", "off the T-pose [mm]", "moved [mm]"], rows).lines(),
-        f"the performer's heading is known to {heading_deg:.1f} deg; T-pose held for {result.seconds:.1f} s",
+        f"standard deviation of the heading {heading_deg:.1f} deg; T-pose held for {result.seconds:.1f} s",
     ]
     return {"seconds": result.seconds, "heading_sd_deg": heading_deg, "stations": stations}, lines
 

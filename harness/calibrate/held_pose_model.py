@@ -82,7 +82,7 @@ class HeldPoseModel:
 
     def fit(self, measured_m: Floats) -> HeldPoseFit:
         """Fit positions (S, 3) measured in a frame whose z axis is up [m]."""
-        heading_rad = _heading_between_rad(measured_m, self.place_m)
+        heading_rad = heading_between_rad(measured_m, self.place_m)
         shift_m = np.mean(self.place_m - rotations.rotate(rotations.about_z(heading_rad), measured_m), axis=0)
         for _ in range(20):
             residual = self._residual(measured_m, heading_rad, shift_m)
@@ -112,7 +112,7 @@ class HeldPoseModel:
         return out
 
 
-def _heading_between_rad(from_m: Floats, to_m: Floats) -> float:
+def heading_between_rad(from_m: Floats, to_m: Floats) -> float:
     """Rotation about the vertical that fits points (S, 3) to others best, each about its mean [rad]."""
     a, b = ((points - points.mean(axis=0))[:, :2] @ [1.0, 1.0j] for points in (from_m, to_m))
     return float(np.angle(np.vdot(a, b)))

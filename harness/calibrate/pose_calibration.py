@@ -1,4 +1,4 @@
-"""Calibration of skeleton and mounts from eight poses (Liu et al. 2011, eq. 1; docs/methods.md A3, H15).
+"""Calibration of skeleton and mounts from eight poses (Liu et al. 2011, eq. 1; docs/papers.md A3; docs/calibration.md).
 
 Differences from eq. 1:
 
@@ -74,7 +74,7 @@ class PoseCalibration:
     pose_error_rad: Floats
     """(P,) error of each pose, standard deviation of a hinge [rad]."""
     mount_spread: float
-    """Spread of trackers about their nominal mounts, in units of `unknowns.MOUNT_*_SD_M`."""
+    """Spread of trackers about their nominal mounts, in units of `held_pose_model.MOUNT_*_SD_M`."""
     condition: float
     """Condition number of the whitened normal matrix."""
     hints: tuple[str, ...]
@@ -117,9 +117,9 @@ def calibrate_poses(
 
 
 def _reading_sd(holds: Sequence[HoldReadings]) -> tuple[float, float]:
-    """Standard deviations of typical places [m] and orientations [rad] on an axis, from how readings scatter in a hold.
+    """Standard deviations of median positions [m] and orientations [rad] on an axis, from the scatter within holds.
 
-    The device's errors wander over a second, so that a typical reading of a few is hardly better than any one.
+    Device errors are correlated over about a second, so a median is hardly better than a single reading.
     """
     moved_m = float(np.median([hold.moved_m for hold in holds])) * _SD_PER_QUARTILE
     turned_rad = float(np.median([hold.turned_rad for hold in holds])) * _SD_PER_QUARTILE

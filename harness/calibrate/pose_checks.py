@@ -33,14 +33,15 @@ def require_no_boresight(bundle: BundleAdjustment) -> None:
         bundle.forward_kinematics(at).world_from_bone[:, bundle.shared.carriers], bundle.turn
     )
     turn_rad = rotations.rotate(rotations.inverse(LEVEL_FROM_TRACKER), turn_rad)
-    found = np.flatnonzero(np.any(turn_rad != 0.0, axis=1))
-    if len(found) == 0:
+    rotated_stations = np.flatnonzero(np.any(turn_rad != 0.0, axis=1))
+    if len(rotated_stations) == 0:
         return
     mounts = bundle.shared.mounts
     rotated = "; ".join(
-        f"station {j + 1} ({mounts[j].station}) {station_orientation.rotation_text(turn_rad[j])}" for j in found
+        f"station {j + 1} ({mounts[j].station}) {station_orientation.rotation_text(turn_rad[j])}"
+        for j in rotated_stations
     )
-    undo = ", ".join(f"b{j + 1}" for j in found)
+    undo = ", ".join(f"b{j + 1}" for j in rotated_stations)
     raise UnusableHold(
         f"These stations report orientations with the same rotation in every pose (axes x forward, z down): {rotated}.",
         f"Undo the boresight (send {undo}) or the alignment (R) of these stations, or remove any rotation that is "
@@ -48,23 +49,23 @@ def require_no_boresight(bundle: BundleAdjustment) -> None:
     )
 
 
-def require_poses_held(bundle: BundleAdjustment, found: BundleFit) -> None:
+def require_poses_held(bundle: BundleAdjustment, fit: BundleFit) -> None:
     """UnusableHold when a pose was not held as shown, or when stations are exchanged."""
-    if found.heading_sd_rad > HEADING_SD_RAD:
+    if fit.heading_sd_rad > HEADING_SD_RAD:
         names = ", ".join(mount.station for mount in bundle.shared.mounts)
         raise UnusableHold(
             f"Stations {names} do not determine which way the performer faces.",
             "Wear trackers on both sides of the body: a left and a right wrist, hand or ankle.",
         )
-    worst = int(np.argmax(found.pose_error_rad))
-    usual = OUTLIER_RATIO * float(np.median(found.pose_error_rad))
-    if found.pose_error_rad[worst] <= min(MOST_POSE_ERROR_RAD, max(usual, OUTLIER_RAD)):
+    worst = int(np.argmax(fit.pose_error_rad))
+    usual = OUTLIER_RATIO * float(np.median(fit.pose_error_rad))
+    if fit.pose_error_rad[worst] <= min(MOST_POSE_ERROR_RAD, max(usual, OUTLIER_RAD)):
         return
-    _require_no_exchange(bundle, found)
+    _require_no_exchange(bundle, fit)
     mounts = bundle.shared.mounts
-    off_m = _distances_m(bundle, found)[worst]
+    off_m = _distances_m(bundle, fit)[worst]
     station = int(np.argmax(off_m))
-    off_deg, off_mm = np.rad2deg(found.pose_error_rad[worst]), 1e3 * off_m[station]
+    off_deg, off_mm = np.rad2deg(fit.pose_error_rad[worst]), 1e3 * off_m[station]
     raise UnusableHold(
         f"Pose {worst + 1} ({POSES[worst].name}) was not held as shown: hinges are {off_deg:.0f} deg off (RMS); "
         f"station {mounts[station].station!r} is the farthest from its place in it, {off_mm:.0f} mm.",
@@ -72,11 +73,11 @@ def require_poses_held(bundle: BundleAdjustment, found: BundleFit) -> None:
     )
 
 
-def _distances_m(bundle: BundleAdjustment, found: BundleFit) -> Floats:
+def _distances_m(bundle: BundleAdjustment, fit: BundleFit) -> Floats:
     """(P, S) distance of stations from where they would be had the poses been held as shown, upright [m]."""
-    at = found.solution
+    at = fit.solution
     start = bundle.start()
-    asked = CalibrationSolution(
+    as_shown = CalibrationSolution(
         at.bone_m,
         at.weights_m,
         at.mount_m,
@@ -85,18 +86,18 @@ def _distances_m(bundle: BundleAdjustment, found: BundleFit) -> Floats:
         start.world_from_root,
         bundle.nominal_rad,
     )
-    place_m = bundle.forward_kinematics(asked).place_m
+    place_m = bundle.forward_kinematics(as_shown).place_m
     shift_m = np.median(bundle.place_m - place_m, axis=1, keepdims=True)
     return np.asarray(np.linalg.norm(bundle.place_m - place_m - shift_m, axis=2))
 
 
-def _require_no_exchange(bundle: BundleAdjustment, found: BundleFit) -> None:
+def _require_no_exchange(bundle: BundleAdjustment, fit: BundleFit) -> None:
     mounts = bundle.shared.mounts
     """UnusableHold when exchanging two stations, or all left and right ones, fits far better."""
     stations = list(range(len(mounts)))
     bones = [mount.bone for mount in mounts]
     sides = [(bones.index(b), bones.index(f"r{b[1:]}")) for b in bones if b[0] == "l" and f"r{b[1:]}" in bones]
-    scales = ResidualScales(MOST_POSE_ERROR_RAD / 2.0, 1.0, found.scales.skin_offset_m, 0.005, np.deg2rad(1.0))
+    scales = ResidualScales(MOST_POSE_ERROR_RAD / 2.0, 1.0, fit.scales.skin_offset_m, 0.005, np.deg2rad(1.0))
     plain = _ExchangedFit(bundle, stations, scales)
     candidates = []
     for exchange in [*([pair] for pair in combinations(stations, 2)), sides]:

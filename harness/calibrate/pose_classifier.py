@@ -36,14 +36,14 @@ class PoseClassifier:
         bones = [body.skeleton.index(mount.bone) for mount in mounts]
         placed = [locate_mount(body.skeleton, mount) for mount in mounts]
         mount_m, turn = np.array([at_m for at_m, _ in placed]), np.array([turned for _, turned in placed])
-        found = []
+        poses_of_stations = []
         for pose in poses:
             kinematics.set(pose)
             place_m, turned = kinematics.station_poses(bones, mount_m, turn)
-            found.append((place_m - place_m.mean(axis=0), np.array(turned)))
-        self._place_m = np.array([place_m for place_m, _ in found])
+            poses_of_stations.append((place_m - place_m.mean(axis=0), np.array(turned)))
+        self._place_m = np.array([place_m for place_m, _ in poses_of_stations])
         """(N, S, 3) station positions about their mean [m]."""
-        turned = np.array([turned for _, turned in found])
+        turned = np.array([turned for _, turned in poses_of_stations])
         self._turned = rotations.multiply(turned, rotations.inverse(turned[0]))
         """(N, S, 4) rotation of each station since the first pose, world axes."""
 

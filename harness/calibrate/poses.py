@@ -1,4 +1,4 @@
-"""The eight calibration poses (Liu et al. 2011; docs/methods.md A3, E, H15).
+"""The eight calibration poses (Liu et al. 2011; docs/papers.md A3, E; docs/calibration.md).
 
 T-pose, arms forward, arms down, arms bent, left leg up, right leg up, squat, and a bow with a twist. The paper shows
 no list of its poses; the angles are ours [choice]. Each pose also rotates, bends or leans the trunk and the head, so

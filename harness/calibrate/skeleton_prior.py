@@ -1,8 +1,8 @@
 """Prior of people's bones: PCA of bone lengths over a population of skeletons (Liu et al. 2011, section 3).
 
-See docs/methods.md A2 and H15. Lengths are in metres, not divided by the left tibia as in the paper's figure. Every
-skeleton counts twice, as it is and mirrored, so the prior is symmetric. The residual of the modes is normal and
-independent for each bone. The directions of bones in the rest pose have a normal distribution as well.
+See docs/papers.md A2 and docs/calibration.md. Lengths are in metres, not divided by the left tibia as in the paper's
+figure. Every skeleton counts twice, as it is and mirrored, so the prior is symmetric. The residual of the modes is
+normal and independent for each bone. The directions of bones in the rest pose have a normal distribution as well.
 """
 
 from collections.abc import Sequence
@@ -76,15 +76,15 @@ def fit_skeleton_prior(skeletons: Sequence[Skeleton], modes: int = 5, source: st
     mean_m = length_m.mean(axis=0)
     _, size, rows = np.linalg.svd(length_m - mean_m, full_matrices=False)
     variance = size**2 / (2.0 * (count - 1))
-    whole = np.sum((length_m - mean_m) ** 2, axis=0) / (2.0 * (count - 1))
+    total_variance = np.sum((length_m - mean_m) ** 2, axis=0) / (2.0 * (count - 1))
     # Modes overfit the people that they come from; the factor corrects the residual for other people.
-    rest = (whole - variance[:modes] @ rows[:modes] ** 2) * count / (count - modes)
+    residual_variance = (total_variance - variance[:modes] @ rows[:modes] ** 2) * count / (count - modes)
     direction, across, across_m = _directions(both_m, count)
     return SkeletonPrior(
         mean_m=mean_m,
         modes=rows[:modes],
         mode_sd_m=np.sqrt(variance[:modes]),
-        residual_sd_m=np.sqrt(np.maximum(rest, LEAST_RESIDUAL_SD_M**2)),
+        residual_sd_m=np.sqrt(np.maximum(residual_variance, LEAST_RESIDUAL_SD_M**2)),
         direction=direction,
         across=across,
         across_m=across_m,

@@ -1,4 +1,4 @@
-"""T-pose calibration (Kim et al. 2012, eq. 1; docs/methods.md B2, H13).
+"""T-pose calibration (Kim et al. 2012, eq. 1; docs/papers.md B2; docs/calibration.md).
 
 While the performer stands in T-pose for some seconds, the readings give the room's frame and the mount of each
 tracker. Gravity is the tracker's z axis (docs/is900.md 5.3). The performer's position and heading in the pose define

@@ -1,6 +1,6 @@
 """The unknowns of the eight-pose calibration and their prior (Liu et al. 2011, eq. 1, its last term).
 
-All poses share bones, mode weights and mounts; each pose has a root and hinges of its own (docs/methods.md H15).
+All poses share bones, mode weights and mounts; each pose has a root and hinges of its own (docs/calibration.md).
 """
 
 from collections.abc import Sequence
@@ -9,15 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.body.mounts import Mount, locate_mount
+from harness.calibrate.held_pose_model import MOUNT_ACROSS_SD_M, MOUNT_ALONG_SD_M
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.core import rotations
 from harness.core.arrays import Floats, Ints
 from harness.core.skeleton import Skeleton
 
-MOUNT_ALONG_SD_M, MOUNT_ACROSS_SD_M = 0.03, 0.015
-"""Distance of trackers from their nominal mounts, standard deviation along the bone and on the two axes across it [m].
-
-The values are those of `held_pose_model`; the fit estimates the actual spread in units of them (`mount_spread`)."""
 _LEAST_ACROSS_M = 1e-6
 """Directions with a smaller standard deviation than this are taken as fixed [m]."""
 
@@ -106,7 +103,7 @@ class SharedUnknowns:
         return out
 
     def _lengths(self, at: CalibrationSolution) -> tuple[Floats, Floats]:
-        """What the modes leave of the lengths."""
+        """Residual of the lengths about the modes, in standard deviations, and its Jacobian."""
         slope = self.length_jacobian(at)
         slope[:, self.weights] = -self.space.modes.T
         left_m = at.length_m - self.space.mean_m - at.weights_m @ self.space.modes
@@ -137,8 +134,8 @@ class SharedUnknowns:
         ) / mount_spread
         slope = np.zeros((len(self.mounts), 3, self.count))
         for j, bone in enumerate(self.carriers):
-            own = np.flatnonzero(self.bone_of == bone)
-            slope[j][:, own] = -self._along[j] * self.vector[own].T
+            coordinates = np.flatnonzero(self.bone_of == bone)
+            slope[j][:, coordinates] = -self._along[j] * self.vector[coordinates].T
             slope[j][:, self.mount][:, 3 * j : 3 * j + 3] = np.eye(3)
         off_m = at.mount_m - self.nominal_m(at.bone_m, skin_offset_m)
         return (root @ off_m[..., None]).ravel(), (root @ slope).reshape(-1, self.count)

@@ -34,7 +34,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
         process_executor(args.jobs) as each,
     ):
         findings, outcome = run_placement(
-            args.study, out, folder=args.mocap, each=each, command=this_command(), progress=bar
+            args.study, out, folder=args.mocap, executor=each, command=this_command(), progress=bar
         )
     page = write_placement_page(out)
     content = {**to_json_types(asdict(findings)), "out": str(out), "report": str(page)}

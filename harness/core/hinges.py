@@ -55,6 +55,6 @@ def are_gimbal(axes: Floats) -> bool:
 
 
 def equivalent_euler_angles(angles_rad: Floats) -> Floats:
-    """The other angles (..., 3) of three orthogonal hinges that give the same rotation."""
+    """Second set of angles (..., 3) of three orthogonal hinges for the same rotation."""
     out: Floats = angles_rad * [1.0, -1.0, 1.0] + np.pi
     return out

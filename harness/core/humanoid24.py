@@ -1,4 +1,4 @@
-"""The body's skeleton in numbers: 24 bones and 48 hinges of Liu et al. 2011 (docs/methods.md A2), in CMU's convention.
+"""The body's skeleton in numbers: 24 bones and 48 hinges of Liu et al. 2011 (docs/papers.md A2), in CMU's convention.
 
 Bone vectors are the mean over 20 skeletons of the CMU motion capture library, mirrored left to right. Hinge axes
 are common to all of them. Limits are the envelope of 146 CMU clips, none of them a test clip, plus 10 deg (the

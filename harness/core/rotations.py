@@ -97,7 +97,7 @@ def from_matrix(matrix: Floats) -> Floats:
 
 
 def continuous(quaternions: Floats) -> Floats:
-    """The same rotations (T, ..., 4) with signs such that consecutive quaternions have no negative inner product."""
+    """Rotations (T, ..., 4) with signs chosen such that consecutive quaternions have no negative inner product."""
     q = np.array(quaternions, dtype=float)
     if len(q) > 1:
         flips = np.sum(q[1:] * q[:-1], axis=-1) < 0.0
@@ -113,7 +113,7 @@ def yaw_rad(world_from_body: Floats) -> Floats:
 
 
 def wrap_angle(angle_rad: Floats) -> Floats:
-    """The same angles (...,) in [-pi, pi) [rad]."""
+    """Angles (...,) wrapped to [-pi, pi) [rad]."""
     out: Floats = (angle_rad + np.pi) % (2.0 * np.pi) - np.pi
     return out
 

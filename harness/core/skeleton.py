@@ -135,7 +135,7 @@ def unwrap_angles(skeleton: Skeleton, angles_rad: Floats) -> Floats:
     """Angles (T, D) of the same rotations, with each bone's angles as near as possible to those of the frame before.
 
     Files wrap at 180 deg, and three hinges reach a rotation by two sets of angles: (a, b, c) and the twin
-    (a + pi, pi - b, c + pi) (docs/methods.md F9). The remaining freedom is settled for the whole clip. Each column's
+    (a + pi, pi - b, c + pi) (docs/notes/traps.md F9). The remaining freedom is settled for the clip. Each column's
     median lies in (-pi, pi], and of a bone's two twin courses the one with medians nearer to zero is taken. A single
     frame takes the angles nearest to zero.
     """

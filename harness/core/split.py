@@ -1,4 +1,4 @@
-"""Splits: which motion a method may learn from. A test clip is never among its own examples (docs/methods.md F1)."""
+"""Splits: which motion a method may learn from (docs/notes/traps.md F1). A test clip is never among its examples."""
 
 import re
 from collections.abc import Iterable

@@ -1,10 +1,11 @@
-"""How far off calibration from eight poses is: simulated performers against their truth, the Cramér-Rao bound, and the
-mean skeleton, side by side (docs/methods.md H15)."""
+"""Accuracy of the calibration from eight poses, on simulated performers (docs/calibration.md).
+
+Errors against the truth stand next to the Cramér-Rao bound and to the errors of the mean skeleton.
+"""
 
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.text_table import Table
 from harness.experiment.simulated_calibration import TrackerSession
+from harness.mocap.library import LibraryFolders
 from harness.mocap.skeletons import read_skeletons
 from harness.mocap.sources import POPULATION_SIZE
 from harness.mocap.synthetic import sample_skeletons
@@ -32,43 +34,45 @@ from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
 
 STATIONS = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
-"""Of the first paper."""
+"""Stations of the first paper (Liu et al. 2011)."""
 HOLD_S, MOVE_S, HOLD_MARGIN_S = 3.0, 1.5, 0.2
-"""A hold, the time to the next, and what is left out of a hold at either end [s]."""
+"""Duration of a hold, of the move to the next, and of the margin that is left out at both ends of a hold [s]."""
 MOUNT_OFFSET_SD_M = 0.01
-"""How far trackers sit from their nominal mounts on each axis, standard deviation; they are turned anyhow."""
+"""Standard deviation of the mounts' offset on each axis [m]. The orientation of a tracker is arbitrary."""
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationErrors:
-    """What one performer's calibration was off; N bones, S stations."""
+    """Calibration errors of one performer; N bones, S stations."""
 
     length_m: Floats
-    """(N,) errors of lengths."""
+    """(N,) errors of bone lengths [m]."""
     length_sd_m: Floats
-    """(N,) their bound."""
+    """(N,) Cramér-Rao bound of the bone lengths [m]."""
     from_prior: Bools
-    """(N,)"""
+    """(N,) whether the length comes from the prior instead of the trackers."""
     mean_m: Floats
-    """(N,) errors of the mean skeleton, of other people."""
+    """(N,) errors of the mean skeleton of other people [m]."""
     mount_m: Floats
-    """(S,) errors of mounts in the frames of the bones that carry the trackers."""
+    """(S,) errors of mounts in the frames of the bones that carry the trackers [m]."""
     elbow_m: Floats
-    """(S,) likewise, of a tracker on a wrist seen from the elbow: the joint between radius and wrist turns about their
-    common line, and no tracker tells where on that line it is."""
+    """(S,) the same errors, for trackers on wrists measured from the elbow [m].
+
+    The joint between radius and wrist turns about their common line. No tracker observes its place on that line.
+    """
     mount_sd_m: Floats
-    """(S,) bound of `mount_m`."""
+    """(S,) Cramér-Rao bound of `mount_m` [m]."""
     turn_rad: Floats
-    """(S,) errors of orientation."""
+    """(S,) errors of the mounts' orientation [rad]."""
     turn_sd_rad: Floats
-    """(S,)"""
+    """(S,) Cramér-Rao bound of `turn_rad` [rad]."""
     miss_rad: float
-    """How far poses were missed, as found."""
+    """Estimated standard deviation of the angles by which poses were missed [rad]."""
 
 
 @dataclass(frozen=True)
 class ErrorStatistics:
-    """Of errors over performers and over bones or stations; mm or deg."""
+    """Statistics of errors over performers and over bones or stations, in `unit` (mm or deg)."""
 
     what: str
     unit: str
@@ -76,13 +80,13 @@ class ErrorStatistics:
     median: float
     worst: float
     bound: float
-    """Root mean square of the Cramér-Rao bounds with what is known beforehand of people's bones and of mounts."""
+    """Root mean square of the Cramér-Rao bounds, which include the priors on bone lengths and mounts."""
     mean_skeleton: float
-    """Root mean square of the mean skeleton's errors; NaN where it has none."""
+    """Root mean square of the mean skeleton's errors; NaN where it does not apply."""
     count: int
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON, with None for what there is not."""
+        """Content for JSON; None stands for NaN."""
         return {name: None if value != value else value for name, value in vars(self).items() if name != "what"}
 
     def row(self) -> list[str]:
@@ -99,26 +103,26 @@ TABLE_HEADER = ["error", "rms", "median", "worst", "bound", "mean skeleton", "va
 
 @dataclass(frozen=True, eq=False)
 class CalibrationAccuracy:
-    """Performers one after another."""
+    """Errors of several performers."""
 
     miss_rad: float
     noise: str
     source: str
     done: tuple[CalibrationErrors, ...]
     refused: dict[str, str]
-    """Performers who could not be calibrated, and why."""
+    """Performer -> why the calibration was refused."""
     seconds: tuple[float, ...]
-    """Processor time of each calibration."""
+    """Processor time of each calibration [s]."""
 
     def spreads(self) -> list[ErrorStatistics]:
-        """Of lengths: all, those that the trackers determine, those from the prior; of mounts; of orientations.
+        """Statistics of bone lengths (all, determined by the trackers, from the prior), mounts and orientations.
 
         Empty when every performer was refused.
         """
         if not self.done:
             return []
         off, bound, mean, prior, mount, mount_sd, elbow, turn, turn_sd = (
-            np.array([getattr(trial, field) for trial in self.done])
+            np.array([getattr(errors, field) for errors in self.done])
             for field in (
                 *("length_m", "length_sd_m", "mean_m", "from_prior"),
                 *("mount_m", "mount_sd_m", "elbow_m", "turn_rad", "turn_sd_rad"),
@@ -140,27 +144,31 @@ class CalibrationAccuracy:
         ]
 
     def as_dict(self) -> dict[str, object]:
-        """For JSON."""
+        """Content for JSON."""
         return {
             "performers": len(self.seconds),
             "refused": self.refused,
             "bones_of": self.source,
             "noise": self.noise,
             "miss_deg": float(np.rad2deg(self.miss_rad)),
-            "miss_found_deg": [float(np.rad2deg(trial.miss_rad)) for trial in self.done],
+            "miss_found_deg": [float(np.rad2deg(errors.miss_rad)) for errors in self.done],
             "seconds": list(self.seconds),
             "errors": {spread.what: spread.as_dict() for spread in self.spreads()},
         }
 
     def lines(self) -> list[str]:
-        """For a terminal."""
-        told = [f"{len(self.seconds)} performers, bones learnt from {self.source}"]
-        told += [f"noise {self.noise!r}, poses missed by {np.rad2deg(self.miss_rad):.2f} deg"]
+        """Lines for a terminal."""
+        lines = [f"{len(self.seconds)} performers, bones learnt from {self.source}"]
+        lines += [f"noise {self.noise!r}, poses missed by {np.rad2deg(self.miss_rad):.2f} deg"]
         if self.done:
-            found = np.rad2deg([trial.miss_rad for trial in self.done])
-            told[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
+            found = np.rad2deg([errors.miss_rad for errors in self.done])
+            lines[1] += f" (found: {found.mean():.2f}, {found.min():.2f} to {found.max():.2f})"
         table = Table(TABLE_HEADER, [spread.row() for spread in self.spreads()])
-        return [*told, *(table.lines() if self.done else []), *(f"{name}: {why}" for name, why in self.refused.items())]
+        return [
+            *lines,
+            *(table.lines() if self.done else []),
+            *(f"{name}: {why}" for name, why in self.refused.items()),
+        ]
 
 
 def measure_calibration_accuracy(
@@ -169,15 +177,15 @@ def measure_calibration_accuracy(
     miss_rad: float = float(np.deg2rad(2.5)),
     noise: str = "default",
     seed: int = 1,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     own_directions: bool = True,
     beside_m: float = MOUNT_OFFSET_SD_M,
     stations: Sequence[str] = STATIONS,
 ) -> CalibrationAccuracy:
-    """So many performers of whom nothing is known beforehand: drawn from the built-in spread, or the subjects of the
-    ASF files below `folder`, each with bones learnt from the others.
+    """Measure calibration errors of `count` performers, each with a prior on bone lengths from other people.
 
-    Without `own_directions` their bones are as long but point as the standard skeleton's. BadInput, BadFile,
+    Performers are drawn from the built-in population, or are the subjects of the ASF files below `folder`. Without
+    `own_directions` their bones keep their lengths but point as the standard skeleton's. BadInput, BadFile,
     UnknownName.
     """
     done, refused, seconds = [], {}, []
@@ -195,18 +203,18 @@ def measure_calibration_accuracy(
 
 
 def simulate_pose_holds(session: TrackerSession, miss_rad: float) -> list[list[TrackerFrame]]:
-    """What the tracker reports while the performer holds each of the eight poses."""
+    """Frames of the tracker while the performer holds each of the eight poses."""
     configurations = [configuration(pose, session.body.skeleton) for pose in POSES]
     rng = generator(session.seed, "calibration trial", session.name)
     take = hold_poses(session.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=HOLD_S, move_s=MOVE_S)
     seen = simulate_tracker(session.body, take, session.true_mounts, session.tracker, session.noise, seed=session.seed)
-    # By the host's clock, which hears of everything a little late.
+    # Frames are selected by the host's clock, on which they arrive up to 0.1 s late.
     holds = hold_times_s(len(POSES), HOLD_S, MOVE_S)
     return [[f for f in seen.frames if a + HOLD_MARGIN_S <= f.received_s <= b - HOLD_MARGIN_S + 0.1] for a, b in holds]
 
 
-def _performers(count: int, folder: Path | None) -> list[tuple[str, Skeleton, SkeletonPrior]]:
-    """Name, skeleton and the bones of others, of so many performers."""
+def _performers(count: int, folder: LibraryFolders | None) -> list[tuple[str, Skeleton, SkeletonPrior]]:
+    """Name, skeleton and prior from other people, for each of `count` performers."""
     if folder is None:
         everyone = sample_skeletons(POPULATION_SIZE + count, seed=0)
         space = fit_skeleton_prior(
@@ -258,7 +266,7 @@ def _calibration_errors(found: PoseCalibration, session: TrackerSession) -> Cali
 
 
 def _with_standard_directions(skeleton: Skeleton) -> Skeleton:
-    """Bones as long, pointing as the standard skeleton's."""
+    """A skeleton with the same bone lengths and the standard skeleton's bone directions."""
     standard = standard_skeleton()
     return skeleton.with_bones(standard.bone_m * (skeleton.length_m / standard.length_m)[:, None])
 

@@ -1,4 +1,4 @@
-"""Somebody stands model for a calibration: what they are to hold, whether they do, and what is kept of it."""
+"""Guided calibration of a performer with the stations of a scenario: poses, their collection, and the solution."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -25,6 +25,7 @@ from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import mounts_of
 from harness.experiment.playback import prepare_playback, select_stations
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
+from harness.mocap.library import LibraryFolders
 from harness.stream.frame import TrackerFrame
 
 CalibrationKind = Literal["poses", "tpose"]
@@ -32,7 +33,7 @@ CalibrationKind = Literal["poses", "tpose"]
 
 @dataclass(frozen=True, eq=False)
 class CalibrationOutcome:
-    """A calibration, and what there is to say of it."""
+    """A calibration and its report."""
 
     file: CalibrationFile
     lines: list[str]
@@ -40,21 +41,24 @@ class CalibrationOutcome:
 
 @dataclass(frozen=True, eq=False)
 class CalibrationSession:
-    """A performer with these stations of a scenario on; UnknownName and BadFile as for a run of it."""
+    """Calibration of a performer who wears stations of a scenario; UnknownName and BadFile as for a run of it."""
 
     scenario: Path | str
     stations: tuple[str, ...]
-    """In the order of the stream's rows."""
+    """Station names in the order of the stream's rows."""
     kind: CalibrationKind = "poses"
-    """Bones, mounts and room of eight poses; or mounts and room of the first alone, on a body that is known."""
+    """`poses`: bones, mounts and room from eight poses; `tpose`: mounts and room from the first pose, known body."""
     clip: str | None = None
-    """Whose body that is, and of whose bones nothing may be known beforehand; None: the scenario's first, nobody."""
-    folder: Path | None = None
-    """Library of real motion, where the scenario needs one."""
+    """Clip of the performer. It gives the body for `tpose`, and `poses` excludes its performer from the prior.
+
+    None stands for the scenario's first clip, or for a performer whom the prior does not contain.
+    """
+    folder: LibraryFolders | None = None
+    """Library of real motion, if the scenario needs one."""
 
     @cached_property
     def resolved_scenario(self) -> Scenario:
-        """With no other stations, in this order."""
+        """The scenario with these stations alone, in this order."""
         scenario = expand_clips(load_scenario(self.scenario), self.folder)
         worn = select_stations(scenario, self.stations)
         return replace(scenario, stations={name: scenario.stations[name] for name in worn}, worn=())
@@ -65,24 +69,24 @@ class CalibrationSession:
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
-        """Where the stations are said to be worn."""
+        """Nominal mounts of the stations."""
         return mounts_of(self.resolved_scenario)
 
     @cached_property
     def body(self) -> Body:
-        """The performer's where it is known, otherwise the standard one."""
+        """The performer's body for `tpose`, the standard body for `poses`."""
         if self.kind == "poses":
             return build_body()
         return prepare_playback(self.scenario, clip=self.clip, folder=self.folder).body
 
     @cached_property
     def pose_qpos(self) -> list[Floats]:
-        """The poses (55,) of that body."""
+        """Configurations (55,) of the poses on that body."""
         return [configuration(pose, self.body.skeleton) for pose in self.poses]
 
     @cached_property
     def space(self) -> SkeletonPrior:
-        """What people's bones are like: the scenario's source knows some."""
+        """Prior on bone lengths, from the people of the scenario's motion source."""
         motion = self.resolved_scenario.motion
         source = open_scenario_motion(motion, self.folder, self.resolved_scenario.seed)
         people = source.other_skeletons(without=source.subject(ClipPart.parse(self.clip).clip) if self.clip else "")
@@ -95,14 +99,14 @@ class CalibrationSession:
         show: PoseDisplay | None = None,
         watch: Notifier = lambda text: None,
     ) -> PoseCollector:
-        """Lead the performer through the poses; NotStanding when the stream ends before the last."""
+        """Guide the performer through the poses; UnusableHold when the stream ends before the last pose."""
         classifier = PoseClassifier(self.body, self.mounts, self.pose_qpos)
         collector = PoseCollector(self.stations, len(self.poses), classifier)
         PoseGuide(collector, self.poses, self.pose_qpos, show).run(frames, say, watch)
         return collector
 
     def solve(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:
-        """Solve for what the poses tell; `source` is where the frames come from, in words. NotStanding, BadInput."""
+        """Solve for the calibration; `source` describes where the frames come from. UnusableHold, BadInput."""
         if self.kind == "poses":
             eight = calibrate_poses(held, self.space, self.mounts)
             calibration, skeleton, (words, lines) = (

@@ -25,6 +25,7 @@ from harness.errors import BadInput, HarnessError, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.reference_workload import FRAMES_PER_TIMING, ReferenceWorkload
 from harness.experiment.scenario import Scenario, ScenarioMotion, variants
+from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import MotionSource, open_motion_source
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
@@ -68,7 +69,7 @@ class ClipTask:
     scenario: Scenario
     part: ClipPart
     behaviour: str
-    folder: Path | None
+    folder: LibraryFolders | None
     """The library of real motion."""
     command: str
     """The command that reproduces the run."""
@@ -160,15 +161,15 @@ def _resolve_method(name: str) -> Method:
 
 
 def evaluate_cell(
-    setting: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
+    evaluation: ClipEvaluation, method: Method, planned: PlannedCell, key: str, command: str
 ) -> storage.Cell:
     """Fit a method, run it causally over the simulated stream, and score its estimates."""
-    scenario, simulation = setting.scenario, setting.simulation
-    seen = make_inputs(planned.inputs, simulation.stations)
-    known, fitted = setting.performer_calibration, setting.fit_method(method, planned.method)
-    qpos, status, step_ms, cpu_ms = run_method(fitted, known.calibration, simulation, seen)
+    scenario, simulation = evaluation.scenario, evaluation.simulation
+    inputs = make_inputs(planned.inputs, simulation.stations)
+    calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
+    qpos, status, step_ms, cpu_ms = run_method(fitted, calibration.calibration, simulation, inputs)
     scores = score_estimate(
-        setting.body.skeleton,
+        evaluation.body.skeleton,
         scenario.tracker.rate_hz,
         simulation.truth_qpos,
         qpos,
@@ -176,35 +177,35 @@ def evaluate_cell(
         status,
         step_ms,
         cpu_ms=cpu_ms,
-        estimate_skeleton=known.body.skeleton,
+        estimate_skeleton=calibration.body.skeleton,
     )
     frames = simulation.frames
     return storage.Cell(
         key=key,
         method=planned.method,
-        behaviour=setting.behaviour,
-        clip=str(setting.part),
-        motion_source=setting.source.title,
+        behaviour=evaluation.behaviour,
+        clip=str(evaluation.part),
+        motion_source=evaluation.source.title,
         stations=simulation.stations,
         mount=scenario.mount,
         rate_hz=scenario.tracker.rate_hz,
         inputs=planned.inputs,
         split=scenario.motion.split if method.needs_examples else "none",
-        calibration=known.calibration.kind,
+        calibration=calibration.calibration.kind,
         noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
         seed=scenario.seed,
-        performer=setting.subject.performer,
+        performer=evaluation.subject.performer,
         varied=planned.varied,
         scenario=scenario.name,
-        defined_by=setting.conditions_of(method, planned.inputs),
+        defined_by=evaluation.conditions_of(method, planned.inputs),
         scores=scores,
         health=simulation.health,
-        calibration_errors=known.errors,
-        bone_m=setting.body.skeleton.bone_m,
-        estimate_bone_m=known.body.skeleton.bone_m,
+        calibration_errors=calibration.errors,
+        bone_m=evaluation.body.skeleton.bone_m,
+        estimate_bone_m=calibration.body.skeleton.bone_m,
         source_hash=manifest.source_hash(),
         reproduce=command,
-        notes=setting.notes(method),
+        notes=evaluation.notes(method),
         time_s=simulation.truth_s[simulation.frame_index],
         truth_qpos=simulation.truth_qpos[simulation.frame_index],
         estimate_qpos=qpos,
@@ -245,7 +246,7 @@ def run_method(
     return np.array(qpos), np.array(status), times_ms[0], (times_ms[1], times_ms[2])
 
 
-def open_scenario_motion(motion: ScenarioMotion, folder: Path | None, seed: int) -> MotionSource:
+def open_scenario_motion(motion: ScenarioMotion, folder: LibraryFolders | None, seed: int) -> MotionSource:
     """The motion that a scenario names; BadInput when it needs a library and none is named."""
     return _cached_source(motion.source, folder, seed, motion.rate_hz or None)
 
@@ -258,12 +259,12 @@ def clear_caches() -> None:
 
 
 @lru_cache(maxsize=2)
-def _cached_source(kind: str, folder: Path | None, seed: int, rate_hz: float | None) -> MotionSource:
+def _cached_source(kind: str, folder: LibraryFolders | None, seed: int, rate_hz: float | None) -> MotionSource:
     """One source for all clips of a run, which share examples."""
     return open_motion_source(kind, folder, seed=seed, rate_hz=rate_hz)
 
 
-def check_names(scenarios: Iterable[Scenario], folder: Path | None) -> None:
+def check_names(scenarios: Iterable[Scenario], folder: LibraryFolders | None) -> None:
     """Check that everything exists which the scenarios and their variants name, before hours of work begin.
 
     These are clips, methods, inputs, bones and components. UnknownName, BadInput.

@@ -231,7 +231,7 @@ class Observation:
 
     @cached_property
     def calibration(self) -> PerformerCalibration:
-        """The calibration that methods receive; NotStanding when the held poses do not suffice for one."""
+        """The calibration that methods receive; UnusableHold when the held poses do not suffice for one."""
         settings = self.scenario.calibrating
         model = {"miss_rad": float(np.deg2rad(settings.miss_deg)), "hold_s": settings.hold_s}
         match self.scenario.calibration:
@@ -271,7 +271,7 @@ class Observation:
             del content["calibrating"]  # no pose is held, and the digest of the mounts covers where trackers sit
         skeleton = subject.body.skeleton
         mounts = [array for mount in self.session.true_mounts for array in locate_mount(skeleton, mount)]
-        people = subject.people.values() if scenario.calibration == "poses" else ()
+        poses = scenario.calibration == "poses"
         return {
             **content,
             "tracker": asdict(tracker_of(scenario)),
@@ -281,7 +281,7 @@ class Observation:
             "motion_digest": _motion_digest(subject.clip),
             "body_digest": storage.digest(skeleton.bone_m, skeleton.axes, subject.body.limits_rad),
             "mounts_digest": storage.digest(*mounts),
-            **({"people_digest": storage.digest(*(person.bone_m for person in people))} if people else {}),
+            **({"people_digest": storage.digest(*(p.bone_m for p in subject.people.values()))} if poses else {}),
             "metric_versions": VERSIONS,
         }
 
@@ -328,7 +328,7 @@ class ClipEvaluation:
         return object.__new__(ClipEvaluation)._set(scenario, self.subject, observation)
 
     def with_calibration(self, calibration: PerformerCalibration) -> "ClipEvaluation":
-        """The same evaluation with another calibration given to methods."""
+        """A copy of the evaluation in which methods receive another calibration."""
         return object.__new__(ClipEvaluation)._set(self.scenario, self.subject, self.observation, calibration)
 
     @property

@@ -10,6 +10,7 @@ import time
 import traceback
 from collections.abc import Mapping, Sequence
 from concurrent.futures import BrokenExecutor
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -31,6 +32,7 @@ from harness.experiment.interruption import graceful_stop
 from harness.experiment.planning import cell_names, plan_tasks, scenario_label, split_task
 from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep
+from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.results import storage
 from harness.results.index import CellIndex
@@ -56,7 +58,7 @@ def run(
     scenario: Scenario,
     out: Path,
     *,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     jobs: int = 1,
     command: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,
@@ -74,18 +76,7 @@ def run(
     content = asdict(scenario)
     del content["fault"]  # faults concern the emulator alone, a run does not depend on them
     with process_executor(jobs) as executor:
-        return _run_folder(
-            "run",
-            scenario.name,
-            content,
-            [scenario],
-            out,
-            folder=folder,
-            executor=executor,
-            workers=jobs,
-            command=command,
-            progress=progress,
-        )
+        return _run_folder("run", scenario.name, content, [scenario], out, folder, executor, jobs, command, progress)
 
 
 def run_sweep(
@@ -93,7 +84,7 @@ def run_sweep(
     scenarios: Sequence[Scenario],
     out: Path,
     *,
-    folder: Path | None,
+    folder: LibraryFolders | None,
     executor: TaskExecutor,
     workers: int,
     command: str,
@@ -112,26 +103,14 @@ def run_sweep(
         },
         "methods": list(dict.fromkeys(name for scenario in scenarios for name in scenario.methods)),
     }
-    return _run_folder(
-        "sweep",
-        sweep.name,
-        content,
-        scenarios,
-        out,
-        folder=folder,
-        executor=executor,
-        workers=workers,
-        command=command,
-        only=only,
-        progress=progress,
-    )
+    return _run_folder("sweep", sweep.name, content, scenarios, out, folder, executor, workers, command, progress, only)
 
 
 def run_cells(
     scenarios: Sequence[Scenario],
     out: Path,
     *,
-    folder: Path | None,
+    folder: LibraryFolders | None,
     executor: TaskExecutor,
     command: str,
     progress: ProgressCallback = lambda cell, done, planned: None,
@@ -157,8 +136,7 @@ def _run_folder(
     content: Mapping[str, Any],
     scenarios: Sequence[Scenario],
     out: Path,
-    *,
-    folder: Path | None,
+    folder: LibraryFolders | None,
     executor: TaskExecutor,
     workers: int,
     command: str,
@@ -200,7 +178,9 @@ def _run_folder(
         return next(outcome for outcome in Outcome if outcome.word == summary["outcome"])
 
 
-def _describe(content: Mapping[str, Any], scenarios: Sequence[Scenario], folder: Path | None, command: str) -> Manifest:
+def _describe(
+    content: Mapping[str, Any], scenarios: Sequence[Scenario], folder: LibraryFolders | None, command: str
+) -> Manifest:
     sources = list(dict.fromkeys(open_scenario_motion(s.motion, folder, s.seed).title for s in scenarios))
     constants = {name: repr(registry.resolve(name)) for name in content["methods"]}
     source = sources if "sweep" in content else sources[0]
@@ -244,19 +224,20 @@ def _run_tasks(
             return []
         broken = []
         arguments = [(_session_id(), task, out.absolute(), stop.absolute()) for task in tasks]
-        for which, future in executor(run_task, arguments):
-            try:
-                for cell in future.result():
-                    record(cell)
-            except BrokenExecutor:
-                broken.append(tasks[which])
-            except HarnessError:
-                raise
-            except Exception:  # the task could not be sent or answered: its cells fail, the others go on
-                failure = traceback.format_exc()
-                for planned in tasks[which].cells():
-                    if str(planned) not in outcomes:
-                        record(CellOutcome(str(planned), failure=failure))
+        with closing(executor(run_task, arguments)) as ended:  # an interrupt stops its workers at once
+            for which, future in ended:
+                try:
+                    for cell in future.result():
+                        record(cell)
+                except BrokenExecutor:
+                    broken.append(tasks[which])
+                except HarnessError:
+                    raise
+                except Exception:  # the task could not be sent or answered: its cells fail, the others go on
+                    failure = traceback.format_exc()
+                    for planned in tasks[which].cells():
+                        if str(planned) not in outcomes:
+                            record(CellOutcome(str(planned), failure=failure))
         return broken
 
     with graceful_stop(stop):

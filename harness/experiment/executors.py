@@ -26,9 +26,9 @@ from harness.results.manifest import source_hash
 R = TypeVar("R")
 
 SCHEDULER_TIMEOUT_S = 5.0
-"""How long a scheduler may take to answer before it counts as none."""
+"""Time within which a scheduler must answer [s]."""
 POLL_INTERVAL_S = 1.0
-"""How often it is asked whether it is there and how many workers it has."""
+"""Interval at which the scheduler is asked for its state and its number of workers [s]."""
 LOCAL_CLUSTER_CONFIG = {
     "distributed.scheduler.allowed-failures": 1,  # dead workers per task; `schedule_tasks` tries it alone
     "distributed.scheduler.http.routes": [],
@@ -39,11 +39,11 @@ LOCAL_CLUSTER_CONFIG = {
         ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), 1
     ),
 }
-"""Dask's settings for a cluster of our own."""
+"""Dask settings of a local cluster."""
 
 
 class TaskExecutor(Protocol):
-    """Calls a function with each of several tasks, somewhere."""
+    """Calls a function with the arguments of each task, and yields (index, future) as each task ends."""
 
     def __call__(
         self, function: Callable[..., R], tasks: Sequence[tuple[Any, ...]], /
@@ -84,12 +84,12 @@ def run_in_process(
 
 @contextmanager
 def dask_executor(address: str, workers: int | None = None) -> Iterator[TaskExecutor]:
-    """The workers of the scheduler at an address such as tcp://host:8786; `local` starts one on this machine, with so
-    many workers (by default one for each core), all of which end with this process.
+    """An executor on the workers of the Dask scheduler at an address such as tcp://host:8786.
 
-    Needs the extra `cluster`: MissingExtra. BadInput when no scheduler answers, or none any more. A task whose
-    workers die is begun again elsewhere, and in the end its future has BrokenExecutor. The function and its tasks
-    travel pickled; workers must have this very source of the harness, and see the same folders.
+    `local` starts a scheduler on this machine with `workers` workers, by default one per core; they end with this
+    process. A task whose worker dies is started again elsewhere; if that fails too, its future has BrokenExecutor.
+    Function and tasks travel pickled. Workers must have the same source of the harness and see the same folders.
+    MissingExtra without the extra `cluster`; BadInput when no scheduler answers, or the connection is lost.
     """
     if find_spec("distributed") is None:
         raise MissingExtra("A Dask cluster", "distributed", "cluster")
@@ -106,7 +106,7 @@ def dask_executor(address: str, workers: int | None = None) -> Iterator[TaskExec
 
 @contextmanager
 def _connect_scheduler(address: str, workers: int | None) -> Iterator[Any]:
-    """What a client connects to: the address, or a cluster of our own."""
+    """The address, or a local cluster."""
     if address != "local":
         asyncio.run(_require_scheduler(address))
         yield address
@@ -121,13 +121,13 @@ def _connect_scheduler(address: str, workers: int | None) -> Iterator[Any]:
                 threads_per_worker=1,
                 host="127.0.0.1",
                 scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
-                memory_limit=0,  # the system's: Dask's own would pause and kill workers by share of the machine
+                memory_limit=0,  # no limit of Dask's own, which would pause and kill workers
                 silence_logs=logging.CRITICAL,
             )
         with cluster:
             try:
                 yield cluster
-            except BaseException:  # such as Ctrl-C: Dask would give what runs some seconds to end
+            except BaseException:  # such as Ctrl-C; Dask alone would wait some seconds for running tasks
                 for nanny in cluster.workers.values():
                     nanny.auto_restart = False
                     if nanny.pid:
@@ -136,17 +136,17 @@ def _connect_scheduler(address: str, workers: int | None) -> Iterator[Any]:
 
 
 async def _require_scheduler(address: str) -> None:
-    """BadInput unless a scheduler does: a client of Dask's would wait for one that is mute."""
+    """BadInput unless a scheduler answers. A Dask client would wait for a silent one for ever."""
     from distributed import Security, rpc
 
     advice = "Start one with `dask scheduler`, which prints its address, or take --dask local."
     try:
-        keys = Security().get_connection_args("client")  # of Dask's own configuration, where there are any
+        keys = Security().get_connection_args("client")  # TLS keys of Dask's configuration, if any
         async with asyncio.timeout(SCHEDULER_TIMEOUT_S), rpc(address, connection_args=keys) as asked:
             kind = (await asked.identity())["type"]
-    except Exception as error:  # whatever a stranger may answer
-        said = str(error).rstrip(".") or f"no answer in {SCHEDULER_TIMEOUT_S:g} s"
-        raise BadInput(f"No Dask scheduler at {address}: {said}.", advice) from error
+    except Exception as error:  # an unknown server may answer anything
+        reason = str(error).rstrip(".") or f"no answer in {SCHEDULER_TIMEOUT_S:g} s"
+        raise BadInput(f"No Dask scheduler at {address}: {reason}.", advice) from error
     if kind != "Scheduler":
         raise BadInput(f"No Dask scheduler at {address}, but a {kind.lower()}.", advice)
 
@@ -162,7 +162,7 @@ def _run_on_dask(
 
     try:
         for which, future in schedule_tasks(submit, len(tasks), room.capacity, look_s=POLL_INTERVAL_S):
-            if isinstance(future.exception(), CancelledError):  # by no one here: the connection was lost
+            if isinstance(future.exception(), CancelledError):  # nobody here cancels: the connection was lost
                 raise OSError("lost")
             yield which, future
     except OSError as error:
@@ -171,14 +171,16 @@ def _run_on_dask(
 
 
 class _DaskCapacity:
-    """How many tasks a scheduler is given at a time: one for each worker, for those that wait in one that dies are
-    suspected too."""
+    """Number of tasks that a scheduler is given at a time.
+
+    It is one per worker: tasks that wait in a worker that dies would be suspected as well.
+    """
 
     def __init__(self, client: Any) -> None:
         self._client, self._asked_s, self._places = client, -POLL_INTERVAL_S, 1
 
     def capacity(self) -> int:
-        """OSError when the scheduler is gone."""
+        """Number of workers; OSError when the scheduler is gone."""
         if self._client.status != "running":
             raise OSError(self._client.status)
         if time.monotonic() - self._asked_s >= POLL_INTERVAL_S:
@@ -188,7 +190,7 @@ class _DaskCapacity:
 
 
 def _to_future(submitted: Any) -> Future[Any]:
-    """A future of Dask's as everyone's."""
+    """A future of the standard library from one of Dask."""
     from distributed.scheduler import KilledWorker
 
     future = Future[Any]()
@@ -206,7 +208,7 @@ def _to_future(submitted: Any) -> Future[Any]:
 
 
 _worker_lock = Lock()
-"""Of a worker, whose threads would spoil each other's times and output."""
+"""Held while a task runs: threads of one worker would disturb each other's times and output."""
 
 
 def _run_on_worker(source: str, folder: str, function: Callable[..., R], *task: Any) -> R:
@@ -219,6 +221,6 @@ def _run_on_worker(source: str, folder: str, function: Callable[..., R], *task: 
         raise BadInput("A worker has another version of the harness than the program that it works for.", advice)
     with _worker_lock, redirect_stdout(sys.stderr):
         if folder not in sys.path:
-            sys.path.append(folder)  # a user's own method may lie where they work
+            sys.path.append(folder)  # a user's own method may lie in the caller's working directory
         result = function(*task)
         return list(result) if isinstance(result, Iterator) else result  # type: ignore[return-value]  # both are iterable

@@ -1,4 +1,4 @@
-"""How long work is stopped: the first Ctrl-C lets what runs finish, the second one does not."""
+"""Interruption by Ctrl-C: the first lets running cells finish, the second stops at once."""
 
 import os
 import signal
@@ -13,21 +13,23 @@ _STOP_MESSAGE = b"\nharness: finishing what runs; again stops it at once\n"
 
 @contextmanager
 def graceful_stop(stop: Path) -> Iterator[None]:
-    """The first Ctrl-C or SIGTERM makes the file `stop`, which whoever works looks for; any further one is
-    KeyboardInterrupt. Leaving raises it too when there was one, and removes the file."""
+    """Turn the first Ctrl-C or SIGTERM into the file `stop`, which workers look for; the next raises KeyboardInterrupt.
+
+    Leaving the context removes the file, and raises KeyboardInterrupt if the file existed.
+    """
     stop.unlink(missing_ok=True)
 
-    def ask(number: int, frame: FrameType | None) -> None:
+    def request_stop(number: int, frame: FrameType | None) -> None:
         if stop.exists():
             raise KeyboardInterrupt
         stop.touch()
-        os.write(2, _STOP_MESSAGE)  # a signal may strike while something is printed
+        os.write(2, _STOP_MESSAGE)  # os.write is safe while something else is printed
 
     with ExitStack() as after:
         after.callback(stop.unlink, missing_ok=True)
-        if current_thread() is main_thread():  # the only one that signals may be set in
+        if current_thread() is main_thread():  # signal handlers can be set there alone
             for number in (signal.SIGINT, signal.SIGTERM):
-                after.callback(signal.signal, number, signal.signal(number, ask))
+                after.callback(signal.signal, number, signal.signal(number, request_stop))
         yield
         if stop.exists():
             raise KeyboardInterrupt

@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import TypeVar
 
 from harness.core.split import ClipPart
 from harness.experiment.cells import ClipTask, PlannedCell
 from harness.experiment.scenario import Scenario, variants
+from harness.mocap.library import LibraryFolders, absolute_folders
 
 T = TypeVar("T")
 
@@ -40,7 +40,7 @@ def cell_names(scenario: Scenario, *, labelled: bool = True) -> list[str]:
 
 
 def plan_tasks(
-    scenarios: Iterable[Scenario], folder: Path | None, command: str, workers: int, *, labelled: bool = True
+    scenarios: Iterable[Scenario], folder: LibraryFolders | None, command: str, workers: int, *, labelled: bool = True
 ) -> list[ClipTask]:
     """Tasks that together hold every cell of the scenarios once.
 
@@ -76,11 +76,11 @@ def split_task(task: ClipTask) -> list[ClipTask]:
     ]
 
 
-def _clip_tasks(scenario: Scenario, folder: Path | None, command: str, labelled: bool) -> list[ClipTask]:
+def _clip_tasks(scenario: Scenario, folder: LibraryFolders | None, command: str, labelled: bool) -> list[ClipTask]:
     label = scenario_label(scenario) if labelled else ""
     parts = [ClipPart.parse(text) for text in scenario.motion.test]
     behaviours = scenario.motion.behaviours * (1 if len(scenario.motion.behaviours) > 1 else len(parts))
-    library = folder and folder.absolute()  # a worker's working directory may be another one
+    library = None if folder is None else absolute_folders(folder)  # a worker may have another working directory
     return [
         ClipTask(scenario, part, b, library, command, label=label) for part, b in zip(parts, behaviours, strict=True)
     ]

@@ -21,21 +21,24 @@ from harness.experiment.cells import check_names, open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of, tracker_of
 from harness.experiment.scenario import Scenario, expand_clips, load_scenario
 from harness.experiment.simulated_calibration import PerformerCalibration
+from harness.mocap.library import LibraryFolders
 from harness.simulate.loop import simulate_loop
 from harness.simulate.simulation import Simulation, TrackerConfig
 from harness.stream.codec.samples import DeviceSamples
 
 
 class Playback:
-    """One clip of a scenario with some of its stations, or with `posing` the poses of a calibration, held before it in
-    the same session of the tracker; each part is made when it is first asked for."""
+    """Playback of one clip of a scenario with some of its stations; each part is made when it is first needed.
+
+    With `posing` it plays the calibration poses, which are held before the clip in the same session of the tracker.
+    """
 
     def __init__(self, setting: ClipEvaluation, *, posing: bool = False) -> None:
         self.clip_evaluation, self.posing = setting, posing
 
     @property
     def scenario(self) -> Scenario:
-        """As asked for: stations, rate and noise are put in."""
+        """The scenario with the chosen stations, rate and noise."""
         return self.clip_evaluation.scenario
 
     @property
@@ -44,28 +47,28 @@ class Playback:
 
     @property
     def body(self) -> Body:
-        """The performer's, in truth."""
+        """The performer's true body."""
         return self.clip_evaluation.body
 
     @property
     def mounts(self) -> tuple[Mount, ...]:
-        """Where the stations are said to be worn."""
+        """Nominal mounts of the stations."""
         return mounts_of(self.scenario)
 
     @property
     def performer_calibration(self) -> PerformerCalibration:
-        """What methods are told of trackers, room and body: the truth, until somebody calibrates."""
+        """The calibration that methods receive: exact, unless `with_calibration` gave another."""
         return self.clip_evaluation.performer_calibration
 
     @property
     def calibration(self) -> Calibration:
-        """Of the trackers and the room, as methods are told."""
+        """Calibration of trackers and room that methods receive."""
         return self.performer_calibration.calibration
 
     def with_calibration(self, kept: CalibrationFile) -> "Playback":
-        """The same with methods told what a calibration found, for these stations; BadInput when it lacks one.
+        """A copy of the playback with a stored calibration; BadInput when it lacks one of the stations.
 
-        Where it has no skeleton the body is the scenario's.
+        If it has no skeleton, the body is the scenario's.
         """
         chosen = kept.select(tuple(self.scenario.stations))
         body = self.body if chosen.skeleton is None else humanoid.build_body(chosen.skeleton)
@@ -74,7 +77,7 @@ class Playback:
 
     @cached_property
     def take(self) -> BodyMotion:
-        """What the performer does."""
+        """The motion that is played."""
         if not self.posing:
             return self.clip_evaluation.subject.take
         how = self.scenario.calibrating
@@ -85,12 +88,12 @@ class Playback:
 
     @cached_property
     def simulation(self) -> Simulation:
-        """The first lap as a run of the scenario sees it, with the truth."""
+        """Simulation of the first loop, as a run of the scenario has it, with the truth."""
         return self.clip_evaluation.session.observe(self.take) if self.posing else self.clip_evaluation.simulation
 
     @cached_property
     def samples(self) -> DeviceSamples:
-        """What the device says, lap after lap; in the first one, until it turns back, just what `simulation` says."""
+        """Samples of the device, loop after loop. The first loop equals `simulation` until the motion turns back."""
         session, scenario = self.clip_evaluation.session, self.scenario
         noise = scenario.disturbance.add_to(noise_of(scenario), tuple(scenario.stations))
         noise, name = (session.calibration_noise, session.name) if self.posing else (noise, "")
@@ -107,13 +110,13 @@ def prepare_playback(
     rate_hz: float | None = None,
     noise: str | None = None,
     seed: int | None = None,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     posing: bool = False,
 ) -> Playback:
-    """A clip of a scenario (its first by default), with the first so many of its stations or those that are named.
+    """Prepare the playback of a clip of a scenario, by default its first test clip.
 
-    What is not given is as the scenario has it, but for the calibration: `exact`, until somebody calibrates.
-    UnknownName, BadFile and BadInput as for a run of the scenario.
+    `stations` is a number of stations or their names. Other values are the scenario's, except that the calibration is
+    exact. UnknownName, BadFile and BadInput as for a run of the scenario.
     """
     asked = expand_clips(load_scenario(scenario), folder)
     asked = replace(asked, stations=asked.worn_stations, worn=())
@@ -135,7 +138,7 @@ def prepare_playback(
 
 
 def select_stations(scenario: Scenario, stations: int | Sequence[str]) -> Sequence[str]:
-    """Names of the first so many stations of a scenario, or of those named; BadInput, UnknownName."""
+    """Names of the first `stations` stations of a scenario, or the given names. BadInput, UnknownName."""
     names = list(scenario.worn_stations)
     if isinstance(stations, int):
         if not 1 <= stations <= len(names):
@@ -148,7 +151,7 @@ def select_stations(scenario: Scenario, stations: int | Sequence[str]) -> Sequen
 
 
 def _behaviour(scenario: Scenario, part: ClipPart) -> str:
-    """What a test clip shows; "" for a clip that the scenario does not judge."""
+    """Behaviour of a test clip; "" for a clip that is none of the scenario's test clips."""
     tested, behaviours = scenario.motion.test, scenario.motion.behaviours
     if str(part) not in tested:
         return ""

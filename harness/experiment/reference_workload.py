@@ -1,9 +1,9 @@
-"""The work that speed is measured against: what a method's step does, the same for ever.
+"""Reference workload: a fixed computation that the speed of methods is measured against.
 
-A step takes longer on a slower or busier computer, and so does this, timed between the steps of the same cell: their
-ratio is a method's cost. Half of it is a dense solve (the normal equations of 72 residuals and 54 unknowns), half is
-the overhead of small-array calls. Never change it: results in units of another reference are not comparable, so that
-whoever does raises the version of `step_relative`.
+A step takes longer on a slower or busier computer. So does this workload, which is timed between the steps of the same
+cell; the ratio of the two is a method's cost. Half of it is a dense solve (the normal equations of 72 residuals and
+54 unknowns), half is the overhead of small-array calls. It must not change: results in units of another reference are
+not comparable. A change raises the version of the metric `step_relative`.
 """
 
 import time
@@ -14,22 +14,22 @@ from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
 FRAMES_PER_TIMING = 8
-"""Frames from one timing to the next: of a cell of 8 s at 40 Hz 40 are timed, for 3 % of what the quickest method takes
-with all that is done for its cell."""
+"""Number of frames from one timing to the next. A cell of 8 s at 40 Hz has 40 timings, which take 3 % of the time of a
+cell of the fastest method."""
 
 
 class ReferenceWorkload:
-    """0.15 ms of numpy on one core of a shared 2-core x86 machine."""
+    """Work of 0.15 ms in numpy on one core of a shared 2-core x86 machine."""
 
     def __init__(self) -> None:
         rng = generator(0, "reference")
         self._slope, self._off = rng.normal(size=(72, 54)), rng.normal(size=72)
         self._damping = 0.1 * np.eye(54)
         self._turns, self._points = rng.normal(size=(24, 4)), rng.normal(size=(24, 3))
-        self.work()  # what is done but once is no part of it
+        self.work()  # excludes one-time initialisation from the timings
 
     def work(self) -> Floats:
-        """(54,) the same numbers every time."""
+        """Do the work; its result (54,) is always the same."""
         turns = self._turns / np.sqrt(np.sum(self._turns**2, axis=1, keepdims=True))
         apart = np.sqrt(np.sum((self._points[:, None] - self._points) ** 2, axis=2))
         weights = np.where(apart.mean(axis=1) > 2.0, 0.5, 1.0) * np.abs(turns[:, 0])
@@ -38,7 +38,7 @@ class ReferenceWorkload:
         return step
 
     def cpu_ms(self) -> float:
-        """CPU time of the work, now [ms]."""
+        """CPU time of doing the work once [ms]."""
         start = time.process_time()
         self.work()
         return 1e3 * (time.process_time() - start)

@@ -13,6 +13,7 @@ from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.errors import BadFile, BadInput, UnknownName
+from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import open_motion_source
 from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
@@ -200,7 +201,7 @@ def read_station_sets() -> dict[str, dict[str, Any]]:
     return read_toml(data_folder("scenarios") / _STATION_SETS_FILE, "sets of stations", "Install the package again.")
 
 
-def expand_clips(scenario: Scenario, folder: Path | None) -> Scenario:
+def expand_clips(scenario: Scenario, folder: LibraryFolders | None) -> Scenario:
     """The scenario with every pattern in its clip lists, such as "13_*", replaced by the clips that match it.
 
     Clips are the takes of the motion generator, or those of the library in `folder` (by default HARNESS_MOCAP), sorted

@@ -1,8 +1,8 @@
-"""A recording judged: methods see its frames, and what they make of them is held against the motion it was played from.
+"""Scoring of a recording: methods reconstruct its frames, and their estimates are scored against the played motion.
 
-Only what an emulator or the simulator played has a truth. It is found by the device's clock: that counts from the
-beginning of the motion, and later laps fold back. The way back to the beginning has no truth and is not judged, and
-neither is a frame whose readings are not those of the motion.
+Only motion that an emulator or the simulator played has a truth. A frame's true pose is found by the device's clock,
+which counts from the beginning of the motion; later loops are folded back. The way back to the beginning of a loop has
+no truth and is not scored. Neither is a frame whose readings differ from those of the motion.
 """
 
 import time
@@ -20,6 +20,7 @@ from harness.core.text_table import Table
 from harness.errors import BadInput
 from harness.experiment.playback import Playback, prepare_playback, select_stations
 from harness.experiment.scenario import load_scenario
+from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Session
 from harness.results.reported_metrics import TABLE_COLUMNS
@@ -32,24 +33,24 @@ from harness.stream.frame import TrackerFrame
 from harness.stream.recording.replay import RecordingStream
 
 POSITION_TOLERANCE_M = 0.01
-"""Half of a frame's readings lie this near to those that were played; the wire's rounding is a hundredth of it [m]."""
+"""Largest median distance of a frame's readings from the played ones; rounding on the wire is a hundredth of it [m]."""
 RATE_TOLERANCE = 0.02
-"""A rate that the driver had to measure is the scenario's when it is within this share of it."""
+"""Relative tolerance within which a rate measured by the driver counts as the scenario's."""
 MIN_MATCHED_SHARE = 0.5
-"""With a smaller share of frames that belong to the motion, it is another motion (choice)."""
+"""Smallest share of frames that match the motion; with fewer the recording is of another motion (our choice)."""
 
 
 @dataclass(frozen=True)
 class RecordingScore:
-    """What one method made of a recording."""
+    """Scores of one method on a recording."""
 
     method: str
     frames_matched: int
-    """With an estimate and a truth, after the warm-up."""
+    """Number of frames with an estimate and a truth, after the warm-up."""
     frames_expected: int
-    """True frames between the first and the last of each lap that was recorded, after the warm-up."""
+    """Number of true frames between the first and last recorded frame of each loop, after the warm-up."""
     metrics: dict[str, float | None]
-    """By the names of `score_estimate.metrics`, over all laps together; None is "not measured"."""
+    """Metrics by the names of `Scores.metrics`, over all loops together; None is "not measured"."""
 
     def as_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -63,11 +64,12 @@ def find_playback(
     rate_hz: float | None = None,
     noise: str | None = None,
     seed: int | None = None,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
 ) -> Playback:
-    """What a recording was played from: as told here, else as its note says, else as it was read.
+    """The playback that a recording was made of.
 
-    BadInput when nothing names the scenario; UnknownName and BadFile as for a run of it.
+    Values given here take precedence over the recording's note, and that over what the driver read. BadInput when
+    nothing names the scenario; UnknownName and BadFile as for a run of it.
     """
     note = stream.recording.note if scenario is None else {}
     played = scenario or note.get("scenario")
@@ -76,14 +78,14 @@ def find_playback(
             f"Nothing says what {stream.recording.path} was played from.",
             "Only motion of a scenario has a truth: name it with --scenario, and --clip where it is not the first.",
         )
-    its_own = load_scenario(played)
+    shipped = load_scenario(played)
     stations: int | Sequence[str] = stream.stations
-    if not set(stream.stations) & set(its_own.worn_stations) and set("".join(stream.stations).encode()) <= set(
+    if not set(stream.stations) & set(shipped.worn_stations) and set("".join(stream.stations).encode()) <= set(
         STATION_CHARACTERS
     ):
-        stations = len(stream.stations)  # the driver was told no names: the first so many were played
+        stations = len(stream.stations)  # the driver knew no names: the first stations were played
     read_hz = stream.wire.rate_hz
-    measured = abs(read_hz / its_own.tracker.rate_hz - 1.0) < RATE_TOLERANCE
+    measured = abs(read_hz / shipped.tracker.rate_hz - 1.0) < RATE_TOLERANCE
     return prepare_playback(
         played,
         clip=clip or note.get("clip"),
@@ -99,8 +101,11 @@ def find_playback(
 def name_recorded_stations(
     stream: RecordingStream, scenario: Path | str, names: Sequence[str] | None = None
 ) -> tuple[str, ...]:
-    """What a scenario calls the stations of a recording: as told, else as recorded; where the driver was told no names,
-    they are the first so many. BadInput for another number, UnknownName for others than the scenario's."""
+    """Station names of a recording in a scenario: the given names, else the recorded ones.
+
+    If the driver knew no names, they are the scenario's first stations. BadInput for another number of names,
+    UnknownName for names that the scenario lacks.
+    """
     known, count = load_scenario(scenario), len(stream.stations)
     if names is not None:
         if len(names) != count:
@@ -117,17 +122,17 @@ def name_recorded_stations(
 
 @dataclass(frozen=True, eq=False)
 class _LoopFrames:
-    """Frames of one lap of the motion, in one session of the line."""
+    """Frames of one loop of the motion within one session of the line."""
 
     rows: Ints
-    """(N,) which of the frames given."""
+    """(N,) indices of the recorded frames."""
     index: Ints
-    """(N,) which of the true frames, strictly increasing."""
+    """(N,) indices of the true frames, strictly increasing."""
 
 
 @dataclass(frozen=True, eq=False)
 class _MethodOutput:
-    """What one method made of all F frames."""
+    """Output of one method for all F frames."""
 
     qpos: Floats
     status: Ints
@@ -137,21 +142,21 @@ class _MethodOutput:
         return self.qpos[rows], self.status[rows], self.step_ms[rows]
 
 
-def score_methods(stream: RecordingStream, rehearsal: Playback, methods: Sequence[str]) -> list[RecordingScore]:
+def score_methods(stream: RecordingStream, playback: Playback, methods: Sequence[str]) -> list[RecordingScore]:
     """Run methods over a recording, side by side, at its speed, and score them; BadInput for another motion."""
     sessions = {
-        name: rehearsal.clip_evaluation.fit_method(registry.resolve(name), name).begin(rehearsal.calibration)
+        name: playback.clip_evaluation.fit_method(registry.resolve(name), name).begin(playback.calibration)
         for name in methods
     }
     frames, zero_s, made = _run_methods(stream, sessions)
-    laps = _split_into_loops(frames, zero_s, rehearsal.samples)
-    return [_score_method(name, made[name], laps, rehearsal) for name in methods]
+    loops = _split_into_loops(frames, zero_s, playback.samples)
+    return [_score_method(name, made[name], loops, playback) for name in methods]
 
 
 def _run_methods(
     stream: RecordingStream, sessions: Mapping[str, Session]
 ) -> tuple[list[TrackerFrame], Floats, dict[str, _MethodOutput]]:
-    """The frames, device time of the zero of the device's own clock at each (F,), and the estimates of each method."""
+    """The frames, the device time at which the device's clock was zero for each (F,) [s], and the methods' output."""
     frames, zero_s = [], []
     steps: dict[str, list[tuple[Estimate, float]]] = {name: [] for name in sessions}
     for frame in stream:
@@ -173,7 +178,7 @@ def _run_methods(
 
 
 def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: DeviceSamples) -> list[_LoopFrames]:
-    """The frames that have a truth, lap by lap; BadInput when they are of another motion."""
+    """Frames that have a truth, loop by loop; BadInput when the recording is of another motion."""
     shape = len(frames), len(samples.stations)
     sound = ~np.array([f.suspect for f in frames], bool).reshape(shape)
     stamp_s = np.array([f.measured_s for f in frames]).reshape(shape) - zero_s[:, None]
@@ -181,11 +186,11 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     number = np.round(_row_medians(np.where(sound, since, np.nan)))
     timed = number >= 0.0
     lap, index = np.divmod(np.where(timed, number, 0.0).astype(np.int64), len(samples))
-    judged = timed & (index < samples.take_frames)
+    in_take = timed & (index < samples.take_frames)
     position_m = np.array([f.position_m for f in frames]).reshape(*shape, 3)
     off_m = _row_medians(np.where(sound, np.linalg.norm(position_m - samples.position_m[index], axis=2), np.nan))
-    played = judged & ~(off_m > POSITION_TOLERANCE_M)  # NaN: the list has no positions, or all stations are lost
-    if not played.any() or played.sum() < MIN_MATCHED_SHARE * judged.sum():
+    played = in_take & ~(off_m > POSITION_TOLERANCE_M)  # NaN: no positions are sent, or all stations are lost
+    if not played.any() or played.sum() < MIN_MATCHED_SHARE * in_take.sum():
         raise BadInput(
             f"The recording is of another motion: {played.sum()} of {len(frames)} frames belong to this one.",
             "Name the scenario, clip, seed, noise and rate that it was played with.",
@@ -193,58 +198,60 @@ def _split_into_loops(frames: Sequence[TrackerFrame], zero_s: Floats, samples: D
     rows = np.flatnonzero(played)
     turns = np.flatnonzero((np.diff(lap[rows]) != 0) | (np.diff(zero_s[rows]) != 0.0)) + 1
     return [
-        _LoopFrames(own, index[own])
-        for own in (_strictly_increasing_rows(part, index) for part in np.split(rows, turns))
+        _LoopFrames(part_rows, index[part_rows])
+        for part_rows in (_strictly_increasing_rows(part, index) for part in np.split(rows, turns))
     ]
 
 
 def _strictly_increasing_rows(rows: Ints, index: Ints) -> Ints:
-    """The rows whose index goes on rising: the rest of a frame that came in two is left out."""
+    """Rows whose index exceeds all before: the second part of a frame that arrived in two is left out."""
     highest = np.maximum.accumulate(np.append(-1, index[rows]))[:-1]
     out: Ints = rows[index[rows] > highest]
     return out
 
 
 def _row_medians(values: Floats) -> Floats:
-    """(F,) of each row (F, S), NaN left out; NaN where nothing is left."""
+    """Median of each row (F,) of values (F, S) without NaN; NaN for a row of NaN."""
     some = np.isfinite(values).any(axis=1)
     out = np.full(len(values), np.nan)
     out[some] = np.nanmedian(values[some], axis=1)
     return out
 
 
-def _score_method(name: str, made: _MethodOutput, laps: Sequence[_LoopFrames], rehearsal: Playback) -> RecordingScore:
-    rate_hz, truth_qpos = rehearsal.tracker.rate_hz, rehearsal.simulation.truth_qpos
-    skeleton, scores, expected = rehearsal.body.skeleton, [], 0
-    for number, lap in enumerate(laps):
-        first, last = int(lap.index[0]), int(lap.index[-1])
+def _score_method(name: str, output: _MethodOutput, loops: Sequence[_LoopFrames], playback: Playback) -> RecordingScore:
+    rate_hz, truth_qpos = playback.tracker.rate_hz, playback.simulation.truth_qpos
+    skeleton, scores, expected = playback.body.skeleton, [], 0
+    for number, loop in enumerate(loops):
+        first, last = int(loop.index[0]), int(loop.index[-1])
         warm_s = first / rate_hz + WARM_UP_S if number == 0 else 0.0
-        qpos, status, step_ms = made.at(lap.rows)
+        qpos, status, step_ms = output.at(loop.rows)
         scores.append(
             score_estimate(
                 skeleton,
                 rate_hz,
                 truth_qpos,
                 qpos,
-                lap.index,
+                loop.index,
                 status,
                 step_ms,
-                estimate_skeleton=rehearsal.performer_calibration.body.skeleton,
+                estimate_skeleton=playback.performer_calibration.body.skeleton,
                 warm_up_s=warm_s,
             )
         )
         expected += max(last + 1 - max(first, int(np.ceil(warm_s * rate_hz - 1e-9))), 0)
-    matched = sum(int(one.scored.sum()) for one in scores)
+    matched = sum(int(score.scored.sum()) for score in scores)
     enough = expected > 0 and matched >= COVERAGE_FLOOR * expected
     return RecordingScore(
-        name, matched, expected, _pool_metrics(scores, made.step_ms[1:]) if enough else _not_measured()
+        name, matched, expected, _pool_metrics(scores, output.step_ms[1:]) if enough else _not_measured()
     )
 
 
 def _pool_metrics(scores: Sequence[Scores], step_ms: Floats) -> dict[str, float | None]:
-    """Of all laps together, from the errors of single frames."""
+    """Metrics of all loops together, from the errors of single frames."""
     measured = {
-        name: pool_frames(np.concatenate([one.per_frame[name][one.scored] for one in scores]), DEFINITIONS[name].pool)
+        name: pool_frames(
+            np.concatenate([score.per_frame[name][score.scored] for score in scores]), DEFINITIONS[name].pool
+        )
         for name in FRAME_METRICS
     }
     measured |= step_times_ms(step_ms)

@@ -1,5 +1,8 @@
-"""What methods are told of trackers, room and body before a take, found as on a real day: from a stream in which the
-performer stands model, in the same session of the tracker; and how far from the truth that is."""
+"""Simulated calibration of trackers, room and body, and its errors.
+
+As on a real day the calibration is estimated from a stream in which the performer holds poses, in the same session of
+the tracker as the take.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -29,42 +32,42 @@ from harness.stream.frame import TrackerFrame
 
 @dataclass(frozen=True, eq=False)
 class TrackerSession:
-    """Everything that is true of a session, from the trackers being put on to their being taken off."""
+    """The truth about one session, from putting the trackers on to taking them off."""
 
     name: str
-    """Of the take that it is for: errors that last for a session are those of this take."""
+    """Name of the take of the session, which keys the errors that last for a session."""
     seed: int
     body: Body
-    """The performer's."""
+    """The performer's true body."""
     nominal: tuple[Mount, ...]
-    """Where trackers are said to be worn."""
+    """Nominal mounts: where the trackers should sit."""
     true_mounts: tuple[Mount, ...]
-    """Where they really are."""
+    """True mounts: where the trackers really sit."""
     tracker: TrackerConfig
     noise: Noise
-    """What goes wrong; what happens at one moment of the take does not happen while calibrating."""
+    """Errors of the tracker during the take."""
 
     @property
     def true_calibration(self) -> Calibration:
-        """The truth."""
+        """The exact calibration."""
         return exact_calibration(self.body, self.true_mounts, self.tracker)
 
     @property
     def calibration_noise(self) -> Noise:
-        """What goes wrong while calibrating too."""
+        """Errors of the tracker during calibration: those of the take without events at single moments."""
         return replace(self.noise, mount_slip=(), position_offset=(), orientation_offset=(), lost=())
 
     def make_pose_take(self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float) -> BodyMotion:
-        """The performer holding configurations (55,), at the world's origin and facing x to begin with.
+        """A take in which the performer holds configurations (55,), at the world's origin and facing x at first.
 
-        How the n-th is missed does not depend on those after it.
+        Each pose is missed by random angles of standard deviation `miss_rad`. They do not depend on later poses.
         """
         rng = generator(self.seed, "standing model", self.name)
         take = hold_poses(self.body, configurations, miss_rad=miss_rad, rng=rng, hold_s=hold_s)
         return replace(take, name=f"{self.name} calibration")
 
     def observe(self, take: BodyMotion) -> Simulation:
-        """A take for calibration as the tracker sees it."""
+        """Simulate the stream of a calibration take."""
         return simulate_tracker(
             self.body, take, self.true_mounts, self.tracker, self.calibration_noise, seed=self.seed, session=self.name
         )
@@ -72,29 +75,29 @@ class TrackerSession:
     def observe_poses(
         self, configurations: Sequence[Floats], *, miss_rad: float, hold_s: float
     ) -> tuple[TrackerFrame, ...]:
-        """The stream of `model`."""
+        """Simulate the stream of held configurations, see `make_pose_take`."""
         return self.observe(self.make_pose_take(configurations, miss_rad=miss_rad, hold_s=hold_s)).frames
 
 
 @dataclass(frozen=True, eq=False)
 class PerformerCalibration:
-    """What a method goes by."""
+    """The calibration that a method receives."""
 
     calibration: Calibration
     body: Body
-    """With the bone lengths that are known or were found."""
+    """Body with the known or estimated bone lengths."""
     errors: Mapping[str, float]
-    """How far that is from the truth, see `measure_calibration_errors`; empty where it is the truth."""
+    """Errors against the truth, see `measure_calibration_errors`; empty for the exact calibration."""
     notes: tuple[str, ...] = ()
 
 
 def use_exact_calibration(session: TrackerSession) -> PerformerCalibration:
-    """Nothing had to be found."""
+    """The exact calibration on the true body."""
     return PerformerCalibration(session.true_calibration, session.body, {})
 
 
 def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
-    """Mounts and room from a T-pose; bone lengths are known from elsewhere. NotStanding says what was wrong with it."""
+    """Estimate mounts and room from a simulated T-pose; bone lengths are known. UnusableHold for a bad pose."""
     pose = tpose(session.body.skeleton)
     frames = session.observe_poses([pose], miss_rad=miss_rad, hold_s=hold_s)
     found = calibrate_tpose(frames, session.body, session.nominal)
@@ -105,26 +108,28 @@ def simulate_tpose_calibration(session: TrackerSession, *, miss_rad: float, hold
 
 
 def simulate_poses_calibration(
-    session: TrackerSession, space: SkeletonPrior, *, miss_rad: float, hold_s: float
+    session: TrackerSession, prior: SkeletonPrior, *, miss_rad: float, hold_s: float
 ) -> PerformerCalibration:
-    """Bone lengths, mounts and room from eight poses and from what other people's bones are like: of the performer,
-    nothing is known but the stream. NotStanding when the poses cannot be found in it, or not be calibrated from."""
+    """Estimate bone lengths, mounts and room from eight simulated poses and a prior on bone lengths of other people.
+
+    Only the stream is known of the performer. UnusableHold when the poses cannot be found in it, or are unusable.
+    """
     poses = [configuration(pose, session.body.skeleton) for pose in POSES]
     frames = session.observe_poses(poses, miss_rad=miss_rad, hold_s=hold_s)
-    nobody = build_body()
-    shown = [configuration(pose, nobody.skeleton) for pose in POSES]
+    standard = build_body()
+    shown = [configuration(pose, standard.skeleton) for pose in POSES]
     stations = [mount.station for mount in session.nominal]
-    collector = PoseCollector(stations, len(POSES), PoseClassifier(nobody, session.nominal, shown))
+    collector = PoseCollector(stations, len(POSES), PoseClassifier(standard, session.nominal, shown))
     PoseGuide(collector, POSES).run(frames, say=lambda text: None)
-    found = calibrate_poses(collector.holds, space, session.nominal)
+    found = calibrate_poses(collector.holds, prior, session.nominal)
     errors = measure_calibration_errors(found.calibration, found.skeleton, session)
-    notes = (_error_note(f"eight poses, other bones learnt from {space.source}", errors),)
+    notes = (_error_note(f"eight poses, other bones learnt from {prior.source}", errors),)
     return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
 
 
 def measure_calibration_errors(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:
-    """Of mounts, root mean square over stations [mm] and [deg]; of bone lengths, root mean square [mm]; of the room's
-    frame, its turn about the vertical [deg] and its origin [mm]."""
+    """Errors of a calibration: mounts (RMS over stations) [mm], [deg]; bone lengths (RMS) [mm]; room heading [deg] and
+    origin [mm]."""
     true = session.true_calibration
     beside_m = np.linalg.norm(found.mount_m - true.mount_m, axis=1)
     turned_rad = rotations.angle_between_rad(found.bone_from_station, true.bone_from_station)
@@ -138,10 +143,11 @@ def measure_calibration_errors(found: Calibration, skeleton: Skeleton, session: 
     }
 
 
-def _error_note(how: str, errors: Mapping[str, float]) -> str:
+def _error_note(procedure: str, errors: Mapping[str, float]) -> str:
     return (
-        f"calibrated by {how}: mounts {errors['mount_mm']:.0f} mm and {errors['mount_deg']:.1f} deg off, bone lengths "
-        f"{errors['length_mm']:.0f} mm (root mean square), room {errors['room_heading_deg']:.1f} deg about the vertical"
+        f"calibrated by {procedure}: mounts {errors['mount_mm']:.0f} mm and {errors['mount_deg']:.1f} deg off, "
+        f"bone lengths {errors['length_mm']:.0f} mm (root mean square), "
+        f"room {errors['room_heading_deg']:.1f} deg about the vertical"
     )
 
 

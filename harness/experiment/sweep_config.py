@@ -1,4 +1,4 @@
-"""A sweep as its TOML file has it, and the scenarios that it comes to: scenario x clip x method x seed x any key."""
+"""Sweeps: their TOML files, and the scenarios that they expand to (scenario x clip x method x seed x any key)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -19,29 +19,30 @@ from harness.experiment.scenario import (
     find_scenario,
     load_scenario,
 )
+from harness.mocap.library import LibraryFolders
 
 _EXPECTED, _ADVICE = "a sweep", "See the shipped ones in scenarios/sweeps/."
 
 
 @dataclass(frozen=True)
 class Sweep:
-    """What `harness sweep` reads; what it does not say is as the scenarios have it."""
+    """Content of a sweep's file; keys that it leaves out are those of the scenarios."""
 
     name: str
     scenarios: tuple[str, ...]
-    """Files beside the sweep, without their `.toml`, or shipped scenarios."""
+    """Names of shipped scenarios, or of files in the sweep's folder without `.toml`."""
     schema: int = SCHEMA
     methods: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     clips: tuple[str, ...] = ()
-    """Only these of the scenarios' test clips."""
+    """Subset of the scenarios' test clips, () for all."""
     seeds: tuple[int, ...] = ()
     vary: dict[str, Any] = field(default_factory=dict)
-    """As a scenario's, besides what the scenarios vary themselves."""
+    """Varied keys as in a scenario, in addition to those that the scenarios vary."""
 
 
 def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
-    """The sweep in a TOML file, or the shipped one of that name, and where it stands. BadFile, UnknownName."""
+    """Load the sweep of a TOML file or the shipped one of that name; the sweep and its path. BadFile, UnknownName."""
     path = find_sweep(path)
     content = read_toml(path, _EXPECTED, _ADVICE)
     if "motion" in content:
@@ -66,7 +67,7 @@ def load_sweep(path: Path | str) -> tuple[Sweep, Path]:
 
 
 def find_sweep(path: Path | str) -> Path:
-    """A file as named, or a shipped sweep by its bare name."""
+    """Path of a sweep, given as a file or as the name of a shipped one; BadFile, UnknownName."""
     given = Path(path)
     if given.is_file():
         return given
@@ -82,24 +83,27 @@ def shipped_sweeps() -> list[Path]:
     return sorted(data_folder("scenarios").glob("sweeps/*.toml"))
 
 
-def expand_sweep(sweep: Sweep, path: Path, seed: int | None = None, folder: Path | None = None) -> list[Scenario]:
-    """A scenario for each one named and each seed, whose variants, clips, inputs and methods are the sweep's cells.
+def expand_sweep(
+    sweep: Sweep, path: Path, seed: int | None = None, folder: LibraryFolders | None = None
+) -> list[Scenario]:
+    """Scenarios of a sweep, one for each named scenario and seed, whose cells are the sweep's cells.
 
-    `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName say what does not fit.
+    `seed` replaces all seeds; `folder` is the library whose clips patterns match. BadFile, BadInput and UnknownName
+    for values that do not fit.
     """
-    found = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
-    clips = dict.fromkeys(clip for scenario in found for clip in scenario.motion.test)
+    loaded = [expand_clips(load_scenario(_scenario_file(name, path.parent)), folder) for name in sweep.scenarios]
+    clips = dict.fromkeys(clip for scenario in loaded for clip in scenario.motion.test)
     for clip in sweep.clips:
         if clip not in clips:
             raise UnknownName("test clip of these scenarios", clip, clips)
     out = []
-    for scenario in found:
+    for scenario in loaded:
         seeds = sweep.seeds or (scenario.seed,)
-        for one in seeds if seed is None else (seed,):
-            made = replace(_apply_sweep(scenario, sweep), seed=one)
-            check_scenario(path, made)
-            out.append(made)
-    names = [scenario.name for scenario in found]
+        for number in seeds if seed is None else (seed,):
+            expanded = replace(_apply_sweep(scenario, sweep), seed=number)
+            check_scenario(path, expanded)
+            out.append(expanded)
+    names = [scenario.name for scenario in loaded]
     if len(set(names)) < len(names):
         raise BadFile(path, f"scenarios called {', '.join(names)}", "names of their own", "Rename one.")
     return out
@@ -125,9 +129,9 @@ def _apply_sweep(scenario: Scenario, sweep: Sweep) -> Scenario:
     )
 
 
-def _merge_vary(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> dict[str, Any]:
-    """Both, by dotted keys; what the sweep says of a key counts."""
-    return {**dict(dotted_keys(theirs)), **dict(dotted_keys(ours))}
+def _merge_vary(scenario: Mapping[str, Any], sweep: Mapping[str, Any]) -> dict[str, Any]:
+    """Varied values by dotted key; those of the sweep replace those of the scenario."""
+    return {**dict(dotted_keys(scenario)), **dict(dotted_keys(sweep))}
 
 
 def _scenario_file(name: str, beside: Path) -> Path:

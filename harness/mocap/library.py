@@ -142,6 +142,11 @@ class MotionLibrary:
         )
 
 
+def absolute_folders(folders: LibraryFolders) -> tuple[Path, ...]:
+    """The folders as absolute paths; they need not exist."""
+    return tuple(Path(folder).absolute() for folder in ([folders] if isinstance(folders, Path | str) else folders))
+
+
 def as_folders(folders: LibraryFolders) -> tuple[Path, ...]:
     """The folders as a tuple of paths, each once; BadInput for none, and for a path that is no folder."""
     paths = tuple(dict.fromkeys(map(Path, [folders] if isinstance(folders, Path | str) else folders)))

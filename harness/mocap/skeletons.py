@@ -35,6 +35,4 @@ def _read_skeleton(path: Path) -> Skeleton:
     try:
         return skeleton.subset(BONES)[0]
     except UnknownName as error:
-        raise BadFile(
-            path, str(error), "the 24 bones of core.humanoid24", "Leave it out of the library."
-        ) from error
+        raise BadFile(path, str(error), "the 24 bones of core.humanoid24", "Leave it out of the library.") from error

@@ -38,8 +38,8 @@ _REQUIRED_ATTRIBUTES = ("name", "summary", "needs_examples", "fit")
 
 def methods() -> dict[str, Callable[[], Method]]:
     """Name -> factory of all registered methods. Installed packages cannot replace a built-in name."""
-    known: dict[str, Callable[[], Method]] = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
-    return known | {
+    installed: dict[str, Callable[[], Method]] = {entry.name: entry.load() for entry in entry_points(group=GROUP)}
+    return installed | {
         "ik": ik.Ik,
         "ik:previous": lambda: ik.PREVIOUS,
         "ik:mean": lambda: ik.MEAN,
@@ -57,7 +57,7 @@ def methods() -> dict[str, Callable[[], Method]]:
 
 
 _ORIGINS = {
-    "ik": "docs/methods.md C1",
+    "ik": "docs/papers.md C1",
     "best_match": "Slyper & Hodgins 2008, who play the nearest example",
     "kernel_ridge": "kernel ridge regression, Saunders et al. 1998",
     "local_pca": "Chai & Hodgins 2005, as Liu et al. 2011 compare with it",
@@ -100,30 +100,30 @@ def with_options(method: Method, options: Mapping[str, Any], name: str) -> Metho
     if not dataclasses.is_dataclass(method) or isinstance(method, type):
         raise BadInput(f"{method.name} takes no options.", "Options are the fields of a method's dataclass.")
     fields = [field.name for field in dataclasses.fields(method) if field.init]
-    known = [field for field in fields if field not in _REQUIRED_ATTRIBUTES]
+    option_names = [field for field in fields if field not in _REQUIRED_ATTRIBUTES]
     renamed: Mapping[str, str] = getattr(method, "RENAMED_KEYS", {})
     for option in options:
         if option in renamed:
             raise RenamedKey(f"option of {method.name}", option, renamed[option])
-        if option not in known:
-            raise UnknownName(f"option of {method.name}", option, known)
+        if option not in option_names:
+            raise UnknownName(f"option of {method.name}", option, option_names)
     try:
         copy = replace_fields(method, options, method.name, infinite=True)
         return cast(Method, dataclasses.replace(copy, name=name) if "name" in fields else copy)
     except HarnessError:
         raise
     except Exception as error:  # code from outside may raise anything
-        raise BadInput(f"{error}.", f"Options of {method.name}: {', '.join(known)}.") from error
+        raise BadInput(f"{error}.", f"Options of {method.name}: {', '.join(option_names)}.") from error
 
 
 def _base_method(name: str) -> Method:
     """The method of a name without options or suffix; UnknownName, BadInput."""
-    known = methods()
-    if name in known:
-        return known[name]()
+    registered = methods()
+    if name in registered:
+        return registered[name]()
     module, colon, attribute = name.partition(":")
-    if not colon or not attribute or module in known or not _module_exists(module):
-        raise UnknownName("method", name, known)
+    if not colon or not attribute or module in registered or not _module_exists(module):
+        raise UnknownName("method", name, registered)
     try:
         factory = getattr(importlib.import_module(module), attribute, None)
         if factory is None:
@@ -181,8 +181,8 @@ def _file_hash(file: Path) -> bytes:
             nodes = list(ast.walk(ast.parse(part.read_bytes())))
             names = [a.name for node in nodes if isinstance(node, ast.Import) for a in node.names]
             names += [node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)]
-            beside = [part.parent / f"{name.partition('.')[0]}.py" for name in names]
-            waiting += [other for other in beside if other.is_file()]
+            siblings = [part.parent / f"{name.partition('.')[0]}.py" for name in names]
+            waiting += [other for other in siblings if other.is_file()]
     return _hash_files(files)
 
 

@@ -1,20 +1,21 @@
-"""Orders that a paper expects errors to come in, and whether they do.
+"""Expected orders: rankings of errors that a paper states, and whether the results agree.
 
-A scenario states them, the least error first:
+A scenario states them with the smallest error first:
 
-    [[order]]
+    [[expected_order]]
     methods = ["dynamic_map", "local_pca", "ik"]
     source = "Liu et al. 2011, Fig. 6"
     why_not = { "local_pca > ik" = "why, where it comes out so" }
 
-    [[order]]
+    [[expected_order]]
     inputs = ["pos+ori", "pos"]
     method = "dynamic_map"
     source = "Liu et al. 2011, boxing"
 
-Each is judged by means over the clips on which all that it names were measured, apart for behaviours, performers,
-varied values and, where methods are compared, inputs. Errors are compared as they are printed: a difference that
-tables do not show is none. `harness run` prints it below its table, `summary.json` lists it.
+Each order is evaluated on the means over the clips on which all its methods (or inputs) were measured. Behaviours,
+performers, varied values and, where methods are compared, inputs are evaluated separately. Errors are compared as
+printed, so that a difference that tables do not show counts as none. `harness run` prints the result below its table,
+and `summary.json` lists it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,20 +32,20 @@ METRIC, DECIMALS = "joint_angle_mean_deg", 2
 
 @dataclass(frozen=True)
 class ExpectedOrder:
-    """Of methods, or of one method's inputs."""
+    """An expected order of methods, or of the inputs of one method."""
 
     source: str
-    """Who expects it."""
+    """Paper and figure that state the order."""
     methods: tuple[str, ...] = ()
     inputs: tuple[str, ...] = ()
     method: str = ""
-    """Whose inputs are compared."""
+    """The method whose inputs are compared."""
     why_not: dict[str, str] = field(default_factory=dict)
-    """"a > b" -> why, for neighbours a and b of the order that come out the other way round."""
+    """"a > b" -> reason, for neighbours a and b of the order whose errors are in the opposite order."""
 
     @property
     def by(self) -> str:
-        """The column of summary.csv whose values are compared."""
+        """Column of summary.csv whose values are ranked."""
         return "inputs" if self.inputs else "method"
 
     @property
@@ -53,16 +54,16 @@ class ExpectedOrder:
 
     @property
     def steps(self) -> list[str]:
-        """What may go wrong: "a > b" for each two neighbours."""
+        """The possible violations: "a > b" for each two neighbours."""
         return [f"{less} > {more}" for less, more in pairwise(self.names)]
 
 
 def evaluate_orders(orders: Sequence[ExpectedOrder], rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """For `summary.json`: of its `cells`, one for each order and setting.
+    """Evaluate orders on the rows of `summary.json`: one record for each order and setting.
 
-    Each says `source`, `method` (whose inputs are compared, or ""), `names`, the setting (`behaviour`, `inputs`,
-    `performer`, `varied`), on how many `clips` all were measured and on how many any, their `means_deg` or None,
-    whether it `holds` (None: not judged), and `why` it does not, step by step, or was not judged.
+    A record has `source`, `method` (whose inputs are compared, or ""), `names`, the setting (`behaviour`, `inputs`,
+    `performer`, `varied`), the numbers of clips on which all (`clips`) and any (`clips_of_any`) were measured,
+    `means_deg` or None, `holds` (None: not evaluated), and `why` (reasons for violations, or for no evaluation).
     """
     return [found for order in orders for found in _evaluate_by_group(order, rows)]
 

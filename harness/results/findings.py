@@ -1,7 +1,7 @@
-"""What a paper's experiments came to, published figure beside ours: plain records that are stored as JSON.
+"""Findings of a paper study: published figures next to ours, as plain records that are stored as JSON.
 
-An experiment answers one question of a paper. It has claims, each a published statement with our figure and a verdict,
-tables, and figures as the numbers that they are drawn from, so that a page can be drawn from the file alone.
+An experiment answers one question of a paper. It has claims (each a published statement with our figure and a verdict),
+tables, and charts as the numbers that they are drawn from, so that a page can be drawn from the file alone.
 """
 
 import dataclasses
@@ -15,35 +15,38 @@ from harness.errors import BadFile, UnknownName
 
 SCHEMA = 1
 ClaimVerdict = Literal["reproduced", "not reproduced", "cannot tell", "not comparable", "not run"]
-"""*Reproduced*: the paired 95 % interval lies on the published side; *not reproduced*: on the other; *cannot tell*: it
-holds zero, or there are fewer than 6 clips; *not comparable*: absolute figures of other motion."""
+"""Verdict on a claim, by the paired 95 % interval of the difference.
+
+*reproduced*: it lies on the published side; *not reproduced*: on the other side; *cannot tell*: it contains zero, or
+there are fewer than 6 clips; *not comparable*: absolute figures of other motion.
+"""
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One published statement, and what we found."""
+    """One published statement and our result."""
 
     text: str
-    """Such as "walking, position + orientation: dynamic_map errs less than ik"."""
+    """The statement, such as "walking, position + orientation: dynamic_map errs less than ik"."""
     published: str
     """The figure as printed, such as "1.25 deg", or "order" where only bars are."""
     ours: str
     verdict: ClaimVerdict
     why: str = ""
-    """Of a verdict that is not *reproduced*: what differs, or what is missing."""
+    """Reason for a verdict other than *reproduced*: what differs, or what is missing."""
     clips: int = 0
-    """On which both sides were measured."""
+    """Number of clips on which both sides were measured."""
     difference: float | None = None
-    """Mean paired difference over clips, in `unit`, or the figure that is held against the published one."""
+    """Mean paired difference over clips, or our figure that the published one is compared with, in `unit`."""
     low: float | None = None
     high: float | None = None
-    """Ends of its 95 % interval."""
+    """Ends of the 95 % interval of `difference`."""
     unit: str = ""
 
 
 @dataclass(frozen=True)
 class FindingsTable:
-    """Texts in rows; TypeError if one has not a text for each column."""
+    """A table of texts; TypeError if a row does not have one text per column."""
 
     title: str
     columns: tuple[str, ...]
@@ -57,28 +60,28 @@ class FindingsTable:
 
 @dataclass(frozen=True)
 class BarChart:
-    """A bar for each group and series; intervals where they are known."""
+    """A bar chart with one bar per group and series, and intervals where they are known."""
 
     title: str
     unit: str
     groups: tuple[str, ...]
     series: dict[str, tuple[float | None, ...]]
-    """Name -> a value for each group."""
+    """Name of a series -> its value in each group."""
     low: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     high: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     spread: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
     """Standard deviations over clips, where the paper shows them."""
     published: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
-    """The paper's own figures, where it prints them; of series that are drawn."""
+    """Figures that the paper prints, by series."""
     horizontal: bool = False
     caption: str = ""
-    """What the reader should look for, and over what it was measured."""
+    """What to look for in the chart, and what it was measured on."""
     kind: Literal["bars"] = "bars"
 
 
 @dataclass(frozen=True)
 class LineChart:
-    """Curves over a common axis."""
+    """A chart of curves over a common axis."""
 
     title: str
     x_label: str
@@ -91,50 +94,51 @@ class LineChart:
 
 @dataclass(frozen=True)
 class PaperExperiment:
-    """One experiment of a paper, rerun."""
+    """Findings of one reproduced experiment of a paper."""
 
     name: str
-    """Of its folder in the study, such as "leave_one_out"."""
+    """Name of its folder in the study, such as "leave_one_out"."""
     title: str
     question: str
-    """What the paper asked and showed, so that nobody needs the paper to read on."""
+    """What the paper asked and showed, for readers without the paper."""
     differences: tuple[str, ...]
-    """In which this is another experiment than the paper's."""
+    """Differences between this experiment and the paper's."""
     claims: tuple[Claim, ...] = ()
     tables: tuple[FindingsTable, ...] = ()
     figures: tuple[BarChart | LineChart, ...] = ()
     runs: tuple[str, ...] = ()
-    """Folders of the runs that it rests on, relative to the study's."""
+    """Folders of the runs that it is computed from, relative to the study's."""
     notes: tuple[str, ...] = ()
-    """What came out besides: negative results, cells that failed, clips that were left out and why."""
+    """Further results: negative results, failed cells, and clips that were left out with the reason."""
 
 
 @dataclass(frozen=True)
 class PaperFindings:
-    """A paper rerun; findings.json in the folder of the study."""
+    """Findings of a reproduced paper: findings.json in the folder of the study."""
 
     paper: str
-    """Such as "liu2011"."""
+    """Name of the paper, such as "liu2011"."""
     reference: str
     """Authors, title, venue, year."""
     motion: str
-    """Such as "built-in performer" or "cmu"."""
+    """Title of the motion source, such as "built-in performer" or "cmu"."""
     command: str
     seed: int
     experiments: tuple[PaperExperiment, ...]
     circumstances: dict[str, Any]
-    """See `manifest.here`."""
+    """See `manifest.current_circumstances`."""
     tables: tuple[FindingsTable, ...] = ()
-    """Of the whole study: databases, clips, what was left out and why, tuned constants and what they were chosen on."""
+    """Tables of the whole study: databases, clips, omissions with reasons, tuned constants and their tuning clips."""
     schema: int = SCHEMA
 
 
 def write_findings(path: Path, findings: PaperFindings) -> None:
+    """Write findings as JSON."""
     write_json(path, to_json_types(dataclasses.asdict(findings)))
 
 
 def read_findings(path: Path) -> PaperFindings:
-    """BadFile when it is none."""
+    """Read the findings of a paper study; BadFile when the file is missing or malformed."""
     expected = "the findings of a paper's study"
     content = read_json(path, expected)
     try:

@@ -1,8 +1,8 @@
-"""What a placement study came to: which trackers to wear and where, as plain records that are stored as JSON.
+"""Findings of a placement study (which trackers to wear, and where), as plain records that are stored as JSON.
 
-A *set* is a choice of candidates, worn together. Errors are of one metric, one figure for each clip (averaged over
-methods, seeds and what else the study varies), so that everything is compared on the same clips. A page can be drawn
-from the file alone.
+A *set* is a choice of candidates that are worn together. All errors are of one metric, with one value per clip
+(averaged over methods, seeds and whatever else the study varies), so that sets are compared on the same clips. A page
+can be drawn from the file alone.
 """
 
 import dataclasses
@@ -24,14 +24,14 @@ MODES: dict[PlacementMode, str] = {
     "exhaustive": "every set of so many",
     "refine": "places moved along and around the bone",
 }
-"""What each mode tries."""
+"""Mode -> the sets that it tries."""
 StationNames = tuple[str, ...]
-"""Names of candidates, in the order of `PlacementFindings.candidates`: equal sets are equal tuples."""
+"""Names of candidates in the order of `PlacementFindings.candidates`, so that equal sets are equal tuples."""
 
 
 @dataclass(frozen=True)
 class StationPlacement:
-    """A candidate: one tracker at one place (see `harness.body.mounts.Mount`); a moved one has its own name."""
+    """A candidate: one tracker at one place (see `harness.body.mounts.Mount`). A moved candidate has a new name."""
 
     name: str
     bone: str
@@ -45,15 +45,15 @@ class StationPlacement:
 
 @dataclass(frozen=True)
 class StationSetResult:
-    """One set under the study's own conditions."""
+    """Errors of one set under the study's own conditions."""
 
     stations: StationNames
     rate_hz: float
-    """At which the line carries so many."""
+    """Rate at which the line carries that many stations [Hz]."""
     errors: dict[str, float | None]
     """Clip -> error; None where it was not measured."""
     mean: float | None
-    """Over the clips that were measured."""
+    """Mean over the clips that were measured."""
     low: float | None = None
     """Ends of the 95 % interval of the mean over clips; None with too few."""
     high: float | None = None
@@ -61,50 +61,50 @@ class StationSetResult:
 
 @dataclass(frozen=True)
 class RankedSet:
-    """One set among others of its ranking."""
+    """One set in a ranking."""
 
     stations: StationNames
     rank: int
-    """By mean error, 1 the best."""
+    """Rank by mean error; 1 is the best."""
     rank_low: int
-    """The best rank that the paired intervals leave it: 1 and how many are surely better."""
+    """Best rank that the paired intervals allow: 1 plus the number of sets that are significantly better."""
     rank_high: int
-    """The worst: how many there are, less those that are surely worse."""
+    """Worst rank that they allow: the number of sets minus those that are significantly worse."""
     difference: float | None
-    """Mean paired difference to the set of rank 1 over clips, positive where that one is better; 0 of itself."""
+    """Mean paired difference over clips to the set of rank 1, positive if that set is better; 0 for rank 1."""
     low: float | None = None
-    """Ends of its 95 % interval."""
+    """Ends of the 95 % interval of `difference`."""
     high: float | None = None
     tied: bool = False
-    """Nothing shows that it is worse than rank 1; also true of rank 1 itself."""
+    """Whether the set is not significantly worse than rank 1; true for rank 1."""
     step: float | None = None
-    """Mean paired difference to the set of the rank before; 0 of rank 1."""
+    """Mean paired difference to the set of the previous rank; 0 for rank 1."""
     step_low: float | None = None
     step_high: float | None = None
 
 
 @dataclass(frozen=True)
 class Ranking:
-    """Sets that compete for one job, best first."""
+    """A ranking of sets, best first."""
 
     mode: PlacementMode
     title: str
-    """Such as "3 trackers of 12"."""
+    """Title, such as "3 trackers of 12"."""
     rows: tuple[RankedSet, ...]
     base: StationNames = ()
-    """What `ablate` takes from and `add` adds to."""
+    """The set that `ablate` removes from and `add` adds to."""
 
 
 @dataclass(frozen=True)
 class MarginalContribution:
-    """What one candidate is worth beside others: the error without it less the error with it."""
+    """Contribution of one candidate: the error without it minus the error with it."""
 
     candidate: str
     mode: Literal["ablate", "add", "exhaustive"]
-    """Left out of `base`, added to it, or, over every set tried, on average with it against without it."""
+    """`ablate`: removed from `base`; `add`: added to it; `exhaustive`: mean with it against without, over all sets."""
     base: StationNames
     difference: float | None
-    """Positive where wearing it helps, in the metric's unit."""
+    """Difference in the metric's unit, positive if wearing the candidate helps."""
     low: float | None = None
     high: float | None = None
     clips: int = 0
@@ -112,30 +112,30 @@ class MarginalContribution:
 
 @dataclass(frozen=True)
 class SearchStep:
-    """One step of a search: the set that it came to, against the one before."""
+    """One step of a search: the chosen set, compared with the previous one."""
 
     stations: StationNames
     changed: str
-    """Such as "+ left_ankle", or "left_ankle: along 0.90 to 0.80"; "" of where it began."""
+    """The change, such as "+ left_ankle" or "left_ankle: along 0.90 to 0.80"; "" for the first set."""
     difference: float | None = None
-    """Error before less error now: positive where the step helps."""
+    """Previous error minus new error, positive if the step helps."""
     low: float | None = None
     high: float | None = None
     tied: tuple[str, ...] = ()
-    """What else could have been chosen: nothing shows that it is worse."""
+    """Alternatives that are not significantly worse."""
 
 
 @dataclass(frozen=True)
 class PlacementSearch:
-    """A search that goes step by step."""
+    """A stepwise search."""
 
     mode: Literal["greedy", "refine"]
     title: str
     steps: tuple[SearchStep, ...]
     ended: str = ""
-    """Why it ended."""
+    """Reason why the search ended."""
     held_out: float | None = None
-    """What the last set saves against the first on clips on which nothing was chosen; None where it was not judged."""
+    """Error of the first set minus that of the last on held-out clips; None if it was not evaluated."""
     held_out_low: float | None = None
     held_out_high: float | None = None
     held_out_clips: int = 0
@@ -143,22 +143,24 @@ class PlacementSearch:
 
 @dataclass(frozen=True)
 class BestSet:
-    """The set of so many stations with the least error."""
+    """The set with the smallest error among those with the same number of stations."""
 
     stations: StationNames
     ties: tuple[StationNames, ...] = ()
-    """Others of as many that nothing shows to be worse."""
+    """Sets of the same size that are not significantly worse."""
     on_front: bool = True
-    """No set of fewer or as many stations errs less (Pareto)."""
+    """Whether no set of fewer or as many stations has a smaller error (Pareto front)."""
     of: int = 0
-    """How many sets of so many stations it was chosen from."""
+    """Number of sets of this size that it was chosen from."""
     stays: float | None = None
-    """Share of resamples of the clips in which it is still the best of them."""
+    """Share of resamples of the clips in which it is still the best."""
     crossed: float | None = None
-    """Mean error on each clip of whichever set the other clips would have chosen: what choosing and judging on the same
-    clips flatters the best by is this less its mean."""
+    """Cross-validated error: the mean over clips of the error of the set that the other clips would have chosen.
+
+    It exceeds the mean error by the optimism of choosing and evaluating on the same clips.
+    """
     held_out: float | None = None
-    """Its mean error on the clips on which nothing was chosen."""
+    """Mean error on the held-out clips."""
     held_out_low: float | None = None
     held_out_high: float | None = None
     held_out_clips: int = 0
@@ -166,16 +168,16 @@ class BestSet:
 
 @dataclass(frozen=True)
 class PlacementCondition:
-    """The same sets elsewhere: another behaviour, method or noise."""
+    """Station sets under another condition: another behaviour, method or noise."""
 
     name: str
-    """Such as "boxing" or "ik"; the first of a study is its own."""
+    """Name, such as "boxing" or "ik"; the first condition is the study's own."""
     kind: str
-    """Such as "behaviour", "method" or "noise"."""
+    """What differs, such as "behaviour", "method" or "noise"."""
     best: dict[str, StationNames]
-    """How many stations -> the best set there; JSON's keys are texts."""
+    """Number of stations (as text, for JSON) -> the best set under this condition."""
     means: tuple[float | None, ...]
-    """Of each set of `PlacementFindings.compared`."""
+    """Mean error of each set of `PlacementFindings.compared`."""
     clips: int = 0
     stays: float | None = None
     """Share of resamples of the clips in which the best of the compared sets is still the best."""
@@ -183,42 +185,42 @@ class PlacementCondition:
 
 @dataclass(frozen=True)
 class RankAgreement:
-    """How alike two conditions rank the sets that both measured."""
+    """Agreement of two conditions on the ranking of the sets that both measured."""
 
     a: str
     b: str
     tau: float | None
-    """Kendall's tau-b over the sets, 1 the same order, 0 none, -1 reversed."""
+    """Kendall's tau-b over the sets: 1 for the same order, 0 for none, -1 for the reversed order."""
     sets: int
     low: float | None = None
-    """Ends of its 95 % interval, by resampling clips; None where it was not taken."""
+    """Ends of the 95 % interval by resampling clips; None if it was not computed."""
     high: float | None = None
 
 
 @dataclass(frozen=True)
 class PlacementFindings:
-    """A placement study; findings.json in its folder."""
+    """Findings of a placement study: findings.json in its folder."""
 
     name: str
     title: str
-    """What was asked, in one line."""
+    """The question in one line."""
     metric: str
     unit: str
     motion: str
-    """Such as "built-in performer"."""
+    """Title of the motion source, such as "built-in performer"."""
     behaviours: tuple[str, ...]
     methods: tuple[str, ...]
     noise: str
     link: str
-    """How many stations the line carries at which rate, in words; "" where the rate is the same for all."""
+    """Text that says how many stations the line carries at which rate; "" if the rate is the same for all."""
     seed: int
     command: str
     candidates: tuple[StationPlacement, ...]
     tried: tuple[StationSetResult, ...]
     best: tuple[BestSet, ...]
-    """By number of stations, fewest first."""
+    """Best set for each number of stations, smallest first."""
     circumstances: dict[str, Any]
-    """See `manifest.here`."""
+    """See `manifest.current_circumstances`."""
     rankings: tuple[Ranking, ...] = ()
     searches: tuple[PlacementSearch, ...] = ()
     worth: tuple[MarginalContribution, ...] = ()
@@ -226,31 +228,35 @@ class PlacementFindings:
     """The sets that every condition ranks."""
     conditions: tuple[PlacementCondition, ...] = ()
     agreements: tuple[RankAgreement, ...] = ()
-    """Of each pair of conditions."""
+    """Agreement of each pair of conditions."""
     claims: tuple[Claim, ...] = ()
-    """What papers say, and what came out."""
+    """Claims of papers and our results."""
     notes: tuple[str, ...] = ()
-    """What a reader must know: negative results, what was left out and why."""
+    """Notes for readers: negative results, and omissions with their reasons."""
     failures: dict[str, str] = field(default_factory=dict)
-    """Cell -> why it has no result."""
+    """Failed cell -> reason."""
     planned: int = 0
-    """Cells."""
+    """Number of planned cells."""
     better: Literal["lower", "higher"] = "lower"
-    """Which values of the metric are good; differences above are signed so that positive is as they say."""
+    """Which values of the metric are better; all differences are signed accordingly."""
     kind: Literal["placement"] = "placement"
     schema: int = SCHEMA
 
     def of(self, stations: StationNames) -> StationSetResult | None:
-        """What came of a set."""
+        """Result of a set, None if it was not tried."""
         return next((tried for tried in self.tried if tried.stations == stations), None)
 
 
 def write_placement(path: Path, findings: PlacementFindings) -> None:
+    """Write findings as JSON."""
     write_json(path, to_json_types(dataclasses.asdict(findings)))
 
 
 def read_placement(path: Path) -> PlacementFindings:
-    """BadFile when it is none, of another version, or names sets and candidates that it does not have."""
+    """Read the findings of a placement study.
+
+    BadFile when the file is missing, malformed, of another version, or names unknown candidates.
+    """
     expected, advice = "the findings of a placement study", "Give the command of the study again."
     content = read_json(path, expected)
     if content.get("schema") != SCHEMA:
@@ -265,12 +271,12 @@ def read_placement(path: Path) -> PlacementFindings:
 
 
 def is_placement_findings(path: Path) -> bool:
-    """Whether this file says that it holds a placement study's findings; BadFile when it is no JSON."""
+    """Whether a file holds the findings of a placement study; BadFile when it is no JSON."""
     return read_json(path, "findings").get("kind") == "placement"
 
 
 def _unknown_stations(findings: PlacementFindings) -> list[str]:
-    """Names of stations that are no candidates."""
+    """Names of stations that are not among the candidates."""
     known = {place.name for place in findings.candidates}
     sets = [tried.stations for tried in findings.tried]
     sets += [row.stations for ranking in findings.rankings for row in ranking.rows]

@@ -1,6 +1,6 @@
-"""How soon an error is itself again after a disturbance: cells that were disturbed against those that were not.
+"""Recovery from disturbances: errors of disturbed cells compared with those of undisturbed cells.
 
-A scenario asks for it by varying its disturbance, for example
+A scenario requests it by varying its disturbance, for example
 
     [disturbance]
     station = "right_hand"
@@ -8,9 +8,10 @@ A scenario asks for it by varying its disturbance, for example
     [vary]
     "disturbance.kind" = ["none", "one_lost", "all_lost", "one_off", "all_turned", "start_off"]
 
-Both cells of a pair see the same motion and the same draws of noise (`core.seeds`). The measure is the mean error of
-joint angles over the second that begins 1 s after the last bad frame, divided by that of the undisturbed cell over
-the same frames; up to 1.5 counts as recovered. `harness run` prints it below its table, `summary.json` lists it.
+Both cells of a pair have the same motion and the same draws of noise (`core.seeds`). The measure is the mean joint
+angle error over the second that begins 1 s after the last bad frame, divided by that of the undisturbed cell over the
+same frames. A ratio of up to 1.5 counts as recovered. `harness run` prints it below its table, and `summary.json` lists
+it.
 """
 
 import json
@@ -26,18 +27,18 @@ from harness.core.files import to_json_types
 from harness.results.cell import Cell
 
 MAX_RECOVERED_RATIO = 1.5
-"""Times the undisturbed error."""
+"""Largest ratio to the undisturbed error that counts as recovered."""
 SETTLING_S, WINDOW_S = 1.0, 1.0
-"""The error is taken from so long after the last bad frame, over so long [s]."""
+"""Start of the evaluated window after the last bad frame, and its length [s]."""
 LOST_AFTER_S = 0.5
-"""Under half of the stations for longer than this is LOST, before that HELD [s]."""
+"""Time with fewer than half of the stations after which the status must be LOST; before it, HELD [s]."""
 _SMOOTHING_S = 0.25
 _STATUS_TOLERANCE_S = 0.05
 
 
 @dataclass(frozen=True)
 class Recovery:
-    """One disturbed cell beside its undisturbed one."""
+    """Recovery of one disturbed cell against its undisturbed twin."""
 
     method: str
     inputs: str
@@ -46,20 +47,20 @@ class Recovery:
     clip: str
     disturbance: str
     judged: int
-    """Frames of the second that is judged; 0 when the take ends before it does, and then nothing below is known."""
+    """Number of frames in the evaluated window; 0 if the take ends before it, and then no value below is known."""
     disturbed_deg: float
-    """Mean joint angle error of the frames that are judged."""
+    """Mean joint angle error in the evaluated window [deg]."""
     undisturbed_deg: float
     during: float
-    """Times the undisturbed error while it lasted, from the first bad frame to the last."""
+    """Ratio to the undisturbed error during the disturbance, from the first bad frame to the last."""
     disturbed_mm: float
-    """Mean distance of the joint centres in the same frames."""
+    """Mean distance of the joint centres in the evaluated window [mm]."""
     undisturbed_mm: float
     back_after_s: float | None
-    """From the last bad frame until the error, smoothed over 0.25 s, is at most 1.5 times the undisturbed one and stays
-    so to the end of what is judged; None if it never is."""
+    """Time from the last bad frame until the error, smoothed over 0.25 s, stays within 1.5 times the undisturbed one up
+    to the end of the window [s]; None if it never does."""
     status_right: float
-    """Share of frames, from the first bad one to the last judged one, whose status is what the readings call for."""
+    """Share of frames, from the first bad one to the end of the window, whose status agrees with the readings."""
 
     @property
     def ratio(self) -> float:
@@ -68,7 +69,7 @@ class Recovery:
 
 @dataclass(frozen=True, eq=False)
 class _CellErrors:
-    """What is kept of a cell."""
+    """Errors of one cell over time."""
 
     cell: Mapping[str, str]
     disturbance: Mapping[str, Any]
@@ -77,17 +78,17 @@ class _CellErrors:
     error_mm: Floats
     status: Ints
     reporting: Bools
-    """(F,) at least half of the stations."""
+    """(F,) whether at least half of the stations report."""
 
 
 class RecoveryCollector:
-    """Add cells in any order, then ask for the pairs among them."""
+    """Collects cells in any order and pairs disturbed cells with their undisturbed twins."""
 
     def __init__(self) -> None:
         self._courses: dict[str, dict[str, _CellErrors]] = {}
 
     def add(self, cell: Cell) -> None:
-        """Keep it if its scenario knows disturbances."""
+        """Add a cell, if its scenario has a disturbance."""
         if "disturbance" not in cell.defined_by:
             return
         disturbance = dict(cell.defined_by["disturbance"])
@@ -108,7 +109,7 @@ class RecoveryCollector:
         )
 
     def pairs(self) -> list[Recovery]:
-        """Every disturbed cell whose undisturbed twin is there; `judged` is 0 for takes that end too soon."""
+        """Recovery of every disturbed cell that has an undisturbed twin; `judged` is 0 for takes that end too soon."""
         found = []
         for courses in self._courses.values():
             if (plain_course := courses.get("none")) is not None:
@@ -116,7 +117,7 @@ class RecoveryCollector:
         return found
 
     def rows(self) -> list[dict[str, Any]]:
-        """For `summary.json`: the pairs, each with its ratio."""
+        """Records for `summary.json`: the pairs, each with its ratio."""
         return [{**asdict(recovery), "ratio": recovery.ratio} for recovery in self.pairs()]
 
 
@@ -145,7 +146,7 @@ def _recovery(course: _CellErrors, undisturbed: _CellErrors) -> Recovery:
 
 
 def error_ratio(error: float, undisturbed: float) -> float:
-    """How many times as large: 1 where both are zero, NaN where one is not finite."""
+    """Ratio of an error to the undisturbed one: 1 if both are zero, NaN if one is NaN."""
     if undisturbed == 0.0:
         return 1.0 if error == 0.0 else float("nan") if np.isnan(error) else float("inf")
     return error / undisturbed
@@ -168,7 +169,7 @@ def _back_after_s(since_s: Floats, after: Bools, disturbed_deg: Floats, undistur
 
 
 def _status_is_correct(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
-    """(F,) whether the status is what the readings call for; close to 0.5 s both HELD and LOST are."""
+    """(F,) whether the status agrees with the readings; close to 0.5 s without readings both HELD and LOST do."""
     enough_s = np.where(reporting, time_s, -np.inf)
     enough_s[0] = time_s[0]
     gone_s = time_s - np.maximum.accumulate(enough_s)
@@ -179,12 +180,12 @@ def _status_is_correct(time_s: Floats, reporting: Bools, status: Ints) -> Bools:
 
 
 def tabulate_recovery(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Of `summary.json`'s rows: one for each method, inputs and split, clips pooled.
+    """Pool the recovery rows of `summary.json` over clips: one record for each method, inputs and split.
 
-    Each has `clips`, `undisturbed_deg`, `status_right` (the least) and, under `after`, disturbance -> `ratio` of the
-    means over clips, `worst` ratio of a single clip, how many times as large the error is `during` it (mean over
-    clips), `back_after_s` of the slowest clip (None: one never was). Clips that end too soon are left out, and a
-    disturbance is None where all do.
+    A record has `clips`, `undisturbed_deg`, `status_right` (the lowest) and `after`. The latter maps a disturbance to
+    `ratio` (of the means over clips), `worst` (ratio of a single clip), `during` (ratio during the disturbance, mean
+    over clips) and `back_after_s` of the slowest clip (None: one never recovers). Clips that end too soon are left
+    out; a disturbance is None if all do.
     """
     groups: dict[tuple[str, ...], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -222,5 +223,5 @@ def _mean(rows: Sequence[Mapping[str, Any]], name: str) -> float:
 
 
 def _number(value: float | None) -> float:
-    """JSON has no NaN: what was not finite comes back as null."""
+    """The number, NaN for the null that stands for it in JSON."""
     return float("nan") if value is None else value

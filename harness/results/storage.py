@@ -6,7 +6,7 @@ inputs, the method and the source of both, so that edited code never reuses stal
 
 import re
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,6 @@ __all__ = [
     "read_kind",
     "read_summary",
     "remove_leftovers",
-    "summary_rows",
     "write_cell",
     "write_summary",
 ]
@@ -109,11 +108,6 @@ def read_kind(out: Path) -> str:
     """Kind of the work in a folder with an index: `run`, `sweep` or `placement`."""
     with CellIndex(out, read_only=True) as index:
         return str(index.facts().get("kind", "placement"))
-
-
-def summary_rows(cells: Iterable[Cell]) -> list[dict[str, Any]]:
-    """One row per cell: identity, then every metric; None is "not measured"."""
-    return [as_row(cell) for cell in cells]
 
 
 def write_summary(

@@ -1,6 +1,6 @@
-"""Errors of joint angles and rotations (docs/methods.md, part D). Each metric: a `Pair` in, one number a frame out.
+"""Errors of joint angles and rotations (docs/metrics.md, part D). Each metric maps a `Pair` to one number per frame.
 
-Different definitions give numbers that differ by a factor of two on the same motion; never compare across them.
+Definitions differ by up to a factor of two on the same motion; never compare numbers of different definitions.
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ SIP_BONES = ("lhumerus", "rhumerus", "lfemur", "rfemur")
 
 
 def wrap_angle(angle_rad: Floats) -> Floats:
-    """The same angle within +-pi; exactly zero stays exactly zero."""
+    """Wrap angles to +-pi; exact zeros remain exact."""
     out: Floats = angle_rad - 2.0 * np.pi * np.round(angle_rad / (2.0 * np.pi))
     return out
 
@@ -22,7 +22,7 @@ def wrap_angle(angle_rad: Floats) -> Floats:
 def geodesic_deg(p: Floats, q: Floats) -> Floats:
     """Angle (...,) between rotation matrices (..., 3, 3), by the chord |p - q| = 2 sqrt(2) sin(angle / 2) [deg].
 
-    The chord is exact at zero, where the arc cosine of the trace is worst.
+    The chord is exact at zero, where the arc cosine of the trace is least accurate.
     """
     chord = np.sqrt(np.sum((p - q) ** 2, axis=(-2, -1)))
     out: Floats = np.rad2deg(2.0 * np.arcsin(np.minimum(chord / np.sqrt(8.0), 1.0)))
@@ -30,7 +30,7 @@ def geodesic_deg(p: Floats, q: Floats) -> Floats:
 
 
 def hinge_errors_deg(pair: Pair) -> Floats:
-    """(F, D) wrapped difference of every hinge angle, without sign."""
+    """(F, D) absolute wrapped difference of every hinge angle [deg]."""
     out: Floats = np.rad2deg(np.abs(wrap_angle(pair.estimate.angles_rad - pair.truth.angles_rad)))
     return out
 
@@ -42,13 +42,13 @@ def local_errors_deg(pair: Pair) -> Floats:
 
 
 def joint_angle_mean_deg(pair: Pair) -> Floats:
-    """(F,) D1, the first paper's: mean over the hinges, root orientation excluded."""
+    """(F,) D1, as in Liu et al. 2011: mean absolute difference of the hinge angles, without the root orientation."""
     out: Floats = hinge_errors_deg(pair).mean(axis=1)
     return out
 
 
 def joint_angle_rms_deg(pair: Pair) -> Floats:
-    """(F,) root mean square of the same."""
+    """(F,) root mean square difference of the hinge angles."""
     out: Floats = np.sqrt(np.mean(hinge_errors_deg(pair) ** 2, axis=1))
     return out
 
@@ -60,7 +60,7 @@ def mpjre_deg(pair: Pair) -> Floats:
 
 
 def mpjre_axis_angle_deg(pair: Pair) -> Floats:
-    """(F,) mean wrapped difference of axis-angle components: what head-set papers print as MPJRE."""
+    """(F,) mean absolute wrapped difference of axis-angle components: the MPJRE of papers on head-mounted displays."""
     bones = hinged_bones(pair.skeleton)
     truth, estimate = (
         rotations.log(rotations.from_matrix(p.parent_from_bone[:, bones])) for p in (pair.truth, pair.estimate)
@@ -70,12 +70,12 @@ def mpjre_axis_angle_deg(pair: Pair) -> Floats:
 
 
 def joint_geodesic_global_deg(pair: Pair) -> Floats:
-    """(F,) mean geodesic error of the hinged bones' global rotations, roots aligned."""
+    """(F,) mean geodesic error of the global rotations of the hinged bones, after aligning the roots."""
     return _root_aligned_deg(pair, hinged_bones(pair.skeleton))
 
 
 def sip_error_deg(pair: Pair) -> Floats:
-    """(F,) the same over upper arms and thighs."""
+    """(F,) mean geodesic error of the global rotations of upper arms and thighs, after aligning the roots."""
     return _root_aligned_deg(pair, bones_named(pair.skeleton, SIP_BONES))
 
 
@@ -86,7 +86,7 @@ def root_angle_deg(pair: Pair) -> Floats:
 
 
 def root_heading_deg(pair: Pair) -> Floats:
-    """(F,) wrapped difference of the root's yaw, without sign."""
+    """(F,) absolute wrapped difference of the root's yaw."""
     truth, estimate = (rotations.yaw_rad(p.world_from_root) for p in (pair.truth, pair.estimate))
     out: Floats = np.rad2deg(np.abs(wrap_angle(estimate - truth)))
     return out

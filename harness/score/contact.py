@@ -1,7 +1,7 @@
-"""Feet against the ground, and how smoothly joints move; a `Pair` in, one number a frame out.
+"""Contact of the feet with the ground, and smoothness. Each metric maps a `Pair` to one number per frame.
 
-Differences over time are taken only between frames that follow each other without a gap; the value stands at the
-last frame of each difference, NaN elsewhere. Contact is decided by the truth alone.
+Differences over time are taken only between consecutive frames without a gap. The value is assigned to the last frame
+of a difference and is NaN elsewhere. Contact is determined from the truth alone.
 """
 
 import numpy as np
@@ -10,24 +10,25 @@ from harness.core.arrays import Bools, Floats
 from harness.score.pair import Pair, PoseSequence, bones_named
 
 FOOT_POINTS = ("ltibia", "lfoot", "rtibia", "rfoot")
-"""Their far ends: ankle and toe, left and right."""
+"""Bones whose far ends are ankle and toe, left and right."""
 CONTACT_HEIGHT_M = 0.05
+"""Height above the ground below which a point can be in contact [m] (choice)."""
 CONTACT_SPEED_M_S = 0.15
-"""In contact: lower over the ground and slower than this (choices)."""
+"""Speed below which a point can be in contact [m/s] (choice)."""
 
 
 def sole_heights_m(motion: PoseSequence) -> Floats:
-    """(T, 4) height of the toes, and of the ankles less their height over the toe in the rest pose."""
+    """(T, 4) height of the toes, and of the ankles minus their height over the toe in the rest pose [m]."""
     toe_drop_m = motion.skeleton.bone_m[bones_named(motion.skeleton, ("lfoot", "lfoot", "rfoot", "rfoot")), 2]
     out: Floats = _foot_points_m(motion)[..., 2] + np.where([True, False, True, False], toe_drop_m, 0.0)
     return out
 
 
 def ground_m(truth: PoseSequence) -> float:
-    """Height at which the truth's feet stand [m]: the median over the take of its lowest sole point (choice).
+    """Ground height under the true feet [m]: the median over the take of the lowest sole point (choice).
 
-    Joint centres lie inside the feet and the floor of a recording need not be at zero: on CMU's clips true toes stand
-    30 to 50 mm up, and with the ground at zero the share of frames in contact depends on the session, not the motion.
+    Joint centres lie inside the feet, and the floor of a recording need not be at zero. In CMU's clips, true toes are
+    30 to 50 mm high; with the ground at zero the share of frames in contact would depend on the session.
     """
     return float(np.median(sole_heights_m(truth).min(axis=1)))
 
@@ -44,42 +45,42 @@ def jitter_m_s3(pair: Pair) -> Floats:
 
 
 def jitter_true_m_s3(pair: Pair) -> Floats:
-    """(F,) the truth's own."""
+    """(F,) mean jerk of the true joint centres [m/s^3]."""
     return _jerk(pair, pair.truth)
 
 
 def foot_skate_mm_s(pair: Pair) -> Floats:
-    """(F,) mean horizontal speed of the ankles and toes that truly are in contact; NaN when none is."""
+    """(F,) mean horizontal speed of the ankles and toes that are in contact in the truth; NaN when none is [mm/s]."""
     return _skate(pair, pair.estimate)
 
 
 def foot_skate_true_mm_s(pair: Pair) -> Floats:
-    """(F,) the truth's own."""
+    """(F,) foot skate of the true motion [mm/s]."""
     return _skate(pair, pair.truth)
 
 
 def penetration_mm(pair: Pair) -> Floats:
-    """(F,) depth of the lowest ankle or toe below the ground while any truly is in contact, else NaN."""
+    """(F,) depth of the lowest ankle or toe below the ground while any is in contact in the truth, else NaN [mm]."""
     return np.maximum(-_lowest_mm(pair, pair.estimate), 0.0)
 
 
 def penetration_true_mm(pair: Pair) -> Floats:
-    """(F,) the truth's own."""
+    """(F,) penetration of the true motion [mm]."""
     return np.maximum(-_lowest_mm(pair, pair.truth), 0.0)
 
 
 def float_mm(pair: Pair) -> Floats:
-    """(F,) height of the lowest ankle or toe above the ground while any truly is in contact, else NaN."""
+    """(F,) height of the lowest ankle or toe above the ground while any is in contact in the truth, else NaN [mm]."""
     return np.maximum(_lowest_mm(pair, pair.estimate), 0.0)
 
 
 def float_true_mm(pair: Pair) -> Floats:
-    """(F,) the truth's own."""
+    """(F,) float of the true motion [mm]."""
     return np.maximum(_lowest_mm(pair, pair.truth), 0.0)
 
 
 def in_contact(pair: Pair) -> Bools:
-    """(F, 4) which ankles and toes the truth has on the ground."""
+    """(F, 4) which ankles and toes are in contact in the truth."""
     low = sole_heights_m(pair.truth) - pair.ground_m < CONTACT_HEIGHT_M
     slow = np.zeros_like(low)
     slow[1:] = pair.rate_hz * _length(np.diff(_foot_points_m(pair.truth), axis=0)) < CONTACT_SPEED_M_S

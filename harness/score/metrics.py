@@ -1,6 +1,6 @@
-"""Every metric by its name in files and tables: unit, definition, version, and the function that computes it.
+"""All metrics by their name in files and tables: unit, definition, version, and the function that computes them.
 
-A version goes up whenever the same motion would give another number; results with other versions are not comparable.
+A version increases whenever the same motion gives another number. Results with different versions are not comparable.
 """
 
 from collections.abc import Callable
@@ -16,13 +16,13 @@ Pool = Literal["mean", "rms", "none"]
 
 @dataclass(frozen=True)
 class Definition:
-    """What a number is."""
+    """Definition of a metric."""
 
     unit: str
     text: str
     version: int = 1
     pool: Pool = "none"
-    """How stored per-frame values become one number; `none` where there are no such values."""
+    """Pooling of per-frame values to one number; `none` where there are no per-frame values."""
 
 
 FRAME_METRICS: dict[str, Callable[[Pair], Floats]] = {
@@ -60,14 +60,14 @@ DEFINITIONS: dict[str, Definition] = {
     "frames_matched": Definition("frames", "frames with an estimate, after the warm-up"),
     "frames_expected": Definition("frames", "true frames after the warm-up"),
     "coverage": Definition("share", "frames matched / expected; below the floor nothing else is measured"),
-    "frames_warm_up": Definition("frames", "estimates within the warm-up, which no score counts"),
-    "frames_held": Definition("frames", "of the matched: carried on because too little came in"),
-    "frames_lost": Definition("frames", "of the matched: most stations had been gone for long"),
-    "frames_not_finite": Definition("frames", "estimates with NaN or infinity; they count as not matched"),
+    "frames_warm_up": Definition("frames", "estimates within the warm-up, which are not scored"),
+    "frames_held": Definition("frames", "matched frames with status HELD (too few readings)"),
+    "frames_lost": Definition("frames", "matched frames with status LOST (most stations missing for long)"),
+    "frames_not_finite": Definition("frames", "estimates with NaN or infinity, counted as not matched"),
     "joint_angle_mean_deg": Definition(
         "deg", "mean |difference| of the 48 hinge angles, wrapped, root excluded", 1, "mean"
     ),
-    "joint_angle_rms_deg": Definition("deg", "root mean square of the same", 1, "rms"),
+    "joint_angle_rms_deg": Definition("deg", "root mean square difference of the 48 hinge angles", 1, "rms"),
     "mpjre_deg": Definition("deg", "mean geodesic error of the 22 hinged bones relative to their parents", 1, "mean"),
     "mpjre_axis_angle_deg": Definition(
         "deg", "mean |difference| of axis-angle components of the 22 hinged bones (head-set literature)", 1, "mean"
@@ -75,14 +75,18 @@ DEFINITIONS: dict[str, Definition] = {
     "joint_geodesic_global_deg": Definition(
         "deg", "mean geodesic error of the 22 hinged bones' global rotations, roots aligned", 1, "mean"
     ),
-    "sip_error_deg": Definition("deg", "the same over upper arms and thighs", 1, "mean"),
+    "sip_error_deg": Definition(
+        "deg", "mean geodesic error of global rotations of upper arms and thighs, roots aligned", 1, "mean"
+    ),
     "root_angle_deg": Definition("deg", "geodesic error of the root's orientation", 1, "mean"),
     "root_heading_deg": Definition("deg", "mean |difference| of the root's yaw, wrapped", 1, "mean"),
-    "mpjpe_mm": Definition("mm", "mean distance of the 25 joint centres, nothing aligned", 1, "mean"),
-    "mpjpe_root_mm": Definition("mm", "the same, root positions subtracted", 1, "mean"),
-    "mpjpe_pa_mm": Definition("mm", "the same, best rotation and translation of each frame, no scale", 1, "mean"),
+    "mpjpe_mm": Definition("mm", "mean distance of the 25 joint centres, without alignment", 1, "mean"),
+    "mpjpe_root_mm": Definition("mm", "mean distance of the joint centres, root positions subtracted", 1, "mean"),
+    "mpjpe_pa_mm": Definition(
+        "mm", "mean distance of the joint centres after the best rigid alignment of each frame", 1, "mean"
+    ),
     "root_position_mm": Definition("mm", "mean distance of the root", 1, "mean"),
-    "root_drift_mm_s": Definition("mm/s", "speed at which the root's error grows (least-squares line)"),
+    "root_drift_mm_s": Definition("mm/s", "growth rate of the root error (least-squares line)"),
     "upper_position_mm": Definition("mm", "mean distance of the 16 joints of spine, neck, head and arms", 1, "mean"),
     "lower_position_mm": Definition("mm", "mean distance of the 8 joints of hips and legs", 1, "mean"),
     "hands_position_mm": Definition("mm", "mean distance of the far ends of the hands", 1, "mean"),
@@ -107,14 +111,12 @@ DEFINITIONS: dict[str, Definition] = {
     "float_true_mm": Definition("mm", "the truth's own float", 1, "mean"),
     "lag_ms": Definition("ms", "shift that minimises joint_angle_mean_deg, positive when late; reported, not removed"),
     "step_mean_ms": Definition("ms", "mean wall time of one step, the first frame left out"),
-    "step_p50_ms": Definition("ms", "median of the same"),
-    "step_p95_ms": Definition("ms", "95th percentile of the same"),
-    "step_p99_ms": Definition("ms", "99th percentile of the same"),
+    "step_p50_ms": Definition("ms", "median wall time of one step"),
+    "step_p95_ms": Definition("ms", "95th percentile of the step time"),
+    "step_p99_ms": Definition("ms", "99th percentile of the step time"),
     "first_step_ms": Definition("ms", "wall time of the first step"),
     "fps": Definition("frames/s", "1000 / step_mean_ms"),
-    "step_relative": Definition(
-        "x", "median CPU time of a step / that of a fixed piece of work done between the steps"
-    ),
+    "step_relative": Definition("x", "median CPU time of a step / that of a fixed reference workload"),
 }
 
 VERSIONS: dict[str, int] = {name: definition.version for name, definition in DEFINITIONS.items()}

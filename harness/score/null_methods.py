@@ -1,7 +1,7 @@
-"""Estimates that need no tracker: the truth itself, and three guesses that bound the scale of every score.
+"""Estimates without a tracker: the truth itself, and three simple estimates that give the scale of every score.
 
-A method that errs more than the frozen pose has learnt nothing; one that errs less than the truth one frame late
-is as good as its own latency allows.
+A method with a larger error than the frozen pose has learnt nothing. A method with a smaller error than the truth one
+frame late is as good as its latency allows.
 """
 
 from collections.abc import Callable
@@ -20,7 +20,7 @@ def oracle(truth_qpos: Floats) -> Floats:
 
 
 def last_value(truth_qpos: Floats) -> Floats:
-    """(T, 55) the truth of one frame before."""
+    """(T, 55) the truth of the previous frame."""
     return np.concatenate([truth_qpos[:1], truth_qpos[:-1]])
 
 
@@ -32,7 +32,7 @@ def mean_pose(truth_qpos: Floats) -> Floats:
 
 
 def frozen_pose(truth_qpos: Floats) -> Floats:
-    """(T, 55) the first frame, held."""
+    """(T, 55) the first frame, repeated."""
     return np.repeat(truth_qpos[:1], len(truth_qpos), axis=0)
 
 
@@ -42,7 +42,7 @@ NULL_METHODS: dict[str, Callable[[Floats], Floats]] = {
 
 
 def score_null_methods(skeleton: Skeleton, rate_hz: float, truth_qpos: Floats) -> dict[str, Scores]:
-    """Scores of every null method on one true motion (T, 55)."""
+    """Score every null method on one true motion (T, 55)."""
     frames = len(truth_qpos)
     status, untimed = np.full(frames, Status.SOLVED), np.full(frames, np.nan)
     return {

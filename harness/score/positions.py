@@ -1,4 +1,4 @@
-"""Errors of joint centres (docs/methods.md, part D). Each metric: a `Pair` in, one number a frame out.
+"""Errors of joint centres (docs/metrics.md, part D). Each metric maps a `Pair` to one number per frame.
 
 Nothing is aligned unless the name says so.
 """
@@ -14,25 +14,25 @@ FEET = ("lfoot", "rfoot")
 
 
 def joint_errors_mm(pair: Pair) -> Floats:
-    """(F, 25) distance of every joint centre from its true place."""
+    """(F, 25) distance of every joint centre from its true position."""
     return _distance_mm(pair.estimate.joints_m, pair.truth.joints_m)
 
 
 def mpjpe_mm(pair: Pair) -> Floats:
-    """(F,) mean joint distance, nothing aligned."""
+    """(F,) mean joint distance without alignment."""
     out: Floats = joint_errors_mm(pair).mean(axis=1)
     return out
 
 
 def mpjpe_root_mm(pair: Pair) -> Floats:
-    """(F,) mean joint distance after both root positions are subtracted; orientation stays."""
+    """(F,) mean joint distance after subtracting both root positions; orientations are not aligned."""
     truth, estimate = (p.joints_m - p.root_m[:, None] for p in (pair.truth, pair.estimate))
     out: Floats = _distance_mm(estimate, truth).mean(axis=1)
     return out
 
 
 def mpjpe_pa_mm(pair: Pair) -> Floats:
-    """(F,) mean joint distance after the best rotation and translation of each frame; no scale (Kabsch 1976)."""
+    """(F,) mean joint distance after the best rotation and translation of each frame, without scale (Kabsch 1976)."""
     truth, estimate = (p.joints_m - p.joints_m.mean(axis=1, keepdims=True) for p in (pair.truth, pair.estimate))
     u, _, vt = np.linalg.svd(np.swapaxes(estimate, 1, 2) @ truth)
     vt[:, 2] *= np.sign(np.linalg.det(u) * np.linalg.det(vt))[:, None]
@@ -41,32 +41,32 @@ def mpjpe_pa_mm(pair: Pair) -> Floats:
 
 
 def root_position_mm(pair: Pair) -> Floats:
-    """(F,) distance of the root from its true place."""
+    """(F,) distance of the root from its true position."""
     return _distance_mm(pair.estimate.root_m, pair.truth.root_m)
 
 
 def upper_position_mm(pair: Pair) -> Floats:
-    """(F,) mean over spine, neck, head and arms (16 far ends)."""
+    """(F,) mean joint distance of spine, neck, head and arms (16 far ends)."""
     return _mean_of(pair, tuple(name for name in pair.skeleton.names if name not in LOWER))
 
 
 def lower_position_mm(pair: Pair) -> Floats:
-    """(F,) mean over hip joints and legs (8 far ends)."""
+    """(F,) mean joint distance of hip joints and legs (8 far ends)."""
     return _mean_of(pair, LOWER)
 
 
 def hands_position_mm(pair: Pair) -> Floats:
-    """(F,) mean over the far ends of both hands."""
+    """(F,) mean distance of the far ends of both hands."""
     return _mean_of(pair, HANDS)
 
 
 def feet_position_mm(pair: Pair) -> Floats:
-    """(F,) mean over the far ends of both feet."""
+    """(F,) mean distance of the far ends of both feet."""
     return _mean_of(pair, FEET)
 
 
 def root_drift_mm_s(pair: Pair) -> float:
-    """Speed at which the root's error grows: length of the slope of its least-squares line over time [mm/s]."""
+    """Growth rate of the root error: norm of the slope of its least-squares line over time [mm/s]."""
     time_s = pair.frame_index / pair.rate_hz
     if len(time_s) < 2:
         return float("nan")

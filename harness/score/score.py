@@ -1,4 +1,4 @@
-"""One estimated motion against the truth: every metric, per frame, per joint and as one number."""
+"""Score of an estimated motion: every metric per frame, per joint and as one number."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,23 +14,23 @@ from harness.score.metrics import DEFINITIONS, FRAME_METRICS, Pool
 from harness.score.pair import Pair, compute_poses, hinged_bones, joint_names
 
 WARM_UP_S = 1.0
-"""Estimates before this time of a take are no part of any score [s] (choice)."""
+"""Estimates in this first part of a take are not scored [s] (choice)."""
 COVERAGE_FLOOR = 0.5
-"""With fewer of the expected frames matched, nothing but coverage is measured (choice)."""
+"""With a smaller share of matched frames, only coverage is measured (choice)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Scores:
-    """Numbers about F estimates."""
+    """Scores of F estimates."""
 
     metrics: Mapping[str, float | None]
-    """By the names of `metrics.DEFINITIONS`, in that order; None is "not measured"."""
+    """Metric -> value, in the order of `metrics.DEFINITIONS`; None means "not measured"."""
     per_frame: Mapping[str, Floats]
-    """(F,) each; NaN where undefined (no contact, a gap, an estimate that is not finite)."""
+    """Metric -> (F,) values; NaN where undefined (no contact, a gap, an estimate that is not finite)."""
     per_joint: Mapping[str, Mapping[str, float]]
     """Metric -> hinge, bone or joint -> mean over the scored frames."""
     scored: Bools
-    """(F,) the frames that count: after the warm-up and finite."""
+    """(F,) scored frames: finite and after the warm-up."""
 
 
 def score_estimate(
@@ -47,12 +47,14 @@ def score_estimate(
     warm_up_s: float = WARM_UP_S,
     floor: float = COVERAGE_FLOOR,
 ) -> Scores:
-    """Judge F estimates of E true frames at an even rate.
+    """Score F estimates of E true frames at an even rate; ShapeError, BadInput.
 
-    The truth stands on `skeleton`, the estimate on the one that its method believed in: the same by default.
-    `truth_qpos` (E, 55), `estimate_qpos` (F, 55), `frame_index` (F,) the true frame that each estimate is of,
-    strictly increasing, `status` (F,), `step_ms` (F,) with NaN where not timed, `cpu_ms` (F,) of
-    the steps and (F,) of the reference (see `timing.step_relative`), NaN likewise. Raises ShapeError and BadInput.
+    - `skeleton`: the skeleton of the truth; `estimate_skeleton`: that of the estimate, the same by default;
+    - `truth_qpos` (E, 55), `estimate_qpos` (F, 55);
+    - `frame_index` (F,): the true frame of each estimate, strictly increasing;
+    - `status` (F,): values of `Status`;
+    - `step_ms` (F,): wall time of each step, NaN where not timed;
+    - `cpu_ms`: CPU time (F,) of the steps and (F,) of the reference (see `timing.step_relative`), NaN where not timed.
     """
     frame_index, status, step_ms = _check_shapes(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
     warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
@@ -64,20 +66,22 @@ def score_estimate(
 
     truth = compute_poses(skeleton, truth_qpos)
     ground_m = contact.ground_m(truth) if len(truth_qpos) else 0.0
-    known = frame_index[finite]
+    matched = frame_index[finite]
     estimate = compute_poses(estimate_skeleton or skeleton, estimate_qpos[finite])
-    pair = Pair(truth.at(known), estimate, known, rate_hz, ground_m)
+    pair = Pair(truth.at(matched), estimate, matched, rate_hz, ground_m)
     per_frame = {name: np.full(len(frame_index), np.nan) for name in FRAME_METRICS}
     for name, function in FRAME_METRICS.items():
-        if len(known):
+        if len(matched):
             per_frame[name][finite] = function(pair)
 
     measured: dict[str, float] = {
         name: pool_frames(per_frame[name][scored], DEFINITIONS[name].pool) for name in FRAME_METRICS
     }
-    judged = pair.at(known >= warm_up)
-    measured["root_drift_mm_s"] = positions.root_drift_mm_s(judged)
-    measured["lag_ms"] = timing.lag_ms(truth.angles_rad, judged.estimate.angles_rad, judged.frame_index, rate_hz)
+    scored_pair = pair.at(matched >= warm_up)
+    measured["root_drift_mm_s"] = positions.root_drift_mm_s(scored_pair)
+    measured["lag_ms"] = timing.lag_ms(
+        truth.angles_rad, scored_pair.estimate.angles_rad, scored_pair.frame_index, rate_hz
+    )
     timed = warm & (np.arange(len(step_ms)) > 0)
     measured |= timing.step_times_ms(step_ms[timed])
     measured["step_relative"] = float("nan") if cpu_ms is None else timing.step_relative(cpu_ms[0][timed], cpu_ms[1])
@@ -96,15 +100,15 @@ def score_estimate(
         name: counts[name] if name in counts else measured[name] if enough and np.isfinite(measured[name]) else None
         for name in DEFINITIONS
     }
-    return Scores(metrics, per_frame, _per_joint(judged) if enough else {}, scored)
+    return Scores(metrics, per_frame, _per_joint(scored_pair) if enough else {}, scored)
 
 
 def pool_frames(values: Floats, pool: Pool) -> float:
-    """One number from per-frame values, those that are undefined left out; NaN of none."""
-    known = values[np.isfinite(values)]
-    if not len(known) or pool == "none":
+    """Pool per-frame values to one number; undefined values are left out; NaN without values."""
+    defined = values[np.isfinite(values)]
+    if not len(defined) or pool == "none":
         return float("nan")
-    return float(np.sqrt(np.mean(known**2))) if pool == "rms" else float(np.mean(known))
+    return float(np.sqrt(np.mean(defined**2))) if pool == "rms" else float(np.mean(defined))
 
 
 def _per_joint(pair: Pair) -> dict[str, dict[str, float]]:
@@ -134,7 +138,9 @@ def _check_shapes(
             raise ShapeError("score", name, found, str(expected))
     index = np.asarray(frame_index, dtype=np.int64)
     if frames and (index[0] < 0 or index[-1] >= len(truth_qpos) or (np.diff(index) <= 0).any()):
-        raise BadInput("frame_index does not rise strictly within the true frames.", "Give each frame one estimate.")
+        raise BadInput(
+            "frame_index is not strictly increasing within the true frames.", "Give each frame one estimate."
+        )
     if not np.isfinite(truth_qpos).all():
-        raise BadInput("The truth is not finite.", "Cut the take where its motion is known.")
+        raise BadInput("The truth is not finite.", "Cut the take to the part with known motion.")
     return index, np.asarray(status, dtype=np.int64), np.asarray(step_ms, dtype=float)

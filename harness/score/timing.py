@@ -1,4 +1,4 @@
-"""How late the estimate is, and how long each step took."""
+"""Lag of the estimates, and time of the steps."""
 
 import numpy as np
 
@@ -12,9 +12,10 @@ _FEWEST_FRAMES = 20
 def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: float) -> float:
     """Shift in time that minimises the mean joint-angle error; positive where the estimate is late [ms].
 
-    `truth_rad` (E, D) at an even rate, `estimate_rad` (F, D) at its frames `frame_index`. Whole frames up to 0.5 s
-    either way, all over the same estimates, refined by a parabola through the three errors about the least. NaN where
-    it cannot be told: too few frames, no motion, or the least error at the end of the range.
+    `truth_rad` (E, D) has an even rate; `estimate_rad` (F, D) is at its frames `frame_index`. Shifts of up to 0.5 s in
+    either direction are evaluated on the same estimates, in whole frames, then refined by a parabola through the three
+    errors around the minimum. NaN where it is undefined: too few frames, no motion, or the minimum at the end of the
+    range.
     """
     reach = int(np.floor(LONGEST_LAG_S * rate_hz))
     inside = (frame_index >= reach) & (frame_index < len(truth_rad) - reach)
@@ -29,18 +30,18 @@ def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: 
     if best in (0, len(shifts) - 1):
         return float("nan")
     before, least, after = error[best - 1 : best + 2]
-    bend = before - 2.0 * least + after
-    share = 0.5 * (before - after) / bend if least > 0.0 and bend > 0.0 else 0.0
+    curvature = before - 2.0 * least + after
+    share = 0.5 * (before - after) / curvature if least > 0.0 and curvature > 0.0 else 0.0
     return float(1e3 * (shifts[best] + share) / rate_hz)
 
 
 def step_times_ms(step_ms: Floats) -> dict[str, float]:
-    """Wall time of a step (batch of one): mean, p50, p95, p99 and frames per second; NaN where none was timed."""
-    known = step_ms[np.isfinite(step_ms)]
-    if not len(known):
+    """Wall time of a step (batch of one): mean, p50, p95, p99 [ms] and frames per second (1 / mean); else NaN."""
+    timed = step_ms[np.isfinite(step_ms)]
+    if not len(timed):
         return dict.fromkeys(("step_mean_ms", "step_p50_ms", "step_p95_ms", "step_p99_ms", "fps"), float("nan"))
-    p50, p95, p99 = np.percentile(known, [50, 95, 99])
-    mean = known.mean()
+    p50, p95, p99 = np.percentile(timed, [50, 95, 99])
+    mean = timed.mean()
     return {
         "step_mean_ms": float(mean),
         "step_p50_ms": float(p50),
@@ -51,12 +52,12 @@ def step_times_ms(step_ms: Floats) -> dict[str, float]:
 
 
 def step_relative(step_cpu_ms: Floats, reference_cpu_ms: Floats) -> float:
-    """How often the work of `experiment.reference_workload` fits into a step, by medians of CPU time; NaN where either was not timed.
+    """Median CPU time of a step relative to that of `experiment.reference_workload`; NaN where either was not timed.
 
-    CPU time, since on a busy computer wall time is no measure of the method: whoever is sent to wait in every step
-    takes several times as long, while work as short as the reference seldom is.
+    CPU time is used because wall time on a busy machine does not measure the method: a step that is interrupted takes
+    several times as long, while work as short as the reference is seldom interrupted.
     """
     steps, work = (times[np.isfinite(times)] for times in (step_cpu_ms, reference_cpu_ms))
-    if not len(steps) or not len(work) or np.median(work) <= 0.0:  # a clock may be too coarse for it
+    if not len(steps) or not len(work) or np.median(work) <= 0.0:  # the clock may be too coarse
         return float("nan")
     return float(np.median(steps) / np.median(work))

@@ -22,7 +22,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 
 @dataclass(frozen=True)
 class Disturbance:
-    """A fault of limited duration; sizes and lengths are those of docs/methods.md H ("recovery")."""
+    """A fault of limited duration; sizes and lengths are those of docs/metrics.md ("recovery")."""
 
     kind: Kind = "none"
     """Kind of fault.
@@ -33,7 +33,7 @@ class Disturbance:
     station: str = ""
     """Station of `one_lost` and `one_off`; "" is the first."""
     from_s: float = 3.0
-    """When it begins [s]; `start_off` begins with the take."""
+    """Beginning [s]; `start_off` always begins with the take."""
     lasts_s: float = 2.0
     """Duration [s]."""
     off_m: float = 0.3

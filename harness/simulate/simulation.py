@@ -176,7 +176,7 @@ def _force_m_s2(motion: StationMotion, calibration: Calibration) -> Floats:
 def _transmit(
     readings: SimulatedReadings, wire_format: WireFormat, tracker: TrackerConfig
 ) -> tuple[Bools, ByteCapture]:
-    """Which records (E*S,), in sampling order, got through the line, and the received bytes."""
+    """Encode and transmit: (E*S,) which records got through the line, in sampling order, and the received bytes."""
     characters = np.tile(np.frombuffer(wire_format.characters, np.uint8), len(readings.time_s))
     values = RecordValues(
         readings.device_s.ravel(),

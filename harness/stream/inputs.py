@@ -1,4 +1,4 @@
-"""Which readings a method is given: the input combinations of Liu et al. 2011 (docs/methods.md A6)."""
+"""Which readings a method is given: the input combinations of Liu et al. 2011 (docs/papers.md A6)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -39,14 +39,19 @@ class LineObserver(Protocol):
         """Take bytes read from the device; b"" where nothing arrived and an overdue frame was closed."""
         ...
 
-    def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None: ...
+    def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+        """Take bytes written to the device."""
+        ...
+
     def on_configured(self, wire: WireFormat) -> None:
         """Take the format of the bytes that follow. It is called after each configuration, before the command `C`; the
         device's clock starts at zero there.
         """
         ...
 
-    def on_event(self, event: LineEvent) -> None: ...
+    def on_event(self, event: LineEvent) -> None:
+        """Take an event on the line."""
+        ...
 
 
 class NullLineObserver:

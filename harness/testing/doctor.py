@@ -23,7 +23,7 @@ from harness.core.motion import BodyMotion, Clip
 from harness.core.skeleton import Skeleton
 from harness.errors import HarnessError
 from harness.mocap import synthetic
-from harness.mocap.library import MotionLibrary
+from harness.mocap.library import LibraryFolders, MotionLibrary
 from harness.mocap.sources import MOCAP_VARIABLE, find_library_folders
 from harness.report.kit.render_process import RenderJob, RenderProcess
 from harness.score.metrics import DEFINITIONS
@@ -72,7 +72,7 @@ class InstallationCheck:
         return asdict(self)
 
 
-def check_installation(folder: Path | None) -> list[InstallationCheck]:
+def check_installation(folder: LibraryFolders | None) -> list[InstallationCheck]:
     """Check the scores on true motion, the stream against the truth, and the optional parts.
 
     A missing optional part is listed and is not a failure. A named library that cannot be read is a failure.
@@ -120,7 +120,7 @@ def _rendering_problem() -> str:
         return RenderProcess([RenderJob(file, bone_m, bone_m, standing, standing)]).finish()
 
 
-def _check_library(folder: Path | None) -> InstallationCheck:
+def _check_library(folder: LibraryFolders | None) -> InstallationCheck:
     if folder is None and not os.environ.get(MOCAP_VARIABLE):
         return InstallationCheck("motion library", True, f"none given (--mocap DIR or {MOCAP_VARIABLE})")
     try:

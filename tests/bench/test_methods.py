@@ -26,6 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return where
 
 
+@pytest.mark.long
 def test_methods_and_mink_are_timed_on_the_same_clips(folder: Path) -> None:
     learnt = MotionDatabase.open(folder)
     clips = benchmark_clips.generate_held_out_clips(1, 2.0)

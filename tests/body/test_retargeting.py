@@ -53,6 +53,7 @@ def own_body_errors(clip: Clip, frames: range) -> tuple[float, float]:
     return metres, radians
 
 
+@pytest.mark.long
 def test_staged_clips_are_exact_on_their_own_bodies(mocap: Path) -> None:
     """Every third clip; `make test-slow` checks every frame of all clips."""
     for path in amcs(mocap)[::3]:
@@ -228,6 +229,7 @@ def _shown(value: str | float) -> str:
     return "not measured" if np.isnan(value) else f"{value:.3f}" if abs(value) < 2.0 else f"{value:.1f}"
 
 
+@pytest.mark.long
 def test_one_clip_of_each_subject_on_the_standard_body(mocap: Path) -> None:
     first = {path.stem.split("_")[0]: path for path in reversed(amcs(mocap))}
     hold(list(onto_standard(sorted(first.values()), mocap)))

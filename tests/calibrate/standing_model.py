@@ -1,4 +1,4 @@
-"""Somebody who stands model for the eight poses, as frames of a tracker, and the truth behind them."""
+"""A simulated performer of the eight poses: tracker frames, and the truth behind them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -28,12 +28,12 @@ FRAMES, SECONDS = 12, 2.4
 
 @cache
 def space() -> SkeletonPrior:
-    """Bones of a hundred people, none of whom is judged."""
+    """Prior of the bones of a hundred people, none of whom is a test performer."""
     return fit_skeleton_prior(sample_skeletons(100, seed=0), source="others")
 
 
 def straightened(skeleton: Skeleton) -> Skeleton:
-    """As long, pointing as the standard skeleton's bones."""
+    """A skeleton of these bone lengths with the standard skeleton's directions."""
     standard = standard_skeleton()
     return skeleton.with_bones(standard.bone_m * (skeleton.length_m / standard.length_m)[:, None])
 
@@ -46,19 +46,19 @@ def somebody(number: int, own_directions: bool = True) -> Skeleton:
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A performer with trackers on; everything that may differ is drawn from the seed."""
+    """A performer who wears trackers; body, mounts, room and pose errors are drawn from the seed."""
 
     skeleton: Skeleton
     stations: tuple[str, ...] = SIX
     miss_rad: float = 0.0
     noise_m: float = 0.0
-    """Of each frame on each axis."""
+    """Noise of each frame on each axis, standard deviation."""
     noise_rad: float = 0.0
     beside_m: float = 0.0
     yaw_rad: float = 0.7
     shift_m: tuple[float, float, float] = (1.5, -0.7, 0.4)
     straps: bool = True
-    """Turned anyhow, or as they are meant to be."""
+    """Whether straps have random orientations or the nominal ones."""
     seed: int = 1
 
     @property
@@ -129,7 +129,7 @@ class Model:
 
 
 def turned(held: Sequence[Sequence[TrackerFrame]], station: int, turn: Floats) -> list[list[TrackerFrame]]:
-    """The same with one station's orientations turned in the tracker's axes, as a boresight leaves them."""
+    """Frames with one station's orientations rotated in the tracker's axes, as a boresight does."""
     out = []
     for frames in held:
         rows = []
@@ -142,7 +142,7 @@ def turned(held: Sequence[Sequence[TrackerFrame]], station: int, turn: Floats) -
 
 
 def reordered(held: Sequence[Sequence[TrackerFrame]], rows: list[int]) -> list[list[TrackerFrame]]:
-    """The same with stations in another order."""
+    """Frames with the stations in another order."""
     return [
         [
             replace(

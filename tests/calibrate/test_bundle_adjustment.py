@@ -1,4 +1,4 @@
-"""The normal equations: slopes against differences, elimination of poses against solving for everything at once."""
+"""The normal equations: gradients against finite differences, elimination of poses against the full system."""
 
 import numpy as np
 import pytest
@@ -8,9 +8,9 @@ from harness.calibrate.bundle_adjustment import (
     BundleAdjustment,
     NormalEquations,
     ResidualScales,
-    heading_between_rad,
     mean_rotations,
 )
+from harness.calibrate.held_pose_model import heading_between_rad
 from harness.calibrate.poses import POSES, pose_angles_rad
 from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns
 from harness.core import rotations
@@ -23,7 +23,7 @@ STEP = 1e-6
 
 
 def setting(rng: np.random.Generator) -> tuple[BundleAdjustment, CalibrationSolution, ResidualScales]:
-    """A solution somewhere near the start, with readings that fit it but for a little."""
+    """A solution near the start, with readings that fit it up to small errors."""
     shared = SharedUnknowns(LIKE, space(), [DEFAULT_MOUNTS[station] for station in SIX])
     asked = np.array([pose_angles_rad(pose, LIKE) for pose in POSES])
     bundle = BundleAdjustment(shared, asked, rng.normal(size=(8, 6, 3)), np.tile(np.eye(3), (8, 6, 1, 1)))
@@ -41,7 +41,7 @@ def _small_turns(size_rad: float, rng: np.random.Generator) -> Floats:
 
 
 def test_the_slope_of_the_cost(rng: np.random.Generator) -> None:
-    """Half its gradient, for every shared unknown and every unknown of a pose."""
+    """The right-hand side is minus half the cost's gradient, for shared unknowns and for those of a pose."""
     bundle, at, scales = setting(rng)
     weight = rng.uniform(0.2, 1.0, size=(8, 6, 2))
     normal = bundle.normal_equations(at, scales, weight)
@@ -79,14 +79,14 @@ def test_expectations_against_differences(rng: np.random.Generator) -> None:
 
 
 def whole(normal: NormalEquations) -> tuple[Floats, Floats]:
-    """The normal matrix of everything at once, and its right side."""
-    poses, own, shared = normal.across.shape
+    """The full normal matrix and its right-hand side."""
+    poses, own, shared = normal.coupling.shape
     matrix = np.zeros((shared + poses * own,) * 2)
     matrix[:shared, :shared] = normal.shared
     for p in range(poses):
         rows = slice(shared + p * own, shared + (p + 1) * own)
-        matrix[rows, rows], matrix[rows, :shared] = normal.own[p], normal.across[p]
-        matrix[:shared, rows] = normal.across[p].T
+        matrix[rows, rows], matrix[rows, :shared] = normal.pose_blocks[p], normal.coupling[p]
+        matrix[:shared, rows] = normal.coupling[p].T
     return matrix, np.concatenate([normal.shared_gradient, normal.pose_gradient.ravel()])
 
 

@@ -1,4 +1,4 @@
-"""Calibrations on disk: every digit comes back, and nothing that cannot be true is read."""
+"""Calibration files: every digit is read back, and impossible content is refused."""
 
 import os
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def kept(
 
 
 def same(one: CalibrationFile, other: CalibrationFile) -> bool:
-    """Bit by bit."""
+    """Whether two calibrations are equal bit for bit."""
     a, b = one.calibration, other.calibration
     arrays = ("mount_m", "bone_from_station", "world_from_tracker", "tracker_origin_m")
     assert (one.skeleton is None) == (other.skeleton is None)
@@ -126,7 +126,7 @@ def without(key: str) -> Callable[[str], str]:
 
 
 def line(key: str, value: str) -> Callable[[str], str]:
-    """Of the first key of that name."""
+    """Replaces the first line with this key."""
 
     def change(text: str) -> str:
         lines = text.split("\n")

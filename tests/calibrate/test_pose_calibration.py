@@ -23,7 +23,7 @@ from harness.stream.frame import TrackerFrame
 from tests.calibrate.standing_model import FIVE, SIX, Model, reordered, somebody, space, turned
 
 BEYOND = ("head", "lwrist", "rwrist", "lhand", "rhand", "ltibia", "rtibia", "lfoot", "rfoot", "lradius", "rradius")
-"""What lies beyond the last tracker, and the forearms' split, of which nothing is told."""
+"""Bones on which no reading depends: those beyond the last tracker, and the split of the forearms."""
 
 
 def found_of(model: Model) -> PoseCalibration:
@@ -31,7 +31,7 @@ def found_of(model: Model) -> PoseCalibration:
 
 
 def elbow_off_m(found: PoseCalibration, model: Model) -> Floats:
-    """(S,) errors of mounts; of a tracker on a wrist from the elbow, see docs/methods.md H15."""
+    """(S,) errors of mounts; of a tracker on a wrist from the elbow, see docs/calibration.md."""
     off_m = found.calibration.mount_m - model.truth.mount_m
     for row, bone in enumerate(found.calibration.bones):
         if bone.endswith("wrist"):
@@ -50,7 +50,7 @@ def rms(values: Floats) -> float:
 
 @pytest.mark.parametrize(("number", "own_directions"), [(0, False), (1, True)])
 def test_clean_poses_give_the_truth(number: int, own_directions: bool) -> None:
-    """Of somebody whose proportions were never seen, with trackers a little off their places and turned anyhow."""
+    """Calibration of a performer outside the prior's population, with random mounts and strap orientations."""
     model = Model(somebody(number, own_directions), beside_m=0.01, seed=number)
     found, truth = found_of(model), model.truth
     off_m = np.abs(found.skeleton.length_m - model.skeleton.length_m)
@@ -91,7 +91,7 @@ def test_poses_that_are_missed(miss_deg: float, mount_mm: float, mount_deg: floa
 
 
 def test_where_the_room_lies_and_how_straps_sit_does_not_matter() -> None:
-    """The same performer, in another room and with trackers turned: the same body and the same places."""
+    """Another room and other strap orientations give the same body and the same mount positions."""
     one = Model(somebody(2), SIX, 0.02, beside_m=0.01, yaw_rad=0.3)
     other = replace(one, yaw_rad=-2.9, shift_m=(-4.0, 9.0, -1.0), straps=False)
     first, second = found_of(one), found_of(other)
@@ -129,7 +129,7 @@ def test_what_few_stations_do_not_tell_is_named(stations: tuple[str, ...], unsee
     assert rms(found.skeleton.length_m - model.skeleton.length_m) < 0.02
 
 
-def test_uncertainty_is_told() -> None:
+def test_uncertainty_is_reported() -> None:
     model = Model(somebody(5), SIX, float(np.deg2rad(1.0)), 0.0015, 0.006, beside_m=0.01)
     found = found_of(model)
     prior = np.sqrt(np.diag(space().covariance_m2))
@@ -142,8 +142,8 @@ def test_uncertainty_is_told() -> None:
     assert np.isfinite(found.condition)
 
 
-def test_a_strap_put_on_the_other_way_round_is_told_of() -> None:
-    """As it is meant to be, nothing is said; turned, how, and the calibration is none the worse."""
+def test_a_strap_put_on_the_other_way_round_gives_a_hint() -> None:
+    """A nominal strap gives no hint; a rotated one gives a hint, and the calibration is as good."""
     model = Model(somebody(6), straps=False)
     assert found_of(model).hints == ()
     held = [
@@ -210,7 +210,7 @@ def test_a_pose_that_was_not_held_is_named(pose: int, instead: int, name: str) -
     assert "mm" in message
 
 
-def test_someone_who_moved_is_told_in_which_pose() -> None:
+def test_a_performer_who_moved_learns_in_which_pose() -> None:
     model = Model(somebody(10))
     held = model.held()
     held[3] = [replace(frame, position_m=frame.position_m + 0.2 * k * np.eye(6, 3)) for k, frame in enumerate(held[3])]
@@ -220,7 +220,7 @@ def test_someone_who_moved_is_told_in_which_pose() -> None:
 
 
 def test_stations_that_do_not_tell_the_heading_are_refused() -> None:
-    """As a fit says that is not sure which way the performer faced."""
+    """A fit whose heading is too uncertain is refused."""
     model = Model(somebody(11), ("torso", "head"))
     nominal_rad = np.array([pose_angles_rad(pose, standard_skeleton()) for pose in POSES])
     still = [rows[0] for rows in model.held()]

@@ -1,4 +1,4 @@
-"""Held poses found in streams: all of them, in their order, whatever a performer does in between."""
+"""Collection of held poses from streams: all of them in order, whatever the performer does in between."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -40,7 +40,7 @@ def pose(number: int) -> Floats:
 
 
 def arms_down() -> Floats:
-    """Somebody who rests."""
+    """Configuration of a performer who rests."""
     root_m, turn, angles_rad = unpack(pose(0)[None])
     names = body().skeleton.dof_names
     angles_rad[0, names.index("lhumerus.rz")] += np.deg2rad(75.0)
@@ -78,7 +78,7 @@ def classifier(stations: tuple[str, ...] = SIX) -> PoseClassifier:
 def collected(
     frames: Sequence[TrackerFrame], stations: tuple[str, ...] = SIX, *, blind: bool = False
 ) -> tuple[PoseCollector, list[int]]:
-    """The collector after all frames, and what it said when."""
+    """The collector after all frames, and its messages with their times."""
     collector = PoseCollector(stations, 8, None if blind else classifier(stations))
     said = [collector.add(frame) for frame in frames]
     return collector, [number for number in said if number is not None]
@@ -125,7 +125,7 @@ def test_a_rest_is_no_pose(place: int) -> None:
     assert wanted in passed.why
 
 
-def test_a_repeated_pose_and_one_too_early_are_told() -> None:
+def test_a_repeated_pose_and_one_too_early_are_rejected() -> None:
     order = [0, 1, 2, 1, 4, 3, 4, 5, 6, 7]
     collector, said = collected(stream([pose(n) for n in order]))
     assert said == list(range(1, 9))
@@ -146,7 +146,7 @@ def test_another_number_of_holds(count: int) -> None:
         assert str(collector.rejected[0]).endswith("s on not taken: all 8 poses were taken before")
 
 
-def test_whoever_stops_early_is_told_what_there_was() -> None:
+def test_a_stream_that_ends_early_reports_the_poses_so_far() -> None:
     frames = eight()[: round(12.0 * RATE_HZ)]
     told: list[str] = []
     leading = PoseGuide(PoseCollector(SIX, 8, classifier()), POSES)
@@ -168,7 +168,7 @@ def test_whoever_walks_holds_nothing() -> None:
 
 
 def between(frames: Sequence[TrackerFrame], from_s: float, to_s: float) -> list[int]:
-    """Numbers of the frames of some time, since the first."""
+    """Indices of the frames within a time range since the first."""
     return [n for n, f in enumerate(frames) if from_s <= f.received_s - frames[0].received_s < to_s]
 
 
@@ -196,7 +196,7 @@ def test_short_losses_and_echoes_are_no_matter(rng: np.random.Generator) -> None
 
 
 def test_nothing_is_held_across_a_gap() -> None:
-    """Nobody knows what was done in it."""
+    """After a gap the search for a hold starts anew."""
     frames = [frame for frame in eight() if frame.received_s < 2.0]
     later = [replace(frame, received_s=frame.received_s + 60.0) for frame in frames]
     collector, said = collected([*frames, *later])

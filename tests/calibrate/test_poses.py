@@ -1,4 +1,4 @@
-"""The eight poses: within the limits, standing, hitting nothing, telling apart what is sought."""
+"""The eight poses: within limits, balanced, without collisions, and sufficient for the calibration."""
 
 import mujoco
 import numpy as np
@@ -51,7 +51,7 @@ def test_it_stands(pose: CalibrationPose, skeleton: Skeleton) -> None:
 
 @pytest.mark.parametrize("pose", POSES, ids=lambda pose: pose.name)
 def test_no_limb_is_inside_another_part_of_the_body(pose: CalibrationPose) -> None:
-    """Of bones more than three apart along the skeleton, flesh overlaps by 5 mm at most."""
+    """Bodies more than three joints apart overlap by at most 5 mm."""
     body = build_body()
     model, data = body.model, mujoco.MjData(body.model)
     data.qpos[:] = configuration(pose, body.skeleton)
@@ -65,7 +65,7 @@ def test_no_limb_is_inside_another_part_of_the_body(pose: CalibrationPose) -> No
 
 
 def _apart(model: mujoco.MjModel, a: int, b: int) -> int:
-    """Joints between two bodies."""
+    """Number of joints between two bodies."""
     chains = []
     for body in (a, b):
         chain = [body]

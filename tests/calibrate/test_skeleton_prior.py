@@ -1,4 +1,4 @@
-"""What people's bones are like."""
+"""The prior of people's bones."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_left_and_right_are_alike() -> None:
 
 @pytest.mark.parametrize("modes", [0, 1, 5, 24])
 def test_modes_and_rest_make_up_the_spread(modes: int) -> None:
-    """What the modes leave is put down larger than in these people: n / (n - modes) times."""
+    """The residual variance is that of the population times n / (n - modes)."""
     found = fit_skeleton_prior(PEOPLE, modes)
     lengths = np.array([skeleton.length_m for skeleton in PEOPLE])
     pooled = np.concatenate([lengths, lengths])  # built-in performers are mirror images of themselves
@@ -66,7 +66,7 @@ def test_the_mean_skeleton_has_mean_bones() -> None:
 
 
 def test_modes_help_to_guess_an_arm_of_somebody_else() -> None:
-    """The humerus from everything else: nearer than the mean, over other people."""
+    """The humerus is predicted from the other bones better than by its mean, for people outside the population."""
     found, others = fit_skeleton_prior(PEOPLE, 5), sample_skeletons(40, seed=6)
     arm, rest = [7, 13], [b for b in range(24) if b not in (7, 13)]
     off_m = np.array([skeleton.length_m for skeleton in others]) - found.mean_m

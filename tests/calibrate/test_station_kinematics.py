@@ -1,4 +1,4 @@
-"""Kinematics of several poses at once: against the plain ones, and slopes against differences."""
+"""Station kinematics of several poses: against body kinematics, and Jacobians against finite differences."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ BONES = ("lwrist", "rhand", "ltibia", "thorax", "head", "lhipjoint")
 
 @dataclass(eq=False)
 class State:
-    """Everything that a chain reaches from."""
+    """Arguments of the forward kinematics."""
 
     bone_m: Floats
     root_m: Floats
@@ -50,7 +50,7 @@ def reach(state: State) -> StationPoses:
 
 
 def slopes(change: Callable[[float], State]) -> tuple[Floats, Floats]:
-    """Of places (P, S, 3) and turns (P, S, 3), by central differences."""
+    """Derivatives of positions (P, S, 3) and rotations (P, S, 3) by central differences."""
     ahead, behind = reach(change(STEP)), reach(change(-STEP))
     turn = ahead.world_from_station @ np.swapaxes(behind.world_from_station, -1, -2)
     return (

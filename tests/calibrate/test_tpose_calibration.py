@@ -1,4 +1,4 @@
-"""Calibration from someone who stands in T-pose, against the truth of the simulation."""
+"""T-pose calibration against the truth of the simulation."""
 
 import pickle  # of our own, as a worker process sends it
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ FOUR = SIX[:4]
 
 @dataclass(frozen=True, eq=False)
 class Session:
-    """A performer with trackers on, in a room; straps and room are drawn from the seed."""
+    """A performer who wears trackers, in a room; straps and room are drawn from the seed."""
 
     body: Body
     stations: tuple[str, ...] = SIX
@@ -107,7 +107,7 @@ def off_deg(found: Floats, truth: Floats) -> Floats:
 
 
 def missed(body: Body, miss_deg: float, seed: int) -> Floats:
-    """T-pose as someone holds it whose every hinge, and whole body, is off by so much."""
+    """T-pose with normal errors of every hinge and of the lean."""
     step = np.deg2rad(miss_deg) * generator(seed, "missed").normal(size=54)
     step[[0, 1, 2, 5]] = 0.0
     return Kinematics(body).integrate(humanoid.tpose(body.skeleton), step)
@@ -172,7 +172,7 @@ def test_noise_costs_what_it_must(noise: str, stations: tuple[str, ...], seed: i
 
 
 def test_a_stance_given_where_it_is_leads_back_to_its_place() -> None:
-    """Someone who stands elsewhere and faces another way, and is said to."""
+    """The performer stands elsewhere with another heading, and `pose` says so."""
     session, pose = Session(bodies()[0]), humanoid.tpose(bodies()[0].skeleton)
     pose[:2] = 2.0, -1.0
     pose[3:7] = rotations.about_z(2.0)
@@ -184,7 +184,7 @@ def test_a_stance_given_where_it_is_leads_back_to_its_place() -> None:
 
 
 def test_a_poor_stance_is_made_the_best_of() -> None:
-    """Places of the stations tell some of how a stance is off: bones come out nearer than if it were perfect."""
+    """Residuals show part of the pose error: bones come out nearer than under a perfect pose."""
     session, found_deg, plain_deg = Session(bodies()[0], beside_m=0.01), [], []
     for seed in range(8):
         frames, truth = session.held(missed(session.body, 2.5, seed), seconds=2.5)
@@ -223,7 +223,7 @@ def refusal(session: Session, frames: Sequence[TrackerFrame]) -> str:
 
 
 @pytest.mark.parametrize("noise", ["clean", "default"])
-def test_someone_who_walks_is_told_to_stand(noise: str) -> None:
+def test_a_walking_performer_is_refused(noise: str) -> None:
     body, take = retarget_to_own_body(synthetic.generate("walking", "p1", 1, seed=1, duration_s=3.5, rate_hz=40.0))
     session = Session(body, noise=noise)
     assert "moved" in refusal(session, session.seen(take.qpos)[0])
@@ -275,7 +275,7 @@ def test_a_station_that_was_out_for_a_while_is_no_matter() -> None:
     assert off_deg(found.bone_from_station, truth.bone_from_station).max() < 0.01
 
 
-def test_too_little_time_is_said() -> None:
+def test_a_hold_that_is_too_short_is_refused() -> None:
     session = Session(bodies()[0])
     assert "frames in 1.5 s are too few" in refusal(session, session.held(seconds=1.5)[0])
     assert "too few" in refusal(session, [])

@@ -50,6 +50,7 @@ def check_all_records(client: InterSenseClient, size: int, stations: int, refuse
     assert sum(station.records for station in client.stations) >= len(records) - 3 * split_count - 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("version", "size"), [("1.01", 29), ("2.09", 33)])
 def test_intersense_detects_and_reads_the_tracker(tmp_path: Path, version: str, size: int) -> None:
     with run_device(tmp_path) as device:
@@ -74,6 +75,7 @@ def test_intersense_detects_and_reads_the_tracker(tmp_path: Path, version: str, 
         check_silence(device.port)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("version", ["1.01", "2.09"])
 def test_intersense_reads_and_sets_stations_while_data_flow(tmp_path: Path, version: str) -> None:
     with run_device(tmp_path) as device:
@@ -175,6 +177,7 @@ def test_freevr_after_a_client_that_left_it_streaming(tmp_path: Path) -> None:
         client.close()
 
 
+@pytest.mark.long
 def test_vrui(tmp_path: Path) -> None:
     with run_device(tmp_path) as device:
         previous_client = VrpnClient(device.port)  # leaves the device streaming
@@ -230,6 +233,7 @@ def test_current_vr_juggler(tmp_path: Path) -> None:
         client.close()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stream", [False, True])
 def test_early_vr_juggler(tmp_path: Path, stream: bool) -> None:
     """Its `c` may be lost with the queue that it empties; then a restart helps."""

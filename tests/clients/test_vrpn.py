@@ -37,6 +37,7 @@ def test_plain_reset_and_reading(tmp_path: Path) -> None:
     assert sensors == [k % 4 for k in range(len(sensors))]
 
 
+@pytest.mark.long
 def test_timestamps_with_a_stylus_and_a_wand(tmp_path: Path) -> None:
     with run_device(tmp_path, rate_hz=60.0) as device:
         client = VrpnClient(device.port, is900_time=True, styluses=(1,), wands=(0,))
@@ -100,6 +101,7 @@ def test_a_fifth_station_causes_repeated_flushing(tmp_path: Path) -> None:
     assert "tracker failed to read" not in client.log
 
 
+@pytest.mark.long
 def test_silence_makes_it_reopen_the_port(tmp_path: Path) -> None:
     with run_device(tmp_path) as device:
         client = VrpnClient(device.port)
@@ -131,6 +133,7 @@ def test_microseconds_where_it_expects_milliseconds(tmp_path: Path) -> None:
     assert client.log.count("tracker failed to read") == 1
 
 
+@pytest.mark.long
 def test_a_silent_device_is_restarted(tmp_path: Path) -> None:
     """A device suspended by 13 does not answer `S`; the 19 of the third attempt resumes it."""
     with run_device(tmp_path) as device:
@@ -176,6 +179,7 @@ def test_a_temporarily_unplugged_line(tmp_path: Path) -> None:
     check_reports(client.reports)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("rate_hz", "paced"), [(180.0, False), (180.0, True)])
 def test_four_stations_at_180_hz(tmp_path: Path, rate_hz: float, paced: bool) -> None:
     """Over a line that carries half of it, whole records are dropped, never parts."""

@@ -139,7 +139,7 @@ def test_poses_that_are_missing_are_told_and_nothing_is_written(
         (["--live", "--out", "me.toml", "--port", "x", "--pictures", "there"], "--pictures without --view frames"),
         (["--live", "--out", "me.toml", "--port", "no_such_port", "--scenario", "demo"], "no such port"),
         (["no_such.rec", "--out", "me.toml", "--scenario", "demo"], "no_such.rec"),
-        (["a.rec", "--out", "no/such/me.toml"], "no such folder"),
+        (["a.rec", "--out", "no/such/me.toml"], "folder does not exist"),
         (["a.rec", "--kind", "npose"], "invalid choice"),
     ],
 )
@@ -169,6 +169,7 @@ def test_stations_without_names_are_told_by_the_user(recording: Path, tmp_path: 
     assert main([*words, "--stations", "left_hand,right_hand,left_ankle,right_ankle"]) == 0
 
 
+@pytest.mark.long
 def test_a_tpose_of_a_tracker_that_streams(model: Playback, tmp_path: Path) -> None:
     with serve_emulator(model.samples, tcp="127.0.0.1:0") as device:
         words = ["--port", device.name, "--scenario", "demo", "--clip", CLIP, "--kind", "tpose"]

@@ -106,6 +106,7 @@ def _same_as_a_run(rehearsal: Playback, rows: list[dict[str, str]]) -> None:
         np.testing.assert_array_equal(qpos, estimate.qpos)
 
 
+@pytest.mark.long
 def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: Playback) -> None:
     pytest.importorskip("pythonosc", reason="python-osc is not installed (extra `live`)")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:

@@ -164,6 +164,7 @@ def test_bad_input_is_one_clear_line(simulated: Path, tmp_path: Path, capsys: py
     assert simulated.read_bytes() == before
 
 
+@pytest.mark.long
 def test_what_is_recorded_of_a_port_replays_as_it_was_live(port: str, played: Playback, tmp_path: Path) -> None:
     """Frame by frame, times of reception and all, through two connections into one file."""
     live = []
@@ -259,6 +260,7 @@ def recording(port: str, path: Path, begun: int = 2000) -> subprocess.Popen[str]
     return process
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_is_the_normal_end_of_a_recording(port: str, tmp_path: Path, stop: signal.Signals) -> None:
     with recording(port, tmp_path / "a.rec") as process:

@@ -176,6 +176,7 @@ VARIED = replace(
 )
 
 
+@pytest.mark.long
 def test_every_clip_runs_with_every_combination_of_varied_values(tmp_path: Path) -> None:
     """In every table: noise in its column, the values in theirs, and no row pools over them."""
     engine.run(VARIED, tmp_path / "one")
@@ -216,6 +217,7 @@ def test_what_is_varied_shares_motion_and_learning_with_the_same_result_as_alone
     assert made == {path.name: path.stat().st_mtime_ns for path in (tmp_path / "varied" / "cells").iterdir()}
 
 
+@pytest.mark.long
 def test_a_stream_has_the_stations_that_are_worn_and_no_others(tmp_path: Path) -> None:
     """What is not worn is not lost: one tracker is solved, at one worker or two, as if it were the scenario's only."""
     worn = replace(SMALL, noise="clean", vary={"worn": [["pelvis"], ["left_hand", "pelvis"]]}, methods=("kernel_cca",))
@@ -312,6 +314,7 @@ def await_cells(out: Path, count: int, program: "subprocess.Popen[Any]") -> None
         time.sleep(0.02)
 
 
+@pytest.mark.long
 def test_a_killed_run_leaves_whole_cells_and_resumes(tmp_path: Path) -> None:
     out, methods = tmp_path / "run", ("ik", "mean_pose", "best_match")
     command = run_short_demo(out, "--methods", ",".join(methods))
@@ -341,6 +344,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     assert 0 < summary["cells_finished"] < summary["cells_planned"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("end", "code"), [(signal.SIGINT, 130), (signal.SIGKILL, -9)])
 def test_workers_end_with_the_run(tmp_path: Path, end: signal.Signals, code: int) -> None:
     out = tmp_path / "run"

@@ -10,9 +10,10 @@ import pytest
 from harness.cli import main
 from harness.errors import BadFile
 from harness.experiment.status import read_status
+from harness.results.cell import as_row
 from harness.results.index import CellIndex
 from harness.results.lock import folder_lock
-from harness.results.storage import read_cells, summary_rows
+from harness.results.storage import read_cells
 from tests.report.fabricate import Plan, fabricate
 
 PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)
@@ -45,7 +46,7 @@ def index(out: Path, rows: list[dict[str, Any]], planned: int, **facts: Any) -> 
 
 
 def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path: Path) -> None:
-    out, rows = tmp_path / "sweep", summary_rows(read_cells(made))
+    out, rows = tmp_path / "sweep", [as_row(cell) for cell in read_cells(made)]
     index(out, rows[:3], 10, started_s=1000.0, seen_s=1030.0, made=3)
     (out / "cells" / "finished_but_not_in_the_index").mkdir(parents=True)
     (out / "cells" / ".unfinished-1-abc").mkdir()
@@ -60,7 +61,7 @@ def test_a_sweep_is_counted_and_its_pace_tells_what_is_left(made: Path, tmp_path
 
 def test_the_verb_says_it(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "sweep"
-    index(out, summary_rows(read_cells(made))[:3], 4, started_s=1000.0, seen_s=1030.0, made=3)
+    index(out, [as_row(cell) for cell in read_cells(made)][:3], 4, started_s=1000.0, seen_s=1030.0, made=3)
     assert main(["status", str(out)]) == 4
     assert capsys.readouterr().out.splitlines() == [
         "sweep tiny: finished, 3 of 4 cells finished, 1 failed",

@@ -18,7 +18,7 @@ class Diary:
     def begin(self, calibration: Any) -> "Diary":
         return self
 
-    def masked(self, frame: int) -> int:
+    def mask(self, frame: int) -> int:
         return frame
 
     def step(self, frame: int) -> SimpleNamespace:

@@ -1,4 +1,4 @@
-"""Walks of the built-in performer and what exact trackers read of them."""
+"""Scenes: synthetic motions and the frames of exact trackers."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ from harness.testing.frames import exact_calibration, exact_frames
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A take on its own body, six trackers, and their frames."""
+    """A motion on its own body, the calibration of six stations, and their frames."""
 
     body: Body
     calibration: Calibration
@@ -37,7 +37,7 @@ class Scene:
         return [session.step(frame) for frame in (self.frames if frames is None else frames)]
 
     def only(self, inputs: str) -> list[TrackerFrame]:
-        """The frames with nothing but these inputs."""
+        """The frames with these inputs only."""
         kept = make_inputs(inputs, self.calibration.stations)
         return [kept.mask(frame) for frame in self.frames]
 
@@ -73,7 +73,7 @@ def normal_equations_of(residuals: Residuals) -> tuple[Floats, Floats]:
 
 
 def moved(qpos: Floats, yaw_rad: float, by_m: tuple[float, float, float]) -> Floats:
-    """The same motion elsewhere: turned about the vertical through the origin, then shifted."""
+    """A motion rotated about the vertical through the origin, then shifted."""
     turn, out = rotations.about_z(yaw_rad), np.array(qpos)
     out[:, :3] = rotations.rotate(turn, qpos[:, :3]) + np.array(by_m)
     out[:, 3:7] = rotations.multiply(turn, qpos[:, 3:7])

@@ -1,7 +1,7 @@
-"""Laws that hold for every method that can be named: parametrised over the registry, so that a new one is held to them.
+"""Properties of every method in the registry; a new method is tested as well.
 
-Frames are exact, so that what is left is the method's own error. Bounds follow from what a method is: one that
-learns and has seen the very take gives it back; a null and a method that learns nothing cannot.
+Frames are exact, so the error is the method's own. A method that learns recovers a take that is among its examples.
+Baselines and methods that learn nothing have wider bounds.
 """
 
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ LEARNERS = [name for name in NAMES if registry.resolve(name).needs_examples]
 
 @dataclass(frozen=True)
 class Bound:
-    """Of a take that is among the examples, warm-up left out."""
+    """Largest errors for a take that is among the examples, without the warm-up."""
 
     hinge_deg: float
     """Mean error of the hinges [deg]."""
@@ -45,14 +45,14 @@ class Bound:
 
 
 SEEN_IT = Bound(1.0, 10.0)
-"""For whatever learns from examples, unless it is named below."""
+"""Bound of methods that learn from examples, unless `BOUNDS` has another."""
 BOUNDS = {
     "mean_pose": Bound(9.0, 150.0),  # one posture for all
     "ik": Bound(4.0, 8.0),  # what no station shows is only held to a prior
     "ik:mean": Bound(4.0, 8.0),
     "ik:previous": Bound(4.0, 8.0),
     "ik:gaussian": Bound(4.0, 8.0),
-    "dynamic_map:literal": Bound(4.0, 12.0),  # it loses lock and begins anew by inverse kinematics (docs/methods.md F2)
+    "dynamic_map:literal": Bound(4.0, 12.0),  # it loses lock and restarts by IK (docs/notes/traps.md F2)
 }
 
 
@@ -63,7 +63,7 @@ def walk() -> Scene:
 
 @cache
 def others() -> tuple[BodyMotion, ...]:
-    """Two takes of other people, on the body of the one who walks."""
+    """Two takes of other performers, on the walker's body."""
     clips = [
         synthetic.generate(b, synthetic.performer_names()[p], 1, seed=1, duration_s=4.0, rate_hz=40.0)
         for b, p in _OTHERS
@@ -112,17 +112,19 @@ def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> N
     assert found == pytest.approx(at_home(name), rel=0.02, abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*NAMES, *ALSO])
 def test_the_contract_is_kept(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All but the rule that is the next test's."""
+    """Every rule but the one of the next test."""
     rules = {rule: check for rule, check in RULES.items() if check is not works_in_another_process}
     assert len(rules) == len(RULES) - 1
     monkeypatch.setattr(method_checks, "RULES", rules)
     check_method(registry.resolve(name))
 
 
+@pytest.mark.long
 def test_what_was_fitted_may_go_to_another_process() -> None:
-    """One for all methods, as a process takes seconds to start."""
+    """One process for all methods, since starting one takes seconds."""
     trials = [make_case(registry.resolve(name)) for name in (*NAMES, *ALSO)]
     tasks = [(trial.fit(), trial.calibration, trial.frames) for trial in trials]
     there = {which: future.result() for which, future in run_in_workers(estimate_qpos, tasks, 1)}

@@ -1,4 +1,4 @@
-"""The mean posture and the best match: what they are for is to be beaten, but rightly."""
+"""The baselines: mean pose and best match."""
 
 from dataclasses import replace
 
@@ -9,8 +9,9 @@ from harness.core import rotations
 from harness.core.humanoid24 import unpack
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
+from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.methods.best_match import BestMatch
-from harness.reconstruct.methods.mean_pose import MeanPose, mean_posture
+from harness.reconstruct.methods.mean_pose import MeanPose
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
 

@@ -1,4 +1,4 @@
-"""Methods by name."""
+"""The registry of methods."""
 
 import math
 from collections.abc import Iterator
@@ -36,7 +36,7 @@ def test_presets_differ_in_their_repr() -> None:
     assert registry.resolve("ik:gaussian") == GAUSSIAN
 
 
-def test_anyones_own_class_by_module() -> None:
+def test_a_class_is_found_by_its_module() -> None:
     assert registry.resolve("harness.reconstruct.methods.mean_pose:MeanPose") == MeanPose()
 
 
@@ -111,10 +111,12 @@ def test_packages_add_methods_but_never_replace_one(monkeypatch: pytest.MonkeyPa
 
 
 def test_the_source_hash_follows_a_method_into_its_own_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A lone file, and what it imports from beside itself, however deep; nothing else that lies there."""
+    """The hash covers a file and the modules in its folder that it imports, recursively; no other files."""
     monkeypatch.syspath_prepend(tmp_path)
     for name, text in {
-        "split_method": "import split_options\nfrom harness.reconstruct.methods.ik import Ik\n\n\nclass Mine(Ik): ...\n",
+        "split_method": (
+            "import split_options\nfrom harness.reconstruct.methods.ik import Ik\n\n\nclass Mine(Ik): ...\n"
+        ),
         "split_options": "from split_numbers import *\n",
         "split_numbers": "SIGMA = 1.0\n",
         "split_stranger": "",
@@ -153,7 +155,7 @@ def test_options_of_a_method_and_of_its_clean_up() -> None:
     assert method.name == "ik:gaussian[stopping.most_steps=3]+ik"
 
 
-def test_options_of_anyone_s_own_class() -> None:
+def test_options_of_a_class_from_outside() -> None:
     name = "harness.reconstruct.methods.ik:Ik[stopping.most_steps=2]"
     method = registry.resolve(name)
     assert isinstance(method, Ik)
@@ -192,7 +194,7 @@ def test_values_of_options_are_checked(name: str, message: str) -> None:
 
 
 class Plain:
-    """A method with nothing to set."""
+    """A method without options."""
 
     name, summary, needs_examples, fit = "plain", "nothing", False, None
 

@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 
 from harness.errors import BadFile, BadInput
+from harness.results.cell import as_row
 from harness.results.index import INDEX_FILE, CellCounts, CellIndex
 from harness.results.lock import folder_lock, is_running
-from harness.results.storage import read_cells, summary_rows
+from harness.results.storage import read_cells
 from harness.results.table import SUMMARY_METRICS, TIME_COLUMNS, compute_group_statistics, write_table
 from tests.report.fabricate import Plan, fabricate
 
@@ -25,7 +26,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def rows_of(run: Path) -> list[dict[str, Any]]:
-    return summary_rows(read_cells(run))
+    return [as_row(cell) for cell in read_cells(run)]
 
 
 def named(row: Mapping[str, Any]) -> str:

@@ -16,6 +16,7 @@ from harness.core.files import TEMPORARY, to_json_types
 from harness.errors import BadFile, BadInput, ShapeError
 from harness.results import manifest as manifests
 from harness.results import storage
+from harness.results.cell import as_row
 from tests.results.finish import finish_run
 
 MakeCell = Callable[..., storage.Cell]
@@ -57,7 +58,7 @@ def test_what_calibration_found_is_kept(run_folder: Path, make_cell: MakeCell) -
         back = storage.read_cell(storage.write_cell(run_folder, cell))
         np.testing.assert_array_equal(back.bone_m, known.bone_m)
         np.testing.assert_array_equal(back.estimate_bone_m, cell.estimate_bone_m)
-        assert storage.summary_rows([back])[0]["calibration_errors"] == cell.calibration_errors
+        assert as_row(back)["calibration_errors"] == cell.calibration_errors
     with pytest.raises(ShapeError, match="estimate_bone_m"):
         make_cell(estimate_bone_m=known.bone_m[:5])
 
@@ -203,6 +204,7 @@ def test_a_field_of_the_wrong_kind_is_a_clear_refusal(
 WRITE_FOR_EVER = """
 import dataclasses, itertools, pathlib, sys
 from harness.results import storage
+from harness.results.cell import as_row
 run, key = pathlib.Path(sys.argv[1]), sys.argv[2]
 cell = storage.read_cell(run / "cells" / key)
 for n in itertools.count():

@@ -1,4 +1,4 @@
-"""One boxer, and trackers on a body that does not move."""
+"""Fixtures: motions of a boxer and a walker, and stations at rest."""
 
 from typing import Protocol
 
@@ -17,7 +17,7 @@ SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head"
 
 
 class Still(Protocol):
-    """Makes trackers that lie still for so long, each somewhere, with quaternions of halves: products are exact."""
+    """Makes readings of stations at rest at random poses; their quaternions make products exact."""
 
     def __call__(self, duration_s: float, stations: int = 4, *, seed: int = 1) -> SimulatedReadings: ...
 
@@ -48,7 +48,7 @@ def still() -> Still:
 
 
 def worn(*stations: str) -> list[Mount]:
-    """Default mounts of these stations, or of the six."""
+    """Default mounts of these stations; the six standard ones by default."""
     return [mounts.DEFAULT_MOUNTS[station] for station in stations or SIX]
 
 

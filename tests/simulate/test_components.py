@@ -1,4 +1,4 @@
-"""The parameters of every component, recovered from what it does to trackers that lie still.
+"""The parameters of every component, estimated from its effect on stations at rest.
 
 Each bound is that of a correct component going wrong by chance once in a million seeds (`ODDS`); draws are fixed by
 the seed, so a test that passes once passes always, and a component that is off by a few per cent does not pass.
@@ -42,7 +42,7 @@ def errors(true: SimulatedReadings, seen: SimulatedReadings) -> tuple[Floats, Fl
 
 
 def shifted(true: SimulatedReadings, seen: SimulatedReadings) -> Floats:
-    """Position error (N, S, 3) alone: of hours, rotations take long."""
+    """Position error (N, S, 3) alone; rotations of hours of readings take long."""
     return seen.position_m - true.position_m
 
 
@@ -54,18 +54,18 @@ def assert_sd(samples: Floats, sd: float) -> None:
 
 
 def assert_uniform(samples: Floats, low: float, high: float) -> None:
-    """By the Kolmogorov-Smirnov law."""
+    """The samples pass a Kolmogorov-Smirnov test of uniformity."""
     assert stats.kstest(samples, stats.uniform(low, high - low).cdf).pvalue > ODDS
 
 
 def renewal_share(busy: Bools, mean: float, variance: float, free: float, free_variance: float) -> tuple[float, float]:
-    """The share that was found, and the standard deviation it has by renewal theory (means and variances in rows)."""
+    """The observed share, and its standard deviation by renewal theory (means and variances in rows)."""
     spread = (free**2 * variance + mean**2 * free_variance) / (mean + free) ** 3
     return float(busy.mean()), float(np.sqrt(spread / busy.size))
 
 
 def runs(busy: Bools) -> list[tuple[int, int, int]]:
-    """Station, first and one past last row of every run of True in (N, S), whole ones only."""
+    """Station, first row and end row of every complete run of True in (N, S)."""
     out = []
     for s, column in enumerate(busy.T):
         edges = np.diff(column.astype(int))
@@ -90,7 +90,7 @@ def test_white(still: Still) -> None:
 
 @pytest.mark.parametrize("correlation_s", [0.2, 1.0, 2.0])
 def test_slow(still: Still, correlation_s: float) -> None:
-    """Its innovations are white and of the right size, and neighbours are as alike as exp(-dt/tau)."""
+    """Innovations are white with the right variance, and the lag-1 correlation is exp(-dt/tau)."""
     true, seen = still(600.0), still(600.0)
     slow = DriftNoise(position_m=0.0015, pitch_roll_rad=0.004, yaw_rad=0.008, correlation_s=correlation_s)
     slow.apply(seen)
@@ -266,7 +266,7 @@ def test_coasting_grows_as_the_protocol_says(still: Still, tilt_deg: float, coas
     assert law_cm * (1.0 - 0.026 / coast_s) ** 2 < worst_cm <= law_cm, "the last reading is up to 25 ms before the gap"
 
 
-def test_a_lost_station_keeps_sending_what_it_said_last(still: Still) -> None:
+def test_a_lost_station_repeats_its_last_reading(still: Still) -> None:
     seen = still(10.0)
     WhiteNoise().apply(seen)
     before = seen.position_m.copy()
@@ -373,7 +373,7 @@ def test_more_stations_leave_the_draws_of_the_others_alone(still: Still) -> None
 
 @pytest.mark.parametrize("left_out", ["white", "drift", "session", "excursion", "echo", "dropout", "speed", "clock"])
 def test_one_component_less_leaves_the_draws_of_the_others_alone(still: Still, left_out: str) -> None:
-    """Each component alone does what it does among all: contributions to the position add up."""
+    """A component has the same effect alone and among all: contributions to the position add up."""
 
     def offset(noise: Noise) -> Floats:
         true, seen = still(30.0), still(30.0)

@@ -1,4 +1,4 @@
-"""Named disturbances: what each does to a boxer's readings, and that it does nothing else."""
+"""Disturbances: the effect of each on a boxer's readings, and that it has no other."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ BEGIN_S, END_S = 3.0, 5.0
 
 @pytest.fixture(scope="module")
 def seen(boxer: tuple[Body, BodyMotion]) -> dict[Kind, Simulation]:
-    """The same take with the same noise under every disturbance, at moments clear of the edges."""
+    """One take with the same noise under every disturbance, at times away from the edges."""
     found: dict[Kind, Simulation] = {}
     for kind in KINDS:
         noise = Disturbance(kind, station="right_wrist", from_s=BEGIN_S).add_to(noise_preset("default"), SIX)

@@ -1,4 +1,4 @@
-"""Poses that are held one after another, and trackers that are strapped on beside their places."""
+"""Motions of held poses, and random mounts."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def body() -> Body:
 
 
 def poses(body: Body) -> list[Floats]:
-    """The T-pose, then arms and legs elsewhere."""
+    """The T-pose and other configurations."""
     out, rng = [tpose(body.skeleton)], generator(1, "poses")
     for _ in range(COUNT - 1):
         pose = np.array(out[0])
@@ -67,7 +67,7 @@ def test_who_misses_nothing_holds_the_poses_themselves(body: Body) -> None:
     assert all(np.linalg.norm(found[:2]) > 0.0 for found in held[1:])
 
 
-def test_every_hinge_and_the_lean_miss_by_as_much_as_is_said(body: Body) -> None:
+def test_every_hinge_and_the_lean_have_the_given_error(body: Body) -> None:
     meant = poses(body)[0]
     take = hold_poses(body, [meant] * 60, miss_rad=0.04, rng=generator(1, "miss"), hold_s=0.1, move_s=0.1)
     held = np.array([take.qpos[round(120.0 * begin_s)] for begin_s, _ in hold_times_s(60, 0.1, 0.1)])
@@ -106,7 +106,7 @@ def test_what_passes_is_the_take_s_own(body: Body) -> None:
     assert all((a.position_m == b.position_m).all() for a, b in zip(one, other, strict=True))
 
 
-def test_trackers_sit_as_far_beside_as_is_said(body: Body) -> None:
+def test_mount_errors_have_the_given_size(body: Body) -> None:
     off_m, turned_rad = [], []
     for session in range(60):
         worn = perturb_mounts(SIX, beside_m=0.015, turned_rad=0.2, seed=1, session=str(session))

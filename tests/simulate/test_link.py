@@ -1,4 +1,4 @@
-"""The line: what gets through, when, and what an overload costs."""
+"""The serial line: which records get through, when, and the effect of an overload."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ RECORD_S = 38 * 10 / 115200
 
 
 def rounds(rate_hz: float, stations: int, seconds: float, slot_s: float) -> np.ndarray:
-    """When the records of so many stations are ready [s]."""
+    """Times at which the records of some stations are ready [s]."""
     return (np.arange(round(seconds * rate_hz))[:, None] / rate_hz + slot_s * np.arange(stations)).ravel()
 
 

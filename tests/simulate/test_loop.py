@@ -1,4 +1,4 @@
-"""A take without an end: the first lap is the simulation's, and the way back leads to where it began."""
+"""Endless takes: the first round equals the simulation, and the return ends where the take began."""
 
 import numpy as np
 import pytest

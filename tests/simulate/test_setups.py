@@ -1,4 +1,4 @@
-"""The set-ups of the papers, and configurations that cannot be."""
+"""The set-ups of the papers, and impossible configurations."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,7 +34,7 @@ FIVE = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "pelvis")
 
 
 def error_m(body: Body, simulation: Simulation) -> float:
-    """Farthest that a decoded station, put into the world by the calibration, is from MuJoCo's at the frame's time."""
+    """Largest distance of a decoded station, in world axes, from MuJoCo's at the frame's time."""
     known, kinematics, worst = simulation.calibration, Kinematics(body), 0.0
     bones = [body.skeleton.index(bone) for bone in known.bones]
     for frame, index in zip(simulation.frames, simulation.frame_index, strict=True):
@@ -114,7 +114,7 @@ def test_the_message_names_component_field_and_range() -> None:
 
 
 def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
-    with pytest.raises(BadInput, match="a name twice"):
+    with pytest.raises(BadInput, match="a name occurs twice"):
         simulate_tracker(*boxer, worn("head", "head"), TrackerConfig(), Noise(), seed=1)
     with pytest.raises(BadInput, match="1 to 12"):
         simulate_tracker(*boxer, [], TrackerConfig(), Noise(), seed=1)
@@ -128,7 +128,7 @@ def test_stations_have_names_of_their_own(boxer: Boxer) -> None:
     [("rate_hz", float("inf")), ("rate_hz", float("nan")), ("rate_hz", 0.0), ("latency_s", -5.0), ("baud", 0),
      ("queue_records", 0)],
 )  # fmt: skip
-def test_a_tracker_that_cannot_be_is_told_by_its_key(key: str, value: Any) -> None:
+def test_an_impossible_tracker_is_refused_with_its_key(key: str, value: Any) -> None:
     with pytest.raises(BadInput, match=f"^The tracker's {key} = {value:g}. Give a number"):
         TrackerConfig(**{key: value})
 

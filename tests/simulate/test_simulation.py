@@ -45,7 +45,7 @@ def column(simulation: Simulation, name: str) -> NDArray[Any]:
 
 
 def same(a: TrackerFrame, b: TrackerFrame) -> bool:
-    """Bit for bit, NaN like NaN."""
+    """Whether frames are equal bit for bit, with NaN equal to NaN."""
     pairs = [(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(TrackerFrame)]
     return all(np.asarray(x).tobytes() == np.asarray(y).tobytes() for x, y in pairs)
 
@@ -80,7 +80,7 @@ def test_clean_frames_are_the_truth_but_for_float32(boxer: Boxer) -> None:
     assert column(simulation, "quality").min() == 1.0
 
 
-def test_the_truth_is_told_at_the_mean_of_the_sampling_times(boxer: Boxer) -> None:
+def test_the_truth_is_that_of_the_mean_sampling_time(boxer: Boxer) -> None:
     simulation, trajectory = seen(boxer), Trajectory(*boxer)
     times_s = sampling_times_s(trajectory.duration_s, TrackerConfig(), 6)
     np.testing.assert_allclose(np.diff(times_s, axis=1), TrackerConfig().record_s, atol=1e-12)
@@ -98,12 +98,13 @@ def test_the_tracker_looks_forward_right_and_down(boxer: Boxer) -> None:
     np.testing.assert_allclose(known.tracker_origin_m, TrackerConfig().origin_m)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("noise", NOISE_PRESETS)
 @pytest.mark.parametrize("tracker", [TrackerConfig(), OVERLOADED], ids=["40 Hz", "overload"])
 def test_bytes_in_any_pieces_give_the_same_frames(
     boxer: Boxer, noise: str, tracker: TrackerConfig, rng: np.random.Generator
 ) -> None:
-    """What was decoded in one go is what a driver gets, reading as bytes arrive."""
+    """Decoding all bytes at once gives the frames that a driver gets byte by byte."""
     simulation = seen(boxer, noise, tracker)
     wire, reader, frames = simulation.wire, FrameReader(simulation.wire_format), []
     begin = 0

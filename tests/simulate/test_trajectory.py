@@ -1,4 +1,4 @@
-"""The one smooth motion: through every frame, twice differentiable, and what MuJoCo makes of it."""
+"""The trajectory: through every frame, twice differentiable, and consistent with MuJoCo."""
 
 import mujoco
 import numpy as np

@@ -98,6 +98,7 @@ def test_every_source_yields_the_frames_of_the_simulation(
     assert any(not frame.position_valid.all() for frame in received), "no station was lost: the motion is too easy"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(registry.methods()))
 def test_every_method_estimates_the_same_from_every_source(
     playback: Playback, frames_by_source: Sources, name: str

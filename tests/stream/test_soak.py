@@ -130,6 +130,7 @@ def check_result(result: SoakResult, capsys: pytest.CaptureFixture[str]) -> None
     assert not result.reconfiguring(result.sent[-1].written_s), "the driver did not reconnect in the end"
 
 
+@pytest.mark.long
 def test_a_short_soak(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Half a minute of the faults with fixed times: burst, stall, disconnection."""
     check_result(run_soak(36.0, tmp_path, seed=1), capsys)

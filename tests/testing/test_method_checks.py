@@ -358,6 +358,7 @@ def test_a_correct_method_has_no_violations() -> None:
     assert violations(Standing(StandingSession)) == {}
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("_without_process_rule")
 @pytest.mark.parametrize(
     ("session", "rule"), [b for b in FAULTY if b[1] != PROCESS_RULE], ids=lambda value: getattr(value, "__name__", None)
@@ -404,6 +405,7 @@ def test_the_first_violation_is_raised_with_its_rule() -> None:
     assert "far from every station" in caught.value.seen
 
 
+@pytest.mark.long
 def test_the_verb_prints_a_line_for_each_rule(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "mean_pose"]) == 0
     lines = capsys.readouterr().out.splitlines()

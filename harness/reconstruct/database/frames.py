@@ -4,8 +4,6 @@ import mmap
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from harness.core.arrays import Floats, Ints, Singles
 from harness.reconstruct.solver.ground_frame import qpos_from_postures
 
@@ -49,11 +47,6 @@ class MotionFrames:
     def qpos(self, rows: Ints | slice, ground: Floats) -> Floats:
         """Configurations (K, 55) of some frames on one ground frame (3,), or on one for each (K, 3)."""
         return qpos_from_postures(self.posture[rows], ground)
-
-    def segment_of(self, row: int) -> TakeSegment:
-        """The segment that holds a row."""
-        starts = [segment.start for segment in self.segments]
-        return self.segments[int(np.searchsorted(starts, row, side="right")) - 1]
 
     def release_memory(self) -> None:
         """Return the memory into which a map was read so far to the system; rows are read again when they are used."""

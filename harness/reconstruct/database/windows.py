@@ -1,4 +1,4 @@
-"""Windows of the last m poses, as vectors for a search: E, "world invariance" (docs/methods.md).
+"""Windows of the last m poses, as vectors for a search: E, "world invariance" (docs/papers.md).
 
 The window of frame k holds the poses k, k-1, ... k-m+1, newest first: the posture of k, then for every older pose its
 ground frame relative to that of k (forward, left, turn) and its posture, in metres and radians. These
@@ -75,7 +75,7 @@ class Windows:
         return out if self.scale is None else out * self.scale
 
     def scaled(self, scale: Floats) -> "Windows":
-        """The same windows with every vector multiplied by `scale` (D,)."""
+        """A copy of the windows with every vector multiplied by `scale` (D,)."""
         return Windows(self.database, self.length, self.frames, np.asarray(scale, np.float32).reshape(self.size))
 
 

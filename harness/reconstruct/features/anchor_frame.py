@@ -2,7 +2,7 @@
 
 Kim et al. 2012 compare readings with examples in the room of the T-pose calibration (B2), so their database knows only
 the places where it was captured. Here everything is relative to a point above one station on the trunk, the anchor, and
-to its bone's heading (docs/methods.md E, "world invariance"). The heading is the bone's twist about the vertical, as in
+to its bone's heading (docs/papers.md E, "world invariance"). The heading is the bone's twist about the vertical, as in
 `solver.ground_frame`. Without orientations the heading is estimated from the positions, by the same linear map for
 examples and readings (F5).
 """

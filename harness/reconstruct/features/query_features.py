@@ -77,7 +77,7 @@ def _estimate_velocities(
     before_valid: Bools,
     longest_gap_s: float,
     velocity_m_s: Floats,
-    known: Bools,
+    has_velocity: Bools,
 ) -> bool:
     """Compute velocities (S, 3) since the last frame [m/s], 0 where unknown, and where they are known (S,), in place.
 
@@ -85,9 +85,9 @@ def _estimate_velocities(
     """
     for s in range(len(target_m)):
         gap_s = measured_s[s] - before_s[s]
-        known[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= longest_gap_s
+        has_velocity[s] = measured[s] and before_valid[s] and 0.0 < gap_s <= longest_gap_s
         for i in range(3):
-            velocity_m_s[s, i] = (target_m[s, i] - before_m[s, i]) / gap_s if known[s] else 0.0
+            velocity_m_s[s, i] = (target_m[s, i] - before_m[s, i]) / gap_s if has_velocity[s] else 0.0
             before_m[s, i] = target_m[s, i]
         before_s[s], before_valid[s] = measured_s[s], measured[s]
     return bool(measured.all())

@@ -1,7 +1,7 @@
 """Reduced-rank regression of postures on history and readings; its leading directions are search features.
 
 Predictors of a frame are the window of the last m estimates (Liu et al. 2011, eq. 6 and 8) and the readings of the
-trackers (docs/methods.md G3). A ridge regression over the whole database maps them to the posture of the frame. The
+trackers (docs/notes/ideas.md G3). A ridge regression over the whole database maps them to the posture of the frame. The
 leading directions of its predictions are the features z, in which neighbours are searched and on which local models
 regress. So D_w of eq. 6 is learnt instead of the identity: what does not predict the posture does not count.
 
@@ -77,14 +77,14 @@ class ReducedRankRegression:
         self._searches: dict[bytes, ReducedRankSearch] = {}
         rows = self._training_rows()
         self.mean, self._mean_after = np.zeros(self.size), np.zeros(POSTURE_SIZE)
-        for known, after in self.training_data(windows, rows):
-            self.mean += known.sum(axis=0) / len(rows)
+        for predictors, after in self.training_data(windows, rows):
+            self.mean += predictors.sum(axis=0) / len(rows)
             self._mean_after += after.sum(axis=0) / len(rows)
         self.scatter: Floats = np.zeros((self.size, self.size))
         """(D + 9 S, D + 9 S) covariance of the predictors."""
         self._cross_covariance = np.zeros((self.size, POSTURE_SIZE))
-        for known, after in self.training_data(windows, rows):
-            centred = known - self.mean
+        for predictors, after in self.training_data(windows, rows):
+            centred = predictors - self.mean
             self.scatter += centred.T @ centred / len(rows)
             self._cross_covariance += centred.T @ (after - self._mean_after) / len(rows)
         windows.database.release_memory()
@@ -192,9 +192,9 @@ class ReducedRankVectors:
     def gather(self, rows: Ints | slice) -> Singles:
         selected, start = np.arange(len(self))[rows], 0
         out: Singles = np.empty((len(selected), self.size), np.float32)
-        for known, _ in self.regression.training_data(self.windows, selected):
-            out[start : start + len(known)] = (known - self.regression.mean)[:, self.usual] @ self.directions
-            start += len(known)
+        for predictors, _ in self.regression.training_data(self.windows, selected):
+            out[start : start + len(predictors)] = (predictors - self.regression.mean)[:, self.usual] @ self.directions
+            start += len(predictors)
         self.windows.database.release_memory()
         return out
 
@@ -203,12 +203,12 @@ class ReducedRankSearch:
     """Search among N windows in the features z."""
 
     def __init__(self, regression: ReducedRankRegression, usual: Bools, index: str, neighbours: int) -> None:
-        """For sessions that usually know these columns (D + 9 S,) and search this number of neighbours."""
+        """Index the windows, for sessions that usually know these columns (D + 9 S,)."""
         self.vectors = ReducedRankVectors(regression, regression.windows, usual, regression.directions(usual))
         self.index: Index = make_index(index, self.vectors, neighbours)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
 
-    def nearest(self, known: Floats, measured: Bools, count: int) -> Neighbours:
+    def nearest(self, predictors: Floats, measured: Bools, count: int) -> Neighbours:
         """Windows whose z is nearest to that of predictors (D + 9 S,), of which `measured` readings (2 S,) are known.
 
         The offsets are those of z, possibly along other orthonormal axes.
@@ -220,7 +220,7 @@ class ReducedRankSearch:
                 self._maps.clear()
             entry = self._maps[mask] = self._map(self.vectors.regression.columns(measured))
         to_z, mean = entry
-        return self.index.nearest_with_offsets((known @ to_z - mean).astype(np.float32), count)
+        return self.index.nearest_with_offsets((predictors @ to_z - mean).astype(np.float32), count)
 
     def _map(self, columns: Bools) -> tuple[Floats, Floats]:
         """(D + 9 S, 40) map from predictors to z that uses the known columns only, and (40,) the mean's image."""

@@ -4,7 +4,7 @@ Vectors are assigned to cells around centroids, which faiss computes; a query sc
 cost of a query is the memory that it reads, and human poses hardly vary along most axes. So vectors are rotated onto
 their principal axes, truncated to the leading ones, and stored as 16-bit multiples of one small step: a third of the
 memory. Unlike a neighbour graph, an inverted file does not depend on the order in which frames were added
-(docs/methods.md E, traps). Cells are scanned by a compiled loop of this module. The heap in which faiss keeps the best
+(docs/notes/traps.md). Cells are scanned by a compiled loop of this module. The heap in which faiss keeps the best
 takes longer than all distances when hundreds of neighbours are wanted (`harness bench index` measures both).
 
 Memory layout. `_rows` lists the vectors cell after cell; cell c occupies places `_starts[c]` to `_starts[c + 1]`.

@@ -1,4 +1,4 @@
-"""Exact search in few dimensions: the kd-tree of Kim et al. 2012 (docs/methods.md B3).
+"""Exact search in few dimensions: the kd-tree of Kim et al. 2012 (docs/papers.md B3).
 
 Vectors are rotated onto all of their principal axes first, which changes no distance. A tree that splits along the axis
 of the widest spread then visits half as many vectors.

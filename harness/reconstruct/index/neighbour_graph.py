@@ -1,4 +1,4 @@
-"""The neighbour graph of Chai and Hodgins 2005 (docs/methods.md C2): a search that follows its last answer in time.
+"""The neighbour graph of Chai and Hodgins 2005 (docs/papers.md C2): a search that follows its last answer in time.
 
 A query hardly differs from that of the frame before. So candidates are the last neighbours, their successors in time,
 and the vectors that are linked to those. Every few frames, or when candidates are too few, all vectors are searched

@@ -42,7 +42,7 @@ class BestMatch:
     """Options of the best match, a `Method`."""
 
     name: str = "best_match"
-    summary: str = "the most similar example of all, stood where the trackers are"
+    summary: str = "the nearest example frame, placed at the trackers: a baseline"
     needs_examples: bool = True
     position_weight: float = 0.6
     """Weight of positions in eq. 2 [1/m^2]."""

@@ -4,7 +4,7 @@ Of m pairs only Gram matrices are needed: H of the inputs, F of the outputs, and
 m inputs. The prediction is linear in the outputs, so the result is a weight for each of them. Weights sum to 1.
 
 With full rank, eq. 3 has correlation 1 in every direction. So Gram matrices are centred and regularised
-(docs/methods.md E): (H + kH I)^-1 F (F + kF I)^-1 H x = rho^2 x, with kH = kappa times H's mean eigenvalue. Centring
+(docs/papers.md E): (H + kH I)^-1 F (F + kF I)^-1 H x = rho^2 x, with kH = kappa times H's mean eigenvalue. Centring
 uses an orthonormal basis of the vectors of sum 0, which leaves m - 1 dimensions and no singular matrix. The same ridge
 can regularise the projection of eq. 4, by x^T H (H + kH I) x in place of x^T H^2 x: as printed, the last bases follow
 noise.

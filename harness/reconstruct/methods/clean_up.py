@@ -3,7 +3,7 @@
 For every frame, Levenberg-Marquardt starts from the other method's pose, which is also the mean of the prior of the
 hinges. The root has no prior. The other method never sees the correction.
 
-Source: the last step of Kim et al. 2012 (docs/methods.md B5).
+Source: the last step of Kim et al. 2012 (docs/papers.md B5).
 
 Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `CleanUp`): `prior_sigma_rad` 30 deg, the
 loss of the residuals and the convergence criteria.
@@ -27,7 +27,7 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 
 SUFFIX = "+ik"
-"""What follows the other method's name."""
+"""Suffix of the other method's name."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class CleanUp:
     """Options of the final inverse kinematics, a `Method` around another."""
 
     method: Method
-    """The other method."""
+    """The method whose answers are fitted."""
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
     stopping: Stopping = field(default_factory=Stopping)

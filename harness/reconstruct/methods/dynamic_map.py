@@ -1,4 +1,4 @@
-"""Local dynamic model (`dynamic_map`): maximum a posteriori poses (docs/methods.md A4, A5, E, G3).
+"""Local dynamic model (`dynamic_map`): maximum a posteriori poses (docs/papers.md A4, A5, E).
 
 For every frame:
 
@@ -34,10 +34,10 @@ from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.neighbour_search import FeatureSearch, NeighbourSearch, PoseHistorySearch
+from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.index import Index, make_index
 from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
-from harness.reconstruct.methods.mean_pose import mean_posture
 from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE_SIZE, TILT, qpos_from_posture
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
@@ -58,12 +58,10 @@ class DynamicMap:
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"terms": "regression", "like": "search", "kept": "variance_kept"}
 
     name: str = "dynamic_map"
-    summary: str = (
-        "the pose that is likely by the readings and by a local model of examples, learnt from answers and readings"
-    )
+    summary: str = "maximum a posteriori pose under a local dynamic model of examples, found by history and readings"
     needs_examples: bool = True
     search: Literal["features", "history"] = "features"
-    """What neighbours are compared by: the last estimates and the readings, or the last estimates alone (the paper)."""
+    """Search of the neighbours: by the last estimates and the readings, or by the last estimates alone (the paper)."""
     regression: ReducedRankOptions = field(default_factory=ReducedRankOptions)
     """Options of the reduced-rank regression that makes the features; used when `search` is "features"."""
     poses: int = 3
@@ -121,7 +119,7 @@ class DynamicMap:
 
 WINDOW = DynamicMap(
     "dynamic_map:window",
-    "the same with a local model of the last answers alone, as in Liu et al. 2011, its known traps mended",
+    "dynamic_map with examples found by history alone, as in Liu et al. 2011, and regularised",
     search="history",
     poses=2,
     neighbours=100,
@@ -136,7 +134,7 @@ WINDOW = DynamicMap(
 )
 LITERAL = DynamicMap(
     "dynamic_map:literal",
-    "Liu et al. 2011 to the letter: 99 % of the variance, weights and sigma as printed, start at the closest",
+    "dynamic_map as printed in Liu et al. 2011: 99 % of the variance, no ridge, start at the nearest example",
     search="history",
     poses=2,
     neighbours=40,

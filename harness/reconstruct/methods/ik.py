@@ -1,4 +1,4 @@
-"""Inverse kinematics (`ik`): the whole body is fitted to the trackers, frame by frame (docs/methods.md C1).
+"""Inverse kinematics (`ik`): the whole body is fitted to the trackers, frame by frame (docs/papers.md C1).
 
 Each frame is a robust least-squares problem in the 54 degrees of freedom, solved by Levenberg-Marquardt from the last
 estimate, within the hinges' limits. A weak Gaussian prior of the hinges settles what the trackers leave open. The root
@@ -28,7 +28,7 @@ from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.reconstruct.database import MotionDatabase
-from harness.reconstruct.methods.mean_pose import mean_posture, spread_rad
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import Stopping
 from harness.reconstruct.solver.outlier_gate import JUMP_M
@@ -44,7 +44,7 @@ class Ik:
     """Options of inverse kinematics, a `Method`."""
 
     name: str = "ik"
-    summary: str = "whole-body Levenberg-Marquardt on the trackers, robust, pulled weakly to the examples' mean posture"
+    summary: str = "robust whole-body inverse kinematics with a weak prior about the examples' mean posture"
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
     towards_mean: float = 0.1
@@ -87,16 +87,16 @@ class Ik:
 
 PREVIOUS = Ik(
     "ik:previous",
-    "the same held to the previous pose alone, all hinges alike: learns nothing",
+    "ik with a prior about the last estimate, equal for all hinges; learns nothing",
     towards_mean=0.0,
     spread=False,
 )
 MEAN = Ik(
-    "ik:mean", "the same held to the examples' mean posture alone, all hinges alike", towards_mean=1.0, spread=False
+    "ik:mean", "ik with a prior about the examples' mean posture, equal for all hinges", towards_mean=1.0, spread=False
 )
 GAUSSIAN = Ik(
     "ik:gaussian",
-    "the same with squared residuals and no gate: what robustness is worth",
+    "ik with squared residuals and no outlier gate",
     loss=Loss(robust=False),
     jump_m=math.inf,
 )

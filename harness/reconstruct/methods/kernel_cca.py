@@ -1,9 +1,9 @@
-"""Kernel CCA (`kernel_cca`): regression by kernel canonical correlation analysis (docs/methods.md B).
+"""Kernel CCA (`kernel_cca`): regression by kernel canonical correlation analysis (docs/papers.md B).
 
 For every frame the neighbours are the m training pairs of a kernel CCA between features and postures (`cca`). It gives
 a weight for each neighbour. All other steps are those of `local_regression`: neighbours, smoothing, inverse kinematics.
 
-Source: Kim, Seol and Lee 2012, eq. 2 to 6. Ours: centred Gram matrices and the ridge of eq. 3 (docs/methods.md E),
+Source: Kim, Seol and Lee 2012, eq. 2 to 6. Ours: centred Gram matrices and the ridge of eq. 3 (docs/papers.md E),
 which also regularises eq. 4 unless `regularise_projection` is false.
 
 Options: `neighbours` 12, `bases` 12, `kappa` 0.3, `width` 1, and those of `LocalRegression`;
@@ -26,7 +26,9 @@ class KernelCca(LocalRegression):
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"held": "regularise_projection"}
 
     name: str = "kernel_cca"
-    summary: str = "kernel canonical correlation regression on the nearest examples, smoothed, then fitted"
+    summary: str = (
+        "kernel canonical correlation regression on the nearest examples, smoothed, then fitted to the trackers"
+    )
     neighbours: int = 12
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     bases: int = 12

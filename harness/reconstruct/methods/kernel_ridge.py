@@ -1,11 +1,11 @@
 """Kernel ridge regression (`kernel_ridge`): one smooth map from readings to posture, learnt from all examples.
 
-A control for the papers' local models (docs/methods.md E): one Gaussian kernel over all examples, no neighbours and no
+A control for the papers' local models (docs/papers.md E): one Gaussian kernel over all examples, no neighbours and no
 history. Inputs are the stations' positions and bone orientations, relative to the heading of the station nearest to
 the pelvis, so neither place nor heading matters. A missing reading is replaced by its value at the last estimate. The
 root is fitted to the trackers afterwards.
 
-Source: Saunders et al. 1998 (kernel ridge regression); noise is added to the examples' readings (docs/methods.md G1).
+Source: Saunders et al. 1998 (kernel ridge regression); noise on the examples' readings (docs/notes/ideas.md G1).
 
 Options (fields of `KernelRidge`): `most_frames` 2000 examples, `ridge` 0.01, `width` 1.4 (kernel width over the RMS
 distance of two examples), `lever_m` 0.3 (weight of orientations), and the noise of the examples' readings. They were
@@ -26,8 +26,8 @@ from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.features.anchor_frame import anchor_of
+from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.methods.mean_pose import mean_posture
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root

@@ -1,6 +1,6 @@
 """Weighted regression of successors on windows, in the principal subspace of a few examples.
 
-Liu et al. 2011, eq. 2 to 8 (docs/methods.md A4): K windows x_k with successors y_k, weighted by closeness to the query.
+Liu et al. 2011, eq. 2 to 8 (docs/papers.md A4): K windows x_k with successors y_k, weighted by closeness to the query.
 The result is a Gaussian prediction of the query's successor. With few examples the regression is solved in their K x K
 space: if X holds the weighted, centred windows and X X^T = V L V^T, then X^T X has the principal directions
 U = X^T V L^-1/2 and the same eigenvalues L. With more examples than columns it is solved in the space of the columns.

@@ -1,4 +1,4 @@
-"""Local PCA (`local_pca`): the pose within a local linear model of similar examples (docs/methods.md C2).
+"""Local PCA (`local_pca`): the pose within a local linear model of similar examples (docs/papers.md C2).
 
 For every frame:
 
@@ -29,9 +29,9 @@ from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.ground_step import ground_after_step
+from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.station_features import StationFeatures
 from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
-from harness.reconstruct.methods.mean_pose import mean_posture
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.history_session import HistorySession
 from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
@@ -50,7 +50,7 @@ class LocalPca:
     """Options of local PCA, a `Method`; scenarios/tune_local_pca.toml chose the defaults on validation clips."""
 
     name: str = "local_pca"
-    summary: str = "the pose within a few principal directions of similar examples that fits the readings best"
+    summary: str = "best fit to the readings within the principal directions of similar examples"
     needs_examples: bool = True
     neighbours: int = 300
     """K, examples of the local model."""

@@ -1,4 +1,4 @@
-"""Local regression: the steps that `kernel_cca` and `weighted_blend` have in common (docs/methods.md B).
+"""Local regression: the steps that `kernel_cca` and `weighted_blend` have in common (docs/papers.md B).
 
 For every frame (Kim et al. 2012):
 
@@ -33,9 +33,9 @@ from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
 from harness.reconstruct.features.ground_step import step_ground
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.features.smoothing import smooth
-from harness.reconstruct.methods.mean_pose import mean_posture, spread_rad
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping

@@ -1,4 +1,4 @@
-"""Weighted blend (`weighted_blend`): neighbours weighted by their closeness (docs/methods.md C3).
+"""Weighted blend (`weighted_blend`): neighbours weighted by their closeness (docs/papers.md C3).
 
 Weights fall with a power of the distance in feature space. All other steps are those of `local_regression`: neighbours,
 smoothing and inverse kinematics.
@@ -22,7 +22,7 @@ class WeightedBlend(LocalRegression):
     """Options of the weighted blend, a `Method`."""
 
     name: str = "weighted_blend"
-    summary: str = "the nearest examples blended by their closeness, smoothed, then fitted to the trackers"
+    summary: str = "nearest examples weighted by inverse distance, smoothed, then fitted to the trackers"
     neighbours: int = 16
     """k of eq. 2: neighbours of a frame; those of the frame before are added."""
     power: float = 4.0

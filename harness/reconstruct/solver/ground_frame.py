@@ -63,14 +63,6 @@ def relative_ground(ground: Floats, other: Floats) -> Floats:
     return np.stack([cosine * x + sine * y, cosine * y - sine * x, turn], axis=-1)
 
 
-def step_grounds(ground: Floats, step: Floats) -> Floats:
-    """Ground frames (..., 3) after a step (..., 3) each: the inverse of `relative_ground` up to full turns."""
-    cosine, sine = np.cos(ground[..., 2]), np.sin(ground[..., 2])
-    forward, left = step[..., 0], step[..., 1]
-    x, y = ground[..., 0] + cosine * forward - sine * left, ground[..., 1] + sine * forward + cosine * left
-    return np.stack([x, y, ground[..., 2] + step[..., 2]], axis=-1)
-
-
 @compiled
 def qpos_from_posture(posture: Floats, ground: Floats) -> Floats:
     """The configuration (P + 3,) of one posture (P,) on a ground frame (3,): `qpos_from_postures`, compiled."""

@@ -64,7 +64,7 @@ class HingeLimits:
         return plain
 
     def normalise_motion(self, angles_rad: Floats) -> Floats:
-        """The same motion (T, 48) in one representation throughout: the one that is `principal` on most frames.
+        """Hinge angles (T, 48) of a motion in one representation: the one that is `principal` on most frames.
 
         Continuous angles stay continuous, and takes of one body agree with each other whatever their files start with.
         """

@@ -171,7 +171,7 @@ class IKSession:
         return min(solutions, key=lambda solution: solution.cost)
 
     def _canonical(self, qpos: Floats) -> Floats:
-        """The same pose in principal hinge angles, for which the limits hold also beyond a gimbal's pole."""
+        """The pose in principal hinge angles, for which the limits hold also beyond a gimbal's pole."""
         if self.limits.past_gimbal(qpos[7:]):
             qpos = np.concatenate([qpos[:7], self.limits.principal(qpos[7:])])
         return qpos

@@ -1,4 +1,4 @@
-"""Closed-form inverse kinematics of arms and legs: the analytic final step of Kim et al. 2012 (docs/methods.md B5).
+"""Closed-form inverse kinematics of arms and legs: the analytic final step of Kim et al. 2012 (docs/papers.md B5).
 
 A limb is a ball joint (three hinges), one hinge, and an end of two or three hinges. The distance from shoulder or hip
 to a point beyond the elbow or knee depends on that one hinge alone, and the law of cosines gives its angle. The upper
@@ -239,7 +239,7 @@ def _euler(axes: Floats, rotation: Floats) -> Floats:
 
 @compiled
 def _nearest_euler(angles: Floats, before: Floats) -> Floats:
-    """Of the two representations of three hinges' rotation, the one nearest to `before` (3,)."""
+    """Representation of three hinges' rotation that is nearest to `before` (3,)."""
     first, second = np.empty(3), np.empty(3)
     for k in range(3):
         first[k] = _nearest_equivalent_angle(angles[k], before[k])

@@ -1,4 +1,4 @@
-"""The outlier gate: it leaves out a position that jumps away from the predicted one (docs/methods.md F7).
+"""The outlier gate: it leaves out a position that jumps away from the predicted one (docs/notes/traps.md F7).
 
 A robust loss alone cannot reject an echo: under a wide prior the limb simply follows it. The prediction extrapolates
 the estimated body, not the readings. Over one period at 40 Hz even a punch (100 m/s^2) departs only 6 cm from its last

@@ -1,7 +1,7 @@
 """Residuals between a pose and the readings of one frame, as the solvers weigh them.
 
 Each station has two: the vector from the modelled to the measured position, and the rotation vector from the modelled
-to the measured orientation, both along world axes (docs/methods.md A5, E). A residual's norm e enters the cost either
+to the measured orientation, both along world axes (docs/papers.md A5, E). A residual's norm e enters the cost either
 squared, e^2 / 2 sd^2, or through the Lorentzian of Liu et al. 2011, eq. 12, with a scale sL of its own:
 rho(e) = sL^2/sd^2 log(1 + e^2 / 2 sL^2). That is the square for small e, and gives little weight to large ones.
 """

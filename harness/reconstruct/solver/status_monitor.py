@@ -1,4 +1,4 @@
-"""Status of an estimate, by the number of stations that report (docs/methods.md E, "lost tracker")."""
+"""Status of an estimate, by the number of stations that report (docs/papers.md E, "lost tracker")."""
 
 import numpy as np
 

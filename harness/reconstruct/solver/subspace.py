@@ -1,4 +1,4 @@
-"""The subspace of a local linear model: postures q = p + U w, and the cost of leaving p (docs/methods.md C2).
+"""The subspace of a local linear model: postures q = p + U w, and the cost of leaving p (docs/papers.md C2).
 
 The cost is alpha/2 (q - p)^T Lambda^-1 (q - p) plus beta/2 |q - q'|^2, both quadratic in q. Most directions are kept,
 so it is cheaper to store the normals, the directions that are not. The solver works with all of q: a stiff spring acts

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _WIDTH_IN = 8.6
 """Width of a chart as wide as the page [in]."""
 _LETTERS, _HANDLE_LETTERS, _ROW_IN = 105, 9, 0.2
-"""Of a legend: the page's width and that of a line's sign with margins [average letters]; the height of a row [in]."""
+"""Legend sizes: width of the page and of a line's sign with margins [average letters]; height of a row [in]."""
 _MOST_POINTS = 1500
 """Points of one line; more do not look sharper on a screen."""
 _LABEL_HEIGHT = 0.06

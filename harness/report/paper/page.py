@@ -44,7 +44,7 @@ def paper_page(content: PaperContent) -> str:
     }
     experiments = [(e.title, anchor(e), _experiment(content, e)) for e in findings.experiments]
     sections: list[Section] = [
-        ("Every claim", "claims", claims_table(findings)),
+        ("All claims", "claims", claims_table(findings)),
         *experiments,
         ("Differences from the paper in several experiments", "throughout", _common_differences(findings)),
         ("Databases and clips", "databases", join(*map(paper_table, findings.tables))),
@@ -64,7 +64,9 @@ def paper_page(content: PaperContent) -> str:
 def _experiment(content: PaperContent, experiment: PaperExperiment) -> Markup:
     """Question, verdicts, differences from the paper, figures, tables, notes and runs."""
     counts = ", ".join(f"{count} {kind}" for kind, count in count_verdicts(list(experiment.claims)).items() if count)
-    verdicts = tag("p", tag("a", "Its claims", href="#claims"), ": ", tag("b", counts), ".") if counts else None
+    verdicts = (
+        tag("p", tag("a", "Claims of this experiment", href="#claims"), ": ", tag("b", counts), ".") if counts else None
+    )
     charts = content.charts.get(experiment.name) or [None] * len(experiment.figures)
     figures = [_figure(figure, chart) for figure, chart in zip(experiment.figures, charts, strict=True)]
     shared = shared_differences(content.findings)

@@ -18,7 +18,7 @@ _METRICS = (("joint angle [deg]", "joint_angle_mean_deg", 2), ("mpjpe_pa [mm]", 
 _TITLE = "cost of calibration"
 _CAPTION = (
     "error with exact calibration, then for each other calibration the mean increase over clips and its paired 95 % "
-    "interval (docs/methods.md H17)"
+    "interval (docs/studies.md)"
 )
 
 

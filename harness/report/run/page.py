@@ -96,7 +96,7 @@ def _sections(content: RunContent) -> list[Section]:
         ("Stream health", "health", tables.health_tables(run) if measured else nothing),
         ("Worst two seconds", "worst", _worst_section(content) if content.windows else nothing),
         ("In 3-D", "look", _view_3d(content)),
-        ("Every metric", "metrics", _every_metric(run) if measured else nothing),
+        ("All metrics", "metrics", _every_metric(run) if measured else nothing),
         ("Manifest", "manifest", _manifest(run)),
         ("Reproduce", "reproduce", _reproduce(run)),
     ]
@@ -148,7 +148,7 @@ def _view_3d(content: RunContent) -> Markup:
 
 
 def _every_metric(run: RunData) -> Markup:
-    return details("All metrics, all methods", tables.all_metrics_table(run))
+    return details("All metrics of all methods", tables.all_metrics_table(run))
 
 
 def _manifest(run: RunData) -> Markup:

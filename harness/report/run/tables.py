@@ -84,8 +84,8 @@ def coverage_tables(run: RunData) -> Markup:
         rows.append([run.series_of(row), row["sequences"], matched, expected, share, *others])
     head = ["method", "sequences", "frames matched", "expected", "share", "held", "lost", "not finite"]
     caption = (
-        "Frames after the warm-up. Held: the last pose was kept because too few stations were valid. Lost: most "
-        "stations had been missing for long. Not finite: the estimate is no number and counts as not matched."
+        "Frames after the warm-up. Held: too few readings were valid, and the estimate was carried forward. Lost: "
+        "most stations had been missing for long. Not finite: the estimate is no number and counts as not matched."
     )
     failures = [
         join(tag("b", cell), details(last_line(text), tag("pre", text)))

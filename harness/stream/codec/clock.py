@@ -69,6 +69,6 @@ class ClockUnwrapper:
         return float("nan")
 
 
-def _is_same_clock(previous: tuple[float, float], now: tuple[float, float]) -> bool:
+def _is_same_clock(previous: tuple[float, float], current: tuple[float, float]) -> bool:
     """Whether two (device, host) time pairs may belong to the same running clock."""
-    return -CLOCK_TOLERANCE_S < now[0] - previous[0] < now[1] - previous[1] + CLOCK_TOLERANCE_S
+    return -CLOCK_TOLERANCE_S < current[0] - previous[0] < current[1] - previous[1] + CLOCK_TOLERANCE_S

@@ -99,7 +99,7 @@ class Decoder:
         heads = b"(?:%b|%b)" % (record_head_pattern(STATION_CHARACTERS), _REPLY_HEAD_PATTERN)
         self._layouts: dict[int, RecordLayout] = {}
         for items in set(lists.values()):
-            stations = bytes(station for station, own in lists.items() if own == items)
+            stations = bytes(station for station, accepted in lists.items() if accepted == items)
             self._layouts |= dict.fromkeys(stations, RecordLayout(items, stations, settings or RecordFormat(), heads))
         self._head = re.compile(heads)
         self._buffer = b""
@@ -172,14 +172,14 @@ class Decoder:
         layout = self._layouts.get(buffer[offset + 1])
         if layout is None:
             return 0
-        after = offset + layout.size
-        if after > len(buffer):
+        record_end = offset + layout.size
+        if record_end > len(buffer):
             return 0 if at_end else None
         if not layout.record.match(buffer, offset):
             return 0
         if self._in_step and layout.end:
             return layout.size
-        next_head = buffer[after : after + HEADER_BYTES]
+        next_head = buffer[record_end : record_end + HEADER_BYTES]
         if len(next_head) < HEADER_BYTES and not at_end:
             return None
         return layout.size if self._may_begin(next_head) or (self._in_step and self._has_one_error(next_head)) else 0
@@ -189,13 +189,13 @@ class Decoder:
         if len(head) == HEADER_BYTES:
             return self._head.match(head) is not None
         return any(
-            all(byte in own for byte, own in zip(head, allowed, strict=False))
+            all(byte in accepted for byte, accepted in zip(head, allowed, strict=False))
             for allowed in (_RECORD_HEAD_BYTES, *_REPLY_HEAD_BYTES)
         )
 
     def _has_one_error(self, head: bytes) -> bool:
         """Whether these bytes are a record's head with exactly one wrong byte."""
-        errors = [byte not in own for byte, own in zip(head, _RECORD_HEAD_BYTES, strict=False)]
+        errors = [byte not in accepted for byte, accepted in zip(head, _RECORD_HEAD_BYTES, strict=False)]
         return len(head) == HEADER_BYTES and sum(errors) == 1
 
     def _next_head(self, buffer: bytes, offset: int) -> int:

@@ -60,24 +60,26 @@ class PlausibilityCheck:
                 suspect[row] = not self._accept(station, _state_of_row(readings, row))
         return readings.with_suspect(suspect)
 
-    def _accept(self, station: int, now: _StationState) -> bool:
+    def _accept(self, station: int, current: _StationState) -> bool:
         last, rejected = self._last[station], self._rejected[station]
         accepted = (
-            last is None or self._reachable(last, now) or (rejected is not None and self._reachable(rejected, now))
+            last is None
+            or self._reachable(last, current)
+            or (rejected is not None and self._reachable(rejected, current))
         )
         if accepted:
-            self._last[station], self._rejected[station] = now, None
+            self._last[station], self._rejected[station] = current, None
         else:
-            self._rejected[station] = now
+            self._rejected[station] = current
         return accepted
 
-    def _reachable(self, previous: _StationState, now: _StationState) -> bool:
-        elapsed_s = now[0] - previous[0]
+    def _reachable(self, previous: _StationState, current: _StationState) -> bool:
+        elapsed_s = current[0] - previous[0]
         if elapsed_s != elapsed_s:  # a stamp is missing; the host may read late, or several records at once
-            elapsed_s = now[1] - previous[1] + 2.0 * self._period_s
+            elapsed_s = current[1] - previous[1] + 2.0 * self._period_s
         elapsed_s = max(elapsed_s, 0.0)
-        distance_m = math.dist(previous[2], now[2])
-        cosine = abs(sum(a * b for a, b in zip(previous[3], now[3], strict=True)))
+        distance_m = math.dist(previous[2], current[2])
+        cosine = abs(sum(a * b for a, b in zip(previous[3], current[3], strict=True)))
         turn_rad = min(MAX_TURN_STEP_RAD + MAX_TURN_RATE_RAD_S * elapsed_s, math.pi)
         return not (distance_m > MAX_STEP_M + MAX_SPEED_M_S * elapsed_s or cosine < math.cos(0.5 * turn_rad) - 1e-3)
 

@@ -143,8 +143,8 @@ class FrameReader:
         last_byte = run.offset + run.size * np.arange(1, count + 1)
         self._deferred.append((run.table, self._ends_s[self._ends.searchsorted(last_byte)]))
         self.records += count
-        before, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
-        return count > 1 or self._row <= before or self._row == len(self.wire.stations) - 1
+        previous_row, self._row = self._row, self.wire.characters.index(run.table["station"][-1])
+        return count > 1 or self._row <= previous_row or self._row == len(self.wire.stations) - 1
 
     def _process_deferred(self) -> list[TrackerFrame]:
         """Return the frames that the deferred records complete. Together they cost little more than one record."""
@@ -183,6 +183,7 @@ class CaptureStream:
 
     @property
     def stations(self) -> tuple[str, ...]:
+        """Station names, in the order of the device's stations."""
         return self._wire.stations
 
     def __iter__(self) -> Iterator[TrackerFrame]:
@@ -193,4 +194,5 @@ class CaptureStream:
             yield frame
 
     def close(self) -> None:
+        """End the iteration."""
         self._closed = True

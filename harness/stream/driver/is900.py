@@ -177,7 +177,7 @@ class Is900:
                 if (reader := self._reader.reader) is not None:
                     for diagnosis in self._watchdog.check(now_s, bool(received), reader):
                         self._handle(diagnosis)
-                        if diagnosis.action in ("set up", "reopen"):
+                        if diagnosis.action in ("configure", "reopen"):
                             break
             except LineLost as lost:
                 self._handle_lost_line(lost)

@@ -16,8 +16,8 @@ from harness.stream.driver.config import DriverTiming
 from harness.stream.frame import TrackerFrame
 from harness.stream.line_events import LineEventKind
 
-RecoveryAction = Literal["none", "ask", "set up", "reopen"]
-"""What to do: query the state of the device ("ask"), configure it again ("set up"), or reopen the line and then
+RecoveryAction = Literal["none", "ask", "configure", "reopen"]
+"""What to do: query the state of the device ("ask"), configure it again ("configure"), or reopen the line and then
 configure it ("reopen")."""
 
 
@@ -122,7 +122,7 @@ class Watchdog:
         elapsed_s, timing = now_s - self._last_record_s, self._timing
         if elapsed_s > timing.silent_s:
             if now_s - self._last_byte_s < timing.stalled_s:
-                return [Diagnosis("set up")]
+                return [Diagnosis("configure")]
             return [self.report("silent", f"no byte for {now_s - self._last_byte_s:.1f} s", now_s, "reopen")]
         if elapsed_s > timing.stalled_s and now_s - self._asked_s > timing.stalled_s:
             silent = now_s - self._last_byte_s > timing.stalled_s
@@ -145,7 +145,7 @@ class Watchdog:
         if kind is None:
             return []
         if complaint in self._complaints:
-            return [self.report(kind, complaint, now_s, "set up")]
+            return [self.report(kind, complaint, now_s, "configure")]
         first = not self._complaints
         self._complaints[complaint] = now_s
         return [self._ask(now_s)] if first else []

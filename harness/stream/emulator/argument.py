@@ -44,14 +44,14 @@ class CommandArgument:
             raise CommandError(OUT_OF_RANGE)
         return name
 
-    def numbers(self, count: int | None = None, after: int = 1, max_magnitude: float = _MAX_MAGNITUDE) -> list[float]:
-        """Return the fields from index `after` on, exactly `count` of them, each of at most this magnitude."""
-        texts = self.fields[after:]
+    def numbers(self, count: int | None = None, start: int = 1, max_magnitude: float = _MAX_MAGNITUDE) -> list[float]:
+        """Return the fields from index `start` on, exactly `count` of them, each of at most this magnitude."""
+        texts = self.fields[start:]
         if count is not None and len(texts) > count:
-            raise CommandError(OUT_OF_RANGE, after + count + 1)
+            raise CommandError(OUT_OF_RANGE, start + count + 1)
         if count is not None and len(texts) < count:
-            raise CommandError(MISSING, after + len(texts) + 1)
-        return [_parse_number(text, after + k + 1, max_magnitude) for k, text in enumerate(texts)]
+            raise CommandError(MISSING, start + len(texts) + 1)
+        return [_parse_number(text, start + k + 1, max_magnitude) for k, text in enumerate(texts)]
 
     def codes(self) -> list[int]:
         """Return the fields after the first as integers."""
@@ -61,11 +61,11 @@ class CommandArgument:
                 raise CommandError(OUT_OF_RANGE, index + 2)
         return [int(value) for value in values]
 
-    def integer(self, low: int, high: int, after: int = 1) -> int:
-        """Return the only field from index `after` on, an integer from `low` to `high`."""
-        (value,) = self.numbers(1, after, max_magnitude=high)
+    def integer(self, low: int, high: int, start: int = 1) -> int:
+        """Return the only field from index `start` on, an integer from `low` to `high`."""
+        (value,) = self.numbers(1, start, max_magnitude=high)
         if value != int(value) or not low <= value <= high:
-            raise CommandError(OUT_OF_RANGE, after + 1)
+            raise CommandError(OUT_OF_RANGE, start + 1)
         return int(value)
 
     def require_empty(self) -> None:

@@ -49,8 +49,7 @@ class EmulatorConfig:
                 f"status_bytes = {self.status_bytes} is not possible.", "Status records have 55 or 54 bytes."
             )
         if self.baud not in SUPPORTED_BAUD_RATES:
-            rates = ", ".join(map(str, SUPPORTED_BAUD_RATES))
-            raise BadInput(f"{self.baud} baud is not possible.", f"An IS-900 supports {rates}.")
+            raise BadInput(f"{self.baud} baud.", f"An IS-900 supports {', '.join(map(str, SUPPORTED_BAUD_RATES))}.")
         if self.queue_records < 1:
             raise BadInput(f"queue_records = {self.queue_records} is not possible.", "Give at least 1.")
         if not 0.0 <= self.restart_s <= 3600.0:

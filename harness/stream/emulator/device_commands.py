@@ -43,7 +43,7 @@ def _switch_station(device: DeviceState, argument: CommandArgument, now_s: float
 def _boresight(device: DeviceState, argument: CommandArgument, now_s: float, full: bool) -> None:
     name = argument.station()
     if name in device.rounds.plugged:
-        station = geometry.boresight(device.settings.station(name), device.rounds.raw_orientation(now_s, name), full)
+        station = geometry.boresight(device.settings.station(name), device.rounds.orientation(now_s, name), full)
         device.settings = device.settings.with_station(name, station)
 
 

@@ -58,7 +58,7 @@ class Fault:
     station: str = ""
     """Name of the station that is out of sight; "" is the first."""
     firmware: str = ""
-    """The other version, such as 4.1105, which has no item 40."""
+    """Firmware version, such as 4.1105, which has no item 40."""
 
     def __post_init__(self) -> None:
         keys = {
@@ -68,8 +68,8 @@ class Fault:
             "station": (bool(self.station), self.kind == "lost_station"),
             "firmware": (bool(self.firmware), self.kind == "firmware"),
         }
-        for name, (given, allowed) in keys.items():
-            if given and not allowed:
+        for name, (is_set, allowed) in keys.items():
+            if is_set and not allowed:
                 raise BadInput(f"fault {self.kind!r} has no {name}.", "Omit it.")
         if not (0.0 <= self.share <= 1.0 and self.per_minute >= 0.0 and min((0.0, self.lasts_s, *self.at_s)) >= 0.0):
             raise BadInput(f"Not a possible fault: {self}.", "A share is 0 to 1; times are not negative.")

@@ -57,12 +57,12 @@ def boresight(station: StationSettings, quaternion: Floats, full: bool) -> Stati
 
     Without `full`, only its heading is.
     """
-    _, now = _apply_alignment(np.zeros(3), quaternion, station)
+    _, present = _apply_alignment(np.zeros(3), quaternion, station)
     reference = from_yaw_pitch_roll_deg(np.array([station.reference_deg]))[0]
     if full:
-        correction = rotations.multiply(rotations.inverse(now), reference)
+        correction = rotations.multiply(rotations.inverse(present), reference)
         return replace(clear_boresight(station), full_boresight=_quaternion(correction))
-    correction_deg = station.reference_deg[0] - float(yaw_pitch_roll_deg(now[None])[0, 0])
+    correction_deg = station.reference_deg[0] - float(yaw_pitch_roll_deg(present[None])[0, 0])
     return replace(
         clear_boresight(station), heading_boresight=_quaternion(rotations.about_z(np.deg2rad(correction_deg)))
     )

@@ -56,7 +56,7 @@ def _station_states(settings: DeviceSettings, argument: CommandArgument) -> Iter
 def _emitter_list(settings: DeviceSettings, argument: CommandArgument) -> Iterable[ParsedReply]:
     if not argument.text.strip():
         return settings.emitters
-    number = argument.integer(1, 9999999, after=0)
+    number = argument.integer(1, 9999999, start=0)
     matches = [emitter for emitter in settings.emitters if emitter.number == number]
     if not matches:
         raise CommandError(OUT_OF_RANGE)

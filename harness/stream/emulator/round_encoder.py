@@ -5,8 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.stream.codec import ascii_records
-from harness.stream.codec.records import RecordFormat, RecordValues, encode_records
+from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.emulator import geometry
 from harness.stream.emulator.player import SamplePlayer
 from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings
@@ -38,7 +37,7 @@ class RoundEncoder:
         instant = self.player.instant_of(self.player.latest(now_s, row))
         return 0.0 if station in self._lost else float(np.clip(self.player.samples.quality[instant, row], 0.0, 1.0))
 
-    def raw_orientation(self, now_s: float, station: str) -> Floats:
+    def orientation(self, now_s: float, station: str) -> Floats:
         """Return the quaternion (4,) of the station's latest reading, as it was taken."""
         row = STATION_NAMES.index(station)
         out: Floats = self.player.samples.tracker_from_station[
@@ -55,28 +54,24 @@ class RoundEncoder:
 
     def _encode(self, number: int, settings: DeviceSettings) -> dict[str, bytes]:
         samples, instant, stamps_s = self.player.samples, self.player.instant_of(number), self.player.stamps_s(number)
-        position_m, raw_orientation = samples.position_m[instant].copy(), samples.tracker_from_station[instant].copy()
+        position_m, orientation = samples.position_m[instant].copy(), samples.tracker_from_station[instant].copy()
         quality = samples.quality[instant].copy()
         rows_of: dict[tuple[int, ...], list[int]] = {}
         for row, (name, station) in enumerate(zip(self.plugged, settings.stations, strict=False)):
             if not station.plain:
-                position_m[row], raw_orientation[row] = geometry.apply_station_settings(
-                    position_m[row], raw_orientation[row], station
+                position_m[row], orientation[row] = geometry.apply_station_settings(
+                    position_m[row], orientation[row], station
                 )
             if name in self._lost:
                 quality[row] = 0.0
             rows_of.setdefault(station.items, []).append(row)
-        out = {}
+        out, number_format = {}, record_format(settings)
         for items, rows in rows_of.items():
-            values = RecordValues(stamps_s[rows], position_m[rows], raw_orientation[rows], quality[rows])
-            table = encode_records(
-                items, np.array([ord(STATION_NAMES[row]) for row in rows], np.uint8), values, record_format(settings)
-            )
+            values = RecordValues(stamps_s[rows], position_m[rows], orientation[rows], quality[rows])
+            characters = np.array([ord(STATION_NAMES[row]) for row in rows], np.uint8)
+            table = encode_records(items, characters, values, number_format)
             for index, row in enumerate(rows):
-                row_table = table[index : index + 1]
-                out[STATION_NAMES[row]] = (
-                    row_table.tobytes() if settings.binary else ascii_records.format_records(items, row_table)
-                )
+                out[STATION_NAMES[row]] = to_bytes(items, table[index : index + 1], number_format)
         return out
 
 

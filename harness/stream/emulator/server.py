@@ -48,6 +48,7 @@ class ServerCounts:
     """Greatest such time [s]."""
 
     def add(self, sent: SentMessage) -> None:
+        """Count a message."""
         if sent.unread:
             self.unread += 1
             return
@@ -156,9 +157,11 @@ class RunningEmulator:
 
     @property
     def emulator(self) -> Emulator:
+        """The emulator that is served."""
         return self.server.emulator
 
     def summary(self) -> dict[str, float]:
+        """Return `EmulatorServer.summary`."""
         return self.server.summary()
 
 

@@ -53,8 +53,8 @@ def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSe
     """Set the serial line: `o1152,N,8,0` is a hundredth of the baud rate, parity, bits, handshake."""
     if len(argument.fields) < 4:
         raise CommandError(MISSING, len(argument.fields) + 1)
-    hundredths, parity = CommandArgument(argument.fields[0]).integer(3, 1152, after=0), argument.fields[1]
-    bits, handshake = CommandArgument(",".join(argument.fields[2:])).numbers(2, after=0)
+    hundredths, parity = CommandArgument(argument.fields[0]).integer(3, 1152, start=0), argument.fields[1]
+    bits, handshake = CommandArgument(",".join(argument.fields[2:])).numbers(2, start=0)
     if (
         100 * hundredths not in SUPPORTED_BAUD_RATES
         or parity not in ("N", "O", "E")
@@ -66,14 +66,14 @@ def _set_serial(settings: DeviceSettings, argument: CommandArgument) -> DeviceSe
 
 
 def _set_genlock(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    state, rate_hz = argument.numbers(2, after=0)
+    state, rate_hz = argument.numbers(2, start=0)
     if state not in range(4) or not 0.0 <= rate_hz < 1000.0:
         raise CommandError(OUT_OF_RANGE)
     return replace(settings, genlock=str(int(state)), genlock_hz=rate_hz)
 
 
 def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    number = CommandArgument(argument.fields[0]).integer(1, 9999999, after=0)
+    number = CommandArgument(argument.fields[0]).integer(1, 9999999, start=0)
     x, y, z, nx, ny, nz, identity = argument.numbers(7)
     emitter = Emitter(number, (x, y, z), (nx, ny, nz), int(identity))
     others = (emitter for emitter in settings.draft_emitters if emitter.number != number)
@@ -81,7 +81,7 @@ def _add_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 
 
 def _remove_emitter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    number = argument.integer(1, 9999999, after=0)
+    number = argument.integer(1, 9999999, start=0)
     return replace(
         settings, draft_emitters=tuple(emitter for emitter in settings.draft_emitters if emitter.number != number)
     )
@@ -95,7 +95,7 @@ def _set_address(settings: DeviceSettings, argument: CommandArgument) -> DeviceS
 
 
 def _set_genlock_phase(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-    return replace(settings, genlock_phase=argument.numbers(1, after=0)[0])
+    return replace(settings, genlock_phase=argument.numbers(1, start=0)[0])
 
 
 def _no_change(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
@@ -118,7 +118,7 @@ def _station_setter(field: str, low: int, high: int) -> Setter:
 
 def _device_setter(field: str, low: int, high: int, kind: type = int) -> Setter:
     def setter(settings: DeviceSettings, argument: CommandArgument) -> DeviceSettings:
-        return replace(settings, **{field: kind(argument.integer(low, high, after=0))})
+        return replace(settings, **{field: kind(argument.integer(low, high, start=0))})
 
     return setter
 

@@ -89,8 +89,10 @@ class DeviceSettings:
     """Parity, bits and hardware handshake; stored without effect."""
 
     def station(self, name: str) -> StationSettings:
+        """Return the settings of the station with this character."""
         return self.stations[STATION_NAMES.index(name)]
 
     def with_station(self, name: str, station: StationSettings) -> "DeviceSettings":
+        """Return a copy in which this station has other settings."""
         k = STATION_NAMES.index(name)
         return replace(self, stations=(*self.stations[:k], station, *self.stations[k + 1 :]))

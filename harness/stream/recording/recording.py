@@ -159,18 +159,20 @@ class RecordingWriter:
         self.counts = dict.fromkeys((RECEIVED, SENT, CONFIGURED, EVENT), 0)
         """Bytes received and sent, and numbers of configurations and events, by block kind."""
         self._note = dict(note or {})
-        before = self._existing_recording()
-        self._new = before is None
-        self._stations = before.formats[-1].stations if before and before.formats else None
+        existing = self._existing_recording()
+        self._new = existing is None
+        self._stations = existing.formats[-1].stations if existing and existing.formats else None
         self._file: int | None = None
         self._closed = False
         self._lock = Lock()
         """Held while writing: the thread that reads and the one that closes both write."""
 
     def on_received(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+        """Write bytes received from the device."""
         self._append_all(RECEIVED, data, monotonic_s, wall_s)
 
     def on_sent(self, data: bytes, monotonic_s: float, wall_s: float) -> None:
+        """Write bytes sent to the device."""
         self._append_all(SENT, data, monotonic_s, wall_s)
 
     def on_configured(self, wire: WireFormat, monotonic_s: float | None = None, wall_s: float | None = None) -> None:
@@ -191,6 +193,7 @@ class RecordingWriter:
         self.counts[CONFIGURED] += 1
 
     def on_event(self, event: LineEvent) -> None:
+        """Write an event on the line."""
         self._append_json(EVENT, {"kind": event.kind, "text": event.text}, event.monotonic_s, event.wall_s)
         self.counts[EVENT] += 1
 

@@ -85,6 +85,7 @@ class RecordingStream:
 
     @property
     def stations(self) -> tuple[str, ...]:
+        """Station names, in the order of the device's stations."""
         return self.wire.stations
 
     @property
@@ -98,6 +99,7 @@ class RecordingStream:
         return self._reader.counts
 
     def close(self) -> None:
+        """End the iteration; may be called from any thread."""
         self._closed.set()
 
     def wall_s(self, received_s: float) -> float:

@@ -1,4 +1,4 @@
-"""Principal modes of bone lengths: Liu et al. 2011, Fig. 4 (docs/methods.md A2).
+"""Principal modes of bone lengths: Liu et al. 2011, Fig. 4 (docs/papers.md A2).
 
 The bone lengths of P people vary along principal directions, the modes. Explained variance is computed for lengths
 normalised by each person's left tibia, as the paper shows them, and for lengths in metres. The value of modes for a

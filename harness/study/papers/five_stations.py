@@ -3,10 +3,10 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
+from harness.compare.claims import Errors, claim_lower_error
 from harness.compare.paired_statistics import compare_paired
 from harness.results.expected_orders import METRIC
 from harness.results.findings import Claim, FindingsTable, PaperExperiment
-from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import CellRow, errors_by_clip, mean_table
 

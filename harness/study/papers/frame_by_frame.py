@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from harness.compare.claims import claim_lower_error
 from harness.results.findings import Claim, FindingsTable, LineChart, PaperExperiment
-from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.leave_one_out import DYNAMIC_MAP, METHODS, differences
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import error_lines, errors_by_clip

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from harness.compare.claims import claim_lower_error
 from harness.results.findings import Claim, PaperExperiment
-from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import errors_by_clip, mean_bars, mean_table
 
@@ -104,7 +104,7 @@ def own_model(study: PaperStudy) -> PaperExperiment:
         ),
         extra=(
             "Details that the paper leaves open were chosen on other clips. Read literally it has a larger error "
-            "(docs/methods.md F)."
+            "(docs/notes/traps.md F)."
         ),
     )
 

@@ -1,12 +1,12 @@
-"""Reproduction of Liu et al. 2011: every experiment of docs/methods.md A6, and the speed that the paper states."""
+"""Reproduction of Liu et al. 2011: every experiment of docs/papers.md A6, and the speed that the paper states."""
 
 from functools import partial
 from itertools import pairwise
 
+from harness.compare.claims import claim_lower_error, claim_published_value
 from harness.mocap.skeletons import read_skeletons
 from harness.mocap.synthetic import sample_skeletons
 from harness.results.findings import PaperExperiment
-from harness.study.papers.claims import claim_lower_error, claim_published_value
 from harness.study.papers.eigenmodes import evaluate_bone_modes
 from harness.study.papers.frame_by_frame import frame_by_frame
 from harness.study.papers.leave_one_out import (

@@ -11,6 +11,7 @@ from harness.core.package_data import data_folder
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 from harness.experiment.cells import ProgressCallback, check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, load_scenario
+from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
@@ -51,7 +52,7 @@ def reproduce(
     paper: Paper,
     out: Path,
     *,
-    library: Path | None = None,
+    library: LibraryFolders | None = None,
     seed: int = 1,
     jobs: int = 1,
     command: str = "",

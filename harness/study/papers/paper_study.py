@@ -15,6 +15,7 @@ from harness.errors import HarnessError, was_interrupted
 from harness.experiment import engine
 from harness.experiment.cells import ProgressCallback
 from harness.experiment.scenario import Scenario, variants
+from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.cell import Cell, cell_folder, read_cell
 from harness.results.storage import open_folder, read_summary
@@ -31,7 +32,7 @@ class PaperStudy:
     seed: int
     runs: Mapping[str, Scenario]
     """Name of a run and of its folder -> its scenario."""
-    library: Path | None = None
+    library: LibraryFolders | None = None
     """Folder of the motion library; None for synthetic motion."""
     failures: Mapping[str, str] = field(default_factory=dict)
     """"run: cell" -> traceback or message of its failure."""
@@ -84,7 +85,7 @@ def run_scenarios(
     runs: Mapping[str, Scenario],
     out: Path,
     *,
-    folder: Path | None = None,
+    folder: LibraryFolders | None = None,
     jobs: int = 1,
     command: str = "",
     progress: ProgressCallback = lambda cell, done, planned: None,

@@ -17,7 +17,7 @@ from harness.experiment.benchmark_clips import BenchmarkClip
 from harness.experiment.cells import open_scenario_motion
 from harness.experiment.clip_evaluation import ClipEvaluation
 from harness.experiment.scenario import Scenario
-from harness.mocap.library import MotionLibrary
+from harness.mocap.library import LibraryFolders, MotionLibrary
 from harness.reconstruct.database import MotionDatabase
 from harness.results import manifest
 from harness.study.papers.paper_study import PaperStudy
@@ -102,7 +102,7 @@ def list_test_clips(study: PaperStudy) -> dict[str, set[str]]:
 
 
 def _test_clip_evaluations(
-    study: PaperStudy, library: Path, frames: Mapping[str, int], scenario: Scenario
+    study: PaperStudy, library: LibraryFolders, frames: Mapping[str, int], scenario: Scenario
 ) -> list[ClipEvaluation]:
     """Evaluations of the longest test clip of each behaviour; none of these clips is an example."""
     tables = benchmark_clips.load_clean_scenario().motion

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterable, Sequence
 
+from harness.compare.claims import Errors, claim_lower_error
 from harness.results.cell import Cell
 from harness.results.findings import FindingsTable, PaperExperiment
-from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.five_stations import claim_in_run, differences
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.station_sets import (

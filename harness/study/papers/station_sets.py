@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from scipy import stats
 
+from harness.compare.claims import Errors, claim_lower_error
 from harness.compare.paired_statistics import (
     CONFIDENCE_LEVEL,
     MIN_CLIPS,
@@ -14,7 +15,6 @@ from harness.compare.paired_statistics import (
 )
 from harness.results.expected_orders import METRIC
 from harness.results.findings import BarChart, Claim, ClaimVerdict, FindingsTable, LineChart
-from harness.study.papers.claims import Errors, claim_lower_error
 from harness.study.papers.tables import CellRow, errors_by_clip, format_mean, mean_sd
 
 STATION_ABBREVIATIONS = {

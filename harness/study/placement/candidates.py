@@ -1,19 +1,19 @@
-"""Places where a tracker could be worn: by bone, position along it and angle around it, alone, in pairs and in grids.
+"""Candidate places for stations: bone, position along it and angle around it; single, in pairs and in grids.
 
     [[candidate]]
     name = "ankle"       # right_ankle and left_ankle
     bone = "rtibia"
     along = 0.9
     around_deg = 90.0
-    pair = "each"        # and its mirror image, to be worn or not by itself; "together": both or neither
+    pair = "each"        # also its mirror image, independently; "together": both or neither
 
-    [[grid]]             # every combination: rtibia_50_90 sits half way along, 90 deg around
+    [[grid]]             # all combinations: tibia_50_90 is half way along, 90 deg around
     bones = ["rtibia", "rfemur"]
     along = [0.3, 0.5]
     around_deg = [0.0, 90.0]
     pair = "together"
 
-What may be worn by itself is a `CandidateGroup`: one place, or a mirrored pair.
+A `CandidateGroup` is one place, or a mirrored pair that is used together.
 """
 
 import itertools
@@ -31,9 +31,9 @@ from harness.results.placement_findings import StationPlacement
 
 Pair = Literal["", "each", "together"]
 CandidateGroup = tuple[StationPlacement, ...]
-"""Worn together or not at all."""
+"""Places that are used together."""
 StationSet = tuple[StationPlacement, ...]
-"""A set of trackers, in the order of the candidates."""
+"""A set of places, in the order of the candidates."""
 _OPPOSITE_SIDE: dict[str, Literal["left", "right"]] = {"left": "right", "right": "left"}
 _SIDE_BY_PREFIX: dict[str, Literal["left", "right"]] = {"l": "left", "r": "right"}
 
@@ -49,24 +49,28 @@ class Candidate:
     around_deg: float = 0.0
     """Angle around the bone [deg] (see `harness.body.mounts`)."""
     stand_off_m: float = 0.01
-    """Distance of the tracker's origin from the skin [m]."""
+    """Distance of the station's origin from the skin [m]."""
     pair: Pair = ""
-    """With its mirror image: `each` by itself, or both `together`."""
+    """Also use the mirror image: `each` independently, or both `together`; "" for the place alone."""
 
     def groups(self) -> tuple[CandidateGroup, ...]:
-        """BadInput for a pair in the middle of the body, or a name that says another side than the bone."""
+        """The groups of places; BadInput for a pair in the middle of the body, or a name that contradicts the side."""
         side = body_side(self.bone, self.along)
-        one = StationPlacement(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
+        place = StationPlacement(self.name, self.bone, self.along, self.around_deg, self.stand_off_m, side)
         if not self.pair:
-            return ((one,),)
-        if not one.side:
-            what = f"Candidate {self.name!r} is a pair on {self.bone}, which is in the middle."
-            raise BadInput(what, "Leave `pair` out, or name a bone of one side.")
+            return ((place,),)
+        if not place.side:
+            fault = f"Candidate {self.name!r} is a pair, but {self.bone} is in the middle of the body."
+            raise BadInput(fault, "Leave `pair` out, or name a bone of one side.")
         bare = self.name.removeprefix("left_").removeprefix("right_")
-        if self.name not in (bare, f"{one.side}_{bare}"):
-            raise BadInput(f"Candidate {self.name!r} sits on {self.bone}.", f"Call it {bare!r}: both sides are meant.")
-        one = replace(one, name=f"{one.side}_{bare}")
-        both = tuple(sorted((one, mirror_place(one)), key=lambda each: each.side, reverse=True))  # the right one first
+        if self.name not in (bare, f"{place.side}_{bare}"):
+            raise BadInput(
+                f"Candidate {self.name!r} is on {self.bone}.", f"Name it {bare!r}, since it stands for both sides."
+            )
+        place = replace(place, name=f"{place.side}_{bare}")
+        both = tuple(
+            sorted((place, mirror_place(place)), key=lambda each: each.side, reverse=True)
+        )  # the right one first
         return (both,) if self.pair == "together" else tuple((each,) for each in both)
 
 
@@ -81,105 +85,108 @@ class CandidateGrid:
     pair: Pair = ""
 
     def groups(self) -> tuple[CandidateGroup, ...]:
-        found = itertools.product(self.bones, self.along, self.around_deg)
-        each = [Candidate(self._name(*at), *at, self.stand_off_m, self.pair).groups() for at in found]
-        return tuple(itertools.chain.from_iterable(each))
+        """The groups of places of all combinations."""
+        places = itertools.product(self.bones, self.along, self.around_deg)
+        groups = [Candidate(self._name(*place), *place, self.stand_off_m, self.pair).groups() for place in places]
+        return tuple(itertools.chain.from_iterable(groups))
 
     def _name(self, bone: str, along: float, around_deg: float) -> str:
-        """Such as "rtibia_50_90", or "tibia_50_90" of a pair: per cent along, degrees around."""
+        """The name of a place: "rtibia_50_90", or "tibia_50_90" for a pair (per cent along, degrees around)."""
         sided = bool(self.pair) and opposite_bone(bone) != bone
         return f"{bone[1:] if sided else bone}_{100 * along:g}_{around_deg:g}"
 
 
 def body_side(bone: str, along: float) -> Literal["", "left", "right"]:
-    """Of the body; "" in the middle, where the hip bones begin as well."""
+    """The side of the body; "" in the middle, where the hip bones also begin."""
     standard_skeleton().index(bone)
     middle = opposite_bone(bone) == bone or (bone in ("lhipjoint", "rhipjoint") and along == 0.0)
     return "" if middle else _SIDE_BY_PREFIX[bone[0]]
 
 
 def opposite_bone(bone: str) -> str:
-    """On the other side; the same in the middle."""
+    """The bone on the other side; for a bone in the middle, the same."""
     swapped = {"l": "r", "r": "l"}.get(bone[0], "") + bone[1:]
     return swapped if swapped in standard_skeleton().names else bone
 
 
-def mirror_place(one: StationPlacement) -> StationPlacement:
-    """The same place on the other side: the mirror image of a point of the skin is a point of the other's skin.
+def mirror_place(place: StationPlacement) -> StationPlacement:
+    """The mirror image of a place on the other side of the body.
 
-    Angles grow by the right-hand rule about the bone's direction, which a mirror reverses.
+    Angles around a bone follow the right-hand rule about its direction. Mirroring reverses their sign.
     """
-    moved = replace(one, bone=opposite_bone(one.bone), around_deg=0.0 - one.around_deg)
-    if not one.side:
+    moved = replace(place, bone=opposite_bone(place.bone), around_deg=0.0 - place.around_deg)
+    if not place.side:
         return moved
-    other = _OPPOSITE_SIDE[one.side]
-    return replace(moved, name=f"{other}_{one.name.removeprefix(f'{one.side}_')}", side=other)
+    other = _OPPOSITE_SIDE[place.side]
+    return replace(moved, name=f"{other}_{place.name.removeprefix(f'{place.side}_')}", side=other)
 
 
 def make_candidate_groups(
     tables: Iterable[Candidate | CandidateGrid], skeleton: Skeleton | None = None
 ) -> tuple[CandidateGroup, ...]:
-    """All that a study may let a performer wear; BadInput names every place without flesh, and names given twice."""
+    """All candidates of a study; BadInput lists impossible places and duplicate names."""
     units = tuple(itertools.chain.from_iterable(table.groups() for table in tables))
-    places = [one for unit in units for one in unit]
-    names = [one.name for one in places]
+    places = [place for unit in units for place in unit]
+    names = [place.name for place in places]
     if twice := sorted({name for name in names if names.count(name) > 1}):
-        raise BadInput(f"Candidates called {', '.join(map(repr, twice))} twice.", "Each has a name of its own.")
+        raise BadInput(f"Duplicate names of candidates: {', '.join(map(repr, twice))}.", "Give each a name of its own.")
     if not units:
         raise BadInput("No candidates.", "Name places in [[candidate]] or [[grid]].")
-    if bad := [f"{one.name} ({text})" for one in places if (text := placement_fault(one, skeleton))]:
-        raise BadInput(f"{len(bad)} of {len(places)} candidates cannot be worn: {'; '.join(bad)}", "Leave them out.")
+    if bad := [f"{place.name} ({text})" for place in places if (text := placement_fault(place, skeleton))]:
+        raise BadInput(f"{len(bad)} of {len(places)} candidates are impossible: {'; '.join(bad)}", "Leave them out.")
     return units
 
 
-def placement_fault(one: StationPlacement, skeleton: Skeleton | None = None) -> str:
-    """Why nobody can wear a tracker there; "" if they can. By default on the standard body."""
-    if not 0.0 <= one.along <= 1.0:
-        return f"along = {one.along:g}, not from 0 to 1"
-    if not 0.0 <= one.stand_off_m < 1.0:
-        return f"stand_off_m = {one.stand_off_m:g}, not from 0"
+def placement_fault(place: StationPlacement, skeleton: Skeleton | None = None) -> str:
+    """Explain why a station cannot be placed there, by default on the standard body; "" where it can."""
+    if not 0.0 <= place.along <= 1.0:
+        return f"along = {place.along:g}, not in 0 to 1"
+    if not 0.0 <= place.stand_off_m < 1.0:
+        return f"stand_off_m = {place.stand_off_m:g}, not in 0 to 1"
     try:
-        locate_mount(skeleton or standard_skeleton(), to_mount(one))
+        locate_mount(skeleton or standard_skeleton(), to_mount(place))
     except HarnessError as error:
         return error.what if isinstance(error, BadInput) else str(error)
     return ""
 
 
-def to_mount(one: StationPlacement) -> Mount:
-    return Mount(station_name(one), one.bone, one.along, math.radians(one.around_deg), one.stand_off_m)
+def to_mount(place: StationPlacement) -> Mount:
+    """The mount of a place."""
+    return Mount(station_name(place), place.bone, place.along, math.radians(place.around_deg), place.stand_off_m)
 
 
-def to_station(one: StationPlacement) -> Station:
-    return Station(one.bone, one.along, one.around_deg, one.stand_off_m)
+def to_station(place: StationPlacement) -> Station:
+    """The station of a scenario at a place."""
+    return Station(place.bone, place.along, place.around_deg, place.stand_off_m)
 
 
-def station_name(one: StationPlacement) -> str:
-    """What the stream calls it: one that was moved keeps its name, and with it its draws of noise."""
-    return one.moved_from or one.name
+def station_name(place: StationPlacement) -> str:
+    """Name of the station in the stream. A moved station keeps its name, and with it its random draws of noise."""
+    return place.moved_from or place.name
 
 
 def station_set(units: Iterable[CandidateGroup], order: Sequence[CandidateGroup]) -> StationSet:
-    """The places of some units, each once, in the order of the candidates."""
-    taken = set(itertools.chain.from_iterable(units))
-    return tuple(one for unit in order for one in unit if one in taken)
+    """The places of some units without duplicates, in the order of the candidates."""
+    selected = set(itertools.chain.from_iterable(units))
+    return tuple(place for unit in order for place in unit if place in selected)
 
 
 def select_groups(names: Sequence[str], units: Sequence[CandidateGroup], where: str) -> tuple[CandidateGroup, ...]:
-    """The units that these names stand for, () for all: of a place, or "ankle" for both of a pair. BadInput."""
+    """Select units by names of places or of pairs, such as "ankle"; all units without names. BadInput."""
     if not names:
         return tuple(units)
-    found: dict[CandidateGroup, None] = {}
+    selected: dict[CandidateGroup, None] = {}
     for name in names:
-        meant = [unit for unit in units if any(name in candidate_names(one) for one in unit)]
-        if not meant:
-            known = ", ".join(one.name for unit in units for one in unit)
-            raise BadInput(f"{where} names {name!r}, which is no candidate.", f"Known: {known}.")
-        found |= dict.fromkeys(meant)
-    return tuple(unit for unit in units if unit in found)
+        matching = [unit for unit in units if any(name in candidate_names(place) for place in unit)]
+        if not matching:
+            known = ", ".join(place.name for unit in units for place in unit)
+            raise BadInput(f"{where} has {name!r}, which is not a candidate.", f"The candidates are {known}.")
+        selected |= dict.fromkeys(matching)
+    return tuple(unit for unit in units if unit in selected)
 
 
-def candidate_names(one: StationPlacement) -> Iterator[str]:
-    """Its name, and the name of the pair that it is of."""
-    yield one.name
-    if one.side:
-        yield one.name.removeprefix(f"{one.side}_")
+def candidate_names(place: StationPlacement) -> Iterator[str]:
+    """Yield the name of a place, and the name of its pair."""
+    yield place.name
+    if place.side:
+        yield place.name.removeprefix(f"{place.side}_")

@@ -20,6 +20,7 @@ from harness.experiment.engine import CellResults, run_cells
 from harness.experiment.executors import TaskExecutor
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, variants
+from harness.mocap.library import LibraryFolders
 from harness.study.placement.candidates import StationSet, station_name
 
 MAX_RATE_HZ = 180.0
@@ -60,7 +61,7 @@ class CellCache:
 
     out: Path
     """Folder of the study, as made by `open_study`."""
-    folder: Path | None
+    folder: LibraryFolders | None
     """Motion library; None for synthetic motion."""
     executor: TaskExecutor
     command: str
@@ -142,7 +143,7 @@ class CellCache:
         self.failures |= cells.failures
 
     def _variant(self, request: SetRequest, stations: StationSet) -> tuple[Scenario, dict[str, Any]]:
-        """The scenario that a set is a variant of, and its varied values: the stations, or the places of moved stations."""
+        """The scenario that a set is a variant of, and its varied values: stations, or places of moved stations."""
         rate = link_rate_hz(request.scenario, len(stations), request.link)
         scenario = replace(request.scenario, tracker=replace(request.scenario.tracker, rate_hz=rate), vary={})
         names = [station_name(place) for place in stations]

@@ -1,4 +1,4 @@
-"""A study of where trackers go, as its TOML file has it: candidates, what is tried, where else, and what papers say."""
+"""Configuration of a placement study (TOML): candidates, search modes, further conditions, papers' claims."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -22,114 +22,114 @@ from harness.study.placement.candidates import (
 )
 
 MAX_STATIONS = 12
-"""Of an IS-900 (docs/is900.md)."""
+"""Most stations of an IS-900 (docs/is900.md)."""
 _OLD_PREFIX = "placement_"
-"""What names of shipped studies began with."""
+"""Prefix that names of shipped studies once had."""
 
 
 @dataclass(frozen=True)
 class AblateOptions:
-    """Each unit left out of a set."""
+    """Leave each unit out of a set."""
 
     full: tuple[str, ...] = ()
-    """Names of candidates, or of pairs; all of them by default."""
+    """The full set: names of candidates or pairs; all by default."""
 
 
 @dataclass(frozen=True)
 class AddOptions:
-    """Each unit added to a set."""
+    """Add each unit to a set."""
 
     base: tuple[str, ...] = ()
     of: tuple[str, ...] = ()
-    """What is added; by default every candidate."""
+    """The units to add; all candidates by default."""
 
 
 @dataclass(frozen=True)
 class GreedyOptions:
-    """One unit after another, each time the one that helps most."""
+    """Add one unit after another, each time the one that reduces the error most."""
 
     most: int
-    """Stations at the end."""
+    """Number of stations at the end."""
     base: tuple[str, ...] = ()
     of: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class ExhaustiveOptions:
-    """Every set."""
+    """Measure every set."""
 
     most: int
-    """Stations."""
+    """Most stations of a set."""
     fewest: int = 1
     of: tuple[str, ...] = ()
     most_cells: int = 5000
-    """More are refused."""
+    """Limit of the number of cells; a study with more is refused."""
 
 
 @dataclass(frozen=True)
 class RefineOptions:
-    """The stations of a set moved along and around their bones, step by step."""
+    """Move the stations of a set along and around their bones, step by step."""
 
     set: tuple[str, ...] = ()
-    """By default the best set of `size` stations that was tried."""
+    """The initial set; by default the best measured set of `size` stations."""
     size: int = 0
     along: tuple[float, ...] = (0.2, 0.1)
-    """Steps, the largest first, as shares of the bone's length."""
+    """Steps along the bone, the largest first, as shares of its length."""
     around_deg: tuple[float, ...] = (45.0, 22.5)
-    """As many [deg]."""
+    """Steps around the bone, as many as in `along` [deg]."""
     most_moves: int = 6
 
 
 @dataclass(frozen=True)
 class ConditionOptions:
-    """The same sets of trackers elsewhere."""
+    """A further condition under which the same sets are measured."""
 
     name: str
     scenario: str = ""
-    """Another one, to which the study's own changes are not made; by default the study's with its changes."""
+    """Another scenario, without the study's `changes`; by default the study's scenario with its `changes`."""
     methods: tuple[str, ...] = ()
     changes: dict[str, Any] = field(default_factory=dict)
-    """See `PlacementStudy`."""
+    """Changes to the scenario, as in `PlacementStudy`."""
 
 
 @dataclass(frozen=True)
 class PublishedClaim:
-    """That a set suffices: that none of its size serves better, and that all candidates serve hardly better."""
+    """A claim that a set suffices: no other of its size errs less, and all candidates together err hardly less."""
 
     text: str
     """Such as "walking: both ankles and the pelvis suffice"."""
     source: str
     set: tuple[str, ...]
     among: tuple[str, ...] = ()
-    """The candidates that the source knows, from which sets of as many are formed; by default all."""
+    """The candidates that the source considers; the other sets of the same size consist of these. All by default."""
     margin: float = 0.1
-    """All of them err less by no more than this share of their error."""
+    """Largest relative difference between the error of the set and that of all candidates together."""
     why_not: str = ""
-    """What is known where it does not hold."""
+    """An explanation for a claim that is not reproduced."""
 
 
 @dataclass(frozen=True)
 class PlacementStudy:
-    """What `harness placement` reads."""
+    """The configuration that `harness placement` reads."""
 
     name: str
     kind: Literal["placement"]
     title: str
     scenario: str
-    """A file beside the study without its `.toml`, or a shipped scenario: motion, body, calibration, noise, tracker and
-    seed are its. Its stations, methods, inputs and what it varies are not used."""
+    """A file in the folder of the study (without `.toml`), or a shipped scenario. It defines motion, body, calibration,
+    noise, tracker and seed; its stations, methods, inputs and varied values are not used."""
     methods: tuple[str, ...]
-    """What is minimised is the mean of their errors."""
+    """Methods; the mean of their errors is minimised."""
     schema: int = SCHEMA
     metric: str = "joint_angle_mean_deg"
     inputs: str = "pos+ori"
     held_out: tuple[str, ...] = ()
-    """Clips on which nothing is chosen: what was chosen on the scenario's test clips is judged on these."""
+    """Held-out clips: sets that were chosen on the scenario's test clips are tested on these."""
     link: bool = False
-    """So many stations run at the rate that the line carries them, at most the scenario's."""
+    """Limit the rate of each set to what the serial line carries, at most the scenario's rate."""
     changes: dict[str, Any] = field(default_factory=dict)
-    """To the scenario, such as changes.noise = "clean"; changes.components switches on slipping straps and flesh that
-    wobbles."""
+    """Changes to the scenario, such as changes.noise = "clean"; changes.components adds error components such as strap
+    slip and soft tissue."""
     candidate: tuple[Candidate, ...] = ()
     grid: tuple[CandidateGrid, ...] = ()
     ablate: AblateOptions | None = None
@@ -139,15 +139,16 @@ class PlacementStudy:
     refine: RefineOptions | None = None
     condition: tuple[ConditionOptions, ...] = ()
     condition_size: int = 3
-    """The sets of so many stations that every condition ranks."""
+    """Size of the sets that every condition ranks."""
     claim: tuple[PublishedClaim, ...] = ()
 
     def groups(self) -> tuple[CandidateGroup, ...]:
+        """The candidates of all tables."""
         return make_candidate_groups((*self.candidate, *self.grid))
 
 
 def find_placement_study(path: Path | str) -> Path:
-    """A file as named, or a shipped study by its bare name."""
+    """Find a study by path, or a shipped one by name; BadFile, UnknownName."""
     given = Path(path)
     if given.is_file():
         return given
@@ -169,7 +170,7 @@ def shipped_placements() -> list[Path]:
 
 
 def load_placement_study(path: Path | str) -> PlacementStudy:
-    """BadFile and UnknownName name the place."""
+    """Read and check a study; BadFile and UnknownName name the fault."""
     path = find_placement_study(path)
     expected, advice = "a placement study", "See scenarios/placement/walking.toml."
     content = read_toml(path, expected, advice)
@@ -188,9 +189,9 @@ def load_placement_study(path: Path | str) -> PlacementStudy:
 
 
 def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
-    """What types cannot say: what was found, what is expected, what to try."""
+    """Check what types cannot express; returns what was found, what is expected and advice."""
     if study.schema != SCHEMA:
-        return f"schema {study.schema}", f"schema {SCHEMA}", "This version of the harness reads no other."
+        return f"schema {study.schema}", f"schema {SCHEMA}", "This version of the harness reads only that schema."
     if study.name != Path(study.name).name:
         return f"name = {study.name!r}", "a plain name", "Results are written to a folder of that name."
     if not study.methods:
@@ -198,11 +199,15 @@ def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
     if study.metric not in DEFINITIONS:
         raise UnknownName("metric", study.metric, MARGINS)
     if study.metric not in MARGINS:
-        return f"metric = {study.metric!r}", "one that says how good an estimate is", f"Such are {', '.join(MARGINS)}."
+        return (
+            f"metric = {study.metric!r}",
+            "a metric of accuracy, smoothness or time",
+            f"Use one of {', '.join(MARGINS)}.",
+        )
     if not (study.ablate or study.add or study.greedy or study.exhaustive or study.refine):
-        return "nothing to try", "[ablate], [add], [greedy], [exhaustive] or [refine]", "docs/studies.md explains them."
+        return "no search mode", "[ablate], [add], [greedy], [exhaustive] or [refine]", "docs/studies.md explains them."
     if study.refine and (not study.refine.along or len(study.refine.along) != len(study.refine.around_deg)):
-        return "refine: steps along and around", "as many of both, one at least", "They are taken in pairs."
+        return "refine: steps along and around", "equally many of both, at least one", "The steps are used in pairs."
     if study.refine and min(*study.refine.along, *study.refine.around_deg) <= 0.0:
         return "refine: a step that is not above 0", "steps above 0", "Leave `refine` out, or name larger steps."
     for mode, table in (("greedy", study.greedy), ("exhaustive", study.exhaustive)):
@@ -210,51 +215,53 @@ def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
             return f"{mode}.most = {table.most}", f"1 to {MAX_STATIONS} stations", "An IS-900 has no more."
     names = [condition.name for condition in study.condition]
     if len(set(names)) < len(names) or not all(names):
-        return f"conditions called {', '.join(names)}", "names of their own", "Rename one."
+        return f"conditions named {', '.join(names)}", "distinct names", "Rename one of them."
     if len(set(study.held_out)) < len(study.held_out):
-        return "held_out names a clip twice", "each clip once", "Remove the second."
+        return "held_out has a clip twice", "each clip once", "Remove the duplicate."
     return None
 
 
 def _check_names(study: PlacementStudy) -> None:
-    """That every set is of candidates, and can be worn."""
+    """Check that every named set consists of candidates and has a valid number of stations."""
     units = study.groups()
-    asked: list[tuple[str, tuple[str, ...]]] = [("ablate.full", study.ablate.full)] if study.ablate else []
+    named_sets: list[tuple[str, tuple[str, ...]]] = [("ablate.full", study.ablate.full)] if study.ablate else []
     for mode, table in (("add", study.add), ("greedy", study.greedy)):
-        asked += [(f"{mode}.base", table.base), (f"{mode}.of", table.of)] if table else []
-    asked += [("exhaustive.of", study.exhaustive.of)] if study.exhaustive else []
-    asked += [("refine.set", study.refine.set)] if study.refine else []
+        named_sets += [(f"{mode}.base", table.base), (f"{mode}.of", table.of)] if table else []
+    named_sets += [("exhaustive.of", study.exhaustive.of)] if study.exhaustive else []
+    named_sets += [("refine.set", study.refine.set)] if study.refine else []
     for claim in study.claim:
-        asked += [(f"the claim {claim.text!r}", claim.set), (f"the claim {claim.text!r}", claim.among)]
-    for where, names in asked:
-        found = select_groups(names, units, where)
+        named_sets += [(f"the claim {claim.text!r}", claim.set), (f"the claim {claim.text!r}", claim.among)]
+    for where, names in named_sets:
+        groups = select_groups(names, units, where)
         if where in ("ablate.full", "add.base", "refine.set") and names:
-            check_station_count(sum(map(len, found)), where)
+            check_station_count(sum(map(len, groups)), where)
 
 
 def check_station_count(stations: int, where: str) -> None:
-    """BadInput when nobody can wear so many."""
+    """BadInput for a number of stations that an IS-900 does not support."""
     if not 1 <= stations <= MAX_STATIONS:
-        raise BadInput(f"{where}: {stations} stations.", f"An IS-900 has 1 to {MAX_STATIONS}: name some candidates.")
+        raise BadInput(
+            f"{where}: {stations} stations.", f"An IS-900 has 1 to {MAX_STATIONS} stations; name fewer candidates."
+        )
 
 
 def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptions | None = None) -> Scenario:
-    """What the trackers are tried in: the scenario with the changes, all candidates as its stations, nothing varied."""
-    elsewhere = condition is not None and bool(condition.scenario)
-    named = condition.scenario if condition is not None and elsewhere else study.scenario
+    """The scenario of the study or of a condition: with its changes, all candidates as stations, and nothing varied."""
+    other_scenario = condition is not None and bool(condition.scenario)
+    named = condition.scenario if condition is not None and other_scenario else study.scenario
     scenario = load_scenario(_scenario_file(named, beside))
     methods = (condition.methods if condition is not None else ()) or study.methods
     stations = {}
     for unit in study.groups():
-        for one in unit:
-            stations[one.name] = {"bone": one.bone, "along": one.along, "around_deg": one.around_deg}
-            stations[one.name]["stand_off_m"] = one.stand_off_m
+        for place in unit:
+            stations[place.name] = {"bone": place.bone, "along": place.along, "around_deg": place.around_deg}
+            stations[place.name]["stand_off_m"] = place.stand_off_m
     scenario = replace(
         scenario, vary={}, expected_order=(), worn=(), stations={}, inputs=(study.inputs,), methods=methods
     )
     for where, content in (
         ("stations", {"stations": stations}),
-        ("changes", {} if elsewhere else study.changes),
+        ("changes", {} if other_scenario else study.changes),
         (f"changes of {condition.name!r}" if condition else "", condition.changes if condition else {}),
     ):
         scenario = _apply_changes(scenario, content, where)
@@ -263,16 +270,16 @@ def base_scenario(study: PlacementStudy, beside: Path, condition: ConditionOptio
 
 
 def _apply_changes(scenario: Scenario, content: Mapping[str, Any], where: str) -> Scenario:
-    if strange := [key for key in ("name", "methods", "inputs", "vary", "worn", "expected_order") if key in content]:
-        raise BadInput(f"{where}: {', '.join(strange)}.", "The study has its own.")
+    if fixed := [key for key in ("name", "methods", "inputs", "vary", "worn", "expected_order") if key in content]:
+        raise BadInput(f"{where}: {', '.join(fixed)}.", "The study defines these keys.")
     try:
         return replace_fields(scenario, content, where)
     except (TypeError, ValueError) as error:
-        raise BadInput(f"{error}.", "Values are those that the scenario's own keys may have.") from error
+        raise BadInput(f"{error}.", "Use keys and values as in a scenario.") from error
 
 
 def _scenario_file(name: str, beside: Path) -> Path | str:
-    """Beside the study, or shipped."""
+    """The scenario's file in the folder of the study, or the shipped one."""
     for folder in (beside, data_folder("scenarios")):
         file = folder / (name if name.endswith(".toml") else f"{name}.toml")
         if file.is_file():

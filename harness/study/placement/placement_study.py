@@ -1,8 +1,8 @@
-"""Where trackers go: a study of candidates, tried in sets, ranked with their ties, and held against what papers say.
+"""A placement study: candidate places are measured in sets, ranked with their ties, and compared with papers' claims.
 
-Nothing is chosen on the clips that are held out: modes and rankings see the scenario's test clips alone, and what they
-chose is then judged on the others. Where a study holds none out, what choosing flatters the best set by is told beside
-it (see `ranking.crossed`). Papers' claims are judged on the held-out clips where there are enough.
+Modes and rankings use the scenario's test clips only. What they chose is then measured on the held-out clips. Where a
+study has no held-out clips, the cross-validated error of the best set is reported beside it (see
+`ranking.cross_validated_cost`). Papers' claims are tested on the held-out clips where there are enough of them.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,6 +16,7 @@ from harness.errors import Outcome
 from harness.experiment.cells import ProgressCallback, clear_caches
 from harness.experiment.executors import TaskExecutor, run_in_process
 from harness.experiment.scenario import Scenario
+from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import Claim
 from harness.results.placement_findings import (
@@ -44,22 +45,22 @@ def run_placement(
     path: Path | str,
     out: Path,
     *,
-    folder: Path | None = None,
-    each: TaskExecutor = run_in_process,
+    folder: LibraryFolders | None = None,
+    executor: TaskExecutor = run_in_process,
     command: str = "",
     progress: ProgressCallback = lambda last, done, planned: None,
 ) -> tuple[PlacementFindings, Outcome]:
-    """Do the study in a TOML file, and write findings.json into `out`.
+    """Run the study in a TOML file, and write findings.json into `out`.
 
-    `out` is made, or resumed when it holds this study, else refused (BadInput). What a study tries may change while its
-    cells are kept: modes and claims are no part of what it is. INCOMPLETE when a cell failed, NOT_COMPARABLE when
-    nothing was measured; what papers say and we do not find is a result like any other.
+    `out` is created, or resumed when it holds this study, else refused (BadInput). Modes and claims are not part of the
+    identity of a study: they may change while its cells are kept. The outcome is INCOMPLETE when a cell failed,
+    NOT_COMPARABLE when nothing was measured, else PASS: a claim that is not reproduced is a result.
     """
     clear_caches()  # files may have changed since the last run
-    ready = plan_placement(path, folder)
-    open_study(out, {"placement": ready.study.name, "motion": ready.motion, "seed": ready.scenario.seed})
+    plan = plan_placement(path, folder)
+    open_study(out, {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed})
     (out / "cells").mkdir(exist_ok=True)
-    findings = _PlacementRun(ready, CellCache(out, folder, each, command, progress)).findings(command)
+    findings = _PlacementRun(plan, CellCache(out, folder, executor, command, progress)).findings(command)
     write_placement(out / FINDINGS, findings)
     if findings.failures:
         return findings, Outcome.INCOMPLETE
@@ -67,65 +68,69 @@ def run_placement(
 
 
 class _PlacementRun:
-    """One study under way."""
+    """One placement study while it runs."""
 
-    def __init__(self, ready: PlacementPlan, trying: CellCache) -> None:
-        self.plan, self.study, self.trying = ready, ready.study, trying
+    def __init__(self, plan: PlacementPlan, cache: CellCache) -> None:
+        self.plan, self.study, self.cache = plan, plan.study, cache
         self.costs: dict[StationSet, dict[str, float | None]] = {}
-        """Of every set that was tried on the clips on which choices are made."""
+        """Set -> costs on the test clips, for every set that was measured."""
 
     def measure(self, sets: Sequence[StationSet]) -> Mapping[StationSet, Costs]:
-        errors = self.trying.errors(self.plan.request(self.plan.scenario, sets), self.study.metric)
-        self.costs |= {one: self.plan.costs(found) for one, found in errors.items()}
-        return {one: self.costs[one] for one in sets}
+        """Measure sets on the test clips."""
+        errors = self.cache.errors(self.plan.request(self.plan.scenario, sets), self.study.metric)
+        self.costs |= {stations: self.plan.costs(by_clip) for stations, by_clip in errors.items()}
+        return {stations: self.costs[stations] for stations in sets}
 
     def findings(self, command: str) -> PlacementFindings:
-        ready, study, scenario = self.plan, self.study, self.plan.scenario
-        self.measure(ready.known_sets())
+        plan, study, scenario = self.plan, self.study, self.plan.scenario
+        self.measure(plan.known_sets())
         modes = list(self._modes())
         searches, ends = self._searches()
         best = best_by_size(
-            {names_of_places(one): self.costs[one] for one in self.costs if not is_refined(one)}, ready.cost_sign
+            {names_of_places(stations): self.costs[stations] for stations in self.costs if not is_refined(stations)},
+            plan.cost_sign,
         )
-        rivals = [self._rival(claim) for claim in study.claim]
-        compared = ready.sets_to_compare(self.costs)
-        judged = self._judged([one.stations for one in best], [*rivals, *ends])
-        asked = [ready.request(one, compared) for one in ready.condition_scenarios.values()]
-        self.trying.run_missing([*([ready.request(ready.held_out, judged)] if ready.held_out else []), *asked])
-        held = self._on(ready.held_out, judged) if ready.held_out else {}
-        each = self._elsewhere(compared)
-        best = tuple(_with_held_out_error(one, held.get(one.stations, {}), ready.cost_sign) for one in best)
-        rated = sorted({len(one) for one in self.costs})
+        alternatives = [self._best_alternative(claim) for claim in study.claim]
+        compared = plan.sets_to_compare(self.costs)
+        tested = self._sets_to_test([stations.stations for stations in best], [*alternatives, *ends])
+        requests = [plan.request(scenario, compared) for scenario in plan.condition_scenarios.values()]
+        self.cache.run_missing([*([plan.request(plan.held_out, tested)] if plan.held_out else []), *requests])
+        held = self._costs_in(plan.held_out, tested) if plan.held_out else {}
+        conditions = self._condition_costs(compared)
+        best = tuple(
+            _with_held_out_error(stations, held.get(stations.stations, {}), plan.cost_sign) for stations in best
+        )
+        sizes = sorted({len(stations) for stations in self.costs})
         return PlacementFindings(
             name=study.name,
             title=study.title,
             metric=study.metric,
             unit=DEFINITIONS[study.metric].unit,
-            motion=ready.motion,
+            motion=plan.motion,
             behaviours=tuple(dict.fromkeys(scenario.motion.behaviours)),
             methods=scenario.methods,
             noise=scenario.profile or scenario.noise + ("*" if scenario.components else ""),
-            link=ready.describe_link(rated),
+            link=plan.describe_link(sizes),
             seed=scenario.seed,
             command=command,
-            candidates=tuple(dict.fromkeys((*ready.places, *(place for one in self.costs for place in one)))),
+            candidates=tuple(dict.fromkeys((*plan.places, *(place for stations in self.costs for place in stations)))),
             tried=tuple(
-                summarise_set(names_of_places(one), ready.rate_hz(len(one)), ready.costs(c))
-                for one, c in self.costs.items()
+                summarise_set(names_of_places(stations), plan.rate_hz(len(stations)), plan.costs(c))
+                for stations, c in self.costs.items()
             ),
             best=best,
             circumstances=manifest.current_circumstances(),
             rankings=tuple(ranking for mode in modes for ranking in mode.rankings),
-            searches=tuple(_with_held_out_gain(one, held) for one in searches),
+            searches=tuple(_with_held_out_gain(stations, held) for stations in searches),
             worth=tuple(worth for mode in modes for worth in mode.worth),
             compared=tuple(map(names_of_places, compared)),
-            conditions=rank_by_condition(each, list(map(names_of_places, compared)), ready.cost_sign),
-            agreements=rank_agreements(each, list(map(names_of_places, compared))),
-            claims=tuple(self._claims(rivals, held)),
+            conditions=rank_by_condition(conditions, list(map(names_of_places, compared)), plan.cost_sign),
+            agreements=rank_agreements(conditions, list(map(names_of_places, compared))),
+            claims=tuple(self._claims(alternatives, held)),
             notes=tuple(self._notes(modes, held)),
-            failures=dict(self.trying.failures),
-            planned=self.trying.planned,
-            better="lower" if ready.cost_sign > 0.0 else "higher",
+            failures=dict(self.cache.failures),
+            planned=self.cache.planned,
+            better="lower" if plan.cost_sign > 0.0 else "higher",
         )
 
     def _modes(self) -> Iterator[ModeResult]:
@@ -138,99 +143,99 @@ class _PlacementRun:
             yield search.search_exhaustive(study.exhaustive, units, self.measure)
 
     def _searches(self) -> tuple[list[PlacementSearch], list[StationSet]]:
-        """Those that go step by step, and the sets where `refine_set` began and ended."""
-        study, units, found, ends = self.study, self.plan.groups, list[PlacementSearch](), list[StationSet]()
+        """Results of the stepwise searches; also the first and last set of `refine_set`."""
+        study, units, searches, ends = self.study, self.plan.groups, list[PlacementSearch](), list[StationSet]()
         if study.greedy:
-            found.append(search.search_greedy(study.greedy, units, self.measure))
+            searches.append(search.search_greedy(study.greedy, units, self.measure))
         if study.refine:
-            named = select_groups(study.refine.set, units, "refine.set") if study.refine.set else ()
-            start = station_set(named, units) or search.best_measured_set(study.refine.size, self.costs)
+            groups = select_groups(study.refine.set, units, "refine.set") if study.refine.set else ()
+            start = station_set(groups, units) or search.best_measured_set(study.refine.size, self.costs)
             steps, end = refine_set(study.refine, start, self.measure, len(self.plan.scenario.motion.test))
-            found.append(steps)
+            searches.append(steps)
             ends = [start, end]
-        return found, ends
+        return searches, ends
 
-    def _rival(self, claim: PublishedClaim) -> StationSet:
-        """The best other set that a paper could have meant, on the clips on which choices are made."""
+    def _best_alternative(self, claim: PublishedClaim) -> StationSet:
+        """The best set of a claim's size, other than the claimed one, on the test clips."""
         _, others, _ = published_claims.sets_of_claim(claim, self.plan.groups)
-        found = published_claims.best_alternative(
-            [names_of_places(one) for one in others], {names_of_places(one): self.costs[one] for one in others}
+        best = published_claims.best_alternative(
+            [names_of_places(stations) for stations in others],
+            {names_of_places(stations): self.costs[stations] for stations in others},
         )
-        return next((one for one in others if names_of_places(one) == found), ())
+        return next((stations for stations in others if names_of_places(stations) == best), ())
 
-    def _judged(self, best: Sequence[StationNames], others: Sequence[StationSet]) -> list[StationSet]:
-        """What was chosen or is claimed: it is judged on the held-out clips."""
-        by_name = {names_of_places(one): one for one in self.costs}
-        found = [by_name[one] for one in best] + [one for one in others if one]
+    def _sets_to_test(self, best: Sequence[StationNames], others: Sequence[StationSet]) -> list[StationSet]:
+        """Sets that were chosen or claimed; they are measured on the held-out clips."""
+        by_name = {names_of_places(stations): stations for stations in self.costs}
+        tested = [by_name[names] for names in best] + [stations for stations in others if stations]
         for claim in self.study.claim:
-            suited, _, whole = published_claims.sets_of_claim(claim, self.plan.groups)
-            found += [suited, whole]
-        return list(dict.fromkeys(found))
+            claimed, _, full = published_claims.sets_of_claim(claim, self.plan.groups)
+            tested += [claimed, full]
+        return list(dict.fromkeys(tested))
 
-    def _on(
+    def _costs_in(
         self, scenario: Scenario, sets: Sequence[StationSet], methods: tuple[str, ...] = ()
     ) -> dict[StationNames, Costs]:
-        """What sets cost in a scenario, to its methods or some of them."""
-        errors = self.trying.errors(self.plan.request(scenario, sets), self.study.metric, methods)
-        return {names_of_places(one): self.plan.costs(found) for one, found in errors.items()}
+        """Costs of sets in a scenario, with its methods or some of them."""
+        errors = self.cache.errors(self.plan.request(scenario, sets), self.study.metric, methods)
+        return {names_of_places(stations): self.plan.costs(by_clip) for stations, by_clip in errors.items()}
 
-    def _elsewhere(self, compared: Sequence[StationSet]) -> list[ConditionCosts]:
-        """The study's own condition, each of its methods if there are several, and the others."""
+    def _condition_costs(self, compared: Sequence[StationSet]) -> list[ConditionCosts]:
+        """Costs under the study's own condition, with each of its methods if it has several, and in others."""
         if not compared:
             return []
-        ready, scenario = self.plan, self.plan.scenario
+        scenario = self.plan.scenario
         own = ConditionCosts(f"{' and '.join(dict.fromkeys(scenario.motion.behaviours))} (the study's own)", "own", {})
-        found = [replace(own, costs={names_of_places(one): self.costs[one] for one in compared})]
+        conditions = [replace(own, costs={names_of_places(stations): self.costs[stations] for stations in compared})]
         if len(scenario.methods) > 1:
-            found += [ConditionCosts(m, "method", self._on(scenario, compared, (m,))) for m in scenario.methods]
-        for name, other in ready.condition_scenarios.items():
-            found.append(ConditionCosts(name, _condition_kind(scenario, other), self._on(other, compared)))
-        return found
+            conditions += [
+                ConditionCosts(m, "method", self._costs_in(scenario, compared, (m,))) for m in scenario.methods
+            ]
+        for name, other in self.plan.condition_scenarios.items():
+            conditions.append(ConditionCosts(name, _condition_kind(scenario, other), self._costs_in(other, compared)))
+        return conditions
 
-    def _claims(self, rivals: Sequence[StationSet], held: Mapping[StationNames, Costs]) -> Iterator[Claim]:
+    def _claims(self, alternatives: Sequence[StationSet], held: Mapping[StationNames, Costs]) -> Iterator[Claim]:
         clips = len(self.study.held_out)
-        on, costs = f"judged on {clips} clips on which nothing was chosen", held
+        basis, costs = f"tested on {clips} held-out clips", held
         if clips < MIN_CLIPS:
-            on = "judged on the clips on which the best other was chosen, which flatters that one"
-            costs = {names_of_places(one): costs for one, costs in self.costs.items()}
+            basis = "tested on the clips on which the best other set was chosen, which favours that set"
+            costs = {names_of_places(stations): costs for stations, costs in self.costs.items()}
         unit = DEFINITIONS[self.study.metric].unit
-        for claim, rival in zip(self.study.claim, rivals, strict=True):
-            suited, _, whole = published_claims.sets_of_claim(claim, self.plan.groups)
+        for claim, alternative in zip(self.study.claim, alternatives, strict=True):
+            claimed, _, full = published_claims.sets_of_claim(claim, self.plan.groups)
             yield from published_claims.evaluate_claim(
                 claim,
-                names_of_places(suited),
-                names_of_places(rival),
-                names_of_places(whole),
+                names_of_places(claimed),
+                names_of_places(alternative),
+                names_of_places(full),
                 costs,
                 unit=unit,
-                judged_on=on,
+                basis=basis,
             )
 
     def _notes(self, modes: Sequence[ModeResult], held: Mapping[StationNames, Costs]) -> Iterator[str]:
-        """What a reader must know."""
+        """Notes on how sets were chosen and tested, and what was left out."""
         clips = len(self.plan.scenario.motion.test)
         if held:
-            yield (
-                f"Chosen on {clips} clips; what was chosen is judged on {len(self.study.held_out)} others, on which "
-                "nothing was chosen."
-            )
+            yield (f"Sets were chosen on {clips} clips and then tested on {len(self.study.held_out)} held-out clips.")
         else:
             yield (
-                f"Chosen and judged on the same {clips} clips, which flatters what was chosen; beside it stands the "
-                "error of the set that the other clips would have chosen, clip by clip."
+                f"Sets were chosen and tested on the same {clips} clips, which favours the chosen sets. The "
+                "cross-validated error is given beside: on each clip, that of the set that the other clips choose."
             )
         for ranking in (ranking for mode in modes for ranking in mode.rankings):
             if clips < (least := min_clips(len(ranking.rows) - 1)) and len(ranking.rows) > 1:
                 yield (
-                    f"{ranking.title}: {clips} clips cannot show that any of {len(ranking.rows)} sets is better than "
-                    f"another; {least} might."
+                    f"{ranking.title}: {clips} clips cannot show a significant difference between {len(ranking.rows)} "
+                    f"sets; at least {least} are needed."
                 )
-        _, left_out = complete_sets({names_of_places(one): costs for one, costs in self.costs.items()})
+        _, left_out = complete_sets({names_of_places(stations): costs for stations, costs in self.costs.items()})
         yield from left_out
 
 
 def _condition_kind(own: Scenario, other: Scenario) -> str:
-    """In what a condition differs."""
+    """The kind of a condition: in what its scenario differs from the study's own."""
     for kind, differs in (
         ("behaviour", own.motion != other.motion),
         ("method", own.methods != other.methods),
@@ -242,7 +247,7 @@ def _condition_kind(own: Scenario, other: Scenario) -> str:
 
 
 def _with_held_out_error(best: BestSet, costs: Costs, sign: float) -> BestSet:
-    """With its mean on the held-out clips."""
+    """Add the mean on the held-out clips."""
     values = np.array([sign * value for value in costs.values() if value is not None])
     if not len(values) or len(values) < len(costs):
         return best
@@ -251,11 +256,11 @@ def _with_held_out_error(best: BestSet, costs: Costs, sign: float) -> BestSet:
     return replace(best, held_out=mean, held_out_low=low, held_out_high=high, held_out_clips=len(values))
 
 
-def _with_held_out_gain(found: PlacementSearch, held: Mapping[StationNames, Costs]) -> PlacementSearch:
-    """With what the end saves against the beginning on the held-out clips."""
-    first, last = (held.get(step.stations) for step in (found.steps[0], found.steps[-1]))
-    if found.mode != "refine" or first is None or last is None or first is last:
-        return found
-    saved = compare_paired(first, last)
-    clips = len(saved.clips)
-    return replace(found, held_out=saved.mean, held_out_low=saved.low, held_out_high=saved.high, held_out_clips=clips)
+def _with_held_out_gain(result: PlacementSearch, held: Mapping[StationNames, Costs]) -> PlacementSearch:
+    """Add the gain of the last set over the first on the held-out clips."""
+    first, last = (held.get(step.stations) for step in (result.steps[0], result.steps[-1]))
+    if result.mode != "refine" or first is None or last is None or first is last:
+        return result
+    gain = compare_paired(first, last)
+    clips = len(gain.clips)
+    return replace(result, held_out=gain.mean, held_out_low=gain.low, held_out_high=gain.high, held_out_clips=clips)

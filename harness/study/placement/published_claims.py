@@ -10,9 +10,9 @@ The claim is split into two:
 import itertools
 from collections.abc import Mapping, Sequence
 
+from harness.compare.claims import claim_lower_error
 from harness.results.findings import Claim
 from harness.results.placement_findings import StationNames
-from harness.study.papers.claims import claim_lower_error
 from harness.study.placement.candidates import CandidateGroup, StationSet, select_groups, station_set
 from harness.study.placement.config import PublishedClaim
 from harness.study.placement.ranking import Costs, complete_sets, join_names, sort_by_cost

@@ -1,8 +1,8 @@
-"""Stations of a set moved along and around their bones, as long as it helps beyond noise.
+"""Refinement of a set: stations are moved along and around their bones as long as the improvement is significant.
 
-From where it stands the search looks at every place one step along or around for each station, a mirrored pair moving
-together. The best of them is taken if it is surely better: sign flips over clips, corrected for how many were looked at
-(Holm). When none is, the next smaller step is tried; after the smallest the search ends.
+In each iteration the search measures all places one step along or around the bone, for each station; a mirrored pair
+moves together. It takes the best of them if that is significantly better: sign flips over clips, corrected for the
+number of places (Holm). Otherwise it continues with the next smaller step, and ends after the smallest.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,53 +20,56 @@ from harness.study.placement.ranking import complete_sets, join_names, min_clips
 from harness.study.placement.search import Measure, names_of_places
 
 MoveGroup = tuple[int, ...]
-"""Which places of a set move together."""
+"""Indices of the places of a set that move together."""
 
 
 def refine_set(
     table: RefineOptions, start: StationSet, measure: Measure, clips: int
 ) -> tuple[PlacementSearch, StationSet]:
-    """What it came to, and every step; BadInput on too few clips."""
+    """Refine a set; returns the steps and the final set. BadInput with too few clips."""
     check_clip_count(start, clips)
-    movers = find_move_groups(start)
-    origin = {station_name(one): one for one in start}
-    now, steps, looked = start, [SearchStep(names_of_places(start), "")], 0
+    groups = find_move_groups(start)
+    origin = {station_name(place): place for place in start}
+    current, steps, measured = start, [SearchStep(names_of_places(start), "")], 0
     for along, around_deg in zip(table.along, table.around_deg, strict=True):
         while len(steps) <= table.most_moves:
             moves = {
-                moved: text for moved, text in _candidate_moves(now, movers, along, around_deg, origin) if moved != now
+                moved: text
+                for moved, text in _candidate_moves(current, groups, along, around_deg, origin)
+                if moved != current
             }
-            looked += len(moves)
-            best, step = _best_move(now, moves, measure)
+            measured += len(moves)
+            best, step = _best_move(current, moves, measure)
             if step is None:
                 break
-            now = best
+            current = best
             steps.append(step)
-    ended = f"no place a step of {table.along[-1]:g} along or {table.around_deg[-1]:g} deg around is surely better"
+    steps_text = f"{table.along[-1]:g} along or {table.around_deg[-1]:g} deg around"
+    end = f"no place at a step of {steps_text} is significantly better"
     if len(steps) > table.most_moves:
-        ended = f"{table.most_moves} moves, the most that were asked for"
+        end = f"{table.most_moves} moves, the limit"
     title = f"{join_names(names_of_places(start))}: moved along and around"
-    return PlacementSearch("refine", title, tuple(steps), f"{ended}; {looked} places were looked at"), now
+    return PlacementSearch("refine", title, tuple(steps), f"{end}; {measured} places were measured"), current
 
 
 def check_clip_count(start: StationSet, clips: int) -> None:
-    """BadInput when so few clips could never show that a move helps."""
+    """BadInput when the clips are too few for any move to be significant."""
     moves = 4 * len(find_move_groups(start))
     if clips < (least := min_clips(moves)):
-        found = f"refine: on {clips} clips none of {moves} moves could ever be surely better."
-        raise BadInput(found, f"Judge on {least} clips or more, or refine a smaller set.")
+        fault = f"refine: with {clips} clips, none of {moves} moves can be significantly better."
+        raise BadInput(fault, f"Use {least} clips or more, or refine a smaller set.")
 
 
 def find_move_groups(start: StationSet) -> tuple[MoveGroup, ...]:
-    """Stations that move by themselves, and mirrored pairs, which move together."""
-    found: list[MoveGroup] = []
-    for at, one in enumerate(start):
-        if any(at in mover for mover in found):
+    """Group the stations of a set: mirrored pairs move together, others by themselves."""
+    groups: list[MoveGroup] = []
+    for at, place in enumerate(start):
+        if any(at in group for group in groups):
             continue
-        image = mirror_place(one)
+        image = mirror_place(place)
         others = [i for i, other in enumerate(start) if i > at and _same_place(other, image)]
-        found.append((at, *others[:1]))
-    return tuple(found)
+        groups.append((at, *others[:1]))
+    return tuple(groups)
 
 
 def _same_place(a: StationPlacement, b: StationPlacement) -> bool:
@@ -75,52 +78,58 @@ def _same_place(a: StationPlacement, b: StationPlacement) -> bool:
 
 
 def _candidate_moves(
-    now: StationSet, movers: Sequence[MoveGroup], along: float, around_deg: float, origin: dict[str, StationPlacement]
+    current: StationSet,
+    groups: Sequence[MoveGroup],
+    along: float,
+    around_deg: float,
+    origin: dict[str, StationPlacement],
 ) -> Iterator[tuple[StationSet, str]]:
-    """Every set one step from here that can be worn, and what moved."""
-    for mover in movers:
-        lead = now[mover[0]]
+    """Yield every possible set one step from the current one, and a description of the move."""
+    for group in groups:
+        lead = current[group[0]]
         for d_along, d_around in ((along, 0.0), (-along, 0.0), (0.0, around_deg), (0.0, -around_deg)):
-            there = _move_place(lead, lead.along + d_along, lead.around_deg + d_around, origin)
-            if placement_fault(there):
+            target = _move_place(lead, lead.along + d_along, lead.around_deg + d_around, origin)
+            if placement_fault(target):
                 continue
-            image = mirror_place(there)
-            places = list(now)
-            places[mover[0]] = there
-            for other in mover[1:]:
-                places[other] = _move_place(now[other], image.along, image.around_deg, origin)
-            who = join_names(station_name(now[at]) for at in mover)
-            how = f"along {lead.along:.2f} to {there.along:.2f}"
+            image = mirror_place(target)
+            places = list(current)
+            places[group[0]] = target
+            for other in group[1:]:
+                places[other] = _move_place(current[other], image.along, image.around_deg, origin)
+            names = join_names(station_name(current[at]) for at in group)
+            change = f"along {lead.along:.2f} to {target.along:.2f}"
             if d_around:
-                how = f"around {lead.around_deg:g} to {there.around_deg:g} deg"
-            yield tuple(places), f"{who}: {how}"
+                change = f"around {lead.around_deg:g} to {target.around_deg:g} deg"
+            yield tuple(places), f"{names}: {change}"
 
 
 def _move_place(
-    one: StationPlacement, along: float, around_deg: float, origin: dict[str, StationPlacement]
+    place: StationPlacement, along: float, around_deg: float, origin: dict[str, StationPlacement]
 ) -> StationPlacement:
-    """The same station elsewhere; back where it began it is the candidate again."""
-    first = origin[station_name(one)]
+    """Move a station; at its original place it is the candidate itself again."""
+    first = origin[station_name(place)]
     along, around_deg = round(along, 6), round(180.0 - (180.0 - around_deg) % 360.0, 6)
-    there = replace(first, along=along, around_deg=around_deg)
-    if _same_place(there, first):
+    moved = replace(first, along=along, around_deg=around_deg)
+    if _same_place(moved, first):
         return first
     root = station_name(first)
-    return replace(there, name=f"{root}@{along:.2f}/{around_deg:g}", moved_from=root)
+    return replace(moved, name=f"{root}@{along:.2f}/{around_deg:g}", moved_from=root)
 
 
-def _best_move(now: StationSet, moves: dict[StationSet, str], measure: Measure) -> tuple[StationSet, SearchStep | None]:
-    """The least cost of them if it is surely less than that of now."""
-    costs = measure([now, *moves])
-    by_name = {names_of_places(one): one for one in (now, *moves)}
-    whole, _ = complete_sets({name: costs[one] for name, one in by_name.items()})
-    here = whole.pop(names_of_places(now), None)
-    if here is None or not whole:
-        return now, None
-    order = sort_by_cost(whole)
-    best = compare_paired(here, whole[order[0]])
-    p = holm([sign_flip_p(np.array([here[clip] - whole[name][clip] for clip in here])) for name in order])
+def _best_move(
+    current: StationSet, moves: dict[StationSet, str], measure: Measure
+) -> tuple[StationSet, SearchStep | None]:
+    """The best move if it is significantly better than the current set, else the current set and None."""
+    costs = measure([current, *moves])
+    by_name = {names_of_places(place): place for place in (current, *moves)}
+    complete, _ = complete_sets({name: costs[place] for name, place in by_name.items()})
+    before = complete.pop(names_of_places(current), None)
+    if before is None or not complete:
+        return current, None
+    order = sort_by_cost(complete)
+    best = compare_paired(before, complete[order[0]])
+    p = holm([sign_flip_p(np.array([before[clip] - complete[name][clip] for clip in before])) for name in order])
     if best.mean is None or best.mean <= 0.0 or p[0] > SIGNIFICANCE:
-        return now, None
-    there = by_name[order[0]]
-    return there, SearchStep(order[0], moves[there], best.mean, best.low, best.high)
+        return current, None
+    target = by_name[order[0]]
+    return target, SearchStep(order[0], moves[target], best.mean, best.low, best.high)

@@ -1,7 +1,7 @@
-"""Which trackers to wear: each left out, each added, one after another, or every set of so many.
+"""Search modes of a placement study: leave one out, add one, greedy, exhaustive.
 
-A mode asks for the costs of sets and says what they come to. Modes ask for the same sets again and again; whoever
-measures remembers them. Costs are errors, with the sign turned where high values are good: the less the better.
+A mode requests the costs of sets and evaluates them. Modes request the same sets several times, so the measuring
+function caches them. Costs are errors, with the opposite sign where high values are good: lower is better.
 """
 
 import itertools
@@ -25,32 +25,32 @@ from harness.study.placement.config import (
 from harness.study.placement.ranking import Costs, complete_sets, join_names, rank_sets, sort_by_cost
 
 Measure = Callable[[Sequence[StationSet]], Mapping[StationSet, Costs]]
-"""Tries sets: what each costs on each clip."""
+"""Measures sets: set -> clip -> cost."""
 
 
 @dataclass(frozen=True)
 class ModeResult:
-    """What a mode came to."""
+    """Result of a mode."""
 
     rankings: tuple[Ranking, ...] = ()
     worth: tuple[MarginalContribution, ...] = ()
 
 
 def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
-    """The full set less each unit, and what each is worth there."""
-    full, less = ablation_sets(table, units)
-    costs = measure([full, *less.values()])
-    sets = {names_of_places(one): costs[one] for one in less.values()}
+    """Rank the full set without each unit; the worth of a unit is the increase of the cost without it."""
+    full, reduced = ablation_sets(table, units)
+    costs = measure([full, *reduced.values()])
+    sets = {names_of_places(stations): costs[stations] for stations in reduced.values()}
     ranking = rank_sets("ablate", f"{join_names(names_of_places(full))}: each left out", sets, names_of_places(full))
     worth = [
         _make_worth(
-            one.name,
+            place.name,
             "ablate",
             names_of_places(full),
             compare_paired(_measured_costs(costs[rest]), _measured_costs(costs[full])),
         )
-        for unit, rest in less.items()
-        for one in unit
+        for unit, rest in reduced.items()
+        for place in unit
     ]
     return ModeResult((ranking,), tuple(worth))
 
@@ -58,29 +58,29 @@ def ablate(table: AblateOptions, units: Sequence[CandidateGroup], measure: Measu
 def ablation_sets(
     table: AblateOptions, units: Sequence[CandidateGroup]
 ) -> tuple[StationSet, dict[CandidateGroup, StationSet]]:
-    """The full set, and unit -> the set without it; BadInput where nothing would be left."""
+    """The full set, and unit -> the set without it; BadInput where no station would remain."""
     full = select_groups(table.full, units, "ablate.full")
     check_station_count(sum(map(len, full)), "ablate.full")
     if len(full) < 2:
-        raise BadInput("ablate.full is one unit, without which nothing is worn.", "Name two or more.")
+        raise BadInput("ablate.full has one unit, without which no station remains.", "Name two or more.")
     return station_set(full, units), {unit: station_set([u for u in full if u != unit], units) for unit in full}
 
 
 def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
-    """A base set and each unit, and what each is worth there; without a base each unit alone."""
-    base, more = addition_sets(table, units)
-    costs = measure([*([base] if base else []), *more.values()])
-    sets = {names_of_places(one): costs[one] for one in more.values()}
+    """Rank a base set with each unit added, or the units alone; the worth of a unit is the decrease of the cost."""
+    base, extended = addition_sets(table, units)
+    costs = measure([*([base] if base else []), *extended.values()])
+    sets = {names_of_places(stations): costs[stations] for stations in extended.values()}
     title = f"{join_names(names_of_places(base))}: each added" if base else "each alone"
     worth = [
         _make_worth(
-            one.name,
+            place.name,
             "add",
             names_of_places(base),
             compare_paired(_measured_costs(costs[base]), _measured_costs(costs[both])),
         )
-        for unit, both in more.items()
-        for one in unit
+        for unit, both in extended.items()
+        for place in unit
         if base
     ]
     return ModeResult((rank_sets("add", title, sets, names_of_places(base)),), tuple(worth))
@@ -89,54 +89,61 @@ def add(table: AddOptions, units: Sequence[CandidateGroup], measure: Measure) ->
 def addition_sets(
     table: AddOptions, units: Sequence[CandidateGroup]
 ) -> tuple[StationSet, dict[CandidateGroup, StationSet]]:
-    """The base, and unit -> the base with it."""
+    """The base set, and unit -> the base set with it."""
     base = select_groups(table.base, units, "add.base") if table.base else ()
-    of = [unit for unit in select_groups(table.of, units, "add.of") if unit not in base]
-    more = {unit: station_set([*base, unit], units) for unit in of}
-    check_station_count(max(map(len, more.values()), default=0), "add.of")
-    return station_set(base, units), more
+    added = [unit for unit in select_groups(table.of, units, "add.of") if unit not in base]
+    extended = {unit: station_set([*base, unit], units) for unit in added}
+    check_station_count(max(map(len, extended.values()), default=0), "add.of")
+    return station_set(base, units), extended
 
 
 def search_exhaustive(table: ExhaustiveOptions, units: Sequence[CandidateGroup], measure: Measure) -> ModeResult:
-    """Every set of so many stations, ranked by size, and what each unit is worth on average over them."""
+    """Rank all sets of each size; the worth of a unit is its Shapley value over them."""
     sets = exhaustive_sets(table, units)
     costs = measure(sets)
-    sizes = {size: [one for one in sets if len(one) == size] for size in sorted({len(one) for one in sets})}
+    sizes = {
+        size: [stations for stations in sets if len(stations) == size]
+        for size in sorted({len(stations) for stations in sets})
+    }
     of = select_groups(table.of, units, "exhaustive.of")
     count = sum(map(len, of))
     rankings = [
-        rank_sets("exhaustive", f"{size} of {count} trackers", {names_of_places(one): costs[one] for one in alike})
-        for size, alike in sizes.items()
+        rank_sets(
+            "exhaustive",
+            f"{size} of {count} stations",
+            {names_of_places(stations): costs[stations] for stations in same_size},
+        )
+        for size, same_size in sizes.items()
     ]
     return ModeResult(tuple(rankings), tuple(_shapley_worth(of, units, costs)))
 
 
 def exhaustive_sets(table: ExhaustiveOptions, units: Sequence[CandidateGroup]) -> list[StationSet]:
-    """Of `fewest` to `most` stations, the fewest first."""
+    """All sets of `fewest` to `most` stations, the smallest first."""
     of = select_groups(table.of, units, "exhaustive.of")
     combined = itertools.chain.from_iterable(itertools.combinations(of, n) for n in range(1, table.most + 1))
-    found = [station_set(each, units) for each in combined if table.fewest <= sum(map(len, each)) <= table.most]
-    return sorted(found, key=len)
+    sets = [station_set(groups, units) for groups in combined if table.fewest <= sum(map(len, groups)) <= table.most]
+    return sorted(sets, key=len)
 
 
 def check_cell_count(table: ExhaustiveOptions, units: Sequence[CandidateGroup], cells_each: int) -> None:
-    """BadInput when it would be more cells than the study allows: how many, and about how long."""
+    """BadInput when there are no sets, or more cells than the study allows; the message estimates the duration."""
     of = select_groups(table.of, units, "exhaustive.of")
     sets = _count_sets(tuple(map(len, of)), table.fewest, table.most)
     cells = sets * cells_each
     if not sets:
         raise BadInput(f"exhaustive: no set of {table.fewest} to {table.most} stations.", "Change fewest or most.")
     if cells > table.most_cells:
-        trackers = sum(map(len, of))
+        stations = sum(map(len, of))
         raise BadInput(
-            f"exhaustive: {sets:,} sets of up to {table.most} of {trackers} trackers are {cells:,} cells, about "
-            f"{_format_duration(cells)} of one worker at a second each; at most {table.most_cells:,} are run.",
+            f"exhaustive: {sets:,} sets of up to {table.most} of {stations} stations are {cells:,} cells, about "
+            f"{_format_duration(cells)} for one worker at 1 s each; the limit is {table.most_cells:,} cells.",
             "Lower exhaustive.most, name fewer in exhaustive.of, use [greedy], or raise exhaustive.most_cells.",
         )
 
 
 def _count_sets(sizes: Sequence[int], fewest: int, most: int) -> int:
-    """How many choices of units have so many stations, without listing them."""
+    """Number of combinations of units with `fewest` to `most` stations, computed without listing them."""
     ways = [1] + [0] * most
     for size in sizes:
         for total in range(most, size - 1, -1):
@@ -152,47 +159,54 @@ def _format_duration(seconds: float) -> str:
 
 
 def search_greedy(table: GreedyOptions, units: Sequence[CandidateGroup], measure: Measure) -> PlacementSearch:
-    """One unit after another, each time the one with which the mean cost is least."""
-    have = list(select_groups(table.base, units, "greedy.base") if table.base else ())
+    """Add one unit after another, each time the one that gives the lowest mean cost."""
+    chosen = list(select_groups(table.base, units, "greedy.base") if table.base else ())
     of = select_groups(table.of, units, "greedy.of")
-    most, title = table.most, f"up to {table.most} trackers, one after another"
-    steps = [SearchStep(names_of_places(station_set(have, units)), "")] if have else []
+    most, title = table.most, f"up to {table.most} stations, one after another"
+    steps = [SearchStep(names_of_places(station_set(chosen, units)), "")] if chosen else []
     while True:
-        now = station_set(have, units)
-        more = {
-            station_set([*have, unit], units): unit for unit in of if unit not in have and len(now) + len(unit) <= most
+        current = station_set(chosen, units)
+        extended = {
+            station_set([*chosen, unit], units): unit
+            for unit in of
+            if unit not in chosen and len(current) + len(unit) <= most
         }
-        if not more:
-            return PlacementSearch("greedy", title, tuple(steps), f"{len(now)} stations; no more fit into {most}")
-        costs = measure([*([now] if now else []), *more])
-        whole, _ = complete_sets({names_of_places(one): costs[one] for one in more})
-        if not whole:
+        if not extended:
+            return PlacementSearch(
+                "greedy", title, tuple(steps), f"{len(current)} stations; no further unit fits into {most}"
+            )
+        costs = measure([*([current] if current else []), *extended])
+        complete, _ = complete_sets({names_of_places(stations): costs[stations] for stations in extended})
+        if not complete:
             return PlacementSearch("greedy", title, tuple(steps), "nothing was measured")
-        rows = rank_sets("greedy", "", whole).rows
-        labels = {names_of_places(one): join_names(place.name for place in unit) for one, unit in more.items()}
-        best = next(one for one in more if names_of_places(one) == rows[0].stations)
-        helps = (
-            compare_paired(_measured_costs(costs[now]), _measured_costs(costs[best]))
-            if now
+        rows = rank_sets("greedy", "", complete).rows
+        labels = {
+            names_of_places(stations): join_names(place.name for place in unit) for stations, unit in extended.items()
+        }
+        best = next(stations for stations in extended if names_of_places(stations) == rows[0].stations)
+        gain = (
+            compare_paired(_measured_costs(costs[current]), _measured_costs(costs[best]))
+            if current
             else PairedDifference((), None)
         )
         tied = tuple(labels[row.stations] for row in rows[1:] if row.tied)
         changed = f"+ {labels[rows[0].stations]}"
-        steps.append(SearchStep(rows[0].stations, changed, helps.mean, helps.low, helps.high, tied))
-        have.append(more[best])
+        steps.append(SearchStep(rows[0].stations, changed, gain.mean, gain.low, gain.high, tied))
+        chosen.append(extended[best])
 
 
 def best_measured_set(size: int, costs: Mapping[StationSet, Costs]) -> StationSet:
-    """Of so many stations; BadInput if none was measured."""
-    alike = {names_of_places(one): one for one in costs if len(one) == size}
-    whole, _ = complete_sets({name: costs[one] for name, one in alike.items()})
-    if not whole:
+    """The best measured set of a size; BadInput if none was measured."""
+    same_size = {names_of_places(stations): stations for stations in costs if len(stations) == size}
+    complete, _ = complete_sets({name: costs[stations] for name, stations in same_size.items()})
+    if not complete:
         raise BadInput(f"refine: no set of {size} stations was measured.", "Name it in refine.set.")
-    return alike[sort_by_cost(whole)[0]]
+    return same_size[sort_by_cost(complete)[0]]
 
 
-def names_of_places(one: StationSet) -> StationNames:
-    return tuple(place.name for place in one)
+def names_of_places(stations: StationSet) -> StationNames:
+    """Names of the places of a set."""
+    return tuple(place.name for place in stations)
 
 
 def _measured_costs(costs: Costs) -> Costs:
@@ -200,29 +214,34 @@ def _measured_costs(costs: Costs) -> Costs:
 
 
 def _make_worth(
-    name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, found: PairedDifference
+    name: str, mode: Literal["ablate", "add", "exhaustive"], base: StationNames, gain: PairedDifference
 ) -> MarginalContribution:
-    return MarginalContribution(name, mode, base, found.mean, found.low, found.high, len(found.clips))
+    return MarginalContribution(name, mode, base, gain.mean, gain.low, gain.high, len(gain.clips))
 
 
 def _shapley_worth(
     units: Sequence[CandidateGroup], order: Sequence[CandidateGroup], costs: Mapping[StationSet, Costs]
 ) -> Iterator[MarginalContribution]:
-    """What adding a unit saves, averaged over the sets it can be added to, those of each size together counting alike:
-    Shapley's value, as far as the sets were tried."""
+    """Shapley value of each unit, over the sets that were measured.
+
+    It is the decrease of the cost when the unit is added, averaged over the sets that it can be added to. Each size of
+    sets has the same weight.
+    """
     for unit in units:
         sizes: dict[int, list[tuple[StationSet, StationSet]]] = {}
-        for one in costs:
-            if not set(unit) & set(one) and (more := station_set([one, unit], order)) in costs:
-                sizes.setdefault(len(one), []).append((one, more))
-        without = _mean_by_clip([_mean_by_clip([costs[one] for one, _ in pairs]) for pairs in sizes.values()])
-        having = _mean_by_clip([_mean_by_clip([costs[more] for _, more in pairs]) for pairs in sizes.values()])
-        found = compare_paired(without, having)
-        yield from (_make_worth(one.name, "exhaustive", (), found) for one in unit)
+        for stations in costs:
+            if not set(unit) & set(stations) and (extended := station_set([stations, unit], order)) in costs:
+                sizes.setdefault(len(stations), []).append((stations, extended))
+        without = _mean_by_clip([_mean_by_clip([costs[stations] for stations, _ in pairs]) for pairs in sizes.values()])
+        with_unit = _mean_by_clip(
+            [_mean_by_clip([costs[extended] for _, extended in pairs]) for pairs in sizes.values()]
+        )
+        gain = compare_paired(without, with_unit)
+        yield from (_make_worth(place.name, "exhaustive", (), gain) for place in unit)
 
 
 def _mean_by_clip(each: Sequence[Costs]) -> dict[str, float | None]:
-    """Clip -> mean; None where one of them has none."""
+    """Clip -> mean of several costs; None where one of them is missing."""
     out: dict[str, float | None] = {}
     for clip in dict.fromkeys(clip for costs in each for clip in costs):
         values = [costs.get(clip) for costs in each]

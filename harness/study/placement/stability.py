@@ -61,7 +61,7 @@ def rank_agreements(
 
 
 def tau_b(a: Floats, b: Floats) -> Floats:
-    """Kendall's tau-b of (..., n) and (..., n) values, over the last axis; NaN where all values of one side are equal."""
+    """Kendall's tau-b of (..., n) and (..., n) values, over the last axis; NaN where one side has only ties."""
     first, second = np.triu_indices(a.shape[-1], 1)
     sign_a, sign_b = (np.sign(side[..., first] - side[..., second]) for side in (a, b))
     with np.errstate(invalid="ignore"):

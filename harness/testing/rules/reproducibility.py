@@ -23,7 +23,7 @@ from harness.testing.rules.assertions import require_identical
 
 
 def is_deterministic(case: ContractCase) -> str:
-    """The same examples and frames give the same estimates."""
+    """Repeating a session with equal examples and frames gives equal estimates."""
     first, second = (stack_qpos(run_session(case.begin_sessions(1)[0], case.frames)) for _ in range(2))
     return require_identical(first, second)
 

@@ -232,6 +232,7 @@ def test_five_thousand_frames_load_within_a_second(tmp_path: Path) -> None:
     assert time.process_time() - start_s < 1.0
 
 
+@pytest.mark.long
 def test_every_staged_motion_parses(mocap: Path) -> None:
     """All clips are complete; in every 40th frame the body has a person's height above a floor near z = 0."""
     library = MotionLibrary(mocap)

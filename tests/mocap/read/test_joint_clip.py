@@ -140,6 +140,7 @@ def test_hinges_fitted_to_bvh_are_those_of_the_amc(mocap: Path, name: str) -> No
     assert np.rad2deg(np.abs(np.angle(np.exp(1j * turn)))).max() < 0.01
 
 
+@pytest.mark.long
 def test_every_staged_bvh_loads(mocap: Path) -> None:
     library = MotionLibrary(mocap)
     for entry in library.entries():

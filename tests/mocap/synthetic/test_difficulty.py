@@ -40,6 +40,7 @@ def mean_error_deg(estimate: Floats, truth: Floats) -> float:
     return float(np.rad2deg(np.abs((estimate - truth + np.pi) % (2.0 * np.pi) - np.pi)).mean())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("behaviour", synthetic.BEHAVIOURS)
 def test_learning_from_other_takes_beats_the_mean_pose_threefold(behaviour: str) -> None:
     """Kernel ridge regression from tracker readings to angles, trained on all takes but the test take."""

@@ -138,6 +138,7 @@ def test_the_performers_are_the_ones_that_results_were_measured_on() -> None:
     assert blake2b(bones_m.tobytes(), digest_size=8).hexdigest() == "b81940f776d8d094"
 
 
+@pytest.mark.long
 @on_every_take
 def test_joints_stay_within_limits_and_bend_the_right_way(behaviour: str, who: str, take: int) -> None:
     clip, _ = made(behaviour, who, take)

@@ -1,4 +1,4 @@
-"""Headings that positions define."""
+"""Headings estimated from positions."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ EVERY: Bools = np.ones(4, bool)
 
 @pytest.fixture
 def stations() -> Floats:
-    """(200, 4, 3) of performers who face along x with two stations before them; the anchor is the last."""
+    """(200, 4, 3) stations of performers who face along x, two of them in front; the anchor is the last."""
     rng = np.random.default_rng(3)
     middle = np.array([[0.5, 0.3, 1.0], [0.5, -0.3, 1.0], [0.0, 0.0, 1.7], [0.0, 0.0, 1.3]])
     scatter = rng.normal(0.0, 0.1, (200, 4, 3))

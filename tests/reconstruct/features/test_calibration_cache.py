@@ -1,4 +1,4 @@
-"""What is worked out for trackers is made once, anew when they are worn otherwise, and never mixed up."""
+"""The cache makes a value once per calibration, and never returns that of another."""
 
 import threading
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The moment of a frame is the device's, whenever the host got round to it."""
+"""The time of a frame is the device's, whenever the host received it."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The compiled forms against those for many poses at once."""
+"""The compiled functions for one pose against those for many poses."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from harness.reconstruct.solver.ground_frame import (
     posture_from_qpos,
     qpos_from_posture,
     qpos_from_postures,
-    step_grounds,
+    relative_ground,
 )
 from tests.reconstruct.conftest import Scene
 from tests.reconstruct.conftest import moved as elsewhere
@@ -22,13 +22,14 @@ from tests.reconstruct.conftest import moved as elsewhere
 def test_standing_and_stepping(boxing: Scene, yaw_rad: float) -> None:
     qpos = elsewhere(boxing.take.qpos, yaw_rad, (3.0, 1.0, 0.0))[30]
     step = np.array([0.1, -0.2, 0.3])
-    np.testing.assert_allclose(ground_after_step(qpos, step), step_grounds(ground_from_qpos(qpos), step), atol=1e-12)
-    posture, ground = posture_from_qpos(qpos), ground_from_qpos(qpos)
+    ground = ground_from_qpos(qpos)
+    np.testing.assert_allclose(relative_ground(ground, ground_after_step(qpos, step)), step, atol=1e-12)
+    posture = posture_from_qpos(qpos)
     np.testing.assert_allclose(qpos_from_posture(posture, ground), qpos_from_postures(posture, ground), atol=1e-12)
 
 
-def test_readings_of_an_example_are_its_controls(boxing: Scene) -> None:
-    """What exact trackers read after a window is what the database says that they would have read."""
+def test_readings_of_an_example_have_its_features(boxing: Scene) -> None:
+    """Features of exact readings after a window equal those of the database."""
     windows = MotionDatabase.build(boxing.body, [boxing.take]).windows(2, with_successor=True)
     controls = StationFeatures(boxing.body, windows, boxing.calibration, 0.3)
     qpos = elsewhere(boxing.take.qpos, 2.0, (3.0, 1.0, 0.0))

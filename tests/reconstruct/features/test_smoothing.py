@@ -1,4 +1,4 @@
-"""Eq. 6: its weights, and that on rotations it goes the shortest way."""
+"""Eq. 6: its weights, and the shorter arc for rotations."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Kernel CCA against the problem as it is written, and against regressions whose answer is known."""
+"""Kernel CCA against the eigenproblem as printed, and against regressions with a known solution."""
 
 import numpy as np
 import pytest
@@ -12,14 +12,14 @@ PAIRS, KAPPA = 14, 1e-2
 
 
 def planted(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """Inputs (m, 7), outputs (m, 5) that follow from them but for some noise, and a new input (7,)."""
+    """Inputs (m, 7), outputs (m, 5) that depend on them with noise, and a new input (7,)."""
     x = rng.normal(size=(PAIRS, 7))
     y = np.tanh(x @ rng.normal(size=(7, 5))) + 0.1 * rng.normal(size=(PAIRS, 5))
     return x, y, 0.5 * rng.normal(size=7)
 
 
 def grams(x: Floats, y: Floats, new: Floats, width: float = 0.7) -> tuple[Floats, Floats, Floats]:
-    """Gaussian kernels of both sides, as docs/methods.md E says, and the query's."""
+    """Gaussian kernels of both sides (docs/papers.md E), and the query's."""
     sharpness = [0.5 / (width**2 * scipy.spatial.distance.pdist(side, "sqeuclidean").mean()) for side in (x, y)]
     far = [np.sum((side[:, None] - side) ** 2, axis=2) for side in (x, y)]
     kernels = [np.exp(-sharp * squared) for sharp, squared in zip(sharpness, far, strict=True)]
@@ -27,7 +27,7 @@ def grams(x: Floats, y: Floats, new: Floats, width: float = 0.7) -> tuple[Floats
 
 
 def as_written(h: Floats, f: Floats, k: Floats, y: Floats, bases: int, held: bool) -> tuple[Floats, Floats]:
-    """Correlations (l,) and the answer by eq. 3 to 5, as one generalised symmetric eigenproblem on both blocks."""
+    """Correlations (l,) and prediction of eq. 3 to 5, as one generalised symmetric eigenproblem on both blocks."""
     within = scipy.linalg.null_space(np.ones((1, PAIRS)))
     n = PAIRS - 1
     centred_h, centred_f = within.T @ h @ within, within.T @ f @ within
@@ -115,7 +115,7 @@ def test_eigenvectors_are_those_of_the_matrix(rng: np.random.Generator, size: in
 @pytest.mark.parametrize("size", [2, 12, 20, 24, 31])
 @pytest.mark.parametrize("value", [0.0, 1e-200, 0.3, 1.0])
 def test_eigenvectors_of_next_to_nothing_are_numbers(size: int, value: float) -> None:
-    """What reflections leave of a matrix of rank 1 falls below what squares can hold."""
+    """Reflections of a matrix of rank 1 leave elements whose squares underflow."""
     values, rows = cca.symmetric_eigen(np.full((size, size), value))
     np.testing.assert_allclose(np.sort(values)[-1], size * value, rtol=1e-9, atol=1e-140)
     np.testing.assert_allclose(rows @ rows.T, np.eye(size), atol=1e-9)

@@ -1,4 +1,4 @@
-"""The dynamic map on motion whose truth is known, in its database and out of it."""
+"""The local dynamic model on known motion, inside and outside its database."""
 
 from dataclasses import replace
 
@@ -18,11 +18,11 @@ from tests.reconstruct.conftest import Scene, moved
 
 BOTH = [DynamicMap(), LocalPca()]
 FEW = [DynamicMap(neighbours=30), LocalPca(neighbours=60)]
-"""For one take of three seconds."""
+"""Options for one take of three seconds."""
 
 
 def angles_deg(scene: Scene, estimates: list[Estimate], truth: Floats) -> Floats:
-    """(T,) mean over the hinges of wrapped differences [deg]."""
+    """(T,) mean absolute hinge error [deg]."""
     away = np.array([e.qpos[7:] for e in estimates]) - truth[:, 7:]
     out: Floats = np.rad2deg(np.abs((away + np.pi) % (2 * np.pi) - np.pi).mean(axis=1))
     return out
@@ -88,7 +88,7 @@ def test_a_station_that_is_off_for_a_while_moves_the_pose_little(walk: Scene, me
 
 @pytest.mark.parametrize("method", BOTH)
 def test_frames_that_are_missing_or_early(walk: Scene, method: Method) -> None:
-    """The past keeps the examples' rate: a short gap is bridged, a long one begins anew, an early frame replaces."""
+    """The history keeps the examples' rate: short gaps are bridged, long ones reset it."""
     dropped = {40, 41, 60, *range(70, 90)}
     kept = [i for i in range(len(walk.frames)) if i not in dropped]
     frames = [walk.frames[i] for i in kept]
@@ -121,7 +121,7 @@ def test_what_is_far_from_all_examples_is_believed_less(walk: Scene) -> None:
 
 
 def test_with_positions_alone_the_heading_of_the_last_answers_does_not_matter(walk: Scene) -> None:
-    """Lent to the view, its error would come back with the next answer (docs/methods.md F5)."""
+    """A heading from the last estimate would feed its error back (docs/notes/traps.md F5)."""
     for inputs in ("pos", "pos+ori"):
         session = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).begin(walk.calibration)
         for frame in walk.only(inputs)[:20]:

@@ -1,4 +1,4 @@
-"""Inverse kinematics on motion whose truth is known."""
+"""Inverse kinematics on known motion."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -42,7 +42,7 @@ def test_six_clean_trackers_are_met_from_the_first_frame(
 
 
 def test_examples_help_where_trackers_are_silent(walk: Scene) -> None:
-    """The mean posture beats the previous pose; how far each hinge moves, and both together, beat either."""
+    """The prior about the mean posture beats that about the last estimate; scaled by spread it beats both."""
     previous, mean, both = (np.mean(walk.off_m(walk.run(m), walk.take.qpos)) for m in (PREVIOUS, MEAN, Ik()))
     assert both < mean < previous
 
@@ -135,7 +135,7 @@ def test_either_kind_of_reading_is_met_alone(walk: Scene, kind: str) -> None:
 
 
 def test_passes_the_pole_of_a_shoulder(walk: Scene) -> None:
-    """The middle angle of three goes from 60 to 120 deg and back: lawful only as the twin, outer two off by pi."""
+    """The middle angle of three goes from 60 to 120 deg and back: within limits only in the equivalent form."""
     names = [walk.body.model.joint(1 + d).name for d in range(48)]
     qpos = np.tile(walk.take.qpos[0], (81, 1))
     qpos[:, 7 + names.index("rhumerus.ry")] = np.deg2rad(90.0 - 30.0 * np.cos(np.linspace(0.0, 2.0 * np.pi, 81)))

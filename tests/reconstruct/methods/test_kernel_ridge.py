@@ -1,4 +1,4 @@
-"""The regression: it learns a smooth map, wherever the performer stands, and bears silent stations."""
+"""Kernel ridge regression: a smooth map, invariant to the performer's place, robust to silent stations."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ EXACT = KernelRidge(ridge=1e-6, position_noise_m=0.0, orientation_noise_rad=0.0)
 
 
 def angle_error_deg(scene: Scene, qpos: np.ndarray) -> np.ndarray:
-    """(T,) mean over the hinges."""
+    """(T,) mean absolute hinge error [deg]."""
     off = unpack(qpos)[2] - unpack(scene.take.qpos)[2]
     return np.asarray(np.rad2deg(np.abs((off + np.pi) % (2.0 * np.pi) - np.pi)).mean(axis=1))
 
@@ -31,7 +31,7 @@ def test_a_take_that_was_learnt_comes_back_wherever_it_is_performed(walk: Scene,
     assert walk.off_m(estimates, qpos).max() < 0.03  # the posture is stood by a rigid fit
 
 
-def test_a_silent_station_is_read_off_the_last_answer(walk: Scene) -> None:
+def test_a_silent_station_takes_its_value_at_the_last_estimate(walk: Scene) -> None:
     frames = [drop_stations(f, [0]) if k > 10 else f for k, f in enumerate(walk.frames)]
     error_deg = angle_error_deg(walk, np.array([e.qpos for e in walk.run(KernelRidge(), frames)]))
     mean_deg = np.rad2deg(np.abs(unpack(walk.take.qpos)[2] - unpack(walk.take.qpos)[2].mean(axis=0))).mean()

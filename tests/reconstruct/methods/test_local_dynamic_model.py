@@ -22,7 +22,7 @@ def examples(rng: np.random.Generator, count: int, rank: int, size: int = 20) ->
 def test_a_planted_linear_system_is_recovered(
     rng: np.random.Generator, kept: float, off: float, count: int, rank: int
 ) -> None:
-    """Without a ridge a factor of the singular X X^T needs a trace of one."""
+    """Without a ridge, factorising the singular X X^T needs a tiny one."""
     away, weight = examples(rng, count, rank)
     slope, level = rng.normal(size=(away.shape[1], 7)), rng.normal(size=7)
     found = forecast(away, away @ slope + level, weight, kept, 0.0)
@@ -31,7 +31,7 @@ def test_a_planted_linear_system_is_recovered(
 
 
 def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.Generator) -> None:
-    """More examples than numbers: the normal equations, with a trace of a ridge."""
+    """More examples than columns: the normal equations, with a tiny ridge."""
     away = rng.normal(size=(400, 12))
     weight = neighbour_weights(np.sort(rng.uniform(0.0, 2.0, 400)), 0.7)
     slope, level = rng.normal(size=(12, 7)), rng.normal(size=7)
@@ -42,7 +42,7 @@ def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.
 
 @pytest.mark.parametrize("ridge", [1e-6, 1e-3, 0.1])
 def test_many_examples_and_few_are_solved_alike(rng: np.random.Generator, ridge: float) -> None:
-    """The normal equations give what the K x K space gives: zeros beside the numbers change nothing but the way."""
+    """Normal equations and K x K space agree: appended zero columns change only the formulation."""
     away, after = rng.normal(size=(100, 12)), rng.normal(size=(100, 6))
     weight = neighbour_weights(np.sort(rng.uniform(0.0, 2.0, 100)), 0.7)
     primal = forecast(away, after, weight, 1.0, ridge)
@@ -52,7 +52,7 @@ def test_many_examples_and_few_are_solved_alike(rng: np.random.Generator, ridge:
 
 
 def _unreachable(away: Floats, weight: Floats) -> Floats:
-    """What of the query, the origin, lies outside the examples' plane: no regression knows its effect."""
+    """A part of the query (the origin) lies outside the examples' plane: the regression ignores it."""
     middle = weight @ away
     _, spread, axes = np.linalg.svd(away - middle)
     axes = axes[: np.count_nonzero(spread > 1e-9 * spread[0])]
@@ -104,7 +104,7 @@ def test_single_precision_is_good_enough(rng: np.random.Generator) -> None:
 
 @pytest.mark.parametrize("spread", [1e-3, 0.01, 0.1])
 def test_single_precision_is_good_enough_far_from_the_examples(rng: np.random.Generator, spread: float) -> None:
-    """As after a turn of all readings: neighbours are alike, and none is near."""
+    """A distant query, as after a rotation of all readings: all neighbours are about equally far."""
     away, weight = examples(rng, 800, 40)
     far: Singles = (spread * away + rng.normal(0.0, 0.5, away.shape[1])).astype(np.float32)
     after: Singles = (far @ rng.normal(0.0, 0.1, (away.shape[1], 6)) + rng.normal(0.0, 0.1 * spread, (800, 6))).astype(

@@ -1,4 +1,4 @@
-"""Solving within a local linear model: slopes against differences, and confinement."""
+"""Solving within a local linear model: gradients against finite differences, and the subspace."""
 
 import numpy as np
 import pytest
@@ -83,7 +83,7 @@ def test_undamped_steps_solve_the_normal_equations_within_the_space(walk: Scene,
 
 
 def test_what_is_left_out_varies_least(walk: Scene) -> None:
-    """Found by inverse iteration: orthonormal, and next to no more variance than the smallest eigenvalues hold."""
+    """Directions by inverse iteration are orthonormal and hold hardly more variance than the least eigenvalues."""
     space, scatter = space_of(walk, 40), scatter_of(postures_of(walk))
     np.testing.assert_allclose(space.normals @ space.normals.T, np.eye(12), atol=1e-10)
     held = np.trace(space.normals @ scatter @ space.normals.T)
@@ -96,7 +96,7 @@ def test_inverse(rng: np.random.Generator) -> None:
 
 
 def test_costs_are_those_of_c2(walk: Scene, rng: np.random.Generator) -> None:
-    """Up to a constant: alpha/2 (q - p)^T Lambda^-1 (q - p) and beta/2 |q - expected|^2, written out."""
+    """The cost is alpha/2 (q - p)^T Lambda^-1 (q - p) + beta/2 |q - expected|^2 up to a constant."""
     postures, expected = postures_of(walk), posture_from_qpos(walk.take.qpos[33])
     space, scatter = fit_subspace(postures, 7, 0.8, expected, 3.0), scatter_of(postures)
 

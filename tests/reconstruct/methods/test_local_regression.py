@@ -1,4 +1,4 @@
-"""The second paper's methods: what they must do alike, and what each does by itself."""
+"""The methods of Kim et al. 2012: common properties, and those of each."""
 
 from dataclasses import replace
 
@@ -11,6 +11,7 @@ from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.anchor_frame import anchor_of
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
+from harness.reconstruct.features.ground_step import step_ground
 from harness.reconstruct.features.query_features import QueryFeatures
 from harness.reconstruct.methods.kernel_cca import KernelCca
 from harness.reconstruct.methods.local_regression import LocalRegression
@@ -25,7 +26,7 @@ IDS = [method.name for method in METHODS]
 
 
 def angle_error_deg(scene: Scene, qpos: np.ndarray) -> np.ndarray:
-    """(T,) mean over the hinges."""
+    """(T,) mean absolute hinge error [deg]."""
     off = unpack(qpos)[2] - unpack(scene.take.qpos)[2]
     return np.asarray(np.rad2deg(np.abs((off + np.pi) % (2.0 * np.pi) - np.pi)).mean(axis=1))
 
@@ -88,6 +89,7 @@ def test_when_all_are_lost_it_says_so_and_goes_on_by_itself(walk: Scene, method:
     assert walk.off_m(estimates, walk.take.qpos)[72:].max() < 0.02
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("method", METHODS, ids=IDS)
 def test_the_closed_form_meets_every_limb_tracker(walk: Scene, method: LocalRegression) -> None:
     estimates = walk.run(replace(method, solve="limbs"))
@@ -108,7 +110,7 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     assert examples.nearest(query, trust, 1).tolist() == [row]
     inputs, asked, poses = examples.regression_data(np.array([row]), np.array([row]), query, trust)
     np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
-    stood = ground_frame.qpos_from_postures(poses[0, :52], ground_frame.step_grounds(np.array(view), poses[0, 52:]))
+    stood = ground_frame.qpos_from_postures(poses[0, :52], step_ground(np.array(view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 

@@ -69,6 +69,7 @@ def test_the_page_is_whole_and_quiet(page: Any, seen: dict[str, list[str]]) -> N
     assert seen == {"requests": [], "errors": []}
 
 
+@pytest.mark.long
 def test_the_slider_moves_the_figures(page: Any, seen: dict[str, list[str]]) -> None:
     assert not page.evaluate("'Plotly' in window"), "the library is unpacked before it is needed"
     page.locator("#stage").scroll_into_view_if_needed()

@@ -253,6 +253,7 @@ def test_rendered_strips_show_two_bodies(tmp_path: Path, renders: None) -> None:
         assert np.mean(blue - red > 0.1) > 0.003, "no blue truth"
 
 
+@pytest.mark.long
 def test_the_movie_plays_in_real_time(tmp_path: Path, renders: None) -> None:
     import imageio_ffmpeg
 

@@ -60,7 +60,7 @@ def test_it_opens_on_how_far_it_came_and_what_was_found(folder: Path) -> None:
     said = sentence(sweep)
     assert said.startswith("168 of 257 cells finished, 84 failed, 5 still to run. dynamic_map has the lowest error: ")
     assert re.search(
-        r"error over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$",
+        r"over 14 clips\. The next is ik with [\d.]+ deg; it is worse by [\d.]+ to [\d.]+ deg \(95 % interval\)\.$",
         said,
     )
     raw = (folder / "report.html").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Flesh that gives way: the oscillator against its closed form, its sizes against published ones; and loose straps."""
+"""Soft tissue artefact: the oscillator against closed forms, sizes against published ones; and strap slips."""
 
 from dataclasses import replace
 
@@ -32,14 +32,14 @@ KNEE = Mount("below_knee", "rtibia", 0.3, 0.0)
 
 
 def own_axes(true: SimulatedReadings, seen: SimulatedReadings) -> Floats:
-    """(N, S, 3) how far stations are from where they were, along their axes there [m]."""
+    """(N, S, 3) displacement of stations in their own axes [m]."""
     return rotations.rotate(rotations.inverse(true.turn), seen.position_m - true.position_m)
 
 
 def worn_through(
     body: Body, take: BodyMotion, *mounts: Mount, wobble: SoftTissueArtefact | None = None
 ) -> SimulatedReadings:
-    """What these trackers say of a take, with nothing else wrong."""
+    """Readings of a take with this component alone."""
     trajectory, tracker = Trajectory(body, take), TrackerConfig(rate_hz=40.0, slot_s=0.0)
     time_s = sampling_times_s(trajectory.duration_s, tracker, len(mounts))
     return simulate_readings(trajectory, mounts, tracker, Noise(soft_tissue=wobble), time_s, seed=1, take=take.name)
@@ -96,7 +96,7 @@ def test_a_ramp_of_push_is_followed_as_the_closed_form_says(damping: float) -> N
 
 
 def test_the_rate_of_sampling_does_not_change_the_motion(rng: np.random.Generator) -> None:
-    """Of a push that is straight between the slower samples; stiff and soft oscillators side by side."""
+    """For a piecewise linear push two sampling rates agree, for stiff and soft oscillators."""
     knots = rng.normal(size=(40, 3))
     finer = np.arange(391) / 10.0
     dense = np.stack([np.interp(finer, np.arange(40.0), column) for column in knots.T], axis=1)
@@ -202,7 +202,7 @@ def test_flesh_of_no_bone() -> None:
         soft_tissue.tissue_thickness_m("femur", 0.5)
 
 
-def test_loose_straps_slip_as_often_and_as_far_as_said(still: Still) -> None:
+def test_strap_slips_have_the_given_rate_and_size(still: Still) -> None:
     slipped, along, around = [], [], []
     for seed in range(60):
         true, seen = still(0.5, 8, seed=seed), still(0.5, 8, seed=seed)

@@ -48,10 +48,10 @@ def random_values(count: int, seed: int = 1) -> RecordValues:
     )
 
 
-def encode_bytes(codes: tuple[int, ...], given: RecordValues, settings: RecordFormat, stations: bytes = b"1") -> bytes:
-    count = len(given.measured_s)
+def encode_bytes(codes: tuple[int, ...], values: RecordValues, settings: RecordFormat, stations: bytes = b"1") -> bytes:
+    count = len(values.measured_s)
     characters = np.resize(np.frombuffer(stations, np.uint8), count)
-    return to_bytes(codes, encode_records(codes, characters, given, settings), settings)
+    return to_bytes(codes, encode_records(codes, characters, values, settings), settings)
 
 
 def decode_table(data: bytes, codes: tuple[int, ...], settings: RecordFormat, stations: bytes = b"123") -> Table:
@@ -72,8 +72,8 @@ def ascii_format(unit: float = INCHES, tick: float = 1e-3) -> RecordFormat:
 
 
 def test_example_d_position_and_angles_in_inches() -> None:
-    given = RecordValues(np.zeros(1), *POSE, np.ones(1))
-    assert encode_bytes((2, 4, 1), given, ascii_format()) == EXAMPLE_D
+    values = RecordValues(np.zeros(1), *POSE, np.ones(1))
+    assert encode_bytes((2, 4, 1), values, ascii_format()) == EXAMPLE_D
     readings = decode(EXAMPLE_D, (2, 4, 1), ascii_format())
     np.testing.assert_allclose(readings.position_m, POSE[0], atol=0.5 * 0.01 * INCHES)
     assert rotations.angle_between_rad(readings.tracker_from_station[0], POSE[1][0]) < 1e-6
@@ -81,8 +81,8 @@ def test_example_d_position_and_angles_in_inches() -> None:
 
 def test_example_e_quality_time_buttons_and_joystick() -> None:
     codes = (40, 2, 4, 21, 22, 23, 1)
-    given = RecordValues(np.array([12.345]), *POSE, np.array([214.0 / 255.0]), np.array([5]), np.array([[127, 255]]))
-    assert encode_bytes(codes, given, ascii_format(), b"3") == EXAMPLE_E
+    values = RecordValues(np.array([12.345]), *POSE, np.array([214.0 / 255.0]), np.array([5]), np.array([[127, 255]]))
+    assert encode_bytes(codes, values, ascii_format(), b"3") == EXAMPLE_E
     rows = decode_table(EXAMPLE_E, codes, ascii_format())
     assert (rows["buttons"][0], rows["joystick"][0].tolist(), rows["quality"][0]) == (5, [127, 255], 214)
     readings = decode(EXAMPLE_E, codes, ascii_format())
@@ -116,21 +116,21 @@ def test_lengths_match_the_documented_table(codes: tuple[int, ...], length: int)
 
 
 def test_adjacent_wide_numbers_are_cut_by_column() -> None:
-    given = RecordValues(np.zeros(1), np.array([[-12.5, -100.0, -999.0]]) * 0.01, POSE[1], np.ones(1))
-    data = encode_bytes((2, 1), given, ascii_format(0.01))
+    values = RecordValues(np.zeros(1), np.array([[-12.5, -100.0, -999.0]]) * 0.01, POSE[1], np.ones(1))
+    data = encode_bytes((2, 1), values, ascii_format(0.01))
     assert data == b"01  -12.50-100.00-999.00\r\n"
     assert decode_table(data, (2, 1), ascii_format(0.01))["position"].tolist() == [[-12.5, -100.0, -999.0]]
 
 
 def test_a_number_too_wide_for_its_column_becomes_the_widest_number() -> None:
-    given = RecordValues(np.array([1e12]), np.array([[1e6, -1e6, np.inf]]), POSE[1], np.ones(1))
-    data = encode_bytes((2, 21, 1), given, ascii_format(0.01, 1e-6))
+    values = RecordValues(np.array([1e12]), np.array([[1e6, -1e6, np.inf]]), POSE[1], np.ones(1))
+    data = encode_bytes((2, 21, 1), values, ascii_format(0.01, 1e-6))
     assert data == b"01 9999.99-999.999999.99" + b"99999999999999"[:14] + b"\r\n"
 
 
 def test_a_nan_makes_no_record() -> None:
-    given = RecordValues(np.array([1.0]), np.array([[np.nan, 0.0, 0.0]]), POSE[1], np.ones(1))
-    data = encode_bytes((2, 1), given, ascii_format())
+    values = RecordValues(np.array([1.0]), np.array([[np.nan, 0.0, 0.0]]), POSE[1], np.ones(1))
+    data = encode_bytes((2, 1), values, ascii_format())
     assert data == b"01     nan   0.00   0.00\r\n"
     decoder = Decoder({ord("1"): (2, 1)}, ascii_format())
     assert not [event for event in [*decoder.feed(data), *decoder.finish()] if isinstance(event, RecordRun)]
@@ -152,8 +152,8 @@ def test_a_malformed_field_makes_no_record(field: bytes) -> None:
 def test_every_item_is_encoded_and_decoded(codes: tuple[int, ...], unit: float, tick: float, binary: bool) -> None:
     """As the same bytes; the pose as exactly as its form allows."""
     settings = RecordFormat(unit, tick, binary)
-    given = random_values(40)
-    data = encode_bytes(codes, given, settings, b"123")
+    values = random_values(40)
+    data = encode_bytes(codes, values, settings, b"123")
     rows = decode_table(data, codes, settings)
     assert to_bytes(codes, rows, settings) == data
     readings = decode_readings(rows, np.zeros(40), b"123", settings)
@@ -161,17 +161,19 @@ def test_every_item_is_encoded_and_decoded(codes: tuple[int, ...], unit: float, 
     assert readings.station.tolist() == [k % 3 for k in range(40)]
     position_m, angle_rad = _tolerances(codes, settings)
     if position_m < np.inf:
-        assert np.abs(readings.position_m - given.position_m).max() <= position_m
+        assert np.abs(readings.position_m - values.position_m).max() <= position_m
     if angle_rad < np.inf:
-        assert rotations.angle_between_rad(readings.tracker_from_station, given.tracker_from_station).max() <= angle_rad
+        assert (
+            rotations.angle_between_rad(readings.tracker_from_station, values.tracker_from_station).max() <= angle_rad
+        )
     if 21 in codes:
-        assert np.abs(readings.measured_s - given.measured_s).max() <= 1e-6 + (0.0 if binary else 0.5 * tick)
+        assert np.abs(readings.measured_s - values.measured_s).max() <= 1e-6 + (0.0 if binary else 0.5 * tick)
     if 22 in codes:
-        assert rows["buttons"].tolist() == np.asarray(given.buttons).tolist()
+        assert rows["buttons"].tolist() == np.asarray(values.buttons).tolist()
     if 23 in codes:
-        assert rows["joystick"].tolist() == np.asarray(given.joystick).tolist()
+        assert rows["joystick"].tolist() == np.asarray(values.joystick).tolist()
     if 40 in codes or 76 in codes:
-        assert np.abs(readings.quality - given.quality).max() <= 0.5 / (255 if 40 in codes else 100) + 1e-9
+        assert np.abs(readings.quality - values.quality).max() <= 0.5 / (255 if 40 in codes else 100) + 1e-9
 
 
 def _tolerances(codes: tuple[int, ...], settings: RecordFormat) -> tuple[float, float]:

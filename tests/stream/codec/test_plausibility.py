@@ -129,6 +129,7 @@ def test_readings_are_concatenated_unchanged() -> None:
     np.testing.assert_array_equal(concatenate_readings([readings[:7], readings[7:]]).position_m, readings.position_m)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("behaviour", "rate_hz"), [("boxing", 120.0), ("jumping", 40.0)])
 def test_no_sound_reading_of_a_simulation_is_marked(behaviour: str, rate_hz: float) -> None:
     """With every noise preset and disturbance, and with the 16-bit list too."""

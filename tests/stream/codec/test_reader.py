@@ -71,6 +71,7 @@ def test_chunks_change_only_the_times_of_reception(chunk: int) -> None:
         assert all(np.array_equal(a, b) for a, b in zip(station_columns(first), station_columns(second), strict=True))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["flipped", "lost", "added"])
 def test_a_damaged_byte_costs_the_record_that_it_touches_and_rarely_another(
     kind: str, rng: np.random.Generator

@@ -49,6 +49,7 @@ def until(stream: Is900, condition: Callable[[TrackerFrame], bool]) -> list[Trac
     return frames
 
 
+@pytest.mark.long
 def test_the_stream_contract_holds(serve: Serve) -> None:
     with serve() as emulator:
         opened: list[Is900] = []
@@ -64,6 +65,7 @@ def test_the_stream_contract_holds(serve: Serve) -> None:
         assert not emulator.emulator.device.streaming
 
 
+@pytest.mark.long
 def test_the_driver_reconnects_after_unplugging(serve: Serve) -> None:
     events: list[LineEvent] = []
     with serve(EmulatorConfig(faults=(Fault("disconnect", at_s=(4.0,), lasts_s=1.5),))) as emulator:
@@ -89,6 +91,7 @@ def nothing_left() -> Iterator[None]:
     assert resources() == before
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("nothing_left")
 def test_nothing_is_left_behind(serve: Serve) -> None:
     faults = (Fault("disconnect", at_s=(4.0,), lasts_s=0.3), Fault("reset", at_s=(6.0,)))
@@ -182,6 +185,7 @@ def test_a_second_client_is_refused(serve: Serve) -> None:
         Is900(emulator.name)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("baud", [9600, 57600])
 def test_the_baud_rate_of_a_real_port_is_detected(baud: int, tmp_path: Path) -> None:
     config = EmulatorConfig(baud=baud, check_baud=True)

@@ -80,6 +80,7 @@ def test_a_pty_is_raw_and_echoes_nothing(pty_emulator: RunningEmulator, link: Pa
     os.close(client)
 
 
+@pytest.mark.long
 def test_a_client_that_does_not_read_loses_whole_records(pty_emulator: RunningEmulator, link: Path) -> None:
     client = open_client(link)
     os.write(client, SET_UP)

@@ -99,6 +99,7 @@ def stopped(out: Path, ending: signal.Signals) -> tuple[int, str]:
     return program.returncode, said
 
 
+@pytest.mark.long
 def test_a_killed_study_keeps_its_cells_and_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "tiny"
     assert stopped(out, signal.SIGKILL)[0] == -signal.SIGKILL

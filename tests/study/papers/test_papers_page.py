@@ -24,7 +24,9 @@ def test_every_experiment_and_no_other_has_a_row() -> None:
 
 
 def test_every_verdict_has_a_row() -> None:
-    assert re.findall(r"^\| (\S) ([a-z ]+) \|", PAGE, re.MULTILINE) == [(mark, word) for word, mark in MARKS.items()]
+    assert re.findall(r"^\| (\S) ([a-z ]+) \|", PAGE.split("## Reproduction")[1], re.MULTILINE) == [
+        (mark, word) for word, mark in MARKS.items()
+    ]
 
 
 def test_every_file_that_is_named_is_there() -> None:
@@ -38,7 +40,7 @@ def test_the_experiment_of_the_page_is_one(tmp_path: Path) -> None:
     """The experiment in the text runs; without results its claim is "not run"."""
     (code,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
     imports = (
-        "from harness.results.findings import PaperExperiment\nfrom harness.study.papers.claims import claim_lower_error\n"
+        "from harness.results.findings import PaperExperiment\nfrom harness.compare.claims import claim_lower_error\n"
         "from harness.study.papers.paper_study import PaperStudy\n"
         "from harness.study.papers.tables import errors_by_clip, mean_bars\n\n\n"
     )

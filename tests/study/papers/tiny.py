@@ -1,14 +1,14 @@
-"""A paper of two short runs, for tests; `python -m tests.study.papers.tiny --out DIR` is the verb with it for any paper."""
+"""A paper of two short runs for tests; `python -m tests.study.papers.tiny --out DIR` runs the verb `paper` with it."""
 
 import sys
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from harness.cli import main
+from harness.compare.claims import claim_lower_error
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
 from harness.results.findings import PaperExperiment
 from harness.study.papers import paper as papers
-from harness.study.papers.claims import claim_lower_error
 from harness.study.papers.paper import Paper
 from harness.study.papers.paper_study import PaperStudy
 from harness.study.papers.tables import error_lines, errors_by_clip, errors_by_joint_group, mean_bars, mean_table

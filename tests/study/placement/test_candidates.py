@@ -105,7 +105,7 @@ def test_places_that_nobody_can_wear_are_named() -> None:
         CandidateGrid(("rtibia", "rwrist"), (0.5,), (0.0, 90.0)),
         Candidate("far", "head", 1.5),
     ]
-    with pytest.raises(BadInput, match="3 of 7 candidates cannot be worn") as refusal:
+    with pytest.raises(BadInput, match="3 of 7 candidates are impossible") as refusal:
         make_candidate_groups(tables, STANDARD.with_bones(bone_m))
     for named in ("rwrist_50_0 (Station", "rwrist_50_90 (Station", "which has no length", "far (along = 1.5"):
         assert named in str(refusal.value)
@@ -116,9 +116,9 @@ def test_places_that_nobody_can_wear_are_named() -> None:
     ("tables", "said"),
     [
         ([], "No candidates"),
-        ([ANKLE, replace(ANKLE, along=0.5)], "'left_ankle', 'right_ankle' twice"),
-        ([replace(PELVIS, pair="each")], "which is in the middle"),
-        ([replace(ANKLE, name="left_ankle")], "sits on rtibia"),
+        ([ANKLE, replace(ANKLE, along=0.5)], "Duplicate names of candidates: 'left_ankle', 'right_ankle'"),
+        ([replace(PELVIS, pair="each")], "in the middle of the body"),
+        ([replace(ANKLE, name="left_ankle")], "is on rtibia"),
     ],
 )
 def test_candidates_that_make_no_sense_are_refused(tables: list[Candidate], said: str) -> None:
@@ -139,5 +139,5 @@ def test_sets_are_named_by_candidates_or_pairs_in_the_order_of_the_candidates() 
         "pelvis",
     ]
     assert select_groups([], units, "x") == units
-    with pytest.raises(BadInput, match=r"greedy.base names 'knee'.*Known: right_ankle, left_ankle, pelvis"):
+    with pytest.raises(BadInput, match=r"greedy.base has 'knee'.*candidates are right_ankle, left_ankle, pelvis"):
         select_groups(["knee"], units, "greedy.base")

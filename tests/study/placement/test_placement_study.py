@@ -159,7 +159,7 @@ def test_a_set_that_does_not_suffice_is_said_so(done: tuple[Path, Path, Placemen
     _, _, findings = done
     assert [claim.verdict for claim in findings.claims] == ["not reproduced", "not reproduced"]
     assert "pelvis" in findings.claims[0].text
-    assert all("judged on the clips on which the best other was chosen" in claim.why for claim in findings.claims)
+    assert all("tested on the clips on which the best other set was chosen" in claim.why for claim in findings.claims)
 
 
 def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings]) -> None:
@@ -173,7 +173,9 @@ def test_conditions_rank_the_same_sets(done: tuple[Path, Path, PlacementFindings
 
 
 def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
-    changes = '[exhaustive]\nmost = 1\n[changes.components]\nslip = [{ station = "pelvis" }]'  # nobody else has it
+    changes = (
+        '[exhaustive]\nmost = 1\n[changes.components]\nmount_slip = [{ station = "pelvis" }]'  # nobody else has it
+    )
     findings, outcome = run_placement(written(tmp_path, changes), tmp_path / "out")
     assert outcome is Outcome.INCOMPLETE
     assert len(findings.failures) == 2 * 2  # sets without a pelvis
@@ -184,17 +186,17 @@ def test_a_cell_that_fails_stops_nothing_and_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("tables", "said"),
     [
-        ([""], "nothing to try"),
+        ([""], "no search mode"),
         (["[exhaustive]\nmost = 13"], "1 to 12 stations"),
-        (["[exhaustive]\nmost = 2\nmost_cells = 11"], "6 sets of up to 2 of 3 trackers are 12 cells"),
-        (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base names 'knee'"),
-        (["[refine]\nset = ['pelvis']\nalong = []"], "as many of both"),
-        (["[refine]\nset = ['pelvis']"], "on 2 clips none of 4 moves .* 8 clips or more"),
+        (["[exhaustive]\nmost = 2\nmost_cells = 11"], "6 sets of up to 2 of 3 stations are 12 cells"),
+        (["[greedy]\nmost = 2\nbase = ['knee']"], "greedy.base has 'knee'"),
+        (["[refine]\nset = ['pelvis']\nalong = []"], "equally many of both"),
+        (["[refine]\nset = ['pelvis']"], "with 2 clips, none of 4 moves .* 8 clips or more"),
         (["[refine]\nset = ['pelvis']\nalong = [0.1, 0.0]"], "steps above 0"),
-        (["[ablate]\n[changes]\nmethods = ['ik']"], "The study has its own"),
+        (["[ablate]\n[changes]\nmethods = ['ik']"], "The study defines these keys"),
         (["[ablate]\n[changes]\nnoise = 'loud'"], "loud"),
-        (["[ablate]\n[[condition]]\nname = 'a'\n[[condition]]\nname = 'a'"], "names of their own"),
-        (["[ablate]\n[[claim]]\ntext = 't'\nsource = 's'\nset = ['knee']"], "names 'knee'"),
+        (["[ablate]\n[[condition]]\nname = 'a'\n[[condition]]\nname = 'a'"], "distinct names"),
+        (["[ablate]\n[[claim]]\ntext = 't'\nsource = 's'\nset = ['knee']"], "has 'knee'"),
         (["[[candidate]]\nname = 'far'\nbone = 'head'\nalong = 2.0\n[ablate]"], "far .along = 2"),
         (["[[candidate]]\nname = 'x'\nbone = 'headd'\n[ablate]"], "Did you mean 'head'"),
         (["[abblate]"], "Did you mean 'ablate'"),
@@ -214,8 +216,8 @@ def test_what_makes_no_sense_is_refused_before_anything_is_written(
         ('kind = "sweep"', "kind = 'sweep'"),
         ("schema = 2", "schema 2"),
         ('metric = "mpjpe"', "no metric called 'mpjpe'"),
-        ('metric = "lag_ms"', "says how good an estimate is"),
-        ('held_out = ["walking_p1_01@0.20-0.25"]', "also chosen on"),
+        ('metric = "lag_ms"', "metric of accuracy, smoothness or time"),
+        ('held_out = ["walking_p1_01@0.20-0.25"]', "also a test clip"),
         ('held_out = ["walking_p9_01"]', "walking_p9_01"),
         ("methods = []", "no methods"),
         ('methods = ["nobody"]', "nobody"),

@@ -27,7 +27,7 @@ def costs(level: float, jitter: float = 0.01, clips: int = 8) -> Costs:
 
 
 def verdicts(found: dict[StationNames, Costs]) -> tuple[Claim, Claim]:
-    return evaluate_claim(CLAIM, SUITED, OTHER, WHOLE, found, unit="deg", judged_on="on some clips")
+    return evaluate_claim(CLAIM, SUITED, OTHER, WHOLE, found, unit="deg", basis="on some clips")
 
 
 def test_a_set_is_held_against_all_others_of_its_size_among_the_papers_trackers() -> None:

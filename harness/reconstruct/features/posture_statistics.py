@@ -1,0 +1,50 @@
+"""Mean and spread of the hinge angles of examples, on which priors of the posture rest."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from harness.body.humanoid import Body, tpose
+from harness.core.arrays import Floats
+from harness.core.motion import BodyMotion
+from harness.errors import BadInput
+from harness.reconstruct.database import MotionDatabase
+from harness.reconstruct.solver.ground_frame import HINGES
+from harness.reconstruct.solver.hinge_limits import HingeLimits
+
+
+def mean_posture(body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> Floats:
+    """(55,) circular mean of the examples' hinge angles [rad], with the root of the T-pose; BadInput without examples.
+
+    Angles are averaged as directions, in principal form and within the limits.
+    """
+    limits, total, count = HingeLimits(body), np.zeros((2, 48)), 0
+    for angles in _principal_angles(limits, examples):
+        total += [np.sum(np.sin(angles), axis=0), np.sum(np.cos(angles), axis=0)]
+        count += len(angles)
+    if not count:
+        raise BadInput("The mean posture is learnt from examples, and there are none.", "Name some in the scenario.")
+    out = np.array(tpose(body.skeleton))
+    out[7:] = limits.clip(limits.principal(np.arctan2(*total)))
+    return out
+
+
+def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, centre: Floats) -> Floats:
+    """(48,) RMS deviation of the examples' hinge angles from those of a configuration (55,) [rad]."""
+    limits, total, count = HingeLimits(body), np.zeros(48), 0
+    for angles in _principal_angles(limits, examples):
+        away = np.remainder(angles - centre[7:] + np.pi, 2.0 * np.pi) - np.pi
+        total += np.sum(away**2, axis=0)
+        count += len(angles)
+    return np.sqrt(total / count)
+
+
+def _principal_angles(limits: HingeLimits, examples: Sequence[BodyMotion] | MotionDatabase) -> Iterator[Floats]:
+    """Principal hinge angles (T, 48) [rad], take by take, since a database may be larger than memory."""
+    if isinstance(examples, MotionDatabase):
+        for run in examples.segments:
+            yield limits.principal(examples.posture[run.start : run.stop, HINGES].astype(float))
+        examples.release_memory()
+    else:
+        for take in examples:
+            yield limits.principal(take.qpos[:, 7:])
