@@ -8,7 +8,8 @@ For every frame:
 
 Source: Liu et al. 2011, eq. 2 to 14. Three variants:
 
-- `dynamic_map:literal`: the paper as printed. Windows are compared by the last m estimates.
+- `dynamic_map:literal`: a first literal reading of the paper; it answers mostly by its IK fallback. Windows are
+  compared by the last m estimates.
 - `dynamic_map:window`: the same search, with a ridge in place of cut-off components, wider weights and sigmas.
 - `dynamic_map` (ours): readings take part in the search and in the regression, by features from a reduced-rank
   regression (`reduced_rank_regression`). A prediction from its own estimates alone drifts with its errors.

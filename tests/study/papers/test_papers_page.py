@@ -30,7 +30,7 @@ def test_every_verdict_has_a_row() -> None:
 
 
 def test_every_file_that_is_named_is_there() -> None:
-    names = re.findall(r"`((?:harness|scenarios)/[a-z0-9_/.*]+)`", PAGE) + re.findall(r"\]\(([^)]+)\)", PAGE)
+    names = re.findall(r"`((?:harness|scenarios)/[a-z0-9_/.*]+)`", PAGE) + re.findall(r"\]\(([^)#]+)", PAGE)
     assert len(names) > 5
     for name in names:
         assert list(ROOT.glob(name)) or (ROOT / "docs" / name).exists(), name
