@@ -67,7 +67,9 @@ def add_calibrate(verbs: Verbs) -> None:
     verb.add_argument("--pictures", type=Path, metavar="DIR", help="folder of --view frames")
     text = "with --simulate: standard deviation of each hinge from each pose [deg] (default 2.5)"
     verb.add_argument("--miss", type=float, metavar="DEG", help=text)
-    verb.add_argument("--noise", metavar="PRESET", help="with --simulate: clean, noise or default (default: default)")
+    verb.add_argument(
+        "--noise", metavar="PRESET", help="with --simulate: clean, noise or default (the last is used if none is given)"
+    )
 
 
 def run_calibrate(args: argparse.Namespace) -> Outcome:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from harness.core.number_format import count_noun
 from harness.experiment.planning import cell_names
 from harness.experiment.scenario import Scenario, load_scenario, shipped_scenarios, variants
 from harness.experiment.sweep_config import expand_sweep, load_sweep, shipped_sweeps
@@ -44,7 +45,7 @@ def _describe_scenario(name: str) -> str:
     scenario = load_scenario(name)
     motion = scenario.motion
     return (
-        f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {len(motion.test)} clips, "
+        f"{motion.source}: {', '.join(dict.fromkeys(motion.behaviours))}; {count_noun(len(motion.test), 'clip')}, "
         f"{len(scenario.worn_stations)} stations, {_describe_noise(scenario)}; {len(scenario.methods)} methods"
     )
 

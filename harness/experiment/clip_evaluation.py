@@ -253,8 +253,8 @@ class Observation:
         mounts = self.session.true_mounts
         simulation = simulate_tracker(self.subject.body, take, mounts, tracker, noise, seed=scenario.seed)
         if len(simulation.truth_s) <= WARM_UP_S * tracker.rate_hz:
-            found = f"{self.subject.part} is judged for {len(simulation.truth_s) / tracker.rate_hz:.2f} s"
-            raise BadInput(f"{found}, all of it warm-up, which no score counts.", f"Take more than {WARM_UP_S:g} s.")
+            found = f"{self.subject.part} has {len(simulation.truth_s) / tracker.rate_hz:.2f} s of motion"
+            raise BadInput(f"{found}, all of it warm-up, which is not scored.", f"Take more than {WARM_UP_S:g} s.")
         return simulation
 
     @cached_property

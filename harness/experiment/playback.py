@@ -1,5 +1,7 @@
-"""A scenario's clip, or its performer standing model for a calibration, made ready to be worn outside a run: played by
-an emulator, tracked live, or recorded."""
+"""Playback of a scenario outside a run, for the emulator, a live session or a recording.
+
+It plays a clip, or the calibration poses of the performer.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace

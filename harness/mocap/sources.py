@@ -71,7 +71,7 @@ class SyntheticSource:
 
     def check(self, name: str) -> None:
         if name not in self.names():
-            raise UnknownName("built-in take", name, self.names())
+            raise UnknownName("synthetic take", name, self.names())
 
     def subject(self, name: str) -> str:
         return _parse_take_name(name)[1]

@@ -19,7 +19,7 @@ def folder_lock(out: Path) -> Iterator[None]:
             yield
     except Timeout as error:
         advice = f"`harness status {out}` shows its progress. Wait for it, or name another folder."
-        raise BadInput(f"Another process is at work in {out}.", advice) from error
+        raise BadInput(f"Another process uses {out}.", advice) from error
 
 
 def is_running(out: Path) -> bool:

@@ -148,7 +148,7 @@ def _single_threaded() -> Iterator[None]:
 
 
 def scenario_from_manifest(manifest: Manifest) -> Scenario:
-    """What a run was of, read off its manifest, but for its methods. BadInput when it was no single scenario's."""
+    """Read the scenario of a run from its manifest, without methods. BadInput unless it is of a single scenario."""
     known = {field.name for field in fields(Scenario)}
     content = {name: value for name, value in manifest.inputs.items() if name in known}
     try:

@@ -266,9 +266,9 @@ def test_a_whole_clip_is_never_its_own_example(tmp_path: Path, split: Any) -> No
     [
         ({"methods": ("ikk",)}, "Did you mean 'ik'"),
         ({"inputs": ("position",)}, "input combination"),
-        ({"motion": replace(SMALL.motion, test=("walking_p1_99", "boxing_p2_01"))}, "built-in take"),
-        ({"motion": replace(SMALL.motion, examples=("walking_p9_01",))}, "built-in take"),
-        ({"motion": replace(SMALL.motion, withheld=("walking_p9_01@0.20-0.40",))}, "built-in take"),
+        ({"motion": replace(SMALL.motion, test=("walking_p1_99", "boxing_p2_01"))}, "synthetic take"),
+        ({"motion": replace(SMALL.motion, examples=("walking_p9_01",))}, "synthetic take"),
+        ({"motion": replace(SMALL.motion, withheld=("walking_p9_01@0.20-0.40",))}, "synthetic take"),
         ({"stations": {"head": Station("haed")}}, "bone"),
         ({"components": {"eco": {"share": 0.1}}}, "echo"),
         ({"components": {"echo": {"shar": 0.1}}}, "share"),

@@ -11,7 +11,7 @@ from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
 METRICS = (PRIMARY_METRIC, SECONDARY_METRIC, "mpjre_deg", "mpjpe_root_mm", "jitter_m_s3", "step_p50_ms", "coverage")
-"""Metrics that the page reads of each cell; table.csv has all metrics."""
+"""Metrics that the page reads of each cell; summary.csv has all metrics."""
 
 
 @dataclass(frozen=True)

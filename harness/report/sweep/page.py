@@ -95,7 +95,7 @@ def _varied(sweep: SweepData, *, with_intervals: bool, can_draw: bool) -> Markup
         if can_draw:
             charts += [chart_panel(sweep_chart(sweep, key, n, lines)) for n, lines in by_scenario.items() if lines]
         if (more := len(scenarios) - len(by_scenario)) > 0:
-            text += f" For {key.name}, {more:,} more scenarios are only in table.csv."
+            text += f" For {key.name}, {more:,} more scenarios are only in summary.csv."
         numbers = [_tables(sweep, key, n, lines) for n, lines in by_scenario.items()]
         tables.append(details(f"Numbers: {key.name}", *numbers) if can_draw else join(tag("h3", key.name), *numbers))
     return join(tag("p", text), tag("div", *charts, class_="panels broad") if charts else None, *tables)
