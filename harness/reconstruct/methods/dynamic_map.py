@@ -135,7 +135,7 @@ WINDOW = DynamicMap(
 )
 LITERAL = DynamicMap(
     "dynamic_map:literal",
-    "dynamic_map as printed in Liu et al. 2011: 99 % of the variance, no ridge, start at the nearest example",
+    "a first literal reading of Liu et al. 2011: 99 % of the variance, no ridge, start at the nearest example",
     search="history",
     poses=2,
     neighbours=40,
