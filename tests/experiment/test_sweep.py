@@ -127,7 +127,7 @@ def test_more_methods_are_added_and_other_sweeps_refused(made_up: Path) -> None:
     (made_up / "mine" / "thesis.tex").write_text("years of work")
     with pytest.raises(BadInput, match=r"thesis\.tex"):
         sweep(sweep_file(made_up), made_up / "mine")
-    with folder_lock(out), pytest.raises(BadInput, match="Another process is at work"):
+    with folder_lock(out), pytest.raises(BadInput, match="Another process uses"):
         sweep(sweep_file(made_up), out)
 
 

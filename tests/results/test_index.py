@@ -148,6 +148,6 @@ def test_a_folder_has_one_coordinator(tmp_path: Path) -> None:
     assert not is_running(tmp_path)
     with folder_lock(tmp_path):
         assert is_running(tmp_path)
-        with pytest.raises(BadInput, match="at work"), folder_lock(tmp_path):
+        with pytest.raises(BadInput, match="Another process uses"), folder_lock(tmp_path):
             pass
     assert not is_running(tmp_path)
