@@ -148,9 +148,9 @@ def test_a_local_cluster_ends_with_the_program(end: signal.Signals, tmp_path: Pa
     program = tmp_path / "program.py"
     program.write_text(
         "import time\n"
-        "from harness.experiment.executors import dask\n"
+        "from harness.experiment.executors import dask_executor\n"
         "if __name__ == '__main__':\n"
-        "    with dask('local', workers=2) as each:\n"
+        "    with dask_executor('local', workers=2) as each:\n"
         "        for which, _ in each(time.sleep, [(0.0,), (600.0,), (600.0,)]):\n"
         "            print(which, flush=True)\n"
     )
