@@ -81,8 +81,3 @@ def bone_poses(skeleton: Skeleton, qpos: Floats) -> tuple[Floats, Floats]:
     """Joint positions (T, 24, 3) [m] and `world_from_bone` (T, 24, 4) of configurations (T, 55), signs continuous."""
     pose = pose_from_qpos(skeleton, qpos)
     return pose.start_m, rotations.continuous(rotations.from_matrix(pose.world_from_bone))
-
-
-def joint_centres_m(skeleton: Skeleton, qpos: Floats) -> Floats:
-    """(T, 25, 3) positions of the root, then of each bone's far end, for configurations (T, 55) [m]."""
-    return np.concatenate([qpos[:, None, :3], pose_from_qpos(skeleton, qpos).end_m], axis=1)

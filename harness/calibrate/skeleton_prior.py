@@ -49,11 +49,6 @@ class SkeletonPrior:
         out: Floats = (self.modes.T * self.mode_sd_m**2) @ self.modes + np.diag(self.residual_sd_m**2)
         return out
 
-    def explained_variance(self) -> float:
-        """Share of the variance of the lengths that the modes explain."""
-        modes = float(np.sum(self.mode_sd_m**2))
-        return modes / (modes + float(np.sum(self.residual_sd_m**2)))
-
     def mean_skeleton(self, like: Skeleton) -> Skeleton:
         """Skeleton of mean bone lengths and directions, with the hinges of another skeleton."""
         return like.with_bones(self.mean_m[:, None] * self.direction)

@@ -52,7 +52,7 @@ def specialise(function: F, *arguments: Any) -> F:
     return cast(F, cast(Any, function).compile(tuple(map(numba.typeof, arguments))))
 
 
-class _ModuleCache(_FunctionCache):  # type: ignore[misc]
+class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: numba leaves it untyped
     """numba's cache on disk, with a stamp that also covers imported compiled modules and constants."""
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:

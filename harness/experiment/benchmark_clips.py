@@ -23,7 +23,7 @@ from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import DatabaseMethod, Method, Reconstructor
 from harness.reconstruct.database import MotionDatabase
-from harness.score.angles import wrap_angle
+from harness.score.angles import wrap_difference
 from harness.simulate.simulation import Simulation, simulate_tracker
 
 RATE_HZ, TAKE_S = 40.0, 20.0
@@ -152,4 +152,4 @@ def integrate_steps(step: Floats) -> Floats:
 
 def joint_angle_error_deg(estimate: Floats, truth: Floats) -> float:
     """Joint angle error (D1) between configurations (F, 55), averaged over frames and joints [deg]."""
-    return float(np.rad2deg(np.abs(wrap_angle(estimate[:, 7:] - truth[:, 7:])).mean()))
+    return float(np.rad2deg(np.abs(wrap_difference(estimate[:, 7:] - truth[:, 7:])).mean()))

@@ -13,8 +13,8 @@ SIP_BONES = ("lhumerus", "rhumerus", "lfemur", "rfemur")
 """Upper arms and thighs: von Marcard et al. 2017, Sparse Inertial Poser."""
 
 
-def wrap_angle(angle_rad: Floats) -> Floats:
-    """Wrap angles to +-pi; exact zeros remain exact."""
+def wrap_difference(angle_rad: Floats) -> Floats:
+    """Differences of angles wrapped to +-pi [rad]. Unlike `rotations.wrap_angle` it keeps every small value exact."""
     out: Floats = angle_rad - 2.0 * np.pi * np.round(angle_rad / (2.0 * np.pi))
     return out
 
@@ -31,7 +31,7 @@ def geodesic_deg(p: Floats, q: Floats) -> Floats:
 
 def hinge_errors_deg(pair: Pair) -> Floats:
     """(F, D) absolute wrapped difference of every hinge angle [deg]."""
-    out: Floats = np.rad2deg(np.abs(wrap_angle(pair.estimate.angles_rad - pair.truth.angles_rad)))
+    out: Floats = np.rad2deg(np.abs(wrap_difference(pair.estimate.angles_rad - pair.truth.angles_rad)))
     return out
 
 
@@ -65,7 +65,7 @@ def mpjre_axis_angle_deg(pair: Pair) -> Floats:
     truth, estimate = (
         rotations.log(rotations.from_matrix(p.parent_from_bone[:, bones])) for p in (pair.truth, pair.estimate)
     )
-    out: Floats = np.rad2deg(np.abs(wrap_angle(estimate - truth))).mean(axis=(1, 2))
+    out: Floats = np.rad2deg(np.abs(wrap_difference(estimate - truth))).mean(axis=(1, 2))
     return out
 
 
@@ -88,7 +88,7 @@ def root_angle_deg(pair: Pair) -> Floats:
 def root_heading_deg(pair: Pair) -> Floats:
     """(F,) absolute wrapped difference of the root's yaw."""
     truth, estimate = (rotations.yaw_rad(p.world_from_root) for p in (pair.truth, pair.estimate))
-    out: Floats = np.rad2deg(np.abs(wrap_angle(estimate - truth)))
+    out: Floats = np.rad2deg(np.abs(wrap_difference(estimate - truth)))
     return out
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats, Ints
-from harness.score.angles import wrap_angle
+from harness.score.angles import wrap_difference
 
 LONGEST_LAG_S = 0.5
 _FEWEST_FRAMES = 20
@@ -23,7 +23,7 @@ def lag_ms(truth_rad: Floats, estimate_rad: Floats, frame_index: Ints, rate_hz: 
         return float("nan")
     estimate, at = estimate_rad[inside], frame_index[inside]
     shifts = np.arange(-reach, reach + 1)
-    error = np.array([np.abs(wrap_angle(estimate - truth_rad[at - shift])).mean() for shift in shifts])
+    error = np.array([np.abs(wrap_difference(estimate - truth_rad[at - shift])).mean() for shift in shifts])
     if min(np.ptp(error), np.ptp(estimate, axis=0).max()) < 1e-9:
         return float("nan")
     best = int(np.argmin(error))

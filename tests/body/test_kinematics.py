@@ -10,6 +10,7 @@ from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from tests.body.conftest import random_qpos
+from tests.joint_centres import joint_centres_m
 
 STATIONS = tuple(mounts.DEFAULT_MOUNTS)
 
@@ -68,7 +69,7 @@ def test_whole_takes_agree_with_single_poses(worn: Worn, rng: np.random.Generato
     kin = worn[0]
     own, qpos = kin.body.skeleton, random_qpos(rng, 12)
     joints_m, turns = kinematics.bone_poses(own, qpos)
-    centres_m = kinematics.joint_centres_m(own, qpos)
+    centres_m = joint_centres_m(own, qpos)
     assert centres_m.shape == (12, 25, 3)
     for frame, configuration in enumerate(qpos):
         kin.set(configuration)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from harness.calibrate.skeleton_prior import LEAST_RESIDUAL_SD_M, fit_skeleton_prior
+from harness.calibrate.skeleton_prior import LEAST_RESIDUAL_SD_M, SkeletonPrior, fit_skeleton_prior
 from harness.core.humanoid24 import standard_skeleton
 from harness.errors import BadInput
 from harness.mocap.synthetic import sample_skeletons
@@ -21,6 +21,12 @@ def test_left_and_right_are_alike() -> None:
     np.testing.assert_allclose(found.direction[left] * [1.0, -1.0, 1.0], found.direction[right], atol=1e-12)
 
 
+def explained_variance(prior: SkeletonPrior) -> float:
+    """Share of the variance of the lengths that the modes explain."""
+    modes = float(np.sum(prior.mode_sd_m**2))
+    return modes / (modes + float(np.sum(prior.residual_sd_m**2)))
+
+
 @pytest.mark.parametrize("modes", [0, 1, 5, 24])
 def test_modes_and_rest_make_up_the_spread(modes: int) -> None:
     """The residual variance is that of the population times n / (n - modes)."""
@@ -32,11 +38,11 @@ def test_modes_and_rest_make_up_the_spread(modes: int) -> None:
     expected = np.maximum((whole - kept) * len(PEOPLE) / (len(PEOPLE) - modes), LEAST_RESIDUAL_SD_M**2)
     np.testing.assert_allclose(found.residual_sd_m**2, expected, atol=1e-12)
     np.testing.assert_allclose(found.modes @ found.modes.T, np.eye(modes), atol=1e-12)
-    assert 0.0 <= found.explained_variance() <= 1.0
+    assert 0.0 <= explained_variance(found) <= 1.0
 
 
 def test_more_modes_keep_more() -> None:
-    kept = [fit_skeleton_prior(PEOPLE, modes).explained_variance() for modes in range(8)]
+    kept = [explained_variance(fit_skeleton_prior(PEOPLE, modes)) for modes in range(8)]
     assert kept[0] == 0.0
     assert all(np.diff(kept) > 0.0)
     assert kept[5] > 0.85

@@ -11,7 +11,7 @@ import pytest
 
 from harness.body import humanoid
 from harness.body.humanoid import Body
-from harness.body.kinematics import Kinematics, joint_centres_m
+from harness.body.kinematics import Kinematics
 from harness.body.mounts import DEFAULT_MOUNTS, Mount, locate_mount
 from harness.body.retargeting import retarget_to_own_body
 from harness.calibrate.hold import UnusableHold, median_rotation
@@ -27,6 +27,7 @@ from harness.reconstruct.methods.ik import PREVIOUS
 from harness.simulate.noise import noise_preset
 from harness.simulate.simulation import TrackerConfig, simulate_tracker
 from harness.stream.frame import TrackerFrame
+from tests.joint_centres import joint_centres_m
 
 SIX = ("left_wrist", "right_wrist", "left_ankle", "right_ankle", "torso", "head")
 FIVE = ("left_hand", "right_hand", "left_ankle", "right_ankle", "pelvis")

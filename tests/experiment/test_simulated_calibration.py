@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.body import kinematics
 from harness.body.humanoid import Body
 from harness.calibrate.poses import POSES, configuration
 from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
@@ -35,6 +34,7 @@ from harness.results.storage import read_cells, read_summary
 from harness.simulate.simulation import Simulation, exact_calibration, simulate_tracker
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import make_inputs
+from tests.joint_centres import joint_centres_m
 
 BESIDE = CalibrationSettings(beside_m=0.015, turned_deg=180.0)
 SMALL = Scenario(
@@ -288,9 +288,7 @@ def test_methods_and_their_examples_stand_on_the_body_that_was_found(
     other.fit_method(Watching(), "watching")
     assert [body for body, _ in bodies] == [made.body, found[1].body]
     (own,), (calibrated,) = (examples for _, examples in bodies)
-    reach_m = [
-        kinematics.joint_centres_m(body.skeleton, q[:1]) for (body, _), q in zip(bodies, (own, calibrated), strict=True)
-    ]
+    reach_m = [joint_centres_m(body.skeleton, q[:1]) for (body, _), q in zip(bodies, (own, calibrated), strict=True)]
     assert np.abs(own - calibrated).max() > 1e-3
     assert np.abs(reach_m[0] - reach_m[1]).max() < 0.3
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from harness.body import humanoid
-from harness.body.kinematics import Kinematics, joint_centres_m
+from harness.body.kinematics import Kinematics
 from harness.errors import BadInput, MissingExtra
 from harness.live.lsl import LslOutput, import_pylsl
+from tests.joint_centres import joint_centres_m
 from tests.live.posing import configuration, live_pose
 
 try:

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from harness.body import humanoid
-from harness.body.kinematics import Kinematics, joint_centres_m
+from harness.body.kinematics import Kinematics
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.errors import BadInput
 from harness.live.unity import HIPS, UNITY_BONES, UnityPose
 from harness.live.vmc import VmcOutput, parse_address
+from tests.joint_centres import joint_centres_m
 from tests.live.posing import configuration, live_pose
 
 osc_packet = pytest.importorskip("pythonosc.osc_packet", reason="python-osc is not installed (extra `live`)")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body
-from harness.body.kinematics import joint_centres_m
 from harness.body.retargeting import retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
@@ -20,6 +19,7 @@ from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.stream.frame import TrackerFrame
 from harness.stream.inputs import make_inputs
 from harness.testing.frames import exact_calibration, exact_frames
+from tests.joint_centres import joint_centres_m
 
 
 @dataclass(frozen=True, eq=False)

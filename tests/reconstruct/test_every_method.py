@@ -10,7 +10,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from harness.body.kinematics import joint_centres_m
 from harness.body.retargeting import retarget_to_common_body
 from harness.core.estimate import Status
 from harness.core.motion import BodyMotion
@@ -18,7 +17,7 @@ from harness.core.workers import run_in_workers
 from harness.mocap import synthetic
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method
-from harness.score.angles import wrap_angle
+from harness.score.angles import wrap_difference
 from harness.testing import method_checks
 from harness.testing.contract_case import make_case
 from harness.testing.frames import exact_frames
@@ -26,6 +25,7 @@ from harness.testing.method_checks import check_method
 from harness.testing.rules import RULES
 from harness.testing.rules.assertions import require_identical
 from harness.testing.rules.reproducibility import estimate_qpos, works_in_another_process
+from tests.joint_centres import joint_centres_m
 from tests.reconstruct.conftest import Scene, moved, scene
 
 NAMES = sorted(registry.methods())
@@ -81,7 +81,7 @@ def errors(method: Method, examples: list[BodyMotion], shown: Scene) -> tuple[fl
     said, true = np.array([e.qpos for e in estimates])[20:], shown.take.qpos[20:]
     skeleton = shown.body.skeleton
     off_m = np.linalg.norm(joint_centres_m(skeleton, said) - joint_centres_m(skeleton, true), axis=2)
-    return float(np.rad2deg(np.abs(wrap_angle(said[:, 7:] - true[:, 7:]))).mean()), 1e3 * float(off_m.mean())
+    return float(np.rad2deg(np.abs(wrap_difference(said[:, 7:] - true[:, 7:]))).mean()), 1e3 * float(off_m.mean())
 
 
 @cache

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from harness.body.humanoid import Body, tpose
+from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
@@ -33,7 +34,7 @@ def spread_rad(body: Body, examples: Sequence[BodyMotion] | MotionDatabase, cent
     """(48,) RMS deviation of the examples' hinge angles from those of a configuration (55,) [rad]."""
     limits, total, count = HingeLimits(body), np.zeros(48), 0
     for angles in _principal_angles(limits, examples):
-        away = np.remainder(angles - centre[7:] + np.pi, 2.0 * np.pi) - np.pi
+        away = rotations.wrap_angle(angles - centre[7:])
         total += np.sum(away**2, axis=0)
         count += len(angles)
     return np.sqrt(total / count)

@@ -14,6 +14,7 @@ import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.compiled import compiled
+from harness.reconstruct.solver.matrix_algebra import dot
 
 _EIGENVALUE_FLOOR = 1e-12
 """Added to eigenvalues between 0 and 1, so that outputs may have a lower rank."""
@@ -21,13 +22,6 @@ _ROUNDING = 1e-15
 """Relative size below which an off-diagonal element counts as 0."""
 _UNDERFLOW = 1e-290
 """Squared length below which a Householder vector is skipped."""
-
-
-def canonical_correlations(inputs: Floats, outputs: Floats, *, bases: int, kappa: float) -> Floats:
-    """The largest canonical correlations (l,) of two Gram matrices (m, m), in descending order."""
-    squared, _, _ = _canonical_bases(_centre(inputs), _centre(outputs), bases, kappa)
-    out: Floats = np.sqrt(np.maximum(squared[::-1], 0.0))
-    return out
 
 
 @compiled
@@ -167,12 +161,12 @@ def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
     for k in range(size - 1):
         reflector[:] = matrix[k]
         reflector[: k + 1] = 0.0
-        squared = _dot(reflector, reflector)
+        squared = dot(reflector, reflector)
         if squared < _UNDERFLOW:
             continue
         off_diagonal[k] = -np.copysign(np.sqrt(squared), reflector[k + 1])
         reflector[k + 1] -= off_diagonal[k]
-        share = np.sqrt(0.5 * _dot(reflector, reflector))
+        share = np.sqrt(0.5 * dot(reflector, reflector))
         for i in range(k + 1, size):
             reflector[i] /= share  # I - v v^T is the reflection
         along[:], turned[:] = 0.0, 0.0
@@ -181,7 +175,7 @@ def symmetric_eigen(matrix: Floats) -> tuple[Floats, Floats]:
             for j in range(size):
                 along[j] += share * row[j]
                 turned[j] += share * other[j]
-        _add_scaled(along, -0.5 * _dot(along, reflector), reflector)
+        _add_scaled(along, -0.5 * dot(along, reflector), reflector)
         for i in range(k + 1, size):
             row, other, share, more = matrix[i], rows[i], reflector[i], along[i]
             for j in range(size):
@@ -233,9 +227,9 @@ def _project(vector: Floats, across: Floats) -> Floats:
     out = np.zeros_like(vector)
     for i in range(len(across)):
         for j in range(i):
-            _add_scaled(across[i], -_dot(across[i], across[j]), across[j])
-        across[i] /= np.sqrt(_dot(across[i], across[i]))
-        _add_scaled(out, _dot(across[i], vector), across[i])
+            _add_scaled(across[i], -dot(across[i], across[j]), across[j])
+        across[i] /= np.sqrt(dot(across[i], across[i]))
+        _add_scaled(out, dot(across[i], vector), across[i])
     return out
 
 
@@ -244,15 +238,6 @@ def _add_scaled(to: Floats, share: float, other: Floats) -> None:
     """Add a multiple of another vector (n,) in place."""
     for k in range(len(to)):
         to[k] += share * other[k]
-
-
-@compiled
-def _dot(a: Floats, b: Floats) -> float:
-    """Dot product of two vectors (n,); faster than `@` on short ones."""
-    total = 0.0
-    for k in range(len(a)):
-        total += a[k] * b[k]
-    return total
 
 
 @compiled

@@ -101,7 +101,7 @@ class KernelRidgeSession:
         turned = rotations.multiply(rotations.exp(options.orientation_noise_rad * noise[..., 3:]), turned)
         x = self._features(position_m, turned)
         angles = np.concatenate([take.qpos[:, 7:] for take in fitted.takes])[fitted.frames]
-        y = (angles - self._mean_qpos[7:] + np.pi) % (2.0 * np.pi) - np.pi
+        y = rotations.wrap_angle(angles - self._mean_qpos[7:])
 
         self._x_mean, self._x = x.mean(axis=0), x - x.mean(axis=0)
         self._width = 2.0 * options.width**2 * 2.0 * float(np.mean(np.sum(self._x**2, axis=1)))

@@ -26,7 +26,6 @@ from harness.body.mounts import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
-from harness.experiment.scenario import Station
 from harness.results.placement_findings import StationPlacement
 
 Pair = Literal["", "each", "together"]
@@ -153,11 +152,6 @@ def placement_fault(place: StationPlacement, skeleton: Skeleton | None = None) -
 def to_mount(place: StationPlacement) -> Mount:
     """The mount of a place."""
     return Mount(station_name(place), place.bone, place.along, math.radians(place.around_deg), place.stand_off_m)
-
-
-def to_station(place: StationPlacement) -> Station:
-    """The station of a scenario at a place."""
-    return Station(place.bone, place.along, place.around_deg, place.stand_off_m)
 
 
 def station_name(place: StationPlacement) -> str:

@@ -7,7 +7,7 @@ from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
-from harness.score.angles import wrap_angle
+from harness.score.angles import wrap_difference
 from harness.testing.contract_case import (
     DISTURBANCES,
     FRAMES,
@@ -77,7 +77,7 @@ def is_invariant_to_placement(case: ContractCase) -> str:
     transformed = transform_motion(case.truth, 2.0, np.array([5.0, -3.0, 0.0]))
     frames = exact_frames(case.body, case.calibration, transformed[:FRAMES], RATE_HZ)
     original, moved = (stack_qpos(case.run(f)) for f in (case.frames, frames))
-    hinges_rad = np.abs(wrap_angle(moved[:, 7:] - original[:, 7:])).mean(axis=1)
+    hinges_rad = np.abs(wrap_difference(moved[:, 7:] - original[:, 7:])).mean(axis=1)
     tilt_rad = rotations.angle_between_rad(*(_remove_heading(qpos) for qpos in (original, moved)))
     angle_deg = np.rad2deg(np.maximum(hinges_rad, tilt_rad)).mean()
     height_mm = 1e3 * float(np.abs(moved[:, 2] - original[:, 2]).mean())
