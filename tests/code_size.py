@@ -24,12 +24,16 @@ def code_lines(source: str) -> int:
     docstrings = {
         line
         for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        if isinstance(node, ast.Expr) and _is_docstring(node)
         for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
     }
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     lines = {n for t in tokens if t.type not in _NO_CODE for n in range(t.start[0], t.end[0] + 1)}
     return len(lines - docstrings)
+
+
+def _is_docstring(node: ast.AST) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 
 def package_sizes(root: Path) -> dict[str, int]:
@@ -41,7 +45,7 @@ def package_sizes(root: Path) -> dict[str, int]:
         sizes[f"code lines, {folder if not folder.endswith('.py') else 'top'}"] += lines
         sizes["code lines"] += lines
         for node in ast.walk(ast.parse(source)):
-            sizes["statements"] += isinstance(node, ast.stmt) and not isinstance(getattr(node, "value", None), ast.Constant)
+            sizes["statements"] += isinstance(node, ast.stmt) and not _is_docstring(node)
             if isinstance(node, ast.FunctionDef):
                 sizes[f"functions over {LONG_FUNCTION} lines"] += (node.end_lineno or 0) - node.lineno >= LONG_FUNCTION
             names.update([node.name] if isinstance(node, ast.ClassDef) else [])
