@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-long test-slow gate lint docs compiled clean
+.PHONY: demo test test-long test-slow mutants gate lint docs compiled clean
 
 demo: compiled
 	$(BIN)/harness demo
@@ -17,6 +17,10 @@ test-long: compiled
 
 test-slow: compiled
 	$(BIN)/python -m pytest -m slow --hypothesis-profile=default
+
+# Changes 60 lines of the package, one at a time, and counts the tests that notice: see CONTRIBUTING.md.
+mutants: compiled
+	$(BIN)/python -m tests.mutants --jobs 2
 
 # Compares the project's own methods with their baseline: see CONTRIBUTING.md.
 gate: compiled

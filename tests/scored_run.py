@@ -78,6 +78,7 @@ def make_cell(truth_qpos: Floats, judge: Judge) -> Callable[..., storage.Cell]:
             "estimate_qpos": estimate,
             "frame_index": np.arange(frames),
             "status": np.zeros(frames),
+            "origin": np.zeros(frames),
             "step_ms": np.full(frames, 2.0),
             "quality": np.ones((frames, 2)),
             "position_valid": np.ones((frames, 2)),

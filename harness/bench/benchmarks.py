@@ -6,6 +6,7 @@ from importlib.util import find_spec
 from harness.bench.load import bench_load
 from harness.bench.neighbour_search import bench_index
 from harness.bench.regression_gate import bench_regression_gate
+from harness.bench.rejected_readings import bench_rejected_readings
 from harness.bench.rows import BenchmarkRow
 from harness.bench.simulated_stream import bench_stream
 from harness.bench.startup import bench_startup
@@ -41,6 +42,7 @@ BENCHMARKS: dict[str, Callable[[int, bool], list[BenchmarkRow]]] = {
     "ik": _ik,
     "index": lambda seed, large: bench_index(seed),
     "methods": _methods,
+    "outliers": lambda seed, large: bench_rejected_readings(seed),
     "gate": lambda seed, large: bench_regression_gate(seed),
     "sweep": lambda seed, large: bench_sweep(seed),
 }

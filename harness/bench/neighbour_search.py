@@ -18,7 +18,7 @@ from harness.bench.rows import BenchmarkRow
 from harness.body import humanoid, mounts
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.arrays import Bools, Ints, Singles
+from harness.core.arrays import Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.core.seeds import generator
@@ -26,7 +26,7 @@ from harness.experiment import benchmark_clips
 from harness.mocap import synthetic
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
-from harness.reconstruct.index import INDEXES, ArrayVectors, Lookup, NeighbourGraph, Vectors
+from harness.reconstruct.index import INDEXES, ArrayVectors, Lookup, Vectors
 from harness.reconstruct.index.inverted_file import cells_for, probes_for
 from harness.reconstruct.index.selection import FLAT_MAX_VECTORS, best_index
 from harness.reconstruct.methods.dynamic_map import DynamicMap
@@ -50,8 +50,6 @@ class SearchProblem:
     """(Q, D) queries of each held-out take."""
     count: int
     """Number of neighbours to find."""
-    follows: Bools | None
-    """(N,) whether the next vector is that of the next frame; None where no index uses this."""
 
 
 def bench_index(seed: int = 1, sizes: Sequence[int] = SIZES) -> list[BenchmarkRow]:
@@ -73,7 +71,7 @@ def pose_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMo
         _single_motion_database(body, take).windows(POSES, with_successor=True).gather(_QUERY_FRAMES)
         for take in held_out
     ]
-    return SearchProblem(f"{POSES} poses", windows, queries, EXAMPLES, windows.consecutive)
+    return SearchProblem(f"{POSES} poses", windows, queries, EXAMPLES)
 
 
 def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
@@ -88,9 +86,7 @@ def reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[Bod
         signs = np.copysign(1.0, np.vecdot(orientations, examples.hemisphere * orientations.dtype.type(1.0)))
         orientations *= signs[..., None]
         queries.append(vectors)
-    return SearchProblem(
-        f"{len(STATIONS)} stations", ArrayVectors(examples.gather(slice(None))), queries, NEIGHBOURS, None
-    )
+    return SearchProblem(f"{len(STATIONS)} stations", ArrayVectors(examples.gather(slice(None))), queries, NEIGHBOURS)
 
 
 def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
@@ -101,7 +97,7 @@ def pose_and_reading_problem(body: Body, database: MotionDatabase, held_out: Seq
         return method.fit_database(body, source, generator(0, "bench")).station_features(calibration)[1]
 
     queries = [vectors(_single_motion_database(body, take)).gather(_QUERY_FRAMES) for take in held_out]
-    return SearchProblem("poses and stations", vectors(database), queries, method.neighbours, None)
+    return SearchProblem("poses and stations", vectors(database), queries, method.neighbours)
 
 
 def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[BodyMotion]) -> SearchProblem:
@@ -113,7 +109,7 @@ def feature_problem(body: Body, database: MotionDatabase, held_out: Sequence[Bod
         replace(vectors, windows=_single_motion_database(body, take).windows(method.poses, with_successor=True))
         for take in held_out
     ]
-    return SearchProblem("evidence", vectors, [z.gather(_QUERY_FRAMES) for z in queries], method.neighbours, None)
+    return SearchProblem("evidence", vectors, [z.gather(_QUERY_FRAMES) for z in queries], method.neighbours)
 
 
 PROBLEMS = (pose_problem, reading_problem, pose_and_reading_problem, feature_problem)
@@ -141,13 +137,9 @@ def _exact_calibration(body: Body) -> Calibration:
 def _compare_indexes(search: SearchProblem) -> list[BenchmarkRow]:
     """Compare all indexes; exact search is the reference for recall and speed."""
     indexes = {name: kind(search.vectors, search.count) for name, kind in INDEXES.items()}
-    begin: dict[str, Callable[[], Lookup]] = {
-        name: partial(_stateless_lookup, index) for name, index in indexes.items()
-    }
+    begin: dict[str, Callable[[], Lookup]] = {name: index.begin_search for name, index in indexes.items()}
     if len(search.vectors) > FLAT_MAX_VECTORS:
         begin["faiss"] = partial(_stateless_lookup, FaissInvertedFile(search.vectors, search.count))
-    if search.follows is not None:
-        begin["graph"] = NeighbourGraph(search.vectors, search.follows, indexes["inverted_file"]).begin_search
     seconds: dict[str, list[float]] = {name: [] for name in begin}
     hits: dict[str, list[float]] = {name: [] for name in begin}
     for queries in search.queries:

@@ -84,10 +84,16 @@ class BodyMesh:
             first += mesh.n_points
         self._body = meshes[0].append_polydata(*meshes[1:])
         self._shadow = self._body.copy()
-        self.look: Any = plotter.add_mesh(self._body, color=colour, opacity=opacity, culling="back").prop
+        actor: Any = plotter.add_mesh(self._body, color=colour, opacity=opacity, culling="back")
+        self.look: Any = actor.prop
         self.look.interpolation = "Phong"
         self.look.ambient, self.look.diffuse, self.look.specular, self.look.specular_power = 0.42, 0.8, 0.25, 12.0
-        plotter.add_mesh(self._shadow, color=_SHADOW, lighting=False)
+        self._actors: Any = (actor, plotter.add_mesh(self._shadow, color=_SHADOW, lighting=False))
+
+    def set_visible(self, visible: bool) -> None:
+        """Show or hide the body and its shadow."""
+        for actor in self._actors:
+            actor.visibility = visible
 
     def move(self, root_m: Floats, world_from_root: Floats, start_m: Floats, world_from_bone: Floats) -> None:
         """Set the pose of the root (3,) [m], (3, 3) and of the bones' joints (B, 3) [m], (B, 3, 3)."""

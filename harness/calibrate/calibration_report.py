@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.calibrate.calibration_verdict import pose_verdict, tpose_verdict
 from harness.calibrate.pose_calibration import PoseCalibration
 from harness.calibrate.poses import POSES
 from harness.calibrate.tpose_calibration import TPoseCalibration
@@ -47,11 +48,13 @@ def report_pose_calibration(result: PoseCalibration) -> CalibrationReport:
         "beside": result.mount_spread,
         "condition": result.condition,
         "hints": list(result.hints),
+        "verdict": (verdict := pose_verdict(result)),
         "miss_deg_of_pose": miss_deg,
         "stations": {name: _finite(row) for name, row in mounts.items()},
         "bones": {name: _finite(row) for name, row in lengths.items()},
     }
-    return diagnostics, [*_bone_lines(lengths), "", *_mount_lines(mounts), "", *_fit_lines(result, miss_deg)]
+    lines = [*_bone_lines(lengths), "", *_mount_lines(mounts), "", *_fit_lines(result, miss_deg)]
+    return diagnostics, [*lines, "", verdict]
 
 
 def _bone_lines(lengths: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -102,8 +105,11 @@ def report_tpose_calibration(result: TPoseCalibration) -> CalibrationReport:
     lines = [
         *Table(["station", "off the T-pose [mm]", "moved [mm]"], rows).lines(),
         f"standard deviation of the heading {heading_deg:.1f} deg; T-pose held for {result.seconds:.1f} s",
+        "",
+        verdict := tpose_verdict(result),
     ]
-    return {"seconds": result.seconds, "heading_sd_deg": heading_deg, "stations": stations}, lines
+    diagnostics = {"seconds": result.seconds, "heading_sd_deg": heading_deg, "verdict": verdict, "stations": stations}
+    return diagnostics, lines
 
 
 def _mm(length_m: float) -> str:

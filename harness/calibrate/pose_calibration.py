@@ -23,7 +23,7 @@ from harness.calibrate.poses import POSES, pose_angles_rad
 from harness.calibrate.skeleton_prior import SkeletonPrior
 from harness.calibrate.tpose_calibration import LEVEL_FROM_TRACKER
 from harness.calibrate.uncertainty import CalibrationUncertainty, estimate_uncertainty
-from harness.calibrate.unknowns import SharedUnknowns
+from harness.calibrate.unknowns import CalibrationSolution, SharedUnknowns
 from harness.core import humanoid24, rotations
 from harness.core.arrays import Bools, Floats, freeze
 from harness.core.calibration import Calibration
@@ -73,6 +73,8 @@ class PoseCalibration:
     """Error of the performer's poses, standard deviation of a hinge [rad]."""
     pose_error_rad: Floats
     """(P,) error of each pose, standard deviation of a hinge [rad]."""
+    pose_distance_m: Floats
+    """(P, S) distance of each station from its place in each pose as shown [m]."""
     mount_spread: float
     """Spread of trackers about their nominal mounts, in units of `held_pose_model.MOUNT_*_SD_M`."""
     condition: float
@@ -88,6 +90,7 @@ class PoseCalibration:
         freeze(self, np.bool_, from_prior=(bones,))
         freeze(self, mount_sd_m=(stations,), mount_sd_rad=(stations,), residual_m=(stations,), residual_rad=(stations,))
         freeze(self, mount_bound_m=(stations,), mount_bound_rad=(stations,), pose_error_rad=("P",))
+        freeze(self, pose_distance_m=(len(self.pose_error_rad), stations))
 
 
 def calibrate_poses(
@@ -98,22 +101,32 @@ def calibrate_poses(
     `mounts` are the nominal positions of the trackers, in the order of the stream's stations; orientations are free.
     UnusableHold names the pose and the station and what to do. BadInput for a wrong number of poses or stations.
     """
+    holds = measure_poses(held, mounts)
+    bundle = pose_bundle(holds, space, mounts)
+    pose_checks.require_no_boresight(bundle)
+    fit = fit_bundle(bundle, *_reading_sd(holds))
+    pose_checks.require_poses_held(bundle, fit)
+    return _assemble(bundle, fit, estimate_uncertainty(bundle, fit), sum(hold.seconds for hold in holds))
+
+
+def measure_poses(held: Sequence[Sequence[TrackerFrame]], mounts: Sequence[Mount]) -> list[HoldReadings]:
+    """Median readings of the eight holds, in the order of `poses.POSES`; UnusableHold, BadInput."""
     if len(held) != len(POSES):
         raise BadInput(
             f"{len(held)} poses were held; {len(POSES)} are needed.",
             f"Hold these, one after another: {', '.join(pose.name for pose in POSES)}.",
         )
     names = [mount.station for mount in mounts]
-    holds = [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
+    return [measure_hold(rows, names, pose.name) for rows, pose in zip(held, POSES, strict=True)]
+
+
+def pose_bundle(holds: Sequence[HoldReadings], space: SkeletonPrior, mounts: Sequence[Mount]) -> BundleAdjustment:
+    """The least-squares problem of the eight holds, with the poses as shown."""
     like = humanoid24.standard_skeleton()
     nominal_rad = np.array([pose_angles_rad(pose, like) for pose in POSES])
     turn = rotations.multiply(LEVEL_FROM_TRACKER, np.array([hold.tracker_from_station for hold in holds]))
     place_m = rotations.rotate(LEVEL_FROM_TRACKER, np.array([hold.position_m for hold in holds]))
-    bundle = BundleAdjustment(SharedUnknowns(like, space, mounts), nominal_rad, place_m, rotations.to_matrix(turn))
-    pose_checks.require_no_boresight(bundle)
-    fit = fit_bundle(bundle, *_reading_sd(holds))
-    pose_checks.require_poses_held(bundle, fit)
-    return _assemble(bundle, fit, estimate_uncertainty(bundle, fit), sum(hold.seconds for hold in holds))
+    return BundleAdjustment(SharedUnknowns(like, space, mounts), nominal_rad, place_m, rotations.to_matrix(turn))
 
 
 def _reading_sd(holds: Sequence[HoldReadings]) -> tuple[float, float]:
@@ -126,24 +139,29 @@ def _reading_sd(holds: Sequence[HoldReadings]) -> tuple[float, float]:
     return float(np.hypot(FLOOR_M, moved_m)), float(np.hypot(FLOOR_RAD, turned_rad))
 
 
+def calibration_of(kind: str, at: CalibrationSolution, skeleton: Skeleton, mounts: Sequence[Mount]) -> Calibration:
+    """The calibration of a solution; the first pose stands at the world's origin and faces x."""
+    world_from_level, shift_m = _world_from_level(skeleton, at)
+    return Calibration(
+        kind=kind,
+        stations=tuple(mount.station for mount in mounts),
+        bones=tuple(mount.bone for mount in mounts),
+        mount_m=at.mount_m,
+        bone_from_station=rotations.from_matrix(at.bone_from_station),
+        world_from_tracker=rotations.multiply(world_from_level, LEVEL_FROM_TRACKER),
+        tracker_origin_m=shift_m,
+    )
+
+
 def _assemble(
     bundle: BundleAdjustment, fit: BundleFit, uncertainty: CalibrationUncertainty, seconds: float
 ) -> PoseCalibration:
     at, mounts = fit.solution, bundle.shared.mounts
     skeleton = bundle.shared.template.with_bones(at.bone_m)
-    bone_from_station = rotations.from_matrix(at.bone_from_station)
-    world_from_level, shift_m = _world_from_level(skeleton, fit)
+    calibration = calibration_of("poses", at, skeleton, mounts)
     off_m, off_rad = bundle.residuals(bundle.forward_kinematics(at))
     return PoseCalibration(
-        calibration=Calibration(
-            kind="poses",
-            stations=tuple(mount.station for mount in mounts),
-            bones=tuple(mount.bone for mount in mounts),
-            mount_m=at.mount_m,
-            bone_from_station=bone_from_station,
-            world_from_tracker=rotations.multiply(world_from_level, LEVEL_FROM_TRACKER),
-            tracker_origin_m=shift_m,
-        ),
+        calibration=calibration,
         skeleton=skeleton,
         mean_m=bundle.shared.space.mean_m,
         length_sd_m=uncertainty.length_sd_m,
@@ -158,19 +176,19 @@ def _assemble(
         residual_rad=np.sqrt(np.mean(np.sum(off_rad**2, axis=2), axis=0)),
         hinge_error_rad=fit.scales.pose_error_rad,
         pose_error_rad=fit.pose_error_rad,
+        pose_distance_m=pose_checks.pose_distances_m(bundle, fit),
         mount_spread=fit.scales.mount_spread,
         condition=uncertainty.condition,
-        hints=station_orientation.strap_hints(skeleton, mounts, bone_from_station),
+        hints=station_orientation.strap_hints(skeleton, mounts, calibration.bone_from_station),
         seconds=seconds,
     )
 
 
-def _world_from_level(skeleton: Skeleton, fit: BundleFit) -> tuple[Floats, Floats]:
+def _world_from_level(skeleton: Skeleton, at: CalibrationSolution) -> tuple[Floats, Floats]:
     """World from level axes: rotation (4,) and translation (3,) [m].
 
     The first pose stands at the origin and faces x. The floor is the median height of the lower sole over the poses.
     """
-    at = fit.solution
     root = rotations.from_matrix(at.world_from_root)
     qpos = humanoid24.pack(at.root_m, root, at.angles_rad)
     soles_m = np.min(ground.sole_heights_m(skeleton, kinematics.pose_from_qpos(skeleton, qpos)), axis=1)

@@ -63,7 +63,7 @@ def require_poses_held(bundle: BundleAdjustment, fit: BundleFit) -> None:
         return
     _require_no_exchange(bundle, fit)
     mounts = bundle.shared.mounts
-    off_m = _distances_m(bundle, fit)[worst]
+    off_m = pose_distances_m(bundle, fit)[worst]
     station = int(np.argmax(off_m))
     off_deg, off_mm = np.rad2deg(fit.pose_error_rad[worst]), 1e3 * off_m[station]
     raise UnusableHold(
@@ -73,7 +73,7 @@ def require_poses_held(bundle: BundleAdjustment, fit: BundleFit) -> None:
     )
 
 
-def _distances_m(bundle: BundleAdjustment, fit: BundleFit) -> Floats:
+def pose_distances_m(bundle: BundleAdjustment, fit: BundleFit) -> Floats:
     """(P, S) distance of stations from where they would be had the poses been held as shown, upright [m]."""
     at = fit.solution
     start = bundle.start()

@@ -36,11 +36,14 @@ class PoseClassifier:
         bones = [body.skeleton.index(mount.bone) for mount in mounts]
         placed = [locate_mount(body.skeleton, mount) for mount in mounts]
         mount_m, turn = np.array([at_m for at_m, _ in placed]), np.array([turned for _, turned in placed])
-        poses_of_stations = []
+        poses_of_stations, middles = [], []
         for pose in poses:
             kinematics.set(pose)
             place_m, turned = kinematics.station_poses(bones, mount_m, turn)
+            middles.append(place_m.mean(axis=0))
             poses_of_stations.append((place_m - place_m.mean(axis=0), np.array(turned)))
+        self._middle_m = np.array(middles)
+        """(N, 3) mean of the stations' positions in each pose [m]."""
         self._place_m = np.array([place_m for place_m, _ in poses_of_stations])
         """(N, S, 3) station positions about their mean [m]."""
         turned = np.array([turned for _, turned in poses_of_stations])
@@ -64,6 +67,16 @@ class PoseClassifier:
         off_m = self.distances_m(now, first)
         best = int(np.argmin(off_m))
         return best if off_m[best] <= _distance_limit_m(first) else None
+
+    def aligned_m(self, pose: int, position_m: Floats) -> tuple[Floats, Floats]:
+        """Positions (S, 3) in the frame of a pose at the body's size, and distances (S,) from their places in it [m].
+
+        Place, heading and size are those that fit the pose best.
+        """
+        heading, away_m = _align(position_m, self._place_m[pose])
+        level_m = rotations.rotate(heading, position_m - position_m.mean(axis=0))
+        size = _size(level_m, self._place_m[pose])
+        return level_m / size + self._middle_m[pose], np.linalg.norm(away_m, axis=1)
 
     def _distance_m(self, now: HoldReadings, first: HoldReadings | None, pose: int) -> float:
         heading, away_m = _align(now.position_m, self._place_m[pose])
@@ -89,5 +102,9 @@ def _align(found_m: Floats, place_m: Floats) -> tuple[Floats, Floats]:
     a, b = (points[:, :2] @ [1.0, 1.0j] for points in (level_m, place_m))
     heading = rotations.about_z(float(np.angle(np.vdot(a, b))))
     turned_m = rotations.rotate(heading, level_m)
-    size = np.clip(np.sum(turned_m * place_m) / max(float(np.sum(place_m**2)), 1e-9), *BODY_SCALES)
-    return rotations.multiply(heading, LEVEL_FROM_TRACKER), turned_m - size * place_m
+    return rotations.multiply(heading, LEVEL_FROM_TRACKER), turned_m - _size(turned_m, place_m) * place_m
+
+
+def _size(turned_m: Floats, place_m: Floats) -> float:
+    """The performer's size over the body's."""
+    return float(np.clip(np.sum(turned_m * place_m) / max(float(np.sum(place_m**2)), 1e-9), *BODY_SCALES))

@@ -81,6 +81,26 @@ class PoseCollector:
         self._checked_s = now_s
         return self._check(list(window))
 
+    def still_s(self) -> float:
+        """Longest time up to now in which no station moves by the rules of a hold [s], at most `HOLD_S`.
+
+        In steps of `CHECK_EVERY_S`. 0 while the performer has not moved since the last hold, and while a station is
+        silent. It is computed anew at each call, from up to `HOLD_S` of frames.
+        """
+        frames, still_s = list(self._window), 0.0
+        time_s = np.array([frame.received_s for frame in frames])
+        for wanted_s in np.arange(2.0 * EDGE_S, span_s(frames) + CHECK_EVERY_S, CHECK_EVERY_S).tolist():
+            first = int(np.searchsorted(time_s, time_s[-1] - wanted_s))
+            statistics = _hold_statistics(frames[first:])
+            if not np.isfinite(statistics.middle_m).all() or not np.isfinite(statistics.turn).all():
+                return 0.0  # a silent station completes no hold
+            if self._last is not None and not statistics.moved_from(self._last):
+                return 0.0
+            if self._moving(statistics.strayed, time_s[first:]) is not None:
+                break
+            still_s = float(time_s[-1] - time_s[first])
+        return min(still_s, HOLD_S)
+
     def _check(self, frames: list[TrackerFrame]) -> int | None:
         statistics, time_s = _hold_statistics(frames), np.array([frame.received_s for frame in frames])
         if (moving := self._moving(statistics.strayed, time_s)) is not None:

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,7 +18,6 @@ from harness.commands.common import (
     positive_int,
     print_result,
     print_status,
-    show_progress,
     sigterm_as_interrupt,
 )
 from harness.errors import BadInput, Outcome, was_interrupted
@@ -141,6 +141,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
     from harness.experiment.calibration_session import CalibrationSession
     from harness.experiment.playback import select_stations
     from harness.experiment.scenario import load_scenario
+    from harness.live.pose_terminal import PoseTerminal
     from harness.live.viewer import ViewerOutput
     from harness.stream.driver import DriverConfig, Is900
 
@@ -150,19 +151,21 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
     stations = tuple(select_stations(load_scenario(args.scenario), parse_stations(args)))
     session = CalibrationSession(args.scenario, stations, args.kind or "poses", args.clip, args.mocap)
     with ExitStack() as opened:
-        show: PoseDisplay | None = None
+        terminal = PoseTerminal(session.body.skeleton, sys.stderr)
+        opened.callback(terminal.close)
+        displays: list[PoseDisplay] = [terminal]
         if args.view is not None:
             view = ViewerOutput(args.view, session.body.skeleton, args.pictures, force=args.force)
             opened.callback(view.close)
             print_status(view.description)
-            show = view.show
+            displays.append(view)
         config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
         device = opened.enter_context(
             Is900(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )
         names = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
         print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {names}; Ctrl-C ends it")
-        collector = session.collect_poses(device, print_status, show, show_progress)
+        collector = session.collect_poses(device, print_status, displays)
     print_status("solving")
     return session.solve(collector.holds, f"the tracker at {args.port}")
 

@@ -18,7 +18,6 @@ from harness.commands.common import (
     positive_float,
     print_result,
     print_status,
-    show_progress,
     sigterm_as_interrupt,
 )
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
@@ -197,10 +196,15 @@ def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitSt
 def _calibrate_by_poses(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "CalibrationFile":
     """Calibrate from eight poses before methods learn, so that they learn on the performer's bone lengths."""
     from harness.experiment.calibration_session import CalibrationSession
+    from harness.live.pose_terminal import PoseTerminal
 
     session = CalibrationSession(args.scenario, tuple(playback.scenario.stations), folder=args.mocap)
     with _open_device(args, playback, events) as device:
-        held = session.collect_poses(device, print_status, watch=show_progress).holds
+        terminal = PoseTerminal(session.body.skeleton, sys.stderr)
+        try:
+            held = session.collect_poses(device, print_status, [terminal]).holds
+        finally:
+            terminal.close()
     found = session.solve(held, args.port)
     for line in found.lines:
         print_status(line)

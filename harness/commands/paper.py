@@ -16,6 +16,10 @@ def add_paper(verbs: Verbs) -> None:
     verb.add_argument("paper", choices=["liu2011", "kim2012"], help="Liu et al. 2011; Kim, Seol and Lee 2012")
     text = "use the real motion in this folder; may be repeated (default: synthetic motion)"
     add_mocap_flag(verb, text)
+    text = "two short clips of each kind: shows in minutes that everything works; too few to compare methods"
+    verb.add_argument("--quick", action="store_true", help=text)
+    text = "run this experiment alone; may be repeated (docs/papers.md lists them)"
+    verb.add_argument("--only", action="append", metavar="EXPERIMENT", help=text)
     verb.add_argument("--seed", type=int, default=1, help="seed of all runs (default 1)")
     text = "clips computed at the same time (default 2)"
     verb.add_argument("--jobs", type=positive_int, default=2, metavar="N", help=text)
@@ -29,14 +33,18 @@ def run_paper(args: argparse.Namespace) -> Outcome:
     from harness.report.paper.writer import write_paper_page
     from harness.study.papers.paper import load_paper, reproduce
 
-    out = args.out or Path("results") / (args.paper + ("_cmu" if args.mocap else ""))
+    paper = load_paper(args.paper)
+    paper = paper.only(args.only) if args.only else paper
+    form = ("_cmu" if args.mocap else "") + ("_quick" if args.quick else "")
+    out = args.out or Path("results") / (args.paper + form)
     with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
         findings, outcome = reproduce(
-            load_paper(args.paper),
+            paper,
             out,
             library=args.mocap,
             seed=args.seed,
             jobs=args.jobs,
+            quick=args.quick,
             command=this_command(),
             progress=bar,
         )

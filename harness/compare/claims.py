@@ -1,10 +1,16 @@
-"""Evaluation of a paper's claims with errors by clip."""
+"""Evaluation of a paper's claims with errors by clip, and Holm's correction for the number of printed statements."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
-from harness.compare.paired_statistics import compare_paired
-from harness.results.findings import Claim
+import numpy as np
+
+from harness.compare.margins import margin_of
+from harness.compare.paired_statistics import MIN_CLIPS, compare_paired
+from harness.compare.significance import SIGNIFICANCE, holm, sign_flip_p
+from harness.results.findings import Claim, ClaimKind, ClaimVerdict, Reading
+from harness.results.reported_metrics import PRIMARY_METRIC
 
 Errors = Mapping[str, float]
 """Clip -> error; all clips are of one kind."""
@@ -13,38 +19,194 @@ TOLERANCE = 0.25
 
 
 def claim_lower_error(
-    text: str, less: Errors, more: Errors, *, published: str = "order", unit: str = "deg", why: str = ""
+    text: str,
+    less: Errors,
+    more: Errors,
+    *,
+    published: str = "order",
+    unit: str = "deg",
+    why: str = "",
+    kind: ClaimKind = "printed",
+    reading: Reading = "",
 ) -> Claim:
     """Claim that `less` is below `more`, tested by the paired interval.
 
-    `why` explains a claim that is not reproduced.
+    An interval within the margin of joint angles is *same*. `why` explains a claim that is not reproduced.
     """
     difference = compare_paired(more, less)
     if difference.mean is None:
-        return Claim(text, published, "not measured", "not run", difference.why, unit=unit)
+        return Claim(text, published, "not measured", "not run", difference.why, unit=unit, kind=kind, reading=reading)
     means = [sum(side[clip] for clip in difference.clips) / len(difference.clips) for side in (less, more)]
+    verdict, reason = difference.verdict, difference.why
+    margin = margin_of(PRIMARY_METRIC).of(means[1])
+    if unit == "deg" and difference.low is not None and -margin <= difference.low <= (difference.high or 0.0) <= margin:
+        verdict, reason = "same", f"the whole interval lies within the margin, {margin:.2f} {unit}"
     return Claim(
         text=text,
         published=published,
         ours=f"{means[0]:.2f} against {means[1]:.2f} {unit}",
-        verdict=difference.verdict,
-        why="" if difference.verdict == "reproduced" else "; ".join(filter(None, (difference.why, why))),
+        verdict=verdict,
+        kind=kind,
+        reading=reading,
+        why="" if verdict == "reproduced" else "; ".join(filter(None, (reason, why))),
         clips=len(difference.clips),
         difference=difference.mean,
         low=difference.low,
         high=difference.high,
         unit=unit,
+        p=_paired_p(more, less, difference.clips),
     )
 
 
+def claim_noninferior(
+    text: str,
+    errors: Errors,
+    reference: Errors,
+    *,
+    published: str = "order",
+    why: str = "",
+    kind: ClaimKind = "printed",
+    reading: Reading = "",
+) -> Claim:
+    """Claim that `errors` [deg] exceed `reference` by less than the margin of joint angles (non-inferiority).
+
+    *Reproduced* when the 95 % interval of the excess ends below the margin, *not reproduced* when it begins above. The
+    difference of the claim is margin - excess, so that positive values agree with the paper. `p` is that of this
+    difference.
+    """
+    excess = compare_paired(errors, reference)
+    if excess.mean is None:
+        return Claim(text, published, "not measured", "not run", excess.why, unit="deg", kind=kind, reading=reading)
+    means = [sum(side[clip] for clip in excess.clips) / len(excess.clips) for side in (errors, reference)]
+    margin = margin_of(PRIMARY_METRIC).of(means[1])
+    allowed = {clip: reference[clip] + margin for clip in excess.clips}
+    room = compare_paired(allowed, errors)
+    reason = {
+        "reproduced": "",
+        "not reproduced": f"the excess is larger than the margin, {margin:.2f} deg",
+        "cannot tell": f"the interval of the excess contains the margin, {margin:.2f} deg",
+    }[room.verdict]
+    reason = room.why if room.low is None else reason
+    return Claim(
+        text=text,
+        published=published,
+        ours=f"{means[0]:.2f} against {means[1]:.2f} deg, margin {margin:.2f}",
+        verdict=room.verdict,
+        why="" if room.verdict == "reproduced" else "; ".join(filter(None, (reason, why))),
+        clips=len(room.clips),
+        difference=room.mean,
+        low=room.low,
+        high=room.high,
+        unit="deg",
+        kind=kind,
+        reading=reading,
+        p=_paired_p(allowed, errors, room.clips),
+    )
+
+
+WORST_FIRST: tuple[ClaimVerdict, ...] = ("not run", "not reproduced", "cannot tell", "same", "reproduced")
+
+
+def claim_all(text: str, parts: Mapping[str, Claim]) -> Claim:
+    """One claim that holds when every part does (intersection-union test).
+
+    The verdict and the figures are those of the worst part, and the reason names it. All parts must hold, so p is the
+    largest. One part suffices to refute the claim; its own p is then multiplied by the number of parts (Bonferroni).
+    """
+    name, worst = min(parts.items(), key=lambda part: (WORST_FIRST.index(part[1].verdict), part[1].difference or 0.0))
+    found = [part.p for part in parts.values() if part.p is not None]
+    p = max(found) if len(found) == len(parts) else None
+    if worst.verdict == "not reproduced":
+        p = None if worst.p is None else min(1.0, len(parts) * worst.p)
+    return replace(
+        worst,
+        text=text,
+        ours="; ".join(f"{part.ours} ({name})" for name, part in parts.items()),
+        why=f"{name}: {worst.why}" if worst.why else "",
+        p=p,
+    )
+
+
+def claim_decreasing(
+    text: str, series: Mapping[str, Errors], what: str, *, kind: ClaimKind = "printed", reading: Reading = ""
+) -> Claim:
+    """Claim that errors decrease from each entry of `series` to the next; `what` names the entries in words.
+
+    Every step must decrease; the difference of the claim is that of the worst step.
+    """
+    names = list(series)
+    steps = {
+        f"from {before} to {after} {what}": claim_lower_error(
+            text, series[after], series[before], kind=kind, reading=reading
+        )
+        for before, after in pairwise(names)
+    }
+    if not steps or any(step.verdict == "not run" for step in steps.values()):
+        why = f"no clip has results for all {what}"
+        return Claim(text, "order", "not measured", "not run", why, unit="deg", kind=kind, reading=reading)
+    means = ", ".join(f"{sum(errors.values()) / len(errors):.2f}" for errors in series.values())
+    return replace(claim_all(text, steps), ours=f"{means} deg with {', '.join(names)} {what}")
+
+
+def correct_claims(claims: Sequence[Claim]) -> list[Claim]:
+    """Correct the p of a paper's printed statements for their number, by the method of Holm (1979).
+
+    The statements of each reading are one family. A verdict by a difference that is not significant in its family
+    becomes *cannot tell*. The p of a sign-flip test of n clips is 2^(1 - n) or more, so the reason says where there are
+    too few clips. Claims of other kinds, and those without a p, stay as they are.
+    """
+    corrected = list(claims)
+    for reading in {claim.reading for claim in claims}:
+        family = [at for at, claim in enumerate(claims) if _is_tested(claim) and claim.reading == reading]
+        for at, p in zip(family, holm([claims[at].p or 0.0 for at in family]), strict=True):
+            corrected[at] = _with_correction(claims[at], p, len(family))
+    return corrected
+
+
+def _is_tested(claim: Claim) -> bool:
+    return claim.kind == "printed" and claim.p is not None
+
+
+def _with_correction(claim: Claim, p: float, statements: int) -> Claim:
+    claim = replace(claim, p_holm=p)
+    if p <= SIGNIFICANCE or claim.verdict not in ("reproduced", "not reproduced"):
+        return claim
+    few = statements * 2.0 ** (1 - claim.clips) > SIGNIFICANCE
+    reason = (
+        f"too few clips: {claim.clips} cannot show a difference among {statements} printed statements"
+        if few
+        else f"not significant among {statements} printed statements: p = {p:.2g} after Holm"
+    )
+    return replace(claim, verdict="cannot tell", why="; ".join(filter(None, (reason, claim.why))))
+
+
+def _paired_p(more: Errors, less: Errors, clips: Iterable[str]) -> float | None:
+    """p of the paired differences by sign flips; None with too few clips for an interval."""
+    difference = np.array([more[clip] - less[clip] for clip in clips])
+    return sign_flip_p(difference) if len(difference) >= MIN_CLIPS else None
+
+
 def claim_published_value(
-    text: str, published: float, errors: Errors, *, comparable: bool, why: str, unit: str = "deg"
+    text: str,
+    published: float,
+    errors: Errors,
+    *,
+    comparable: bool,
+    why: str,
+    unit: str = "deg",
+    kind: ClaimKind = "printed",
+    reading: Reading = "",
 ) -> Claim:
     """Claim that the mean error is the published figure, within `TOLERANCE`; `why` says why it is not `comparable`.
 
     The means are compared directly, since figures from two motion libraries have no paired difference.
     """
-    claim = Claim(text, f"{published:g} {unit}", "not measured", "not run", "no clip was measured", unit=unit)
+    claim = Claim(
+        *(text, f"{published:g} {unit}", "not measured", "not run", "no clip was measured"),
+        unit=unit,
+        kind=kind,
+        reading=reading,
+    )
     if not errors:
         return claim
     mean = sum(errors.values()) / len(errors)

@@ -10,7 +10,7 @@ class Calibration:
     """Mounts of S stations on their bones, and the pose of the tracker's frame in the world."""
 
     kind: str
-    """Source of the values: `exact` (the truth of the simulation), `tpose` or `poses`."""
+    """Source of the values: `exact` (the truth of the simulation), `tpose`, `poses`, `liu2011` or `kim2012`."""
     stations: tuple[str, ...]
     """(S,) station names in the order of the stream's rows."""
     bones: tuple[str, ...]

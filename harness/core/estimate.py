@@ -16,17 +16,31 @@ class Status(IntEnum):
     """For more than 0.5 s fewer than half of the configured stations had readings."""
 
 
+class Origin(IntEnum):
+    """Which part of a method computed an estimate."""
+
+    MODEL = 0
+    """The method's own model, from readings of this frame."""
+    FALLBACK = 1
+    """A simpler solution instead of the model, such as inverse kinematics while there is no history yet."""
+    BRIDGED = 2
+    """No reading of this frame: the last pose again, or an extrapolation."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Estimate:
-    """One pose of the body and its status, in the form that is posed, rendered, exported and scored.
+    """One pose of the body, its status and its origin, in the form that is posed, rendered, exported and scored.
 
-    Raises ShapeError for a pose that is no vector, and ValueError for an unknown status.
+    Raises ShapeError for a pose that is no vector, and ValueError for an unknown status or origin.
     """
 
     qpos: Floats
     """(55,) root position [m], root quaternion (w, x, y, z), 48 hinge angles [rad]."""
     status: Status
+    origin: Origin = Origin.MODEL
+    """Part of the method that computed the pose. Tables print the share of frames that are not from the model."""
 
     def __post_init__(self) -> None:
         freeze(self, qpos=("Q",))
         object.__setattr__(self, "status", Status(self.status))
+        object.__setattr__(self, "origin", Origin(self.origin))

@@ -131,32 +131,43 @@ def local_rotation(skeleton: Skeleton, bone: int, angles_rad: Floats) -> Floats:
     return turn
 
 
-def unwrap_angles(skeleton: Skeleton, angles_rad: Floats) -> Floats:
-    """Angles (T, D) of the same rotations, with each bone's angles as near as possible to those of the frame before.
+_POLE_MARGIN_RAD = np.deg2rad(10.0)
+"""A track may pass a gimbal's pole by this much, as the joint limits of `core.humanoid24` do [rad]."""
 
-    Files wrap at 180 deg, and three hinges reach a rotation by two sets of angles: (a, b, c) and the twin
-    (a + pi, pi - b, c + pi) (docs/notes/traps.md F9). The remaining freedom is settled for the clip. Each column's
-    median lies in (-pi, pi], and of a bone's two twin courses the one with medians nearer to zero is taken. A single
-    frame takes the angles nearest to zero.
+
+def unwrap_angles(skeleton: Skeleton, angles_rad: Floats) -> Floats:
+    """Angles (T, D) of the same rotations, continuous and on the near branch of each gimbal.
+
+    Files wrap at 180 deg, and three hinges (a, b, c) have the equivalent angles (a + pi, pi - b, c + pi)
+    (docs/notes/traps.md F9). The near branch is the one with b within 90 deg, where joint limits hold and solvers
+    answer. A track past the pole by at most `_POLE_MARGIN_RAD` stays continuous. One that goes farther jumps to the
+    near branch at the pole: it would otherwise be on the far branch until it passes the pole again. Between jumps
+    columns are unwrapped, and shifted by whole turns so that their medians lie in (-pi, pi].
     """
     out = np.array(angles_rad, dtype=float)
     for where in skeleton.dof_of_bone:
-        column = out[:, where]
-        if column.size == 0:
-            continue
         if are_gimbal(skeleton.axes[where]):
-            # The distance between two frames is the same for both twins, so whether to change over does not depend
-            # on which of them the frame before took.
-            kept = _wrapped_squared(column[1:] - column[:-1])
-            changed = _wrapped_squared(equivalent_euler_angles(column[1:]) - column[:-1])
-            over = np.concatenate([[False], np.cumsum(changed < kept) % 2 == 1])
-            column = np.where(over[:, None], equivalent_euler_angles(column), column)
-            courses = [_centre_on_zero(np.unwrap(c, axis=0)) for c in (column, equivalent_euler_angles(column))]
-            column = min(courses, key=lambda c: float(np.sum(np.median(c, axis=0) ** 2)))
+            out[:, where] = _unwrap_gimbal(out[:, where])
         else:
-            column = _centre_on_zero(np.unwrap(column, axis=0))
-        out[:, where] = column
+            out[:, where] = _centre_on_zero(np.unwrap(out[:, where], axis=0))
     return out
+
+
+def _unwrap_gimbal(angles_rad: Floats) -> Floats:
+    """`unwrap_angles` for the angles (T, 3) of one gimbal, T >= 1."""
+    is_near = np.cos(angles_rad[:, 1]) >= 0.0
+    near = np.where(is_near[:, None], angles_rad, equivalent_euler_angles(angles_rad))
+    far = equivalent_euler_angles(near)
+    crosses = _wrapped_squared(far[1:] - near[:-1]) < _wrapped_squared(near[1:] - near[:-1])
+    run = np.concatenate([[0], np.cumsum(crosses)])
+    deepest = np.maximum.reduceat(np.cos(near[:, 1]), np.flatnonzero(np.diff(run, prepend=-1)))
+    # A run of frames between two crossings that stays close to the pole continues the last run that does not.
+    deep = deepest > np.sin(_POLE_MARGIN_RAD)
+    base = np.maximum.accumulate(np.where(deep, np.arange(len(deep)), 0))
+    on_far = (run - base[run]) % 2 == 1
+    out = np.where(on_far[:, None], far, near)
+    stretches = np.split(out, 1 + np.flatnonzero(crosses & (on_far[1:] == on_far[:-1])))
+    return np.concatenate([_centre_on_zero(np.unwrap(stretch, axis=0)) for stretch in stretches])
 
 
 def _wrapped_squared(difference_rad: Floats) -> Floats:

@@ -12,6 +12,7 @@ from harness.body.mounts import Mount
 from harness.calibrate import calibration_report
 from harness.calibrate.calibration_file import CalibrationFile
 from harness.calibrate.guided_calibration import Notifier, PoseDisplay, PoseGuide
+from harness.calibrate.performer_preview import PerformerPreview
 from harness.calibrate.pose_calibration import calibrate_poses
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
@@ -96,13 +97,13 @@ class CalibrationSession:
         self,
         frames: Iterable[TrackerFrame],
         say: Notifier,
-        show: PoseDisplay | None = None,
-        watch: Notifier = lambda text: None,
+        displays: Sequence[PoseDisplay] = (),
     ) -> PoseCollector:
         """Guide the performer through the poses; UnusableHold when the stream ends before the last pose."""
         classifier = PoseClassifier(self.body, self.mounts, self.pose_qpos)
         collector = PoseCollector(self.stations, len(self.poses), classifier)
-        PoseGuide(collector, self.poses, self.pose_qpos, show).run(frames, say, watch)
+        preview = PerformerPreview(self.body, self.mounts, self.pose_qpos, classifier)
+        PoseGuide(collector, self.poses, self.pose_qpos, displays, preview).run(frames, say)
         return collector
 
     def solve(self, held: Sequence[Sequence[TrackerFrame]], source: str) -> CalibrationOutcome:

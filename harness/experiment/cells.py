@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
 from platform import node
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -167,19 +167,23 @@ def evaluate_cell(
     scenario, simulation = evaluation.scenario, evaluation.simulation
     inputs = make_inputs(planned.inputs, simulation.stations)
     calibration, fitted = evaluation.performer_calibration, evaluation.fit_method(method, planned.method)
-    qpos, status, step_ms, cpu_ms = run_method(fitted, calibration.calibration, simulation, inputs)
+    answers = run_method(fitted, calibration.calibration, calibration.map_stream(simulation), inputs)
+    frames = simulation.frames
+    position_valid = np.array([f.position_valid for f in frames])
+    orientation_valid = np.array([f.orientation_valid for f in frames])
     scores = score_estimate(
         evaluation.body.skeleton,
         scenario.tracker.rate_hz,
         simulation.truth_qpos,
-        qpos,
+        answers.qpos,
         simulation.frame_index,
-        status,
-        step_ms,
-        cpu_ms=cpu_ms,
+        answers.status,
+        answers.step_ms,
+        origin=answers.origin,
+        complete=(position_valid & orientation_valid).all(axis=1),
+        cpu_ms=(answers.step_cpu_ms, answers.reference_cpu_ms),
         estimate_skeleton=calibration.body.skeleton,
     )
-    frames = simulation.frames
     return storage.Cell(
         key=key,
         method=planned.method,
@@ -208,30 +212,47 @@ def evaluate_cell(
         notes=evaluation.notes(method),
         time_s=simulation.truth_s[simulation.frame_index],
         truth_qpos=simulation.truth_qpos[simulation.frame_index],
-        estimate_qpos=qpos,
+        estimate_qpos=answers.qpos,
         frame_index=simulation.frame_index,
-        status=status,
-        step_ms=step_ms,
-        step_cpu_ms=cpu_ms[0],
-        reference_cpu_ms=cpu_ms[1],
+        status=answers.status,
+        origin=answers.origin,
+        step_ms=answers.step_ms,
+        step_cpu_ms=answers.step_cpu_ms,
+        reference_cpu_ms=answers.reference_cpu_ms,
         quality=np.array([f.quality for f in frames]),
-        position_valid=np.array([f.position_valid for f in frames]),
-        orientation_valid=np.array([f.orientation_valid for f in frames]),
+        position_valid=position_valid,
+        orientation_valid=orientation_valid,
         suspect=np.array([f.suspect for f in frames]),
     )
 
 
+class MethodAnswers(NamedTuple):
+    """The answers of a session to F frames, and the times of its steps."""
+
+    qpos: Floats
+    """(F, 55) estimates."""
+    status: Ints
+    """(F,) values of `core.estimate.Status`."""
+    origin: Ints
+    """(F,) values of `core.estimate.Origin`."""
+    step_ms: Floats
+    """(F,) wall time of each step [ms]."""
+    step_cpu_ms: Floats
+    """(F,) CPU time of each step [ms]."""
+    reference_cpu_ms: Floats
+    """(F,) CPU time of the reference work after each step [ms]."""
+
+
 def run_method(
     reconstructor: Reconstructor, calibration: Calibration, simulation: Simulation, inputs: Inputs
-) -> tuple[Floats, Ints, Floats, tuple[Floats, Floats]]:
+) -> MethodAnswers:
     """Run a reconstructor over a stream. It never sees the truth.
 
-    Returns the estimates (F, 55), status (F,), wall time of each step (F,) [ms], and the CPU times (F,) of each step
-    and of the reference work [ms]. Reference work follows every `FRAMES_PER_TIMING` steps. It evicts the method's data
+    Reference work follows every `FRAMES_PER_TIMING` steps, and its time is NaN elsewhere. It evicts the method's data
     from the processor's caches, so the step after it is not timed (NaN).
     """
     session, work = reconstructor.begin(calibration), ReferenceWorkload()
-    qpos, status, step_ms, cpu_ms, reference_ms = [], [], [], [], []
+    qpos, status, origin, step_ms, cpu_ms, reference_ms = [], [], [], [], [], []
     for index, frame in enumerate(simulation.frames):
         shown = inputs.mask(frame)
         start_cpu, start = time.process_time(), time.perf_counter()
@@ -240,10 +261,11 @@ def run_method(
         cpu_ms.append(1e3 * (time.process_time() - start_cpu))
         qpos.append(estimate.qpos)
         status.append(estimate.status)
+        origin.append(estimate.origin)
         reference_ms.append(work.cpu_ms() if index % FRAMES_PER_TIMING == FRAMES_PER_TIMING - 1 else np.nan)
     times_ms = np.array([step_ms, cpu_ms, reference_ms])
     times_ms[:2, FRAMES_PER_TIMING::FRAMES_PER_TIMING] = np.nan
-    return np.array(qpos), np.array(status), times_ms[0], (times_ms[1], times_ms[2])
+    return MethodAnswers(np.array(qpos), np.array(status), np.array(origin), *times_ms)
 
 
 def open_scenario_motion(motion: ScenarioMotion, folder: LibraryFolders | None, seed: int) -> MotionSource:

@@ -13,7 +13,7 @@ import numpy as np
 
 from harness.body import humanoid, retargeting
 from harness.body.mounts import Mount, locate_mount
-from harness.calibrate.skeleton_prior import fit_skeleton_prior
+from harness.calibrate.skeleton_prior import SkeletonPrior, fit_skeleton_prior
 from harness.core.fields import replace_fields
 from harness.core.humanoid24 import BONES, standard_skeleton
 from harness.core.motion import BodyMotion, Clip
@@ -21,10 +21,13 @@ from harness.core.seeds import generator
 from harness.core.skeleton import Skeleton
 from harness.core.split import ClipPart, allowed_frames, refuse_leak, select_examples
 from harness.errors import BadInput
+from harness.experiment.example_subset import keep_share
 from harness.experiment.scenario import Scenario, ScenarioMotion
 from harness.experiment.simulated_calibration import (
     PerformerCalibration,
     TrackerSession,
+    simulate_kim2012_calibration,
+    simulate_liu2011_calibration,
     simulate_poses_calibration,
     simulate_tpose_calibration,
     use_exact_calibration,
@@ -201,7 +204,8 @@ class Training:
             refuse_leak(held_out, clip.name, runs, len(clip), clip.rate_hz)
             parts = (_cut_take(whole_take, run, clip.name) for run in runs)
             takes += [_resample(self.body, part, self.subject.rate_hz) for part in parts]
-        return thin_takes(takes, self.subject.motion.thin_to)
+        kept = keep_share(takes, self.subject.motion.example_share, self.subject.seed)
+        return thin_takes(kept, self.subject.motion.thin_to)
 
     def fit(self, method: Method, name: str) -> Reconstructor:
         """The method of that name, fitted once to the examples."""
@@ -239,11 +243,18 @@ class Observation:
                 return use_exact_calibration(self.session)
             case "tpose":
                 return simulate_tpose_calibration(self.session, **model)
+            case "kim2012":
+                return simulate_kim2012_calibration(self.session, **model)
             case "poses":
-                people = self.subject.people
-                origin = f"{len(people)} others ({self.subject.source.title})"
-                prior = fit_skeleton_prior(list(people.values()), source=origin)
-                return simulate_poses_calibration(self.session, prior, **model)
+                return simulate_poses_calibration(self.session, self._skeleton_prior, **model)
+            case "liu2011":
+                return simulate_liu2011_calibration(self.session, self._skeleton_prior, **model)
+
+    @property
+    def _skeleton_prior(self) -> SkeletonPrior:
+        """Prior of the performer's bones, from other people."""
+        people = self.subject.people
+        return fit_skeleton_prior(list(people.values()), source=f"{len(people)} others ({self.subject.source.title})")
 
     @cached_property
     def simulation(self) -> Simulation:
@@ -267,11 +278,13 @@ class Observation:
         content["stations"] = {name: asdict(station) for name, station in scenario.worn_stations.items()}
         for key in ("test", "behaviours", "examples", "withheld"):
             del content["motion"][key]
+        if scenario.motion.example_share == 1.0:
+            del content["motion"]["example_share"]  # nothing is left out: the same as before the key was there
         if scenario.calibration == "exact":
             del content["calibrating"]  # no pose is held, and the digest of the mounts covers where trackers sit
         skeleton = subject.body.skeleton
         mounts = [array for mount in self.session.true_mounts for array in locate_mount(skeleton, mount)]
-        poses = scenario.calibration == "poses"
+        with_prior = scenario.calibration in ("poses", "liu2011")
         return {
             **content,
             "tracker": asdict(tracker_of(scenario)),
@@ -281,7 +294,7 @@ class Observation:
             "motion_digest": _motion_digest(subject.clip),
             "body_digest": storage.digest(skeleton.bone_m, skeleton.axes, subject.body.limits_rad),
             "mounts_digest": storage.digest(*mounts),
-            **({"people_digest": storage.digest(*(p.bone_m for p in subject.people.values()))} if poses else {}),
+            **({"people_digest": storage.digest(*(p.bone_m for p in subject.people.values()))} if with_prior else {}),
             "metric_versions": VERSIONS,
         }
 

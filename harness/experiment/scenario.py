@@ -50,6 +50,9 @@ class ScenarioMotion:
     thin_to: int = 0
     """Number of frames that all examples together keep, evenly spaced, for a sparse database (Kim et al. 2012); 0 keeps
     all."""
+    example_share: float = 1.0
+    """Share of the frames of all examples that is kept, in pieces of 0.5 s drawn by the scenario's seed; smaller
+    shares are subsets of larger ones (see `harness.experiment.example_subset`)."""
     database: Literal["all", "behaviour"] = "all"
     """Learn from all examples, or only from those of the test clip's behaviour (Liu et al. 2011)."""
     split: Literal["block", "sequence", "subject"] = "sequence"
@@ -115,10 +118,10 @@ class Scenario:
     worn: tuple[str, ...] = ()
     """Names of the stations that are worn; all of them if empty. Vary "worn" to compare sets of stations. The stream
     has no other stations, so that a station that is not worn is not a lost one."""
-    calibration: Literal["exact", "tpose", "poses"] = "exact"
+    calibration: Literal["exact", "tpose", "poses", "liu2011", "kim2012"] = "exact"
     """Source of the mounts, room and body that methods get: `exact` is the truth, `tpose` estimates mounts and room
-    from a T-pose (bone lengths are known), `poses` estimates all three from eight poses. Vary it to measure the cost of
-    calibration."""
+    from a T-pose (bone lengths are known), `poses` estimates all three from eight poses. `liu2011` and `kim2012` are
+    the papers' equations as printed: eight poses, and a T-pose. Vary it to measure the cost of calibration."""
     calibrating: CalibrationSettings = field(default_factory=CalibrationSettings)
     """Errors of the simulated calibration."""
     mount: str = "tibia"
@@ -341,6 +344,8 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
             refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
     if not 1.0 <= scenario.tracker.rate_hz <= 1000.0:
         refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
+    if not 0.0 < scenario.motion.example_share <= 1.0:
+        refuse(f"motion.example_share = {scenario.motion.example_share}", "above 0, at most 1", "1 keeps all frames.")
     for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):
         if value < 0.0:
             refuse(f"motion.{key} = {value}", "0 or more", "0 uses the whole clip, or the rate in the file.")

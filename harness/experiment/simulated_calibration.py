@@ -12,6 +12,8 @@ import numpy as np
 from harness.body.humanoid import Body, build_body, tpose
 from harness.body.mounts import Mount
 from harness.calibrate.guided_calibration import PoseGuide
+from harness.calibrate.kim2012_calibration import SensorMaps, calibrate_kim2012
+from harness.calibrate.liu2011_calibration import calibrate_liu2011
 from harness.calibrate.pose_calibration import calibrate_poses
 from harness.calibrate.pose_classifier import PoseClassifier
 from harness.calibrate.pose_collector import PoseCollector
@@ -89,6 +91,14 @@ class PerformerCalibration:
     errors: Mapping[str, float]
     """Errors against the truth, see `measure_calibration_errors`; empty for the exact calibration."""
     notes: tuple[str, ...] = ()
+    maps: SensorMaps | None = None
+    """Maps of the readings that the method receives; None leaves them as the tracker reports them."""
+
+    def map_stream(self, simulation: Simulation) -> Simulation:
+        """The simulation with the frames that the method receives."""
+        if self.maps is None:
+            return simulation
+        return replace(simulation, frames=tuple(self.maps.apply(frame) for frame in simulation.frames))
 
 
 def use_exact_calibration(session: TrackerSession) -> PerformerCalibration:
@@ -114,6 +124,43 @@ def simulate_poses_calibration(
 
     Only the stream is known of the performer. UnusableHold when the poses cannot be found in it, or are unusable.
     """
+    held = _observe_eight_poses(session, miss_rad, hold_s)
+    found = calibrate_poses(held, prior, session.nominal)
+    errors = measure_calibration_errors(found.calibration, found.skeleton, session)
+    notes = (_error_note(f"eight poses, other bones learnt from {prior.source}", errors),)
+    return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
+
+
+def simulate_liu2011_calibration(
+    session: TrackerSession, prior: SkeletonPrior, *, miss_rad: float, hold_s: float
+) -> PerformerCalibration:
+    """As `simulate_poses_calibration`, by eq. 1 of Liu et al. 2011 as printed; the same stream.
+
+    UnusableHold also when a bone of the minimum has no length, since no body can be built from it.
+    """
+    found = calibrate_liu2011(_observe_eight_poses(session, miss_rad, hold_s), prior, session.nominal)
+    errors = measure_calibration_errors(found.calibration, found.skeleton, session)
+    notes = (_error_note(f"Liu's eq. 1 as printed, other bones learnt from {prior.source}", errors),)
+    return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
+
+
+def simulate_kim2012_calibration(session: TrackerSession, *, miss_rad: float, hold_s: float) -> PerformerCalibration:
+    """Maps by eq. 1 of Kim et al. 2012 as printed, from the T-pose of `simulate_tpose_calibration`.
+
+    Methods receive mapped readings and the nominal mounts. The errors name the room's heading alone, because the maps
+    have no mounts and no common origin.
+    """
+    frames = session.observe_poses([tpose(session.body.skeleton)], miss_rad=miss_rad, hold_s=hold_s)
+    found = calibrate_kim2012(frames, session.body, session.nominal)
+    heading_deg = _heading_error_deg(found.maps.world_from_tracker, session)
+    note = f"calibrated by Kim's eq. 1 as printed: no mounts, room {heading_deg:.1f} deg about the vertical"
+    return PerformerCalibration(
+        found.calibration, session.body, {"room_heading_deg": heading_deg}, (note,), maps=found.maps
+    )
+
+
+def _observe_eight_poses(session: TrackerSession, miss_rad: float, hold_s: float) -> list[list[TrackerFrame]]:
+    """Frames of the eight holds, as the collector finds them in the simulated stream."""
     poses = [configuration(pose, session.body.skeleton) for pose in POSES]
     frames = session.observe_poses(poses, miss_rad=miss_rad, hold_s=hold_s)
     standard = build_body()
@@ -121,10 +168,7 @@ def simulate_poses_calibration(
     stations = [mount.station for mount in session.nominal]
     collector = PoseCollector(stations, len(POSES), PoseClassifier(standard, session.nominal, shown))
     PoseGuide(collector, POSES).run(frames, say=lambda text: None)
-    found = calibrate_poses(collector.holds, prior, session.nominal)
-    errors = measure_calibration_errors(found.calibration, found.skeleton, session)
-    notes = (_error_note(f"eight poses, other bones learnt from {prior.source}", errors),)
-    return PerformerCalibration(found.calibration, build_body(found.skeleton), errors, notes)
+    return collector.holds
 
 
 def measure_calibration_errors(found: Calibration, skeleton: Skeleton, session: TrackerSession) -> dict[str, float]:
@@ -133,14 +177,18 @@ def measure_calibration_errors(found: Calibration, skeleton: Skeleton, session: 
     true = session.true_calibration
     beside_m = np.linalg.norm(found.mount_m - true.mount_m, axis=1)
     turned_rad = rotations.angle_between_rad(found.bone_from_station, true.bone_from_station)
-    room = rotations.multiply(found.world_from_tracker, rotations.inverse(true.world_from_tracker))
     return {
         "mount_mm": 1e3 * _rms(beside_m),
         "mount_deg": float(np.rad2deg(_rms(turned_rad))),
         "length_mm": 1e3 * _rms(skeleton.length_m - session.body.skeleton.length_m),
-        "room_heading_deg": float(np.rad2deg(abs(rotations.yaw_rad(room)))),
+        "room_heading_deg": _heading_error_deg(found.world_from_tracker, session),
         "room_origin_mm": 1e3 * float(np.linalg.norm(found.tracker_origin_m - true.tracker_origin_m)),
     }
+
+
+def _heading_error_deg(world_from_tracker: Floats, session: TrackerSession) -> float:
+    room = rotations.multiply(world_from_tracker, rotations.inverse(session.true_calibration.world_from_tracker))
+    return float(np.rad2deg(abs(rotations.yaw_rad(room))))
 
 
 def _error_note(procedure: str, errors: Mapping[str, float]) -> str:

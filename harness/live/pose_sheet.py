@@ -26,7 +26,7 @@ def draw_poses(poses: Sequence[CalibrationPose], skeleton: Skeleton, folder: Pat
     try:
         drawn = []
         for number, pose in enumerate(poses, 1):
-            viewer.show(number, configuration(pose, skeleton))
+            viewer.show_pose(number, configuration(pose, skeleton))
             picture, deadline_s = folder / f"{number:08d}.png", time.monotonic() + _DRAW_TIMEOUT_S
             while not picture.exists():
                 if time.monotonic() > deadline_s:

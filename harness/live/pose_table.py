@@ -20,14 +20,16 @@ class PoseTableOutput:
         root = [f"root.{axis}_m" for axis in "xyz"] + [f"root.q{axis}" for axis in "wxyz"]
         hinges = [f"{skeleton.dof_names[d]}_rad" for d in hinges_in_qpos_order(skeleton)]
         times = ["received_s", "taken_s", "ready_s", *(f"device_s.{name}" for name in stations)]
-        head = ",".join(["frame", "status", *times, *root, *hinges]) + "\n"
+        head = ",".join(["frame", "status", "origin", *times, *root, *hinges]) + "\n"
         self._file = IncrementalFile(path, head.encode(), force=force)
 
     def send(self, pose: LivePose) -> None:
         frame = pose.frame
         times = (frame.received_s, pose.taken_s, pose.ready_s, *frame.measured_s.tolist())
         numbers = map(repr, (*times, *pose.estimate.qpos.tolist()))
-        line = f"{pose.number},{pose.estimate.status.name.lower()},{','.join(numbers)}\n"
+        estimate = pose.estimate
+        states = f"{estimate.status.name.lower()},{estimate.origin.name.lower()}"
+        line = f"{pose.number},{states},{','.join(numbers)}\n"
         if self._file.write(line.encode(), pose.ready_s):
             self._file.save()
 

@@ -14,7 +14,7 @@ from harness.body.humanoid import Body
 from harness.body.kinematics import Kinematics
 from harness.calibrate.guided_calibration import Calibrator, Notifier
 from harness.core.calibration import Calibration
-from harness.core.estimate import Status
+from harness.core.estimate import Origin, Status
 from harness.live.capture import CapturedFrame, CaptureThread
 from harness.live.clock import HostClockEstimator
 from harness.live.dropping_queue import DroppingQueue
@@ -60,6 +60,8 @@ class LiveResult:
     """Frames that the queue dropped."""
     status: dict[str, int]
     """Number of poses by status."""
+    origin: dict[str, int]
+    """Number of poses by origin."""
     seconds: float
     """Time from the first to the last pose [s]."""
     stages: StageLatencies
@@ -139,6 +141,7 @@ class _SolverThread:
         self._host_clock = HostClockEstimator()
         self._stages = StageLatencies(1.0 / options.rate_hz if options.deadline_s is None else options.deadline_s)
         self._status: Counter[str] = Counter()
+        self._origin: Counter[str] = Counter()
         self._failed: dict[str, str] = {}
         self._session: Session | None = None
         self._frames_calibrated = self._frames_discarded = 0
@@ -184,6 +187,7 @@ class _SolverThread:
             frames_before=self._frames_calibrated + self._frames_discarded,
             dropped=self._queue.dropped - self._frames_discarded,
             status={state.name.lower(): self._status[state.name] for state in Status},
+            origin={part.name.lower(): self._origin[part.name] for part in Origin},
             seconds=self._last_s - self._first_s,
             stages=self._stages,
             failed=self._failed,
@@ -218,6 +222,7 @@ class _SolverThread:
             received_s = frame.received_s if self._options.host_timestamps else captured.captured_s
             self._stages.add(received_s, taken_s, ready_s, sent_s)
             self._status[estimate.status.name] += 1
+            self._origin[estimate.origin.name] += 1
             self._first_s, self._last_s = self._first_s or ready_s, ready_s
             number += 1
             if len(self._queue) == 0 and sent_s - collected_s > _COLLECT_PERIOD_S:

@@ -18,6 +18,7 @@ def as_dict(result: LiveResult, jitter: Mapping[str, Any]) -> dict[str, Any]:
         "frames_dropped": result.dropped,
         "poses": result.poses,
         "status": result.status,
+        "origin": result.origin,
         "deadline_ms": 1e3 * stages.deadline_s,
         "deadline_missed": stages.missed,
         "latency": {name: durations.as_dict() for name, durations in stages.by_name().items()},
@@ -31,7 +32,9 @@ def lines(result: LiveResult, jitter: Mapping[str, Any]) -> list[str]:
     stages = result.stages
     rows = [_time_row(name, durations.as_dict()) for name, durations in stages.by_name().items()]
     rows += [_time_row(name, jitter[key]) for name, key in _JITTER_LABELS.items() if jitter.get(key)]
-    states = ", ".join(f"{count} {name}" for name, count in result.status.items())
+    states = "; ".join(
+        ", ".join(f"{count} {name}" for name, count in counted.items()) for counted in (result.status, result.origin)
+    )
     counts = f"{result.poses} poses in {result.seconds:.1f} s ({states}); {result.dropped} frames dropped"
     if result.frames_before:
         counts += f", {result.frames_before} before the first"

@@ -11,6 +11,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from harness.calibrate.guided_calibration import GuidedPose
 from harness.core.arrays import Floats
 from harness.core.skeleton import Skeleton
 from harness.core.workers import ignore_sigint
@@ -68,10 +69,19 @@ class ViewerOutput:
         self._require_process()
         self._shared.put(pose)
 
-    def show(self, number: int, qpos: Floats) -> None:
+    def show_pose(self, number: int, qpos: Floats) -> None:
         """Show a configuration (55,) until the next one; OSError when the viewer's process has ended."""
         self._require_process()
         self._shared.set(number, qpos)
+
+    def show(self, guided: GuidedPose) -> None:
+        """Show the wanted pose, the performer beside it, and a meter of stillness; OSError as `show_pose`.
+
+        A viewer that writes pictures replaces that of the pose.
+        """
+        self._require_process()
+        beside = None if guided.performer is None else guided.performer.qpos
+        self._shared.set(guided.number, guided.target, beside, guided.still_share)
 
     def _require_process(self) -> None:
         if self._pipe.poll():

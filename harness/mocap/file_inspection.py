@@ -93,6 +93,7 @@ def inspect_clip(clip: Clip) -> Inspection:
     )
     if not humanoid:
         return facts
+    facts = replace(facts, turns=motion_checks.find_turns(skeleton, clip.angles_rad, clip.rate_hz))
     leg = 0.5 * sum(float(skeleton.length_m[skeleton.index(bone)]) for bone in LEG_BONES)
     above = float(np.median(clip.root_m[:, 2])) / leg
     doubts = list(facts.doubts)
@@ -213,6 +214,7 @@ def _inspect_points(name: str, points: PointTrajectories, rate_hz: float) -> Ins
         fastest_joint=joint,
         fastest_frame=frame,
         spikes=motion_checks.find_spikes(points.names, points.position_m, rate_hz),
+        turns=(),
         frozen=motion_checks.find_frozen_frames(points.position_m),
         missing_share=0.0,
         missing_markers=(),

@@ -3,10 +3,10 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from harness.mocap.motion_checks import Spike
+from harness.mocap.motion_checks import Spike, SuddenTurn
 
-MAX_LISTED_SPIKES = 8
-"""Number of spikes that are listed; the others are counted."""
+MAX_LISTED = 8
+"""Number of spikes, and of turns, that are listed; the others are counted."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ class Inspection:
     fastest_joint: str
     fastest_frame: int
     spikes: tuple[Spike, ...]
+    turns: tuple[SuddenTurn, ...]
+    """Turns of a hand or foot by 30 deg and more in a single frame; empty where there are no bones."""
     frozen: tuple[tuple[int, int], ...]
     """First and last frame of each run of equal frames, counted from 1."""
     missing_share: float
@@ -56,14 +58,15 @@ class Inspection:
     @property
     def findings(self) -> tuple[str, ...]:
         """Problems of the motion, each in a sentence; empty if there are none."""
-        findings = [
-            f"frame {s.frame}: {s.joint} is off by {s.speed_m_s:.1f} m/s" for s in self.spikes[:MAX_LISTED_SPIKES]
-        ]
-        if len(self.spikes) > MAX_LISTED_SPIKES:
-            findings.append(f"and {len(self.spikes) - MAX_LISTED_SPIKES} more frames with spikes")
+        findings = [f"frame {s.frame}: {s.joint} is off by {s.speed_m_s:.1f} m/s" for s in self.spikes[:MAX_LISTED]]
+        if len(self.spikes) > MAX_LISTED:
+            findings.append(f"and {len(self.spikes) - MAX_LISTED} more frames with spikes")
+        findings += [f"frame {t.frame}: {t.bone} turns by {t.turn_deg:.0f} deg" for t in self.turns[:MAX_LISTED]]
+        if len(self.turns) > MAX_LISTED:
+            findings.append(f"and {len(self.turns) - MAX_LISTED} more turns of hands and feet")
         findings += [f"frames {first} to {last} are all the same" for first, last in self.frozen]
         if self.missing_share > 0.0:
-            labels = ", ".join(self.missing_markers[:MAX_LISTED_SPIKES])
+            labels = ", ".join(self.missing_markers[:MAX_LISTED])
             findings.append(f"{100 * self.missing_share:.2g} % of the marker positions are missing ({labels})")
         if self.limits_share:
             findings.append(f"{100 * self.limits_share:.1f} % of the frames break a joint limit ({self.limits_worst})")

@@ -21,14 +21,11 @@ from harness.core.fields import replace_fields
 from harness.core.options import parse_name, split_outside_brackets
 from harness.errors import BadInput, HarnessError, RenamedKey, UnknownName
 from harness.reconstruct.contract import Method
-from harness.reconstruct.methods import dynamic_map, ik
+from harness.reconstruct.methods import dynamic_map, ik, kernel_cca, local_pca, weighted_blend
 from harness.reconstruct.methods.best_match import BestMatch
 from harness.reconstruct.methods.clean_up import SUFFIX, CleanUp
-from harness.reconstruct.methods.kernel_cca import KernelCca
 from harness.reconstruct.methods.kernel_ridge import KernelRidge
-from harness.reconstruct.methods.local_pca import LocalPca
 from harness.reconstruct.methods.mean_pose import MeanPose
-from harness.reconstruct.methods.weighted_blend import WeightedBlend
 
 GROUP = "harness.methods"
 """Entry-point group of installed packages."""
@@ -47,12 +44,15 @@ def methods() -> dict[str, Callable[[], Method]]:
         "mean_pose": MeanPose,
         "kernel_ridge": KernelRidge,
         "best_match": BestMatch,
-        "local_pca": LocalPca,
+        "local_pca": local_pca.LocalPca,
+        "local_pca:chai2005": lambda: local_pca.CHAI2005,
         "dynamic_map": dynamic_map.DynamicMap,
         "dynamic_map:window": lambda: dynamic_map.WINDOW,
         "dynamic_map:literal": lambda: dynamic_map.LITERAL,
-        "weighted_blend": WeightedBlend,
-        "kernel_cca": KernelCca,
+        "weighted_blend": weighted_blend.WeightedBlend,
+        "weighted_blend:literal": lambda: weighted_blend.LITERAL,
+        "kernel_cca": kernel_cca.KernelCca,
+        "kernel_cca:literal": lambda: kernel_cca.LITERAL,
     }
 
 

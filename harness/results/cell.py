@@ -45,7 +45,7 @@ _TEXTS = (
     *("source_hash", "reproduce", "notes"),
 )
 _FLOATS = ("time_s", "truth_qpos", "estimate_qpos", "step_ms", "step_cpu_ms", "reference_cpu_ms", "quality")
-_INTS = ("frame_index", "status")
+_INTS = ("frame_index", "status", "origin")
 _BOOLS = ("position_valid", "orientation_valid", "suspect")
 _ERROR_PREFIX = "error."
 _ADVICE = "Delete the cell's folder and run again; finished cells are kept."
@@ -91,6 +91,8 @@ class Cell:
     """(F,) index of the true frame of each estimate."""
     status: Ints
     """(F,) status of each estimate, see `core.estimate.Status`."""
+    origin: Ints
+    """(F,) origin of each estimate, see `core.estimate.Origin`."""
     step_ms: Floats
     """(F,) wall time of each step [ms]; NaN where not timed."""
     quality: Floats
@@ -129,7 +131,7 @@ class Cell:
         freeze(self, time_s=(frames,), quality=(frames, stations))
         freeze(self, step_ms=(frames,), step_cpu_ms=(frames,), reference_cpu_ms=(frames,))
         freeze(self, truth_qpos=(frames, "Q"), estimate_qpos=(frames, "Q"))
-        freeze(self, np.int64, frame_index=(frames,), status=(frames,))
+        freeze(self, np.int64, frame_index=(frames,), status=(frames,), origin=(frames,))
         freeze(self, bool, **dict.fromkeys(_BOOLS, (frames, stations)))
         for name in ("stations", "notes"):
             object.__setattr__(self, name, tuple(getattr(self, name)))

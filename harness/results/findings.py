@@ -14,12 +14,22 @@ from harness.core.files import read_json, to_json_types, write_json
 from harness.errors import BadFile, UnknownName
 
 SCHEMA = 1
-ClaimVerdict = Literal["reproduced", "not reproduced", "cannot tell", "not comparable", "not run"]
+ClaimVerdict = Literal["reproduced", "same", "not reproduced", "cannot tell", "not comparable", "not run"]
 """Verdict on a claim, by the paired 95 % interval of the difference.
 
-*reproduced*: it lies on the published side; *not reproduced*: on the other side; *cannot tell*: it contains zero, or
-there are fewer than 6 clips; *not comparable*: absolute figures of other motion.
+*reproduced*: it lies on the published side; *same*: it lies within the margin of `compare.margins`, so the difference
+is too small to matter; *not reproduced*: it lies on the other side; *cannot tell*: it contains zero, there are too few
+clips, or the difference is not significant after Holm's correction; *not comparable*: absolute figures of other motion.
 """
+ClaimKind = Literal["printed", "derived", "repeated", "speed"]
+"""Kind of a claim.
+
+*printed*: the paper prints the statement; *derived*: it follows from printed ones, or is our reading of a word;
+*repeated*: a printed statement asked of one more method; *speed*: today's speed against the paper's. Only printed
+statements count in the headline.
+"""
+Reading = Literal["", "as printed", "ours"]
+"""Methods of a claim: the paper's as printed, our best, or "" where the statement is not about a method."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +52,12 @@ class Claim:
     high: float | None = None
     """Ends of the 95 % interval of `difference`."""
     unit: str = ""
+    kind: ClaimKind = "printed"
+    reading: Reading = ""
+    p: float | None = None
+    """Two-sided p of the difference; None where nothing was tested."""
+    p_holm: float | None = None
+    """`p` corrected for the number of printed statements of the paper with this reading (see `correct_claims`)."""
 
 
 @dataclass(frozen=True)

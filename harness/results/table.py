@@ -39,6 +39,7 @@ SUMMARY_METRICS = (
     "mpjpe_root_mm",
     "jitter_m_s3",
     "coverage",
+    "fallback_share",
     "step_p50_ms",
 )
 """Metrics of the groups in summary.json; the table has all metrics."""

@@ -63,7 +63,12 @@ DEFINITIONS: dict[str, Definition] = {
     "frames_warm_up": Definition("frames", "estimates within the warm-up, which are not scored"),
     "frames_held": Definition("frames", "matched frames with status HELD (too few readings)"),
     "frames_lost": Definition("frames", "matched frames with status LOST (most stations missing for long)"),
+    "frames_fallback": Definition("frames", "matched frames that a fallback answered in place of the method's model"),
+    "frames_bridged": Definition("frames", "matched frames without readings, answered by the last or a predicted pose"),
     "frames_not_finite": Definition("frames", "estimates with NaN or infinity, counted as not matched"),
+    "fallback_share": Definition(
+        "share", "frames that a fallback answered / undisturbed frames: every station reported for the last 0.5 s"
+    ),
     "joint_angle_mean_deg": Definition(
         "deg", "mean |difference| of the 48 hinge angles, wrapped, root excluded", 1, "mean"
     ),

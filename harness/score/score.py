@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.arrays import Bools, Floats, Ints
-from harness.core.estimate import Status
+from harness.core.estimate import Origin, Status
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
@@ -15,6 +15,8 @@ from harness.score.pair import Pair, compute_poses, hinged_bones, joint_names
 
 WARM_UP_S = 1.0
 """Estimates in this first part of a take are not scored [s] (choice)."""
+UNDISTURBED_AFTER_S = 0.5
+"""A frame is undisturbed when every station has reported for this long [s] (choice): time to find the body again."""
 COVERAGE_FLOOR = 0.5
 """With a smaller share of matched frames, only coverage is measured (choice)."""
 
@@ -42,6 +44,8 @@ def score_estimate(
     status: Ints,
     step_ms: Floats,
     *,
+    origin: Ints | None = None,
+    complete: Bools | None = None,
     cpu_ms: tuple[Floats, Floats] | None = None,
     estimate_skeleton: Skeleton | None = None,
     warm_up_s: float = WARM_UP_S,
@@ -54,8 +58,12 @@ def score_estimate(
     - `frame_index` (F,): the true frame of each estimate, strictly increasing;
     - `status` (F,): values of `Status`;
     - `step_ms` (F,): wall time of each step, NaN where not timed;
+    - `origin` (F,): values of `Origin`, all MODEL by default;
+    - `complete` (F,): frames in which every station reported, all by default;
     - `cpu_ms`: CPU time (F,) of the steps and (F,) of the reference (see `timing.step_relative`), NaN where not timed.
     """
+    origin = np.full(len(estimate_qpos), Origin.MODEL) if origin is None else np.asarray(origin)
+    complete = np.ones(len(estimate_qpos), bool) if complete is None else np.asarray(complete)
     frame_index, status, step_ms = _check_shapes(skeleton, truth_qpos, estimate_qpos, frame_index, status, step_ms)
     warm_up = int(np.ceil(warm_up_s * rate_hz - 1e-9))
     finite = np.isfinite(estimate_qpos).all(axis=1) & (np.linalg.norm(estimate_qpos[:, 3:7], axis=1) > 0.0)
@@ -78,6 +86,8 @@ def score_estimate(
         name: pool_frames(per_frame[name][scored], DEFINITIONS[name].pool) for name in FRAME_METRICS
     }
     scored_pair = pair.at(matched >= warm_up)
+    undisturbed = scored & undisturbed_frames(complete, frame_index, rate_hz)
+    measured["fallback_share"] = _share(origin[undisturbed] == Origin.FALLBACK)
     measured["root_drift_mm_s"] = positions.root_drift_mm_s(scored_pair)
     measured["lag_ms"] = timing.lag_ms(
         truth.angles_rad, scored_pair.estimate.angles_rad, scored_pair.frame_index, rate_hz
@@ -93,6 +103,8 @@ def score_estimate(
         "frames_warm_up": int((~warm).sum()),
         "frames_held": int((status[scored] == Status.HELD).sum()),
         "frames_lost": int((status[scored] == Status.LOST).sum()),
+        "frames_fallback": int((origin[scored] == Origin.FALLBACK).sum()),
+        "frames_bridged": int((origin[scored] == Origin.BRIDGED).sum()),
         "frames_not_finite": int((~finite).sum()),
     }
     enough = expected > 0 and coverage >= floor
@@ -101,6 +113,26 @@ def score_estimate(
         for name in DEFINITIONS
     }
     return Scores(metrics, per_frame, _per_joint(scored_pair) if enough else {}, scored)
+
+
+def undisturbed_frames(complete: Bools, frame_index: Ints, rate_hz: float) -> Bools:
+    """(F,) frames that end a run of complete frames, without a gap, of at least `UNDISTURBED_AFTER_S`.
+
+    `complete` (F,) has the frames in which every station reported, `frame_index` (F,) their true frames. Frames before
+    the first count as complete.
+    """
+    frames = round(UNDISTURBED_AFTER_S * rate_hz)
+    rows = np.arange(len(complete))
+    broken = ~complete
+    broken[1:] |= np.diff(frame_index) > 1
+    last = np.maximum.accumulate(np.where(broken, rows, -frames))
+    out: Bools = complete & (rows - last >= frames)
+    return out
+
+
+def _share(values: Bools) -> float:
+    """Share of true values; NaN without values."""
+    return float(values.mean()) if len(values) else float("nan")
 
 
 def pool_frames(values: Floats, pool: Pool) -> float:

@@ -6,7 +6,7 @@ from harness.bench.neighbour_search import bench_index
 def test_recall_of_every_index_on_a_small_set() -> None:
     rows = {row.name: row for row in bench_index(sizes=(800,))}
     recall = {name: row.value for name, row in rows.items() if "recall@" in name}
-    assert len(rows) == 2 * len(recall) == 2 * (4 + 3 + 3 + 3)
+    assert len(rows) == 2 * len(recall) == 2 * (4 + 4 + 4 + 4)
     for name, share in recall.items():
         if name.startswith(("flat", "kd_tree")):
             assert share == 1.0

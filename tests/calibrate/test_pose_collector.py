@@ -11,9 +11,9 @@ from harness.body import humanoid
 from harness.body.mounts import DEFAULT_MOUNTS
 from harness.body.retargeting import retarget_to_own_body
 from harness.calibrate.guided_calibration import PoseGuide
-from harness.calibrate.hold import measure_hold
+from harness.calibrate.hold import UnusableHold, measure_hold
 from harness.calibrate.pose_classifier import PoseClassifier
-from harness.calibrate.pose_collector import PoseCollector
+from harness.calibrate.pose_collector import HOLD_S, PoseCollector
 from harness.calibrate.poses import POSES, configuration
 from harness.core.arrays import Floats
 from harness.core.humanoid24 import pack, unpack
@@ -184,6 +184,50 @@ def test_a_station_that_is_not_seen_is_named_and_waited_for() -> None:
     assert len(collector.holds) == 1
     assert "pose 3, and pose 2 is wanted" in collector.rejected[0].why
     assert any("'left_ankle' was silent or lost" in line for line in told)
+
+
+def test_a_silent_station_empties_the_meter() -> None:
+    """The meter of a still performer fills until the hold is taken; with a silent station it is empty."""
+    one = eight("clean")[0]
+    still = [replace(one, received_s=0.07 * number) for number in range(60)]
+    silent = changed(still, 0, position_valid=False, orientation_valid=False)
+    told, meter = {}, {}
+    for name, later in (("all", still), ("silent", silent)):
+        collector = PoseCollector(SIX, 8)
+        assert collector.still_s() == 0.0
+        for frame in (*still[:8], *later[8:39]):
+            collector.add(frame)
+        assert not collector.holds
+        meter[name] = collector.still_s()
+        collector.add(later[39])
+        told[name] = collector.message
+        meter[f"{name}, later"] = collector.still_s()
+    assert meter == {"all": pytest.approx(0.07 * 38), "all, later": 0.0, "silent": 0.0, "silent, later": 0.0}
+    assert told["all"] == "pose 1 of 8 taken"
+    assert "'left_wrist' was silent or lost" in told["silent"]
+
+
+def test_the_meter_is_full_while_a_hold_is_refused() -> None:
+    """A station that came back has too few readings, and the meter never exceeds a hold."""
+    one = eight("clean")[0]
+    still = [replace(one, received_s=0.07 * number) for number in range(40)]
+    silent = changed(still, 0, position_valid=False, orientation_valid=False)
+    collector = PoseCollector(SIX, 8)
+    for frame in (*silent[:30], *still[30:]):
+        collector.add(frame)
+    assert not collector.holds
+    assert collector.still_s() == HOLD_S
+    assert "'left_wrist' was silent or lost" in collector.message
+
+
+def test_the_meter_is_computed_for_displays_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    def unread(collector: PoseCollector) -> float:
+        raise AssertionError("nobody reads the meter")
+
+    monkeypatch.setattr(PoseCollector, "still_s", unread)
+    leading = PoseGuide(PoseCollector(SIX, 8), POSES)
+    with pytest.raises(UnusableHold, match="1 of 8 poses were held"):
+        leading.run(eight()[: round(4.5 * RATE_HZ)], lambda text: None)
 
 
 def test_short_losses_and_echoes_are_no_matter(rng: np.random.Generator) -> None:

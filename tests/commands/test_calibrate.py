@@ -16,6 +16,7 @@ import pytest
 
 from harness.body.humanoid import Body, build_body
 from harness.calibrate.calibration_file import CalibrationFile, read_calibration, write_calibration
+from harness.calibrate.guided_calibration import GuidedPose
 from harness.calibrate.poses import POSES
 from harness.cli import main
 from harness.core import rotations
@@ -277,7 +278,7 @@ def test_a_live_session_goes_by_a_file(calibrated: Path, tmp_path: Path, monkeyp
         rows = list(csv.DictReader(file))
     assert len(rows) == len(frames) > 10
     for frame, row in zip(frames, rows, strict=True):
-        qpos = [float(value) for value in list(row.values())[5 + len(STATIONS) :]]
+        qpos = [float(value) for value in list(row.values())[6 + len(STATIONS) :]]
         np.testing.assert_array_equal(qpos, session.step(frame).qpos)
 
 
@@ -337,13 +338,40 @@ def test_what_is_recorded_is_what_is_played(model: Playback, recording: Path) ->
 def test_a_performer_is_told_what_to_do_and_may_stop(recording: Path) -> None:
     posing = CalibrationSession("demo", STATIONS, "tpose", CLIP)
     told: list[str] = []
-    shown: list[int] = []
-
-    def show(number: int, qpos: np.ndarray) -> None:
-        shown.append(number)
-        raise OSError("its window was closed")
-
-    collector = posing.collect_poses(RecordingStream(recording), told.append, show)
-    assert shown == [1]
-    assert told[1] == "its window was closed; from here on, poses are described in words only"
+    window, other = Displayed(fails=True), Displayed()
+    collector = posing.collect_poses(RecordingStream(recording), told.append, [window, other])
+    assert [guided.number for guided in window.shown] == [1]
+    assert told[1] == "its window was closed; from here on, it does not show the poses"
+    assert len(other.shown) > 5
     assert len(collector.holds) == 1
+
+
+class Displayed:
+    """A display that notes what it is shown."""
+
+    def __init__(self, *, fails: bool = False) -> None:
+        self.shown: list[GuidedPose] = []
+        self._fails = fails
+
+    def show(self, guided: GuidedPose) -> None:
+        self.shown.append(guided)
+        if self._fails:
+            raise OSError("its window was closed")
+
+
+def test_the_performer_and_the_meter_stand_beside_the_pose(recording: Path) -> None:
+    """Of a performer who holds what is shown the meter fills, and each hold ends near the wanted pose."""
+    display = Displayed()
+    CalibrationSession("demo", STATIONS).collect_poses(RecordingStream(recording), lambda text: None, [display])
+    assert [guided.number for guided in display.shown] == sorted(guided.number for guided in display.shown)
+    first = next(guided for guided in display.shown if guided.performer is not None)
+    assert first.still_s < 0.5
+    for number in range(1, 9):
+        shown = [guided for guided in display.shown if guided.number == number and guided.performer is not None]
+        assert shown[-1].still_s > 2.0
+        assert shown[-1].performer is not None
+        assert shown[-1].performer.distance_m.max() < 0.3
+        assert np.abs(shown[-1].performer.qpos[7:] - shown[-1].target[7:]).max() < np.deg2rad(60.0)
+        if number > 1:  # while the performer moves on, the meter starts anew and stations are away from their places
+            assert min(guided.still_s for guided in shown) < 1.0
+            assert max(float(guided.performer.distance_m.max()) for guided in shown if guided.performer) > 0.3

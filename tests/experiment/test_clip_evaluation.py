@@ -173,4 +173,4 @@ def test_stations_worn_elsewhere_share_the_motion_and_what_was_learnt() -> None:
 def _estimated(setting: ClipEvaluation, method: Method) -> Floats:
     seen = make_inputs("pos+ori", setting.simulation.stations)
     fitted = setting.fit_method(method, "dynamic_map")
-    return run_method(fitted, setting.performer_calibration.calibration, setting.simulation, seen)[0]
+    return run_method(fitted, setting.performer_calibration.calibration, setting.simulation, seen).qpos

@@ -87,7 +87,7 @@ def test_a_recording_scores_as_the_simulation_does(played: Playback, simulated: 
     simulation = played.simulation
     for one in judged:
         fitted = played.clip_evaluation.fit_method(registry.resolve(one.method), one.method)
-        qpos, status, step_ms, _ = run_method(
+        qpos, status, _, step_ms, *_ = run_method(
             fitted, simulation.calibration, simulation, make_inputs("pos+ori", simulation.stations)
         )
         assert not (status == Status.LOST).all()

@@ -95,12 +95,12 @@ def test_a_table_is_read_back_exactly(tmp_path: Path, rng: np.random.Generator) 
     with (tmp_path / "poses.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["frame"]) for row in rows] == [0, 1, 2, 3]
-    assert {row["status"] for row in rows} == {"held"}
+    assert {(row["status"], row["origin"]) for row in rows} == {("held", "model")}
     for n, row in enumerate(rows):
         assert (float(row["received_s"]), float(row["ready_s"])) == (n / 3, n / 3 + 0.2)
         assert float(row["device_s.hand"]) == n / 7
-        np.testing.assert_array_equal([float(value) for value in list(row.values())[7:]], qpos[n])
-    names = list(rows[0])[7:]
+        np.testing.assert_array_equal([float(value) for value in list(row.values())[8:]], qpos[n])
+    names = list(rows[0])[8:]
     for name in ("lradius.rx_rad", "lfemur.rz_rad"):
         joint = BODY.model.joint(name.removesuffix("_rad"))
         assert names.index(name) == int(joint.qposadr[0])

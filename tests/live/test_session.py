@@ -271,7 +271,7 @@ def test_live_estimates_are_those_of_a_run(worn: Playback) -> None:
     assert len(output.poses) == 60
     for pose, estimate in zip(output.poses, offline, strict=True):
         np.testing.assert_array_equal(pose.estimate.qpos, estimate.qpos)
-        assert pose.estimate.status is estimate.status
+        assert (pose.estimate.status, pose.estimate.origin) == (estimate.status, estimate.origin)
 
 
 def test_a_summary_says_what_happened() -> None:
@@ -282,7 +282,13 @@ def test_a_summary_says_what_happened() -> None:
     assert (content["frames"], content["poses"], content["deadline_ms"]) == (5, 5, 10.0)
     assert content["floor"] == beside
     text = "\n".join(summary.lines(done, beside))
-    for words in ("last byte to pose", "5 poses in", "0 frames dropped", "after their deadline, 10.00 ms"):
+    for words in (
+        "last byte to pose",
+        "5 poses in",
+        "5 model, 0 fallback, 0 bridged",
+        "0 frames dropped",
+        "after their deadline, 10.00 ms",
+    ):
         assert words in text
     (late,) = [line for line in text.split("\n") if line.startswith("the computer: a timer is late")]
     assert late.split()[-3:] == ["0.10", "0.25", "7.50"]

@@ -9,6 +9,8 @@ import pytest
 
 from harness.body import humanoid
 from harness.body.kinematics import Kinematics
+from harness.calibrate.guided_calibration import GuidedPose
+from harness.calibrate.performer_preview import PerformerPose
 from harness.errors import BadFile, BadInput
 from harness.live.viewer import ViewerOutput, _prepare_folder
 from tests.live.posing import live_pose
@@ -89,10 +91,53 @@ def test_a_pose_is_shown_until_the_next(tmp_path: Path) -> None:
     shown = ViewerOutput("frames", OWN, tmp_path, force=False)
     try:
         for number in (1, 2):
-            shown.show(number, np.array(humanoid.tpose(OWN)))
+            shown.show_pose(number, np.array(humanoid.tpose(OWN)))
             until_s = time.monotonic() + 60.0
             while not (tmp_path / f"{number:08d}.png").exists() and time.monotonic() < until_s:
                 time.sleep(0.02)
     finally:
         shown.close()
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["00000001.png", "00000002.png"]
+
+
+def test_the_performer_stands_beside_the_pose(tmp_path: Path) -> None:
+    """One picture for each pose, which is replaced as the performer moves; both bodies and the meter are in it.
+
+    The next pose is alone until the performer is known again.
+    """
+    from matplotlib.image import imread
+
+    qpos = humanoid.tpose(OWN)
+    performer = PerformerPose(qpos, np.zeros(4))
+    shown = ViewerOutput("frames", OWN, tmp_path, force=False)
+    pictures = []
+    try:
+        for guided in (
+            GuidedPose(1, qpos, None, "", 0.0, ""),
+            GuidedPose(1, qpos, performer, "head", 0.0, ""),
+            GuidedPose(1, qpos, performer, "head", 2.0, ""),
+            GuidedPose(2, qpos, None, "", 0.0, ""),
+            GuidedPose(2, qpos, performer, "head", 0.0, ""),
+        ):
+            before = tmp_path / f"{guided.number:08d}.png"
+            stamp = before.stat().st_mtime_ns if before.exists() else 0
+            shown.show(guided)
+            deadline_s = time.monotonic() + 60.0
+            while not before.exists() or before.stat().st_mtime_ns == stamp:
+                assert time.monotonic() < deadline_s
+                time.sleep(0.02)
+            pictures.append(imread(before))
+    finally:
+        shown.close()
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["00000001.png", "00000002.png"]
+    alone, pair, later, next_alone, next_pair = (picture.astype(float)[..., :3] for picture in pictures)
+    coloured = [np.ptp(picture[:600], axis=2) > 60.0 * picture.max() / 255.0 for picture in (alone, pair)]
+    blue = [picture[:600, :, 2] > picture[:600, :, 0] + 40.0 * picture.max() / 255.0 for picture in (alone, pair)]
+    assert coloured[0].sum() > 5_000
+    assert not blue[0].any()
+    assert blue[1].sum() > 3_000
+    assert np.flatnonzero(blue[1].any(axis=0)).mean() > 320.0
+    assert np.abs(pair[:560] - later[:560]).max() < 0.02 * pair.max()
+    assert np.abs(pair[580:] - later[580:]).max() > 0.3 * pair.max()
+    assert np.abs(alone - next_alone).max() < 0.02 * alone.max()
+    assert np.abs(pair - next_pair).max() < 0.02 * pair.max()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from harness.body.humanoid import Body
-from harness.body.retargeting import retarget_to_own_body
+from harness.body.retargeting import retarget_to_common_body, retarget_to_own_body
 from harness.core import rotations
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
@@ -24,15 +24,24 @@ from tests.joint_centres import joint_centres_m
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A motion on its own body, the calibration of six stations, and their frames."""
+    """A take on its performer's body, the calibration of six stations, their frames, and other takes as examples."""
 
     body: Body
     calibration: Calibration
     take: BodyMotion
     frames: list[TrackerFrame]
+    examples: list[BodyMotion]
+    """Other takes of the performer and one of another performer; the take itself is not among them."""
 
-    def run(self, method: Method, frames: list[TrackerFrame] | None = None) -> list[Estimate]:
-        examples = [self.take] if method.needs_examples else []
+    def run(
+        self,
+        method: Method,
+        frames: list[TrackerFrame] | None = None,
+        examples: list[BodyMotion] | None = None,
+    ) -> list[Estimate]:
+        """Estimates of the scene's frames, or of others, after learning from the scene's examples, or from others."""
+        if examples is None:
+            examples = self.examples if method.needs_examples else []
         session = method.fit(self.body, examples, np.random.default_rng(1)).begin(self.calibration)
         return [session.step(frame) for frame in (self.frames if frames is None else frames)]
 
@@ -62,7 +71,13 @@ def scene(behaviour: str, take: int = 1, seconds: float = 3.0) -> Scene:
     clip = synthetic.generate(behaviour, synthetic.performer_names()[0], take, seed=1, duration_s=seconds, rate_hz=40.0)
     body, on_body = retarget_to_own_body(clip)
     calibration = exact_calibration(body)
-    return Scene(body, calibration, on_body, exact_frames(body, calibration, on_body.qpos))
+    names = synthetic.performer_names()
+    others = [
+        synthetic.generate(behaviour, names[performer], other, seed=1, duration_s=12.0, rate_hz=40.0)
+        for performer, other in ((0, take + 1), (0, take + 2), (1, 1))
+    ]
+    examples = [retarget_to_common_body(clip, body.skeleton)[0] for clip in others]
+    return Scene(body, calibration, on_body, exact_frames(body, calibration, on_body.qpos), examples)
 
 
 def normal_equations_of(residuals: Residuals) -> tuple[Floats, Floats]:

@@ -52,7 +52,6 @@ BOUNDS = {
     "ik:mean": Bound(4.0, 8.0),
     "ik:previous": Bound(4.0, 8.0),
     "ik:gaussian": Bound(4.0, 8.0),
-    "dynamic_map:literal": Bound(4.0, 12.0),  # it loses lock and restarts by IK (docs/notes/traps.md F2)
 }
 
 
@@ -89,6 +88,12 @@ def at_home(name: str) -> tuple[float, float]:
     return errors(registry.resolve(name), [walk().take, *others()], walk())
 
 
+@cache
+def unseen(name: str) -> tuple[float, float]:
+    """Errors with other takes as examples."""
+    return errors(registry.resolve(name), walk().examples, walk())
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_a_noiseless_take_that_is_among_the_examples_is_recovered(name: str) -> None:
     hinge_deg, joint_mm = at_home(name)
@@ -99,17 +104,17 @@ def test_a_noiseless_take_that_is_among_the_examples_is_recovered(name: str) -> 
 
 @pytest.mark.parametrize("name", LEARNERS)
 def test_scores_do_not_change_when_the_room_of_the_examples_is_turned_and_shifted(name: str) -> None:
-    examples = [replace(take, qpos=moved(take.qpos, 2.5, (-4.0, 7.0, 0.0))) for take in (walk().take, *others())]
-    assert errors(registry.resolve(name), examples, walk()) == pytest.approx(at_home(name), rel=0.02, abs=0.02)
+    examples = [replace(take, qpos=moved(take.qpos, 2.5, (-4.0, 7.0, 0.0))) for take in walk().examples]
+    assert errors(registry.resolve(name), examples, walk()) == pytest.approx(unseen(name), rel=0.03, abs=0.02)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_scores_do_not_change_when_the_performer_walks_elsewhere(name: str) -> None:
     home = walk()
     take = replace(home.take, qpos=moved(home.take.qpos, -1.2, (3.0, -8.0, 0.0)))
-    away = Scene(home.body, home.calibration, take, exact_frames(home.body, home.calibration, take.qpos))
-    found = errors(registry.resolve(name), [home.take, *others()], away)
-    assert found == pytest.approx(at_home(name), rel=0.02, abs=0.02)
+    away = Scene(home.body, home.calibration, take, exact_frames(home.body, home.calibration, take.qpos), [])
+    found = errors(registry.resolve(name), home.examples, away)
+    assert found == pytest.approx(unseen(name), rel=0.02, abs=0.02)
 
 
 @pytest.mark.long

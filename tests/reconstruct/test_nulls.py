@@ -24,7 +24,7 @@ def test_examples_are_needed(walk: Scene, method: MeanPose | BestMatch) -> None:
 
 def test_the_mean_pose_never_changes_but_follows(walk: Scene) -> None:
     qpos = np.array([e.qpos for e in walk.run(MeanPose())])
-    mean = mean_posture(walk.body, [walk.take])
+    mean = mean_posture(walk.body, walk.examples)
     np.testing.assert_allclose(qpos[:, 7:], np.tile(mean[7:], (len(qpos), 1)), atol=1e-12)
     np.testing.assert_allclose(
         np.diff(qpos[[0, -1], :2], axis=0), np.diff(walk.take.qpos[[0, -1], :2], axis=0), atol=0.1
@@ -41,19 +41,19 @@ def test_the_mean_is_that_of_the_angles(walk: Scene) -> None:
 @pytest.mark.parametrize("yaw_deg", [0.0, 120.0])
 def test_finds_the_very_example_wherever_it_is_performed(walk: Scene, yaw_deg: float) -> None:
     qpos = moved(walk.take.qpos, np.deg2rad(yaw_deg), (3.0, -2.0, 0.0))
-    estimates = walk.run(BestMatch(), exact_frames(walk.body, walk.calibration, qpos))
+    estimates = walk.run(BestMatch(), exact_frames(walk.body, walk.calibration, qpos), [walk.take])
     assert np.max(walk.off_m(estimates, qpos)[2:]) < 1e-3
 
 
 def test_finds_it_with_half_of_the_stations_lost(walk: Scene) -> None:
     frames = [drop_stations(f, [0, 2, 5]) for f in walk.frames]
-    assert np.max(walk.off_m(walk.run(BestMatch(), frames), walk.take.qpos)[2:]) < 1e-3
+    assert np.max(walk.off_m(walk.run(BestMatch(), frames, [walk.take]), walk.take.qpos)[2:]) < 1e-3
 
 
 @pytest.mark.parametrize("kind", ["pos", "ori"])
 def test_finds_it_from_one_kind_of_reading(walk: Scene, kind: str) -> None:
     frames = walk.only(kind)
-    found = np.array([e.qpos for e in walk.run(BestMatch(), frames)])
+    found = np.array([e.qpos for e in walk.run(BestMatch(), frames, [walk.take])])
     assert np.max(np.abs(found[2:, 7:] - walk.take.qpos[2:, 7:])) < 1e-6
 
 
@@ -72,5 +72,8 @@ def test_the_best_match_heeds_a_station_the_less_the_poorer_its_quality(boxing: 
     said[0] = 0.01
     wrong = [replace(frame, position_m=frame.position_m + shift) for frame in boxing.frames[:1]]
     doubted = [replace(frame, quality=said) for frame in wrong]
-    off_m = [boxing.off_m(boxing.run(BestMatch(), frames), boxing.take.qpos[:1])[0] for frames in (wrong, doubted)]
+    off_m = [
+        boxing.off_m(boxing.run(BestMatch(), frames, [boxing.take]), boxing.take.qpos[:1])[0]
+        for frames in (wrong, doubted)
+    ]
     assert off_m[1] < 2e-3 < 0.02 < off_m[0]

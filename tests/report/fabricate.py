@@ -111,6 +111,7 @@ def make_cell(
         estimate_qpos=estimate,
         frame_index=seen,
         status=status,
+        origin=np.zeros_like(status),
         step_ms=step_ms,
         quality=quality[seen],
         position_valid=valid[seen],

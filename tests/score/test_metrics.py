@@ -1,6 +1,6 @@
 """Every metric against a value worked out by hand."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.estimate import Status
+from harness.core.estimate import Origin, Status
 from harness.core.humanoid24 import pack, standard_skeleton, unpack
 from harness.errors import BadInput, ShapeError
 from harness.score import angles, contact, positions, timing
@@ -275,7 +275,7 @@ def test_below_the_floor_nothing_is_measured_but_coverage(judge: Judge, truth_qp
     found = judge(truth_qpos[fewer], fewer).metrics
     assert found["coverage"] == pytest.approx(199 / 400)
     for name, definition in DEFINITIONS.items():
-        assert (found[name] is None) == (definition.unit not in ("frames", "share")), name
+        assert (found[name] is None) == (definition.unit != "frames" and name != "coverage"), name
     none = judge(truth_qpos[:0], half[:0])
     assert none.metrics["frames_matched"] == 0
     assert none.metrics["mpjpe_mm"] is None
@@ -313,6 +313,27 @@ def test_status_is_counted_and_steps_are_timed(truth_qpos: Floats) -> None:
     assert found["step_relative"] == pytest.approx(2.0, rel=0.01)
     for untimed in (None, (cpu_ms[0], np.full(FRAMES, np.nan)), (cpu_ms[0], np.zeros(FRAMES))):
         assert score_estimate(*scored, cpu_ms=untimed, warm_up_s=0.0).metrics["step_relative"] is None
+
+
+def test_fallbacks_are_counted_in_undisturbed_frames(truth_qpos: Floats) -> None:
+    """Frame 40 lacks a station, so frames 40 to 59 are disturbed, 0.5 s at 40 Hz; and so are 20 after a gap."""
+    index = np.r_[0:80, 81:FRAMES]
+    origin, complete = np.full(len(index), Origin.MODEL), np.ones(len(index), bool)
+    complete[40] = False
+    origin[40:60], origin[80:100], origin[30] = Origin.FALLBACK, Origin.FALLBACK, Origin.BRIDGED
+    shown = truth_qpos[index]
+    scored = SKELETON, RATE_HZ, truth_qpos, shown, index, np.zeros(len(index), int), np.full(len(index), np.nan)
+
+    def judge_origin(**changes: np.ndarray) -> Mapping[str, float | None]:
+        given = {"origin": origin, "complete": complete} | changes
+        return score_estimate(*scored, warm_up_s=0.0, **given).metrics
+
+    found = judge_origin()
+    assert (found["frames_fallback"], found["frames_bridged"], found["fallback_share"]) == (40, 1, 0.0)
+    more = origin.copy()
+    more[60], more[39], more[100] = Origin.FALLBACK, Origin.FALLBACK, Origin.FALLBACK
+    assert judge_origin(origin=more)["fallback_share"] == pytest.approx(3.0 / (len(index) - 40))
+    assert judge_origin(complete=np.zeros(len(index), bool))["fallback_share"] is None
 
 
 def test_input_that_makes_no_sense_is_refused(truth_qpos: Floats) -> None:

@@ -417,6 +417,18 @@ def test_levels_are_the_table_of_the_protocol() -> None:
     assert (default.dropout.share, default.dropout.gap_s) == (0.01, (0.1, 0.5))
     assert default.speed == SpeedError(0.002)
     assert default.clock is not None
-    assert default.clock.drift_ppm == 20.0
+    assert (default.clock.offset_s, default.clock.drift_ppm) == (0.0, 20.0)
     with pytest.raises(UnknownName, match="default"):
         noise_preset("defualt")
+
+
+def test_a_session_offset_turns_with_its_station(still: Still) -> None:
+    """The offset is fixed in the housing: a station that turns by 120 degrees carries it to other axes of the room."""
+    true, seen = still(0.5), still(0.5)
+    turned = np.array([0.5, 0.5, 0.5, 0.5])  # x to y, y to z, z to x
+    for readings in (true, seen):
+        readings.turn[10:] = rotations.multiply(turned, readings.turn[10:])
+    SessionBias(scale=0.0, station_offset_m=0.001).apply(seen)
+    shift_m = shifted(true, seen)
+    np.testing.assert_allclose(shift_m[10:], np.roll(shift_m[:10], 1, axis=2), atol=1e-12)
+    assert np.abs(shift_m[10:] - shift_m[:10]).max() > 1e-4

@@ -18,7 +18,7 @@ from harness.body.humanoid import Body, tpose
 from harness.cli import main
 from harness.core import rotations
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate, Status
+from harness.core.estimate import Estimate, Origin, Status
 from harness.core.motion import BodyMotion
 from harness.reconstruct.solver.status_monitor import StatusMonitor
 from harness.stream.frame import TrackerFrame
@@ -201,7 +201,7 @@ class ModifiesEstimates(StandingSession):
 
     def step(self, frame: TrackerFrame) -> Any:
         self.live[7] += 1e-6
-        return SimpleNamespace(qpos=self.live, status=self.coverage.update(frame)[0])
+        return SimpleNamespace(qpos=self.live, status=self.coverage.update(frame)[0], origin=Origin.MODEL)
 
 
 class LooksAhead(StandingSession):
@@ -220,6 +220,7 @@ class DelayedEstimate:
     session: LooksAhead
     frame: int
     status: Status
+    origin: Origin = Origin.MODEL
 
     @property
     def qpos(self) -> np.ndarray:
@@ -252,6 +253,14 @@ class SeedsPython(StandingSession):
 
     def start(self) -> None:
         random.seed(1)
+
+
+class AlwaysFallsBack(StandingSession):
+    """Answers every frame by a fallback."""
+
+    def step(self, frame: TrackerFrame) -> Any:
+        estimate = super().step(frame)
+        return Estimate(estimate.qpos, estimate.status, Origin.FALLBACK)
 
 
 class AlwaysSolved(StandingSession):
@@ -334,6 +343,7 @@ FAULTY: tuple[tuple[type[StandingSession], str], ...] = (
     (LostAtOnce, "the status reports lost stations"),
     (LostForever, "the status reports lost stations"),
     (SolvedWithOne, "the status reports lost stations"),
+    (AlwaysFallsBack, "the method's own model answers undisturbed frames"),
     (NeverRecovers, "the error recovers after a disturbance"),
     (DependsOnPosition, "the posture does not depend on position and heading"),
 )

@@ -6,21 +6,22 @@ of their weights, so that squared Euclidean distances are those of eq. 2. They a
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.arrays import Floats, Ints, Singles
+from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
-from harness.reconstruct.index import make_index
-from harness.reconstruct.index.partial_search import nearest_partial
+from harness.reconstruct.index import Lookup, make_index
+from harness.reconstruct.index.partial_search import nearest_exact, nearest_partial
 from harness.reconstruct.index.selection import AUTO, KD_TREE_MAX_NEIGHBOURS
-from harness.reconstruct.solver.anchor_frame import anchor_of, twist_rad
+from harness.reconstruct.solver.anchor_frame import AnchorFrame, anchor_of, twist_rad
 from harness.reconstruct.solver.ground_frame import relative_ground
 
 Codes = NDArray[np.int16]
@@ -40,6 +41,19 @@ class FeatureWeights:
     """Weight of velocities [s^2/m^2]."""
     orientation: float = 0.2
     """Weight of unit quaternions."""
+
+
+class Query(NamedTuple):
+    """The features of a frame's readings."""
+
+    view: AnchorFrame
+    """The anchor frame to which they are relative."""
+    features: Floats
+    """(10 S,) features; values that were not measured are filled in."""
+    confidence: Floats
+    """(10 S,) confidence in each, from 0 (not measured) to 1."""
+    filled: bool
+    """Whether an estimate supplied all missing values. If not, they must not propose neighbours."""
 
 
 class ExampleFeatures:
@@ -75,14 +89,26 @@ class ExampleFeatures:
             for start in range(run.start, run.stop, _CHUNK):
                 self._fill(max(start - 1, run.start), start, min(start + _CHUNK, run.stop))
         database.release_memory()
-        self._index = make_index(_default_index(len(database)) if index == AUTO else index, self, neighbours)
+        self.index = make_index(_default_index(len(database)) if index == AUTO else index, self, neighbours)
 
-    def nearest(self, query: Floats, confidence: Floats, count: int) -> Ints:
-        """Rows of the `count` frames nearest to a query (10 S,), with confidences (10 S,) from 0 to 1 as weights."""
-        query_f32 = query.astype(np.float32)
-        if confidence.min() == 1.0:
-            return self._index.nearest(query_f32, count)[0]
-        return nearest_partial(self._index, self, query_f32, confidence.astype(np.float32), count)[0]
+    def nearest(self, query: Query, count: int, lookup: Lookup) -> Ints:
+        """Rows of the `count` frames nearest to a query, with its confidences as weights.
+
+        `lookup` is the session's search in `index`.
+        """
+        features, weight = query.features.astype(np.float32), query.confidence.astype(np.float32)
+        if weight.min() == 1.0:
+            return lookup.nearest(features, count)[0]
+        if not query.filled:
+            return nearest_exact(self, features, weight, count)[0]
+        return nearest_partial(lookup, self, features, weight, count)[0]
+
+    @property
+    def consecutive(self) -> Bools:
+        """(N,) whether the next frame is of the same take."""
+        out = np.ones(len(self), bool)
+        out[[segment.stop - 1 for segment in self._database.segments]] = False
+        return out
 
     def __len__(self) -> int:
         return len(self._codes)

@@ -20,8 +20,15 @@ from harness.reconstruct.solver.residuals import Residuals
 class NeighbourSearch(Protocol):
     """Neighbour search of one session."""
 
-    def nearest(self, past: Floats, count: int) -> Neighbours:
-        """The `count` nearest windows for the last estimates (m, 55), newest first, and the current readings."""
+    def nearest(self, past: Floats, count: int, history: bool = True) -> Neighbours:
+        """The `count` nearest windows for the last estimates (m, 55), newest first, and the current readings.
+
+        `history` is whether these estimates are known.
+        """
+        ...
+
+    def readings_suffice(self) -> bool:
+        """Whether the current readings can be searched without estimates."""
         ...
 
     def record(self) -> None:
@@ -33,14 +40,17 @@ class PoseHistorySearch:
     """Search by the last m estimates, D_w = 1 (Liu et al. 2011)."""
 
     def __init__(self, windows: Windows, index: Index) -> None:
-        self._windows, self._index = windows, index
+        self._windows, self._index = windows, index.begin_search()
 
-    def nearest(self, past: Floats, count: int) -> Neighbours:
+    def nearest(self, past: Floats, count: int, history: bool = True) -> Neighbours:
         query = self._windows.query(past)
         rows, squared = self._index.nearest(query, count)
         offsets = self._windows.gather(rows)
         offsets -= query
         return Neighbours(rows, squared, offsets)
+
+    def readings_suffice(self) -> bool:
+        return False
 
     def record(self) -> None:
         pass
@@ -53,20 +63,41 @@ class FeatureSearch:
         self._windows, self._regression, self._residuals, self._index_name = windows, regression, residuals, index
         self._measured_before: Bools = np.zeros(2 * regression.count, bool)
         """(2 S,) readings that this session has had. A station that appears later only takes part in the solver."""
-        self._search: ReducedRankSearch | None = None
+        self._search: tuple[ReducedRankSearch, Index]
+        """The search, and this session's use of its index."""
+        self._usual: Bools = np.zeros(2 * regression.count, bool)
+        """(2 S,) readings for which `_search` was made."""
+        self._fixed = False
+        """Whether `_search` stays, as it does once there is a history."""
+        self._by_orientation = regression
+        """The regression whose heading is that of the anchor's orientation."""
         self._identity = np.tile(rotations.IDENTITY, (regression.count, 1))
 
-    def nearest(self, past: Floats, count: int) -> Neighbours:
+    def nearest(self, past: Floats, count: int, history: bool = True) -> Neighbours:
         residuals = self._residuals
-        if self._search is None:
-            usual = self._measured_before | residuals.measured
-            self._regression = self._regression.with_usual_heading(usual)
-            self._search = self._regression.search(self._regression.columns(usual), self._index_name, count)
+        if not self._fixed:
+            self._prepare(count)
+            self._fixed = history
         window = self._windows.query(past)
         predictors = self._regression.predictors(
             window, residuals.target_m, residuals.world_from_target, self._anchor_frame(past[0])
         )
-        return self._search.nearest(predictors, residuals.measured, count)
+        return self._search[0].nearest(predictors, residuals.measured, count, self._search[1], history)
+
+    def _prepare(self, count: int) -> None:
+        """Make the search for the readings that this session has had so far, unless it is there."""
+        usual = self._measured_before | self._residuals.measured
+        if not np.array_equal(usual, self._usual):
+            self._usual, self._regression = usual, self._by_orientation.with_usual_heading(usual)
+            search = self._regression.search(self._regression.columns(usual), self._index_name, count)
+            self._search = search, search.index.begin_search()
+
+    def readings_suffice(self) -> bool:
+        measured, count, heading = self._residuals.measured, self._regression.count, self._regression.heading
+        places, anchor = measured[:count], self._regression.anchor
+        if not self._fixed:
+            heading = self._by_orientation.with_usual_heading(self._measured_before | measured).heading
+        return bool(places[anchor] and measured[count + anchor] if heading is None else places[heading.stations].all())
 
     def record(self) -> None:
         self._measured_before |= self._residuals.measured

@@ -13,7 +13,7 @@ from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
 from harness.core.compiled import compiled
-from harness.reconstruct.features.example_features import ExampleFeatures
+from harness.reconstruct.features.example_features import ExampleFeatures, Query
 from harness.reconstruct.solver.anchor_frame import AnchorFrame
 from harness.reconstruct.solver.residuals import Residuals
 from harness.reconstruct.solver.root_placement import place_root
@@ -31,11 +31,14 @@ class QueryFeatures:
         self._identity = np.tile(rotations.IDENTITY, (count, 1))
         self._before_m, self._before_s = np.zeros((count, 3)), np.full(count, np.nan)
         self._before_valid: Bools = np.zeros(count, bool)
+        self._shown_m, self._shown_s = np.zeros((count, 3)), -np.inf
+        """(S, 3) positions of the last query, measured or filled in, and its time [s]."""
 
-    def compute(self, frame: TrackerFrame, last_qpos: Floats) -> tuple[AnchorFrame, Floats, Floats]:
-        """The anchor frame, the features (10 S,) and their confidences (10 S,), from 0 (not measured) to 1.
+    def compute(self, frame: TrackerFrame, last_qpos: Floats) -> Query:
+        """The query of a frame; the last estimate (55,) supplies missing values.
 
-        `last_qpos` (55,) is the last estimate, which supplies missing values.
+        The velocity of a station without a reading is that of its filled-in positions. A station that reports again
+        has no velocity, and neither has any station at the start or after a gap.
         """
         residuals, examples = self._residuals, self._examples
         velocity_m_s, moving = np.empty_like(self._before_m), np.empty_like(self._before_valid)
@@ -48,6 +51,13 @@ class QueryFeatures:
         facing = turned[examples.anchor]
         if not complete:
             position_m, turned, facing = self._completed_readings(last_qpos)
+        filled = bool((moving | ~residuals.measured[: len(moving)]).all())
+        gap_s = frame.received_s - self._shown_s
+        if 0.0 < gap_s <= self._longest_gap_s:
+            velocity_m_s[~moving] = (position_m[~moving] - self._shown_m[~moving]) / gap_s
+        else:
+            filled = False
+        self._shown_m, self._shown_s = np.array(position_m), frame.received_s
         w, _, _, z = facing.tolist()
         x_m, y_m, _ = position_m[examples.anchor].tolist()
         view = AnchorFrame(x_m, y_m, 2.0 * math.atan2(z, w))
@@ -55,7 +65,7 @@ class QueryFeatures:
             *(position_m, turned, velocity_m_s, x_m, y_m, view.yaw_rad, examples.hemisphere, examples.scale),
             *(residuals.confidence, moving),
         )
-        return view, query, confidence
+        return Query(view, query, confidence, filled)
 
     def _completed_readings(self, last_qpos: Floats) -> tuple[Floats, Floats, Floats]:
         """Positions (S, 3), orientations (S, 4) and the anchor's (4,); missing ones are those of the last estimate."""

@@ -25,7 +25,13 @@ from harness.reconstruct.database import Windows
 from harness.reconstruct.features.ground_step import features_from_readings
 from harness.reconstruct.features.virtual_trackers import VirtualTrackers
 from harness.reconstruct.index import Index, Neighbours, make_index
-from harness.reconstruct.solver.anchor_frame import AnchorFrame, HeadingEstimator, anchor_of, twist_rad
+from harness.reconstruct.solver.anchor_frame import (
+    MIN_HEADING_EXPLAINED,
+    AnchorFrame,
+    HeadingEstimator,
+    anchor_of,
+    twist_rad,
+)
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 
 _CHUNK = 256
@@ -36,8 +42,6 @@ _CACHED_MAPS = 64
 """Largest number of combinations of missing readings whose maps are cached."""
 _TRAINING_WINDOWS = 20_000
 """Largest number of windows in the training set; more are thinned evenly."""
-_MIN_HEADING_EXPLAINED = 0.8
-"""Least explained share of the heading for its estimate from positions: six stations reach 0.94, two below 0.78."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +113,7 @@ class ReducedRankRegression:
         if mask not in self._by_readings:
             at_m = [at_m for _, at_m, _ in self._station_poses(self.windows, self._training_rows())]
             heading = HeadingEstimator.fit(np.concatenate(at_m), self.anchor, places)
-            usable = heading.explained > _MIN_HEADING_EXPLAINED
+            usable = heading.explained > MIN_HEADING_EXPLAINED
             regression = (
                 ReducedRankRegression(self._body, self.windows, self._calibration, self.options, heading)
                 if usable
@@ -148,9 +152,12 @@ class ReducedRankRegression:
         read = features_from_readings(position_m, orientation, np.array(view), self.options.lever_m)
         return np.concatenate([self.options.window_weight * window, read])
 
-    def columns(self, measured: Bools) -> Bools:
-        """(D + 9 S,) columns that are known when these readings (2 S,) of positions, then orientations, are."""
-        window = np.ones(self.windows.size, bool)
+    def columns(self, measured: Bools, history: bool = True) -> Bools:
+        """(D + 9 S,) columns that are known when these readings (2 S,) of positions, then orientations, are.
+
+        `history` is whether the window is known.
+        """
+        window = np.full(self.windows.size, history)
         places, turns = measured[: self.count], measured[self.count :]
         return np.concatenate([window, np.repeat(np.stack([places, turns], axis=1), [3, 6], axis=1).reshape(-1)])
 
@@ -189,6 +196,10 @@ class ReducedRankVectors:
     def size(self) -> int:
         return int(self.directions.shape[1])
 
+    @property
+    def consecutive(self) -> Bools:
+        return self.windows.consecutive
+
     def gather(self, rows: Ints | slice) -> Singles:
         selected, start = np.arange(len(self))[rows], 0
         out: Singles = np.empty((len(selected), self.size), np.float32)
@@ -208,19 +219,25 @@ class ReducedRankSearch:
         self.index: Index = make_index(index, self.vectors, neighbours)
         self._maps: dict[bytes, tuple[Floats, Floats]] = {}
 
-    def nearest(self, predictors: Floats, measured: Bools, count: int) -> Neighbours:
+    def nearest(
+        self, predictors: Floats, measured: Bools, count: int, lookup: Index | None = None, history: bool = True
+    ) -> Neighbours:
         """Windows whose z is nearest to that of predictors (D + 9 S,), of which `measured` readings (2 S,) are known.
+
+        `history` is whether the window is known, too.
+
+        `lookup` is the session's search in `index`; without it the search has no state.
 
         The offsets are those of z, possibly along other orthonormal axes.
         """
-        mask = measured.tobytes()
+        mask = np.append(measured, history).tobytes()
         entry = self._maps.get(mask)
         if entry is None:
             if len(self._maps) >= _CACHED_MAPS:
                 self._maps.clear()
-            entry = self._maps[mask] = self._map(self.vectors.regression.columns(measured))
+            entry = self._maps[mask] = self._map(self.vectors.regression.columns(measured, history))
         to_z, mean = entry
-        return self.index.nearest_with_offsets((predictors @ to_z - mean).astype(np.float32), count)
+        return (lookup or self.index).nearest_with_offsets((predictors @ to_z - mean).astype(np.float32), count)
 
     def _map(self, columns: Bools) -> tuple[Floats, Floats]:
         """(D + 9 S, 40) map from predictors to z that uses the known columns only, and (40,) the mean's image."""

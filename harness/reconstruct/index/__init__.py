@@ -4,7 +4,7 @@ from harness.reconstruct.index.flat import FlatIndex
 from harness.reconstruct.index.inverted_file import InvertedFile
 from harness.reconstruct.index.kd_tree import KDTree
 from harness.reconstruct.index.neighbour_graph import NeighbourGraph
-from harness.reconstruct.index.partial_search import nearest_partial
+from harness.reconstruct.index.partial_search import nearest_exact, nearest_partial
 from harness.reconstruct.index.protocol import ArrayVectors, Index, Lookup, Neighbours, Vectors
 from harness.reconstruct.index.selection import INDEXES, make_index
 
@@ -20,5 +20,6 @@ __all__ = [
     "Neighbours",
     "Vectors",
     "make_index",
+    "nearest_exact",
     "nearest_partial",
 ]

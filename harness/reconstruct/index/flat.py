@@ -3,13 +3,13 @@
 import numpy as np
 
 from harness.core.arrays import Ints, Singles
-from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Neighbours, StatelessIndex, Vectors
 
 _ROUNDING = 1e-6
 """Rounding error of the first pass, relative to the largest of its terms."""
 
 
-class FlatIndex:
+class FlatIndex(StatelessIndex):
     """An `Index`: |q - x|^2 = |q|^2 - 2 q x + |x|^2 for all x at once, then exact distances for the few candidates.
 
     Vectors are stored relative to their mean, which keeps rounding in the first pass small.

@@ -24,7 +24,7 @@ from harness.core.arrays import Ints, Singles
 from harness.core.compiled import compiled
 from harness.core.seeds import generator
 from harness.reconstruct.index.principal_axes import PrincipalAxes, chunks
-from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Neighbours, StatelessIndex, Vectors
 
 Codes = NDArray[np.int16]
 Places = NDArray[np.int32]
@@ -45,7 +45,7 @@ a float32 that is not negative, read as an integer, have the order of the float.
 distance, then by row."""
 
 
-class InvertedFile:
+class InvertedFile(StatelessIndex):
     """An approximate `Index`; distances are those along the leading axes, between quantised vectors and the query."""
 
     def __init__(self, vectors: Vectors, wanted: int = 100) -> None:

@@ -11,13 +11,13 @@ from harness.core.arrays import Floats, Ints, Singles
 from harness.core.seeds import generator
 from harness.reconstruct.index.flat import rank_neighbours
 from harness.reconstruct.index.principal_axes import PrincipalAxes
-from harness.reconstruct.index.protocol import CHUNK, Neighbours, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Neighbours, StatelessIndex, Vectors
 
 _EXTRA_CANDIDATES = 4
 """Candidates beyond the answer, for rounding may have swapped some near the last place."""
 
 
-class KDTree:
+class KDTree(StatelessIndex):
     """An exact `Index`. It keeps the source of the vectors, and ranks the candidates by exact distances.
 
     The tree is that of scipy, in double precision: for large sets an inverted file needs a sixth of its memory.

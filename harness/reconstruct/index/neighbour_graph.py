@@ -9,10 +9,10 @@ consecutive frames. Each is linked to the nearest few of these, which another in
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.core.arrays import Bools, Ints, Singles
+from harness.core.arrays import Ints, Singles
 from harness.core.seeds import generator
 from harness.reconstruct.index.principal_axes import PrincipalAxes
-from harness.reconstruct.index.protocol import CHUNK, Index, Vectors
+from harness.reconstruct.index.protocol import CHUNK, Index, Neighbours, Vectors
 
 Links = NDArray[np.int32]
 LINKS_PER_VECTOR, FULL_SEARCH_PERIOD, LINK_DISTANCE = 8, 10, float(np.deg2rad(3.0))
@@ -24,12 +24,15 @@ _VARIANCE_SHARE = 0.9995
 
 
 class NeighbourGraph:
-    """The links between vectors, shared by sessions; `begin_search` starts a search for one session."""
+    """An `Index`: the links between vectors. `begin_search` starts a search that follows its answers in time.
 
-    def __init__(self, vectors: Vectors, consecutive: Bools, index: Index) -> None:
-        """`consecutive` (N,): whether the next row is the next frame in time; `index` finds links and full searches."""
-        count = len(vectors)
-        self.index, self.consecutive = index, consecutive
+    Without a session, every search is a full one.
+    """
+
+    def __init__(self, vectors: Vectors, index: Index) -> None:
+        """`index` finds links and makes full searches."""
+        count, consecutive = len(vectors), vectors.consecutive
+        self.vectors, self.index, self.consecutive = vectors, index, consecutive
         self._principal = PrincipalAxes(vectors, generator(0, "graph", count), _VARIANCE_SHARE)
         self._projected = np.empty((count, self._principal.width), np.float16)
         step = 0.0
@@ -40,6 +43,17 @@ class NeighbourGraph:
             step = max(step, float(steps.max(initial=0.0)))
         self.links: Links = self._link(vectors, max(step, LINK_DISTANCE))
         """(N, 8) the rows that each is linked to, filled up with the row itself."""
+
+    def __len__(self) -> int:
+        return len(self._projected)
+
+    def nearest(self, query: Singles, count: int) -> tuple[Ints, Singles]:
+        """See `Lookup`."""
+        return self.index.nearest(query, count)
+
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
+        """See `Index`."""
+        return self.begin_search().nearest_with_offsets(query, count)
 
     def _link(self, vectors: Vectors, max_difference: float) -> Links:
         links = np.repeat(np.arange(len(vectors), dtype=np.int32)[:, None], LINKS_PER_VECTOR, axis=1)
@@ -68,7 +82,7 @@ class NeighbourGraph:
 
 
 class GraphSearch:
-    """The search of one session: a `Lookup` whose answers depend on earlier queries."""
+    """The search of one session: an `Index` whose answers depend on earlier queries."""
 
     def __init__(self, graph: NeighbourGraph) -> None:
         self._graph, self._rows, self._age = graph, np.zeros(0, np.int64), FULL_SEARCH_PERIOD
@@ -86,3 +100,12 @@ class GraphSearch:
         self._age = 0
         self._rows, squared = graph.index.nearest(query, count)
         return self._rows, squared
+
+    def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
+        """See `Index`."""
+        rows, squared = self.nearest(query, count)
+        return Neighbours(rows, squared, self._graph.vectors.gather(rows) - np.asarray(query, np.float32))
+
+    def begin_search(self) -> "GraphSearch":
+        """A search for another session."""
+        return self._graph.begin_search()

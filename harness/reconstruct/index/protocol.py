@@ -1,9 +1,11 @@
 """Protocols of nearest-neighbour search: the vectors, the lookup, and its answer."""
 
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, Self
 
-from harness.core.arrays import Ints, Singles
+import numpy as np
+
+from harness.core.arrays import Bools, Ints, Singles
 
 CHUNK = 1024
 """Number of vectors gathered at a time while an index is built."""
@@ -17,6 +19,11 @@ class Vectors(Protocol):
     @property
     def size(self) -> int:
         """D, the length of a vector."""
+        ...
+
+    @property
+    def consecutive(self) -> Bools:
+        """(N,) whether the next row is the next frame in time."""
         ...
 
     def gather(self, rows: Ints | slice) -> Singles:
@@ -47,11 +54,23 @@ class Lookup(Protocol):
 
 
 class Index(Lookup, Protocol):
-    """A search structure over N vectors: immutable, deterministic, shared by sessions."""
+    """A search structure over N vectors: deterministic and shared by sessions."""
 
     def nearest_with_offsets(self, query: Singles, count: int) -> Neighbours:
         """The nearest vectors as `nearest` finds them, and their offsets from the query."""
         ...
+
+    def begin_search(self) -> "Index":
+        """The index for one session. Only a search that follows its last answer has a state."""
+        ...
+
+
+class StatelessIndex:
+    """Base of an `Index` whose answers do not depend on earlier queries."""
+
+    def begin_search(self) -> Self:
+        """The index itself."""
+        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +79,11 @@ class ArrayVectors:
 
     values: Singles
     """(N, D) the vectors."""
+
+    @property
+    def consecutive(self) -> Bools:
+        """Rows are one take."""
+        return np.arange(1, len(self) + 1) < len(self)
 
     def __len__(self) -> int:
         return len(self.values)

@@ -6,12 +6,14 @@ from harness.errors import UnknownName
 from harness.reconstruct.index.flat import FlatIndex
 from harness.reconstruct.index.inverted_file import InvertedFile
 from harness.reconstruct.index.kd_tree import KDTree
+from harness.reconstruct.index.neighbour_graph import NeighbourGraph
 from harness.reconstruct.index.protocol import Index, Vectors
 
 INDEXES: dict[str, Callable[[Vectors, int], Index]] = {
     "flat": lambda vectors, wanted: FlatIndex(vectors),
     "kd_tree": lambda vectors, wanted: KDTree(vectors),
     "inverted_file": lambda vectors, wanted: InvertedFile(vectors, wanted),
+    "graph": lambda vectors, wanted: NeighbourGraph(vectors, _fastest(vectors, wanted)),
 }
 AUTO = "auto"
 FLAT_MAX_VECTORS, KD_TREE_MAX_DIMENSIONS, KD_TREE_MAX_NEIGHBOURS = 3000, 20, 16
@@ -25,10 +27,14 @@ def make_index(kind: str, vectors: Vectors, wanted: int = KD_TREE_MAX_NEIGHBOURS
     "auto" takes the fastest whose recall is near 1 (`best_index`).
     """
     if kind == AUTO:
-        return make_index(best_index(len(vectors), vectors.size, wanted), vectors, wanted)
+        return _fastest(vectors, wanted)
     if kind not in INDEXES:
         raise UnknownName("index", kind, (AUTO, *INDEXES))
     return INDEXES[kind](vectors, wanted)
+
+
+def _fastest(vectors: Vectors, wanted: int) -> Index:
+    return INDEXES[best_index(len(vectors), vectors.size, wanted)](vectors, wanted)
 
 
 def best_index(count: int, size: int, wanted: int) -> str:

@@ -22,7 +22,7 @@ from harness.body.humanoid import Body
 from harness.core import rotations
 from harness.core.arrays import Bools, Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate
+from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.features.virtual_trackers import station_poses
@@ -97,7 +97,7 @@ class BestMatchSession:
             velocity_m_s, moving = self._velocities(frame)
             self._estimate = self._nearest(velocity_m_s, moving)
             self._gate.update(self._residuals, self._estimate)
-        return Estimate(self._estimate, status)
+        return Estimate(self._estimate, status, Origin.MODEL if any_valid else Origin.BRIDGED)
 
     def _velocities(self, frame: TrackerFrame) -> tuple[Floats, Bools]:
         """(S, 3) velocities since the last frame [m/s], and (S,) where they are has_velocity."""

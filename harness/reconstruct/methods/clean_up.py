@@ -1,12 +1,14 @@
 """Final inverse kinematics (`+ik`): corrects the estimates of any other method so that they fit the trackers.
 
 For every frame, Levenberg-Marquardt starts from the other method's pose, which is also the mean of the prior of the
-hinges. The root has no prior. The other method never sees the correction.
+hinges. A hinge's standard deviation is in proportion to its spread over the examples, as a method that learns from them
+is the more exact the less a hinge moves. Under one wide sigma for all, the noise of readings moved hinges that the
+method knew better (docs/notes/tuning.md). The root has no prior. The other method never sees the correction.
 
 Source: the last step of Kim et al. 2012 (docs/papers.md B5).
 
-Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `CleanUp`): `prior_sigma_rad` 30 deg, the
-loss of the residuals and the convergence criteria.
+Write `+ik` after a method's name, such as `best_match+ik`. Options (fields of `CleanUp`): `spread_share` 0.5,
+`prior_sigma_rad` 30 deg (without examples), the loss of the residuals and the convergence criteria.
 """
 
 import math
@@ -16,10 +18,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.body.humanoid import Body
+from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.estimate import Estimate
 from harness.core.motion import BodyMotion
 from harness.reconstruct.contract import Method, Reconstructor, Session
+from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
 from harness.reconstruct.solver.outlier_gate import OutlierGate
@@ -28,6 +32,8 @@ from harness.stream.frame import TrackerFrame
 
 SUFFIX = "+ik"
 """Suffix of the other method's name."""
+_MIN_SPREAD_RAD = math.radians(1.0)
+"""Smallest spread of a hinge over the examples that scales its prior."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +46,10 @@ class CleanUp:
     """Scales and robust loss of the residuals."""
     stopping: Stopping = field(default_factory=Stopping)
     """Convergence criteria of the solver."""
+    spread_share: float = 0.5
+    """Standard deviation of each hinge about the other method's pose, as a share of its spread over the examples."""
     prior_sigma_rad: float = math.radians(30.0)
-    """Standard deviation of each hinge about the other method's pose [rad]."""
+    """Standard deviation of each hinge about the pose of a method that has no examples [rad]."""
 
     @property
     def name(self) -> str:
@@ -56,7 +64,11 @@ class CleanUp:
         return self.method.needs_examples
 
     def fit(self, body: Body, examples: Sequence[BodyMotion], rng: np.random.Generator) -> "FittedCleanUp":
-        return FittedCleanUp(self, body, self.method.fit(body, examples, rng))
+        inner = self.method.fit(body, examples, rng)
+        if not self.needs_examples:
+            return FittedCleanUp(self, body, inner, np.full(48, self.prior_sigma_rad))
+        hinge_spread_rad = spread_rad(body, examples, mean_posture(body, examples))
+        return FittedCleanUp(self, body, inner, self.spread_share * np.maximum(hinge_spread_rad, _MIN_SPREAD_RAD))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,6 +78,8 @@ class FittedCleanUp:
     options: CleanUp
     body: Body
     inner: Reconstructor
+    hinge_sigma_rad: Floats
+    """(48,) standard deviations of the prior [rad]."""
 
     def begin(self, calibration: Calibration) -> "CleanUpSession":
         return CleanUpSession(self, calibration, self.inner.begin(calibration))
@@ -81,7 +95,7 @@ class CleanUpSession:
         self._limits = HingeLimits(fitted.body)
         self._solver = IKSolver(self._residuals, self._limits, fitted.options.stopping)
         self._precision = np.zeros(self._residuals.kinematics.nv)
-        self._precision[6:] = fitted.options.prior_sigma_rad**-2
+        self._precision[6:] = fitted.hinge_sigma_rad**-2
 
     def step(self, frame: TrackerFrame) -> Estimate:
         estimate = self._inner.step(frame)
@@ -91,4 +105,4 @@ class CleanUpSession:
         start = np.concatenate([estimate.qpos[:7], self._limits.clip(self._limits.principal(estimate.qpos[7:]))])
         qpos = self._solver.solve(start, Prior(start, self._precision)).qpos
         self._gate.update(self._residuals, qpos)
-        return Estimate(qpos, estimate.status)
+        return Estimate(qpos, estimate.status, estimate.origin)

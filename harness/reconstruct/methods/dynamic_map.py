@@ -8,27 +8,28 @@ For every frame:
 
 Source: Liu et al. 2011, eq. 2 to 14. Three variants:
 
-- `dynamic_map:literal`: a first literal reading of the paper; it answers mostly by its IK fallback. Windows are
-  compared by the last m estimates.
+- `dynamic_map:literal`: the equations as printed. Windows are compared by the last m estimates, D_w of eq. 6 is the
+  identity, sigma_d is that of the residuals without a factor, and the solver starts at the closest example.
 - `dynamic_map:window`: the same search, with a ridge in place of cut-off components, wider weights and sigmas.
 - `dynamic_map` (ours): readings take part in the search and in the regression, by features from a reduced-rank
-  regression (`reduced_rank_regression`). A prediction from its own estimates alone drifts with its errors.
+  regression (`reduced_rank_regression`). A prediction from its own estimates alone drifts with its errors. The prior
+  has the full covariance of the residuals, so that unobserved hinges follow the observed ones.
 
-Options are the fields of `DynamicMap`; scenarios/tune_dynamic_map.toml chose the defaults: `search` "features", 3
-poses, 800 neighbours, `width` 0.2, `ridge` 1e-3, `spread` 8, and floors of the prediction's standard deviations: 5 deg
-(hinges), 30 deg (tilt), 0.3 m (height), 3 m and 60 deg (step). `regression` holds the options of the features.
+Options are the fields of `DynamicMap`. docs/methods.md has a table of the defaults; docs/notes/tuning.md says how
+scenarios/tune_dynamic_map.toml and other validation clips chose them. `regression` holds the options of the features.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
+from harness.core.estimate import Origin
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase, Windows
@@ -38,14 +39,30 @@ from harness.reconstruct.features.neighbour_search import FeatureSearch, Neighbo
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.reduced_rank_regression import ReducedRankOptions, ReducedRankRegression
 from harness.reconstruct.index import Index, make_index
+from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.methods.local_dynamic_model import forecast, neighbour_weights
-from harness.reconstruct.solver.ground_frame import HEIGHT, HINGES, POSTURE_SIZE, TILT, qpos_from_posture
+from harness.reconstruct.solver.ground_frame import (
+    HEIGHT,
+    HINGES,
+    POSTURE_SIZE,
+    TILT,
+    ground_from_qpos,
+    posture_from_qpos,
+    qpos_from_posture,
+)
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
-from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping
+from harness.reconstruct.solver.ik_session import (
+    POSTURE_PRIOR_SIGMA_RAD,
+    PosturePrior,
+    SolverOptions,
+)
+from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, multiply_priors
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
+from harness.reconstruct.solver.root_placement import candidate_placements
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
+from harness.reconstruct.solver.subspace import SubspaceSolver, gaussian_space
+from harness.reconstruct.solver.subspace_minimiser import Subspace
 from harness.stream.frame import TrackerFrame
 
 _MIN_WEIGHT_VARIANCE = 1e-6
@@ -56,7 +73,12 @@ _MIN_WEIGHT_VARIANCE = 1e-6
 class DynamicMap:
     """Options of the local dynamic model, a `Method`; scenarios/tune_dynamic_map.toml chose the defaults."""
 
-    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"terms": "regression", "like": "search", "kept": "variance_kept"}
+    RENAMED_KEYS: ClassVar[Mapping[str, str]] = {
+        "terms": "regression",
+        "like": "search",
+        "kept": "variance_kept",
+        "novelty": "widening",
+    }
 
     name: str = "dynamic_map"
     summary: str = "maximum a posteriori pose under a local dynamic model of examples, found by history and readings"
@@ -73,26 +95,34 @@ class DynamicMap:
     """Variance of the weights over the K/2-th neighbour's squared distance; 0 is eq. 6 as printed, D_w = 1."""
     variance_kept: float = 1.0
     """Share of the windows' variance that the regression uses (eq. 5); 1 keeps all and relies on the ridge."""
-    ridge: float = 1e-3
+    ridge: float = 0.1
     """Ridge added to the eigenvalues of the windows' covariance, as a share of its trace."""
-    spread: float = 8.0
+    covariance: Literal["full", "diagonal"] = "full"
+    """Covariance of the prediction: that of the regression's residuals, or its diagonal alone (the paper, eq. 8)."""
+    spread: float = 3.0
     """Factor on the standard deviations of the prediction, which allows for another performer than the examples'.
 
     At 1 the prior is so narrow that it pulls the body off exact trackers."""
-    novelty: float = 0.0
-    """Factor on the nearest example's RMS distance per column, which is added to every sigma in quadrature."""
-    least_sigma_rad: float = math.radians(5.0)
+    widening: float = 100.0
+    """For performers unlike the examples, the covariance grows by the factor f = 1 + (widening d^2)^2, where d is the
+    RMS distance of the nearest example per column of the query; 0 for no growth."""
+    ik_prior_weight: float = 1.0
+    """The prior of `ik` takes part with the weight `ik_prior_weight` (1 - 1/f); 0 leaves it out."""
+    least_sigma_rad: float = math.radians(1.0)
     """Floor of every hinge's standard deviation [rad]."""
-    tilt_sigma_rad: float = math.radians(30.0)
+    tilt_sigma_rad: float = math.radians(3.0)
     """Floor of the root's tilt, standard deviation [rad]."""
-    height_sigma_m: float = 0.3
+    height_sigma_m: float = 0.02
     """Floor of the root's height, standard deviation [m]."""
     step_sigma_m: float = 3.0
-    """Floor of the root's step over the ground, standard deviation [m]; a small one makes a slip permanent."""
+    """Floor of the root's step over the ground, standard deviation [m]; a small one makes a slip permanent.
+
+    With a full covariance neither the step nor the turn has a prior."""
     turn_sigma_rad: float = math.radians(60.0)
     """Floor of the root's rotation about the vertical per frame, standard deviation [rad]."""
     start: Literal["prediction", "closest"] = "prediction"
-    """Start of the solver; the paper's is "closest". The other start is tried if the first fails or leaves outliers."""
+    """Start of the solver. "closest" is the closest example (the paper). "prediction" is the prediction, then the
+    closest example if that does not converge or leaves outliers."""
     index: str = "auto"
     """Search index: "auto" or a name of `index.selection`."""
     loss: Loss = field(default_factory=Loss)
@@ -115,7 +145,9 @@ class DynamicMap:
         """Learn from a database, which may lie on disk."""
         windows = database.windows(self.poses, with_successor=True)
         index = make_index(self.index, windows, self.neighbours) if self.search == "history" else None
-        return FittedDynamicMap(self, body, windows, index, mean_posture(body, database))
+        return FittedDynamicMap(
+            self, body, windows, index, mean_posture(body, database), Ik().posture_prior(body, database)
+        )
 
 
 WINDOW = DynamicMap(
@@ -126,6 +158,10 @@ WINDOW = DynamicMap(
     neighbours=100,
     width=1.0,
     ridge=0.1,
+    covariance="diagonal",
+    spread=8.0,
+    widening=0.0,
+    ik_prior_weight=0.0,
     least_sigma_rad=math.radians(3.0),
     tilt_sigma_rad=math.radians(5.0),
     height_sigma_m=0.05,
@@ -135,24 +171,37 @@ WINDOW = DynamicMap(
 )
 LITERAL = DynamicMap(
     "dynamic_map:literal",
-    "a first literal reading of Liu et al. 2011: 99 % of the variance, no ridge, start at the nearest example",
+    "Liu et al. 2011 as printed, eq. 2 to 14, with constants chosen on validation clips",
     search="history",
     poses=2,
-    neighbours=40,
+    neighbours=200,
     width=0.0,
-    variance_kept=0.99,
+    variance_kept=0.6,
     ridge=0.0,
+    covariance="diagonal",
     spread=1.0,
+    widening=0.0,
+    ik_prior_weight=0.0,
     least_sigma_rad=math.radians(0.01),
     tilt_sigma_rad=math.radians(0.01),
     height_sigma_m=1e-4,
-    step_sigma_m=1e-4,
-    turn_sigma_rad=math.radians(0.01),
+    step_sigma_m=0.3,
+    turn_sigma_rad=math.radians(10.0),
     start="closest",
-    loss=Loss(position_scale_m=0.003, orientation_scale_rad=math.radians(0.5), quality=False, suspect_weight=1.0),
+    loss=Loss(
+        position_sigma_m=0.0007,
+        orientation_sigma_rad=math.radians(0.12),
+        position_scale_m=0.01,
+        orientation_scale_rad=math.radians(3.0),
+        quality=False,
+        suspect_weight=1.0,
+    ),
     jump_m=math.inf,
 )
-"""The paper as printed. The floors only avoid a division by 0; sigma of eq. 12 is that of the trackers."""
+"""The paper as printed. It leaves open K, m, the share of variance, sigma_data, the scale of the Lorentzian, and the
+root's place among the examples. scenarios/tune_dynamic_map_literal.toml chose them. The floors of hinges, tilt and
+height only avoid a division by 0. The step over the ground and the turn are relative to the last estimate and loose, so
+that a slip is not permanent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,6 +215,8 @@ class FittedDynamicMap:
     """Index of the windows; None when `search` is "features"."""
     mean_qpos: Floats
     """(55,) mean posture, the prior of frames without a history."""
+    ik_prior: PosturePrior
+    """Prior of `ik`."""
     _regression_cache: CalibrationCache[ReducedRankRegression] = field(default_factory=CalibrationCache)
 
     def regression(self, calibration: Calibration) -> ReducedRankRegression:
@@ -178,17 +229,32 @@ class FittedDynamicMap:
         return DynamicMapSession(self, calibration)
 
 
+class Prediction(NamedTuple):
+    """A Gaussian of the posture (52) and of the step (3) from the last estimate's ground frame."""
+
+    mean: Floats
+    """(55,)"""
+    covariance: Floats
+    """(55, 55)"""
+    closest: Floats
+    """(55,) what followed the nearest example."""
+    ik_prior_weight: float
+    """Weight of the prior of `ik`: 0 beside an example, more with the distance."""
+
+
 class DynamicMapSession(HistorySession):
     """Follows one performer; fits a local model to every frame."""
 
     def __init__(self, fitted: FittedDynamicMap, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
-        solver_options = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        solver_options = SolverOptions(
+            options.loss, True, options.jump_m, lost_after_s=options.lost_after_s, stopping=options.stopping
+        )
         posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
         super().__init__(
             fitted.body, calibration, solver_options, posture_prior, options.poses, windows.database.rate_hz
         )
-        self._options, self._windows = options, windows
+        self._options, self._windows, self._ik_prior = options, windows, fitted.ik_prior
         self._neighbours: NeighbourSearch
         if fitted.index is None:
             regression = fitted.regression(calibration)
@@ -203,19 +269,57 @@ class DynamicMapSession(HistorySession):
         )
         sigma[POSTURE_SIZE:] = options.step_sigma_m, options.step_sigma_m, options.turn_sigma_rad
         self._least_variance = sigma**2
-        self._closest: Floats = np.zeros(POSTURE_SIZE + 3)
+        self._subspace_solver = (
+            SubspaceSolver(self.residuals, self.limits, options.stopping) if options.covariance == "full" else None
+        )
 
     def solve_next(self) -> IKSolution:
         """Eq. 9 and 10: the maximum a posteriori pose of the frame."""
-        prior = self.predict()
-        from_prediction = self._options.start == "prediction"
-        solution = self.solver.solve(prior.qpos if from_prediction else self._configuration(self._closest), prior)
+        prediction = self.predict()
+        if self._options.start == "closest":
+            return self._solve(prediction, prediction.closest)
+        solution = self._solve(prediction, prediction.mean)
         if solution.converged and self.outlier_share() == 0.0:
             return solution
-        second = self.solver.solve(self._configuration(self._closest) if from_prediction else prior.qpos, prior)
+        second = self._solve(prediction, prediction.closest)
         best = second if second.cost < solution.cost else solution
         self.residuals.evaluate(best.qpos)
         return best
+
+    def solve_cold(self) -> IKSolution:
+        """The best pose under the prediction from the readings alone, where they suffice."""
+        by_ik = super().solve_cold()
+        if self._subspace_solver is None or not self._neighbours.readings_suffice():
+            return by_ik
+        self.cold_origin = Origin.MODEL
+        prediction = self.predict(history=False)
+        postures = [
+            qpos_from_posture(some[:POSTURE_SIZE], np.zeros(3)) for some in (prediction.mean, prediction.closest)
+        ]
+        starts = [
+            by_ik.qpos,
+            *(start for posture in postures for start in candidate_placements(self.residuals, posture)),
+        ]
+        prior = self.joint_prior(prediction)
+        solutions = [
+            self._subspace_solver.solve(prior, ground_from_qpos(start), posture_from_qpos(start)) for start in starts
+        ]
+        best = min(solutions, key=lambda solution: solution.cost)
+        self.residuals.evaluate(best.qpos)
+        return best
+
+    def solve_without_history(self, frame: TrackerFrame) -> IKSolution:
+        """As `solve_cold`, but from the last estimate's place alone."""
+        if self._subspace_solver is None or not self._neighbours.readings_suffice():
+            return super().solve_without_history(frame)
+        return self._solve(self.predict(history=False), np.concatenate([posture_from_qpos(self.qpos), np.zeros(3)]))
+
+    def _solve(self, prediction: Prediction, start: Floats) -> IKSolution:
+        """The maximum a posteriori pose that is reached from a posture and step (55,)."""
+        if self._subspace_solver is None:
+            return self.solver.solve(self._configuration(start), self.independent_prior(prediction))
+        ground = ground_after_step(self.past[0], start[POSTURE_SIZE:])
+        return self._subspace_solver.solve(self.joint_prior(prediction), ground, start[:POSTURE_SIZE])
 
     def _configuration(self, following: Floats) -> Floats:
         """Configuration (55,) of a posture (52) after a step (3) from the last estimate's ground frame."""
@@ -229,24 +333,56 @@ class DynamicMapSession(HistorySession):
         self._neighbours.record()
 
     def predict_gap(self) -> Floats:
-        return self.predict().qpos
+        prediction = self.predict()
+        if self._subspace_solver is None:
+            return self.independent_prior(prediction).qpos
+        prior, most_likely = self.joint_prior(prediction), prediction.mean.copy()
+        most_likely[:POSTURE_SIZE] += np.linalg.solve(prior.curvature, prior.linear)
+        return self._configuration(most_likely)
 
-    def predict(self) -> Prior:
-        """Eq. 8: Gaussian prediction from `past`, in world axes and in the solver's tangent space."""
+    def predict(self, history: bool = True) -> Prediction:
+        """Eq. 8: Gaussian prediction from `past`, widened by factor, floors and distance of the examples.
+
+        Without `history` it comes from the readings alone.
+        """
         options, windows = self._options, self._windows
-        rows, squared, offsets = self._neighbours.nearest(self.past, options.neighbours)
+        rows, squared, offsets = self._neighbours.nearest(self.past, options.neighbours, history)
         variance = 1.0 if options.width == 0.0 else options.width * float(squared[len(squared) // 2])
         weight = neighbour_weights(squared, max(variance, _MIN_WEIGHT_VARIANCE))
         after = windows.successors(rows)
-        next_mean, left = forecast(offsets, after, weight, options.variance_kept, options.ridge)
-        self._closest = after[0].astype(float)
-        mean = self._configuration(next_mean)
-        mean[7:] = self.limits.clip(mean[7:])
-        variance_of = options.spread**2 * left + self._least_variance
-        variance_of += options.novelty**2 * float(squared[0]) / offsets.shape[1]
-        precision = 1.0 / variance_of[_TANGENT_INDICES]
+        mean, covariance = forecast(offsets, after, weight, options.variance_kept, options.ridge)
+        mean[HINGES] = self.limits.clip(mean[HINGES])
+        covariance *= options.spread**2
+        covariance.reshape(-1)[:: len(covariance) + 1] += self._least_variance
+        widened = 1.0 + (options.widening * float(squared[0]) / offsets.shape[1]) ** 2
+        covariance *= widened
+        return Prediction(mean, covariance, after[0].astype(float), options.ik_prior_weight * (1.0 - 1.0 / widened))
+
+    def independent_prior(self, prediction: Prediction) -> Prior:
+        """Eq. 8 as printed, without covariances, in world axes and in the solver's tangent space."""
+        precision = 1.0 / np.diagonal(prediction.covariance)[_TANGENT_INDICES]
         precision[:2] = precision[:2].min()  # forward and left are not the world's x and y
-        return Prior(mean, precision)
+        prior = Prior(self._configuration(prediction.mean), precision)
+        if prediction.ik_prior_weight == 0.0:
+            return prior
+        return multiply_priors(prior, self.ik_prior(), prediction.ik_prior_weight)
+
+    def ik_prior(self) -> Prior:
+        """The prior of `ik` after the last estimate."""
+        return self._ik_prior.prior(self.limits, self.past[0])
+
+    def joint_prior(self, prediction: Prediction) -> Subspace:
+        """The prediction of the posture with its covariances, times the prior of `ik`; the ground frame is free."""
+        mean, precision = np.zeros((2, POSTURE_SIZE))
+        if prediction.ik_prior_weight > 0.0:
+            ik_prior = self.ik_prior()
+            if ik_prior.precision is None:
+                raise ValueError("The product of two priors needs the precisions of both.")
+            mean[HINGES], precision[HINGES] = ik_prior.qpos[7:], prediction.ik_prior_weight * ik_prior.precision[6:]
+        posture = slice(POSTURE_SIZE)
+        return gaussian_space(
+            prediction.mean[posture], np.ascontiguousarray(prediction.covariance[posture, posture]), mean, precision
+        )
 
 
 _TANGENT_INDICES = np.array(

@@ -24,7 +24,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.reconstruct.database import MotionDatabase
@@ -75,14 +74,18 @@ class Ik:
         return self._fitted(body, database)
 
     def _fitted(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> "FittedIk":
+        return FittedIk(self, body, self.posture_prior(body, examples))
+
+    def posture_prior(self, body: Body, examples: Sequence[BodyMotion] | MotionDatabase) -> PosturePrior:
+        """The prior of the hinges; BadInput when it needs examples and there are none."""
         sigma_rad = np.full(48, self.prior_sigma_rad)
         if not self.needs_examples:
-            return FittedIk(self, body, None, sigma_rad)
+            return PosturePrior(None, sigma_rad, self.towards_mean)
         mean_qpos = mean_posture(body, examples)
         if self.spread:
             hinge_spread_rad = np.maximum(spread_rad(body, examples, mean_qpos), _MIN_SPREAD_RAD)
             sigma_rad *= hinge_spread_rad / np.sqrt(np.mean(hinge_spread_rad**2))
-        return FittedIk(self, body, mean_qpos, sigma_rad)
+        return PosturePrior(mean_qpos, sigma_rad, self.towards_mean)
 
 
 PREVIOUS = Ik(
@@ -108,16 +111,11 @@ class FittedIk:
 
     options: Ik
     body: Body
-    mean_qpos: Floats | None
-    """(55,) T-pose root and mean hinge angles; None without examples."""
-    sigma_rad: Floats
-    """(48,) standard deviations of the prior [rad]."""
+    posture_prior: PosturePrior
 
     def begin(self, calibration: Calibration) -> IKSession:
         options = self.options
         solver_options = SolverOptions(
-            options.loss, options.limits, options.jump_m, options.lost_after_s, options.stopping
+            options.loss, options.limits, options.jump_m, lost_after_s=options.lost_after_s, stopping=options.stopping
         )
-        return IKSession(
-            self.body, calibration, solver_options, PosturePrior(self.mean_qpos, self.sigma_rad, options.towards_mean)
-        )
+        return IKSession(self.body, calibration, solver_options, self.posture_prior)

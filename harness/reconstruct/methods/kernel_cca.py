@@ -10,6 +10,7 @@ Options: `neighbours` 12, `bases` 12, `kappa` 0.3, `width` 1, and those of `Loca
 scenarios/tune_kernel_cca.toml chose them.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
@@ -44,3 +45,18 @@ class KernelCca(LocalRegression):
         return cca.regression_weights(
             inputs, query, outputs, self.width, self.bases, self.kappa, self.regularise_projection
         )
+
+
+LITERAL = KernelCca(
+    "kernel_cca:literal",
+    "Kim et al. 2012 as printed, eq. 2 to 6, with constants chosen on validation clips",
+    neighbours=8,
+    index="kd_tree",
+    jump_m=math.inf,
+    outputs="quaternions",
+    bases=6,
+    kappa=0.01,
+    regularise_projection=False,
+)
+"""The paper as printed. It leaves open the number of bases l, the ridge without which eq. 3 is singular, the prior and
+the formulas of the final IK: docs/methods.md."""

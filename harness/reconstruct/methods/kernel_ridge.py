@@ -2,8 +2,9 @@
 
 A control for the papers' local models (docs/papers.md E): one Gaussian kernel over all examples, no neighbours and no
 history. Inputs are the stations' positions and bone orientations, relative to the heading of the station nearest to
-the pelvis, so neither place nor heading matters. A missing reading is replaced by its value at the last estimate. The
-root is fitted to the trackers afterwards.
+the pelvis, so neither place nor heading matters. Without that station's orientation the heading is estimated from the
+positions. Readings that a session never has take no part; one that is missing for a while is replaced by its value at
+the last estimate. The root is fitted to the trackers afterwards.
 
 Source: Saunders et al. 1998 (kernel ridge regression); noise on the examples' readings (docs/notes/ideas.md G1).
 
@@ -13,21 +14,23 @@ chosen on built-in takes that no scenario evaluates.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from harness.body.humanoid import Body
 from harness.core import rotations
-from harness.core.arrays import Floats, Ints
+from harness.core.arrays import Bools, Floats, Ints
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate
+from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
+from harness.reconstruct.features.calibration_cache import CalibrationCache
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.virtual_trackers import station_poses
-from harness.reconstruct.solver.anchor_frame import anchor_of
+from harness.reconstruct.solver.anchor_frame import MIN_HEADING_EXPLAINED, HeadingEstimator, anchor_of
+from harness.reconstruct.solver.ground_frame import ground_from_qpos
 from harness.reconstruct.solver.outlier_gate import OutlierGate
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.root_placement import place_root
@@ -69,7 +72,7 @@ class KernelRidge:
 
 @dataclass(frozen=True, eq=False)
 class FittedKernelRidge:
-    """The chosen examples. The map depends on the mounts, so each session learns it."""
+    """The chosen examples. The map depends on the mounts and on the readings, so sessions learn it."""
 
     options: KernelRidge
     body: Body
@@ -79,46 +82,113 @@ class FittedKernelRidge:
     noise: Floats
     """(N, 12, 6) standard normal, for the readings of up to twelve stations."""
 
+    maps: "CalibrationCache[ReadingMaps]" = field(default_factory=CalibrationCache, repr=False)
+    """Maps of the last calibration, shared by sessions of one performer."""
+
     def begin(self, calibration: Calibration) -> "KernelRidgeSession":
         return KernelRidgeSession(self, calibration)
 
 
-class KernelRidgeSession:
-    """Learns the map for a calibration and applies it to each frame."""
+@dataclass(frozen=True, eq=False)
+class ReadingMap:
+    """Kernel ridge regression of hinges on some of the readings."""
+
+    columns: Bools
+    """(9 S,) readings that take part."""
+    heading: HeadingEstimator | None
+    """Heading from positions; None takes it from the anchor's orientation."""
+    mean: Floats
+    """(C,) mean of the examples' inputs."""
+    inputs: Floats
+    """(N, C) the examples' inputs less their mean."""
+    width: float
+    """Twice the squared width of the kernel."""
+    weights: Floats
+    """(N, 48) weight of each example for each hinge."""
+
+    def angles(self, inputs: Floats) -> Floats:
+        """(M, 48) hinge angles less their mean [rad] for inputs (M, C)."""
+        out: Floats = gaussian_kernel(inputs - self.mean, self.inputs, self.width) @ self.weights
+        return out
+
+
+class ReadingMaps:
+    """The maps for one calibration, each learnt when a session first has its readings."""
 
     def __init__(self, fitted: FittedKernelRidge, calibration: Calibration) -> None:
         options, body, count = fitted.options, fitted.body, len(calibration.stations)
-        self._lever_m = options.lever_m
-        self._residuals = Residuals(body, calibration, Loss())
-        self._monitor, self._gate = StatusMonitor(), OutlierGate(count, _JUMP_M)
-        self._anchor = anchor_of(calibration.bones)
-        self._mean_qpos = self._estimate = mean_posture(body, fitted.takes)
-
+        self.count, self.lever_m, self.anchor = count, options.lever_m, anchor_of(calibration.bones)
+        self.mean_qpos = mean_posture(body, fitted.takes)
         read = [station_poses(body, take, calibration) for take in fitted.takes]
         position_m, turned = (np.concatenate(parts)[fitted.frames] for parts in zip(*read, strict=True))
-        noise = fitted.noise[:, :count]
-        position_m = position_m + options.position_noise_m * noise[..., :3]
-        turned = rotations.multiply(rotations.exp(options.orientation_noise_rad * noise[..., 3:]), turned)
-        x = self._features(position_m, turned)
-        angles = np.concatenate([take.qpos[:, 7:] for take in fitted.takes])[fitted.frames]
-        y = rotations.wrap_angle(angles - self._mean_qpos[7:])
+        noise, qpos = fitted.noise[:, :count], np.concatenate([take.qpos for take in fitted.takes])[fitted.frames]
+        self._examples = (
+            position_m + options.position_noise_m * noise[..., :3],
+            rotations.multiply(rotations.exp(options.orientation_noise_rad * noise[..., 3:]), turned),
+        )
+        self._yaw_rad = ground_from_qpos(qpos)[:, 2]
+        self._angles = rotations.wrap_angle(qpos[:, 7:] - self.mean_qpos[7:])
+        self._options, self._maps = options, dict[bytes, ReadingMap]()
 
-        self._x_mean, self._x = x.mean(axis=0), x - x.mean(axis=0)
-        self._width = 2.0 * options.width**2 * 2.0 * float(np.mean(np.sum(self._x**2, axis=1)))
-        factor = cho_factor(self._kernel(self._x) + options.ridge * np.eye(len(x)))
-        self._weights: Floats = cho_solve(factor, y)
+    def learnt(self, measured: Bools) -> ReadingMap:
+        """The map for sessions that have had these readings (2 S,) of positions, then orientations; cached."""
+        key = measured.tobytes()
+        if key not in self._maps:
+            self._maps[key] = self._learn(measured)
+        return self._maps[key]
+
+    def _learn(self, measured: Bools) -> ReadingMap:
+        places, turns = measured[: self.count], measured[self.count :]
+        columns = np.repeat(np.stack([places, turns], axis=1).reshape(-1), [3, 6] * self.count)
+        heading = None
+        if places[self.anchor] and not turns[self.anchor]:
+            facing_x = rotations.rotate(rotations.about_z(-self._yaw_rad)[:, None], self._examples[0])
+            estimator = HeadingEstimator.fit(facing_x, self.anchor, places)
+            heading = estimator if estimator.explained > MIN_HEADING_EXPLAINED else None
+        x = self.inputs(*self._examples, columns, heading)
+        mean = x.mean(axis=0)
+        x = x - mean
+        width = 2.0 * self._options.width**2 * 2.0 * float(np.mean(np.sum(x**2, axis=1)))
+        factor = cho_factor(gaussian_kernel(x, x, width) + self._options.ridge * np.eye(len(x)))
+        return ReadingMap(columns, heading, mean, x, width, cho_solve(factor, self._angles))
+
+    def inputs(self, position_m: Floats, turned: Floats, columns: Bools, heading: HeadingEstimator | None) -> Floats:
+        """(N, C) inputs: position [m] and two axes of each station's bone, relative to the anchor's heading."""
+        yaw_rad = rotations.yaw_rad(turned[:, self.anchor]) if heading is None else heading.heading_rad(position_m)
+        level = rotations.about_z(-yaw_rad)[:, None]
+        flat = position_m[:, self.anchor, None] * [1.0, 1.0, 0.0]
+        place = rotations.rotate(level, position_m - flat)
+        axes = rotations.to_matrix(rotations.multiply(level, turned))[..., :2].reshape(*place.shape[:2], 6)
+        both = np.concatenate([place, self.lever_m * axes], axis=2)
+        out: Floats = both.reshape(len(both), -1)[:, columns]
+        return out
+
+
+class KernelRidgeSession:
+    """Applies the map of the readings that this session has had to each frame."""
+
+    def __init__(self, fitted: FittedKernelRidge, calibration: Calibration) -> None:
+        count = len(calibration.stations)
+        self._residuals = Residuals(fitted.body, calibration, Loss())
+        self._monitor, self._gate = StatusMonitor(), OutlierGate(count, _JUMP_M)
+        self._maps = fitted.maps.get(calibration, lambda: ReadingMaps(fitted, calibration))
+        self._estimate = self._maps.mean_qpos
+        self._measured_before = np.zeros(2 * count, bool)
+        """(2 S,) positions, then orientations, that this session has had. The others take no part in the map."""
 
     def step(self, frame: TrackerFrame) -> Estimate:
         status, any_valid = self._monitor.update(frame)
         if any_valid:
             self._gate.read(frame, self._residuals)
-            qpos = self._mean_qpos.copy()
-            near = self._kernel(self._features(*self._completed_readings()) - self._x_mean)
-            qpos[7:] += (near @ self._weights)[0]
+            self._measured_before |= self._residuals.measured
+            learnt = self._maps.learnt(self._measured_before)
+            inputs = self._maps.inputs(*self._completed_readings(), learnt.columns, learnt.heading)
+            qpos = self._maps.mean_qpos.copy()
+            qpos[7:] += learnt.angles(inputs)[0]
             qpos[:7] = self._estimate[:7]
             self._estimate = place_root(self._residuals, qpos)
             self._gate.update(self._residuals, self._estimate)
-        return Estimate(self._estimate, status)
+        return Estimate(self._estimate, status, Origin.MODEL if any_valid else Origin.BRIDGED)
 
     def _completed_readings(self) -> tuple[Floats, Floats]:
         """Positions (1, S, 3) and bone orientations (1, S, 4); missing ones are those of the last estimate."""
@@ -133,19 +203,12 @@ class KernelRidgeSession:
         position_m = np.where(here, residuals.target_m, at_m)
         return position_m[None], np.where(facing, residuals.world_from_target, turned)[None]
 
-    def _features(self, position_m: Floats, turned: Floats) -> Floats:
-        """(N, 9 S) inputs: position [m] and two axes of each station's bone, relative to the anchor's heading."""
-        level = rotations.about_z(-rotations.yaw_rad(turned[:, self._anchor]))[:, None]
-        flat = position_m[:, self._anchor, None] * [1.0, 1.0, 0.0]
-        place = rotations.rotate(level, position_m - flat)
-        axes = self._lever_m * rotations.to_matrix(rotations.multiply(level, turned))[..., :2]
-        return np.concatenate([place.reshape(len(place), -1), axes.reshape(len(axes), -1)], axis=1)
 
-    def _kernel(self, x: Floats) -> Floats:
-        """(M, N) kernel between inputs (M, 9 S) and those of the examples."""
-        far = np.sum(x**2, axis=1)[:, None] + np.sum(self._x**2, axis=1) - 2.0 * x @ self._x.T
-        out: Floats = np.exp(-far / self._width)
-        return out
+def gaussian_kernel(x: Floats, examples: Floats, width: float) -> Floats:
+    """(M, N) kernel between inputs (M, C) and those of examples (N, C)."""
+    far = np.sum(x**2, axis=1)[:, None] + np.sum(examples**2, axis=1) - 2.0 * x @ examples.T
+    out: Floats = np.exp(-far / width)
+    return out
 
 
 def _identity_orientations(count: int) -> Floats:

@@ -1,7 +1,8 @@
 """Weighted regression of successors on windows, in the principal subspace of a few examples.
 
 Liu et al. 2011, eq. 2 to 8 (docs/papers.md A4): K windows x_k with successors y_k, weighted by closeness to the query.
-The result is a Gaussian prediction of the query's successor. With few examples the regression is solved in their K x K
+The result is a Gaussian prediction of the query's successor,
+with the residuals' full covariance. With few examples the regression is solved in their K x K
 space: if X holds the weighted, centred windows and X X^T = V L V^T, then X^T X has the principal directions
 U = X^T V L^-1/2 and the same eigenvalues L. With more examples than columns it is solved in the space of the columns.
 """
@@ -19,12 +20,12 @@ Real = TypeVar("Real", Floats, Singles)
 
 
 class Forecast(NamedTuple):
-    """Eq. 8: independent Gaussians of the D numbers of the successor."""
+    """A Gaussian of the D numbers of the successor. Eq. 8 uses the diagonal of its covariance alone."""
 
     mean: Floats
     """(D,) predicted successor."""
-    variance: Floats
-    """(D,) residual variance of the regression."""
+    covariance: Floats
+    """(D, D) residual covariance of the regression."""
 
 
 def neighbour_weights(squared: Floats | Singles, variance: float) -> Floats:
@@ -55,8 +56,8 @@ def forecast(offsets: Real, after: Real, weight: Floats, variance_kept: float, r
     query_row: Real = x @ middle  # minus (query - mean): the query is the origin of `offsets`
     solve = _dual_ridge_regression if variance_kept >= 1.0 else _principal_component_regression
     shift, residual = solve(inner, query_row, y, variance_kept, ridge * total, total)
-    variance = np.einsum("kd,kd->d", residual, residual)  # sigma_d^2 of eq. 8
-    return Forecast((after_middle - shift).astype(float), variance.astype(float))
+    covariance = residual.T @ residual  # its diagonal is sigma_d^2 of eq. 8
+    return Forecast((after_middle - shift).astype(float), covariance.astype(float))
 
 
 def _principal_component_regression(
@@ -94,60 +95,60 @@ def _dual_ridge_regression(
 def _primal_ridge_regression(offsets: Real, after: Real, share: Real, ridge: float) -> Forecast:
     """Eq. 4 with a ridge, in the space of the N columns: cheaper when there are more examples than columns.
 
-    The product of W X (K, N) with the columns X, y and 1 (K, N + D + 1) holds X^T W X, X^T W y and the mean.
+    The product of the weighted columns X and y with X, y and 1 holds all second moments and the means.
     """
-    weighted, columns, after_middle, squares = _weighted_moments(offsets, after, share)
+    weighted, columns = _weighted_columns(offsets, after, share)
     least = max(ridge, 1e-6 if offsets.dtype == np.float32 else 1e-9)
-    shift, variance = _solve_primal(columns.T @ weighted, after_middle, squares, offsets[0], least)
-    return Forecast(after[0] + shift, variance)
+    shift, covariance = _solve_primal(columns.T @ weighted, offsets[0], least)
+    return Forecast(after[0] + shift, covariance)
 
 
 @compiled
-def _weighted_moments(offsets: Real, after: Real, share: Real) -> tuple[Real, Real, Real, Real]:
-    """W X (K, N); X, y and 1 (K, N + D + 1); weighted means (D,) of y and of its squares (D,).
+def _weighted_columns(offsets: Real, after: Real, share: Real) -> tuple[Real, Real]:
+    """W X and W y (K, N + D); X, y and 1 (K, N + D + 1).
 
     X and y are relative to the nearest example's, which keeps single precision accurate for distant queries.
     """
     count, size, following = len(offsets), offsets.shape[1], after.shape[1]
-    weighted, columns = np.empty_like(offsets), np.empty((count, size + following + 1), offsets.dtype)
-    middle, squares = np.zeros((2, following), offsets.dtype)
+    weighted = np.empty((count, size + following), offsets.dtype)
+    columns = np.empty((count, size + following + 1), offsets.dtype)
     for k in range(count):
         row = columns[k]
         for i in range(size):
             row[i] = offsets[k, i] - offsets[0, i]
-            weighted[k, i] = share[k] * row[i]
         for i in range(following):
-            value = after[k, i] - after[0, i]
-            row[size + i] = value
-            middle[i] += share[k] * value
-            squares[i] += share[k] * value * value
+            row[size + i] = after[k, i] - after[0, i]
         row[size + following] = 1.0
-    return weighted, columns, middle, squares
+        for i in range(size + following):
+            weighted[k, i] = share[k] * row[i]
+    return weighted, columns
 
 
 @compiled
-def _solve_primal(product: Real, after_middle: Real, squares: Real, first: Real, ridge: float) -> tuple[Floats, Floats]:
-    """Mean (D,) relative to the nearest example's y, and variance (D,), of eq. 8; x is relative to `first` (N,)."""
-    size, following = product.shape[1], len(squares)
-    middle = product[size + following].astype(np.float64)
+def _solve_primal(product: Real, first: Real, ridge: float) -> tuple[Floats, Floats]:
+    """Mean (D,) relative to the nearest example's y, and covariance (D, D), of eq. 8; x is relative to `first` (N,)."""
+    size, both = len(first), product.shape[1]
+    following = both - size
+    middle = product[both].astype(np.float64)
     outer, slope = np.empty((size, size)), np.empty((size, following))
+    covariance = np.empty((following, following))
     for i in range(size):  # centred, eq. 2
         for j in range(size):
             outer[i, j] = product[i, j] - middle[i] * middle[j]
         for j in range(following):
-            slope[i, j] = product[size + j, i] - middle[i] * after_middle[j]
+            slope[i, j] = product[size + j, i] - middle[i] * middle[size + j]
+    for i in range(following):
+        for j in range(following):
+            covariance[i, j] = product[size + i, size + j] - middle[size + i] * middle[size + j]
     mixed, least = slope.copy(), ridge * np.trace(outer) + 1e-30
     for i in range(size):
         outer[i, i] += least
     _cholesky_solve(outer, slope)
-    mean, variance = np.empty(following), np.empty(following)
-    for j in range(following):
-        mean[j], variance[j] = after_middle[j], squares[j] - np.float64(after_middle[j]) ** 2
-    for i in range(size):
-        for j in range(following):
-            mean[j] -= (first[i] + middle[i]) * slope[i, j]
-            variance[j] -= slope[i, j] * (mixed[i, j] + least * slope[i, j])  # |y|^2 - |y - x slope|^2
-    return mean, np.maximum(variance, 0.0)  # sigma_d^2 of eq. 8
+    mean = middle[size:] - np.dot(first.astype(np.float64) + middle[:size], slope)
+    covariance -= np.dot(slope.T, mixed + least * slope)  # of y - x slope
+    for i in range(following):
+        covariance[i, i] = max(covariance[i, i], 0.0)
+    return mean, covariance
 
 
 @compiled

@@ -16,13 +16,14 @@ Options are the fields of `LocalPca`; scenarios/tune_local_pca.toml chose the de
 `prior_weight` 0.3, `smooth_weight` 0.2 with 0.1 rad, `control_weight` 1 m^-2, `lever_m` 0.3 m.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from harness.body.humanoid import Body
-from harness.core.arrays import Floats, Ints, Singles
+from harness.core.arrays import Bools, Floats, Ints, Singles
 from harness.core.calibration import Calibration
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
@@ -32,15 +33,22 @@ from harness.reconstruct.features.ground_step import ground_after_step
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.features.station_features import StationFeatures
 from harness.reconstruct.index import Index, Vectors, make_index, nearest_partial
+from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE
 from harness.reconstruct.solver.history_session import HistorySession
-from harness.reconstruct.solver.ik_session import POSTURE_PRIOR_SIGMA_RAD, PosturePrior, SolverOptions
-from harness.reconstruct.solver.ik_solver import IKSolution, Stopping
+from harness.reconstruct.solver.ik_session import (
+    POSTURE_PRIOR_SIGMA_RAD,
+    PosturePrior,
+    SolverOptions,
+)
+from harness.reconstruct.solver.ik_solver import IKSolution, Prior, Stopping, multiply_priors
 from harness.reconstruct.solver.outlier_gate import JUMP_M
 from harness.reconstruct.solver.residuals import Loss
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
 from harness.reconstruct.solver.subspace import SubspaceSolver, fit_subspace
 
+_MIN_WIDENING_RAD = math.radians(1.0)
+"""Smallest standard deviation for which the answer is solved again outside the subspace [rad]."""
 _HISTORY = 2
 """Number of past estimates in the query (C2)."""
 
@@ -68,6 +76,13 @@ class LocalPca:
     """Displacement that counts as much as a rotation of one radian in the query [m]."""
     index: str = "auto"
     """Search index: "auto" or a name of `index.selection`."""
+    widening: float = 20.0
+    """Standard deviation of each hinge about the answer within the subspace [rad]: this times the squared RMS distance
+    of the nearest example, per column of the query. Below 1 deg the answer stays within the subspace."""
+    ik_prior_weight: float = 9.0
+    """Weight of the prior of `ik` where the answer leaves the subspace; 0 leaves it out."""
+    restart: bool = True
+    """Whether a cold start follows when readings contradict the answer for long; if not, only after a loss."""
     loss: Loss = field(default_factory=Loss)
     """Scales and robust loss of the residuals."""
     jump_m: float = JUMP_M
@@ -86,7 +101,31 @@ class LocalPca:
 
     def fit_database(self, body: Body, database: MotionDatabase, rng: np.random.Generator) -> "FittedLocalPca":
         """Learn from a database, which may lie on disk."""
-        return FittedLocalPca(self, body, database.windows(_HISTORY, with_successor=True), mean_posture(body, database))
+        return FittedLocalPca(
+            self,
+            body,
+            database.windows(_HISTORY, with_successor=True),
+            mean_posture(body, database),
+            Ik().posture_prior(body, database),
+        )
+
+
+CHAI2005 = LocalPca(
+    "local_pca:chai2005",
+    "Chai and Hodgins 2005: 7 principal directions, squared residuals; its other constants are recalled or chosen",
+    neighbours=100,
+    components=7,
+    prior_weight=0.8,
+    smooth_weight=0.2,
+    smooth_sigma_rad=1.0,
+    widening=0.0,
+    ik_prior_weight=0.0,
+    restart=False,
+    loss=Loss(robust=False, quality=False, suspect_weight=1.0),
+    jump_m=math.inf,
+)
+"""Recalled from the paper, which could not be opened (docs/papers.md C2): 7 directions, alpha 0.8, beta 0.2, the solve
+from the closest example. Chosen on validation clips: the number of neighbours and the units of the three terms."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +137,8 @@ class FittedLocalPca:
     windows: Windows
     mean_qpos: Floats
     """(55,) mean posture, the prior of frames without a history."""
+    ik_prior: PosturePrior
+    """Prior of `ik`."""
     cache: "CalibrationCache[tuple[StationFeatures, Vectors, Index]]" = field(
         default_factory=CalibrationCache, repr=False
     )
@@ -121,41 +162,55 @@ class LocalPcaSession(HistorySession):
 
     def __init__(self, fitted: FittedLocalPca, calibration: Calibration) -> None:
         options, windows = fitted.options, fitted.windows
-        solver_options = SolverOptions(options.loss, True, options.jump_m, options.lost_after_s, options.stopping)
+        solver_options = SolverOptions(
+            options.loss, True, options.jump_m, options.restart, options.lost_after_s, options.stopping
+        )
         posture_prior = PosturePrior(fitted.mean_qpos, np.full(48, POSTURE_PRIOR_SIGMA_RAD))
         super().__init__(fitted.body, calibration, solver_options, posture_prior, _HISTORY, windows.database.rate_hz)
-        self._options, self._windows = options, windows
+        self._options, self._windows, self._ik_prior = options, windows, fitted.ik_prior
         self._subspace_solver = SubspaceSolver(self.residuals, self.limits, options.stopping)
-        self._features, self._examples, self._index = fitted.station_features(calibration)
+        self._precision = np.zeros(6 + len(self.limits.low_rad))
+        self._features, self._examples, index = fitted.station_features(calibration)
+        self._index = index.begin_search()
 
     def solve_next(self) -> IKSolution:
         options = self._options
         history = self._windows.query(self.past)
-        rows = self._nearest(history)
+        rows, squared = self._nearest(history)
         poses = self._windows.successors(rows)
         postures, closest = poses[:, :POSTURE_SIZE], poses[0].astype(float)
         constant_velocity = 2.0 * history[:POSTURE_SIZE].astype(float) - history[-POSTURE_SIZE:]
         beta = options.smooth_weight / options.smooth_sigma_rad**2
         space = fit_subspace(postures, options.components, options.prior_weight, constant_velocity, beta)
-        return self._subspace_solver.solve(
+        solution = self._subspace_solver.solve(
             space, ground_after_step(self.past[0], closest[POSTURE_SIZE:]), closest[:POSTURE_SIZE]
         )
+        sigma_rad = options.widening * squared / self._examples.size
+        if sigma_rad < _MIN_WIDENING_RAD:
+            return solution
+        self._precision[6:] = sigma_rad**-2
+        prior = Prior(solution.qpos, self._precision)
+        ik_prior = self._ik_prior.prior(self.limits, self.past[0])
+        return self.solver.solve(solution.qpos, multiply_priors(prior, ik_prior, options.ik_prior_weight))
 
     def predict_gap(self) -> Floats:
         """The last estimate, since the model has no dynamics."""
         last: Floats = self.past[0]
         return last
 
-    def _nearest(self, past: Singles) -> Ints:
-        """Rows (K,) of the nearest examples by readings and history; missing readings count nothing."""
+    def _nearest(self, past: Singles) -> tuple[Ints, float]:
+        """Rows (K,) of the nearest examples by readings and history, and the squared distance of the first.
+
+        Missing readings count nothing.
+        """
         residuals, features, options = self.residuals, self._features, self._options
         scale = np.float32(np.sqrt(options.control_weight))
         position_m, turned = residuals.target_m, residuals.world_from_target
         ground = ground_after_step(self.past[0], np.zeros(3))
         if residuals.measured.all():
             query = np.concatenate([past, scale * features.query(position_m, turned, ground)])
-            rows, _ = self._index.nearest(query, options.neighbours)
-            return rows
+            rows, squared = self._index.nearest(query, options.neighbours)
+            return rows, float(squared[0])
         count = len(position_m)
         has_position, has_orientation = residuals.measured[:count, None], residuals.measured[count:, None]
         at_m, at_orientation = features.station_poses(residuals.kinematics, self.past[0])
@@ -164,8 +219,8 @@ class LocalPcaSession(HistorySession):
         )
         weight = np.concatenate([np.ones(len(past)), features.columns(residuals.measured)])
         query = np.concatenate([past, scale * control])
-        rows, _ = nearest_partial(self._index, self._examples, query, weight, options.neighbours)
-        return rows
+        rows, squared = nearest_partial(self._index, self._examples, query, weight, options.neighbours)
+        return rows, float(squared[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,6 +237,10 @@ class _WindowsWithFeatures:
     @property
     def size(self) -> int:
         return self.windows.size + int(self.features.shape[1])
+
+    @property
+    def consecutive(self) -> Bools:
+        return self.windows.consecutive
 
     def gather(self, rows: Ints | slice) -> Singles:
         return np.concatenate([self.windows.gather(rows), np.float32(self.scale) * self.features[rows]], axis=1)

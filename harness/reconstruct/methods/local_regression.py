@@ -26,16 +26,16 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats, Ints
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate
+from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.database import MotionDatabase
 from harness.reconstruct.features.calibration_cache import CalibrationCache
-from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights
+from harness.reconstruct.features.example_features import ExampleFeatures, FeatureWeights, Query
 from harness.reconstruct.features.ground_step import step_ground
+from harness.reconstruct.features.pose_space import HingeAngles, JointQuaternions, PoseSpace
 from harness.reconstruct.features.posture_statistics import mean_posture, spread_rad
 from harness.reconstruct.features.query_features import QueryFeatures
-from harness.reconstruct.features.smoothing import smooth
 from harness.reconstruct.solver.ground_frame import POSTURE_SIZE, qpos_from_posture
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolver, Prior, Stopping
@@ -75,6 +75,8 @@ class LocalRegression(ABC):
     """alpha of eq. 6: share of the frame before last in the blend of the last two."""
     beta: float = 0.4
     """beta of eq. 6: share of the last two frames; 0 disables smoothing."""
+    outputs: Literal["angles", "quaternions"] = "angles"
+    """Coordinates in which poses are blended and smoothed: hinge angles, or the joints' quaternions (the paper)."""
     final_ik: bool = True
     """Whether inverse kinematics follows; without it only the root is fitted to the trackers."""
     solve: Literal["body", "limbs"] = "body"
@@ -106,7 +108,7 @@ class LocalRegression(ABC):
 
     @abstractmethod
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
-        """(m,) weights of sum 1 for m >= 2 neighbours: outputs (m, 55), inputs (m, n) and the query (n,)."""
+        """(m,) weights of sum 1 for m >= 2 neighbours: outputs (m, d), inputs (m, n) and the query (n,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +146,12 @@ class LocalRegressionSession:
         jump_m = options.jump_m if options.final_ik else max(options.jump_m, _JUMP_WITHOUT_IK_M)
         self._monitor, self._gate = StatusMonitor(), OutlierGate(len(calibration.stations), jump_m)
         self._examples = fitted.example_features(calibration)
+        self._lookup = self._examples.index.begin_search()
         self._features = QueryFeatures(self._residuals, calibration, self._examples, options.longest_gap_s)
         self._limits = HingeLimits(fitted.body)
+        self._space: PoseSpace = HingeAngles()
+        if options.outputs == "quaternions":
+            self._space = JointQuaternions(fitted.body, self._limits)
         self._solver = IKSolver(self._residuals, self._limits, Stopping(most_steps=options.most_steps))
         self._limbs = LimbSolver(fitted.body, calibration.bones, self._residuals, self._limits)
         self._precision = np.repeat([options.root_sigma_m**-2, options.root_sigma_rad**-2], 3)
@@ -158,33 +164,35 @@ class LocalRegressionSession:
         status, any_valid = self._monitor.update(frame)
         if not any_valid:
             self._last_rows, self._last_poses = _NO_ROWS, []
-            return Estimate(self._estimate, status)
+            return Estimate(self._estimate, status, Origin.BRIDGED)
         self._gate.read(frame, self._residuals)
         if not np.count_nonzero(self._residuals.measured):
-            return Estimate(self._estimate, status)
-        view, query, confidence = self._features.compute(frame, self._estimate)
-        pose = self._smooth(self._regress(query, confidence))
+            return Estimate(self._estimate, status, Origin.BRIDGED)
+        query = self._features.compute(frame, self._estimate)
+        pose = self._space.decode(self._smooth(self._regress(query)))
         self._estimate = self._fit_to_trackers(
-            qpos_from_posture(pose[:POSTURE_SIZE], step_ground(np.array(view), pose[POSTURE_SIZE:]))
+            qpos_from_posture(pose[:POSTURE_SIZE], step_ground(np.array(query.view), pose[POSTURE_SIZE:]))
         )
         self._gate.update(self._residuals, self._estimate)
         return Estimate(self._estimate, status)
 
-    def _regress(self, query: Floats, confidence: Floats) -> Floats:
-        """(55,) posture and root placement, regressed on the neighbours of this frame and the last."""
-        rows = self._examples.nearest(query, confidence, self._options.neighbours)
-        inputs, regression_query, outputs = self._examples.regression_data(rows, self._last_rows, query, confidence)
+    def _regress(self, query: Query) -> Floats:
+        """(d,) posture and root placement in `_space`, regressed on the neighbours of this frame and the last."""
+        rows = self._examples.nearest(query, self._options.neighbours, self._lookup)
+        inputs, regression_query, outputs = self._examples.regression_data(
+            rows, self._last_rows, query.features, query.confidence
+        )
         self._last_rows = rows
-        if len(outputs) == 1:
-            return outputs.reshape(-1)
-        pose: Floats = np.matmul(self._options.weigh(inputs, regression_query, outputs), outputs)
-        return pose
+        coordinates = self._space.encode(outputs)
+        if len(coordinates) == 1:
+            return coordinates.reshape(-1)
+        return self._space.blend(self._options.weigh(inputs, regression_query, coordinates), coordinates)
 
     def _smooth(self, pose: Floats) -> Floats:
-        """Eq. 6 on hinge angles and on the root relative to the anchor, so that walking is not delayed."""
+        """Eq. 6 on the posture and on the root relative to the anchor, so that walking is not delayed."""
         if len(self._last_poses) == 2:
             second_last, last = self._last_poses
-            pose = smooth(pose, last, second_last, self._options.alpha, self._options.beta)
+            pose = self._space.smooth(pose, last, second_last, self._options.alpha, self._options.beta)
         self._last_poses = [*self._last_poses[-1:], pose]
         return pose
 

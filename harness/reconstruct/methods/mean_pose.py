@@ -14,7 +14,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate
+from harness.core.estimate import Estimate, Origin
 from harness.core.motion import BodyMotion
 from harness.reconstruct.features.posture_statistics import mean_posture
 from harness.reconstruct.solver.residuals import Loss, Residuals
@@ -61,4 +61,4 @@ class MeanPoseSession:
         if any_seen:
             self._residuals.read(frame)
             self._qpos = place_root(self._residuals, self._qpos)
-        return Estimate(self._qpos, status)
+        return Estimate(self._qpos, status, Origin.MODEL if any_seen else Origin.BRIDGED)

@@ -8,6 +8,7 @@ Source: the baseline of Kim, Seol and Lee 2012, which prints no weights; the pow
 Options: `neighbours` 16, `power` 4, and those of `LocalRegression`; scenarios/tune_weighted_blend.toml chose them.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,18 @@ class WeightedBlend(LocalRegression):
 
     def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
         return _inverse_distance_weights(inputs, query, self.power)
+
+
+LITERAL = WeightedBlend(
+    "weighted_blend:literal",
+    "the baseline of Kim et al. 2012: 8 neighbours by inverse distance, with the steps of kernel_cca:literal",
+    neighbours=8,
+    index="kd_tree",
+    jump_m=math.inf,
+    outputs="quaternions",
+    power=1.0,
+)
+"""The paper names the baseline and prints no weights; inverse distance is the plainest choice: docs/methods.md."""
 
 
 @compiled

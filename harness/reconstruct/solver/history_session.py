@@ -8,6 +8,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
+from harness.core.estimate import Origin
 from harness.reconstruct.solver.ik_session import IKSession, PosturePrior, SolverOptions
 from harness.reconstruct.solver.ik_solver import IKSolution
 from harness.stream.frame import TrackerFrame
@@ -36,6 +37,8 @@ class HistorySession(IKSession, ABC):
         self.past: Floats = np.tile(self.qpos, (poses, 1))
         """(m, 55) the last answers, newest first."""
         self._rate_hz, self._length, self._recorded_s = rate_hz, 0, -np.inf
+        self.cold_origin = Origin.FALLBACK
+        """Origin of the last cold start."""
         self._unlimited = np.isinf(self.limits.high_rad)
         self._dropped = np.array(self.past[-1])  # the oldest, in case that the newest is replaced
 
@@ -57,10 +60,20 @@ class HistorySession(IKSession, ABC):
                     self._push(self.predict_gap())
                 return self.solve_next()
             self._length = 0
+        return self.solve_without_history(frame)
+
+    def solve_without_history(self, frame: TrackerFrame) -> IKSolution:
+        """The solution while the history is too short: by inverse kinematics."""
+        self.origin = Origin.FALLBACK
         return super().track(frame)
 
+    def solve_cold(self) -> IKSolution:
+        self.cold_origin = Origin.FALLBACK
+        return super().solve_cold()
+
     def record(self, frame: TrackerFrame, cold: bool) -> None:
-        self._length = 0 if cold else self._length
+        if cold:
+            self._length, self.origin = 0, self.cold_origin
         self._push(self.qpos)
         self._recorded_s = self.now_s
 

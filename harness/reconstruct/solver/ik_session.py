@@ -12,7 +12,7 @@ import numpy as np
 from harness.body.humanoid import Body
 from harness.core.arrays import Floats
 from harness.core.calibration import Calibration
-from harness.core.estimate import Estimate, Status
+from harness.core.estimate import Estimate, Origin, Status
 from harness.reconstruct.solver.device_time import DeviceTime
 from harness.reconstruct.solver.hinge_limits import HingeLimits
 from harness.reconstruct.solver.ik_solver import IKSolution, IKSolver, Prior, Stopping
@@ -24,8 +24,9 @@ from harness.stream.frame import TrackerFrame
 
 POSTURE_PRIOR_SIGMA_RAD = float(np.deg2rad(30.0))
 """Standard deviation of hinges about the examples' mean posture, for methods without a history yet [rad]."""
-_OUTLIER_SCALES = 2.0
-"""A reading contradicts the pose when its residual exceeds this many Lorentzian scales: 6 cm, 16 deg."""
+_CONTRADICTION_M, _CONTRADICTION_RAD = 0.06, float(np.deg2rad(16.0))
+"""A reading contradicts the pose when its residual is larger. It depends on no option of a method: a narrow loss or
+prior would reject every answer of its own model."""
 _OUTLIER_SHARE = 0.25
 """From this share of contradicting readings on, a cold start follows at once; below it, after `PATIENCE_S`."""
 _LOSS_SCALE_FACTORS = (10.0, 3.0, 1.0)
@@ -70,6 +71,8 @@ class SolverOptions:
     """Keep hinges within the body's limits."""
     jump_m: float = JUMP_M
     """A position that jumps farther than this from its expected place is left out for a while; inf for never [m]."""
+    restart: bool = True
+    """Whether a cold start follows when readings contradict the pose for long; if not, only after a loss."""
     lost_after_s: float = LOST_AFTER_S
     """Time without enough stations after which the status is LOST [s]."""
     stopping: Stopping = field(default_factory=Stopping)
@@ -90,12 +93,17 @@ class IKSession:
         self.qpos = postures[0]
         """(55,) the last answer."""
         self._posture_prior = posture_prior
+        self._restart = options.restart
         self._monitor = StatusMonitor(options.lost_after_s)
         self._gate = OutlierGate(len(calibration.stations), options.jump_m)
         self._time, self.now_s = DeviceTime(), 0.0
         """Time of this frame [s]."""
         self._postures = postures if posture_prior.mean_qpos is None else (*postures, posture_prior.mean_qpos)
+        self._contradiction = np.repeat([_CONTRADICTION_M, _CONTRADICTION_RAD], len(calibration.stations))
+        """(2S,) residuals from which on a position or an orientation contradicts the pose [m, rad]."""
         self._started, self._tracking = False, False
+        self.origin = Origin.MODEL
+        """Origin of the answer to this frame. Methods with a model set it when inverse kinematics answers instead."""
         self._contradicted_since_s: float | None = None
 
     def track(self, frame: TrackerFrame) -> IKSolution:
@@ -111,18 +119,19 @@ class IKSession:
 
     def outlier_share(self) -> float:
         """The share of measured rows that contradict the pose evaluated last."""
-        far = (self.residuals.distance > _OUTLIER_SCALES * self.residuals.scale) & self.residuals.measured
+        far = (self.residuals.distance > self._contradiction) & self.residuals.measured
         return float(np.count_nonzero(far)) / float(np.count_nonzero(self.residuals.measured))
 
     def step(self, frame: TrackerFrame) -> Estimate:
         """The estimate after one frame; without any valid reading, the last pose again."""
         status, any_valid = self._monitor.update(frame)
+        self.origin = Origin.MODEL if any_valid else Origin.BRIDGED
         self.now_s = self._time.frame_time_s(frame)
         if any_valid:
             self._gate.read(frame, self.residuals)
             cold = self._gate.all_moved or (not self._tracking and (status is Status.SOLVED or not self._started))
             if cold:
-                solution = self._solve_cold()
+                solution = self.solve_cold()
             else:
                 solution, cold = self._verify(self.track(frame))
             self.qpos = self._canonical(solution.qpos)
@@ -130,11 +139,11 @@ class IKSession:
             self.record(frame, cold)
             self._gate.update(self.residuals, self.qpos)
         self._tracking = status is Status.SOLVED or (self._tracking and status is not Status.LOST)
-        return Estimate(self.qpos, status)
+        return Estimate(self.qpos, status, self.origin)
 
     def _verify(self, warm: IKSolution) -> tuple[IKSolution, bool]:
         """The warm solution, or a cold one if readings contradict the warm one for too long; and whether it is cold."""
-        contradicting = self.outlier_share()
+        contradicting = self.outlier_share() if self._restart else 0.0
         if contradicting == 0.0 and not self._gate.left_out:
             self._contradicted_since_s = None
             return warm, False
@@ -145,10 +154,10 @@ class IKSession:
         ):
             return warm, False
         self._contradicted_since_s = self.now_s
-        cold = self._solve_cold()
+        cold = self.solve_cold()
         return (cold, True) if cold.cost < _COLD_COST_RATIO * warm.cost else (warm, False)
 
-    def _solve_cold(self) -> IKSolution:
+    def solve_cold(self) -> IKSolution:
         """The cheapest solution from the last pose and the starting postures, each placed at the readings."""
         starts: list[Floats] = []
         for posture in (self.qpos, *self._postures):

@@ -28,6 +28,20 @@ class Prior:
     """(54,) one over the variance along each tangent direction [1/m^2, 1/rad^2]; 0, or None for all, for no prior."""
 
 
+def multiply_priors(prior: Prior, broad: Prior, weight: float) -> Prior:
+    """The product of two Gaussian priors of the hinges, of which the second counts `weight` times.
+
+    Where the first is narrow it decides; where it is wide, as far from all examples, the broad one does. The root's
+    prior is that of the first. Both need precisions.
+    """
+    if prior.precision is None or broad.precision is None:
+        raise ValueError("The product of two priors needs the precisions of both.")
+    added, precision, qpos = weight * broad.precision[6:], prior.precision.copy(), prior.qpos.copy()
+    precision[6:] += added
+    qpos[7:] += added / precision[6:] * (broad.qpos[7:] - qpos[7:])
+    return Prior(qpos, precision)
+
+
 @dataclass(frozen=True)
 class Stopping:
     """Criteria of convergence, and the limit of steps."""

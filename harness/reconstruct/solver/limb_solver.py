@@ -52,13 +52,17 @@ class LimbSolver:
         return out
 
     def _move_trunk(self, qpos: Floats, station: int, has_position: bool, has_orientation: bool) -> None:
-        """Move the root so that this station gets its measured orientation and position."""
+        """Move the root so that this station gets its measured orientation and position.
+
+        Without a position the root turns on the spot: about the station it would drift, frame by frame.
+        """
         residuals = self._residuals
         if has_orientation:
             bone = residuals.state.world_from_body[residuals.tree.station_body[station]]
             turn = rotations.multiply(residuals.world_from_target[station], rotations.inverse(bone))
-            pivot_m = residuals.station_m[station]
-            qpos[:3] = pivot_m + rotations.rotate(turn, qpos[:3] - pivot_m)
+            if has_position:
+                pivot_m = residuals.station_m[station]
+                qpos[:3] = pivot_m + rotations.rotate(turn, qpos[:3] - pivot_m)
             qpos[3:7] = rotations.multiply(turn, qpos[3:7])
         if has_position:
             qpos[:3] += residuals.target_m[station] - residuals.station_m[station]

@@ -75,6 +75,16 @@ def fit_subspace(postures: Singles, components: int, alpha: float, expected: Flo
 
 
 @compiled
+def gaussian_space(mean: Floats, covariance: Floats, other_mean: Floats, other_precision: Floats) -> Subspace:
+    """All postures, at the cost of two Gaussian priors: mean (P,) and covariance (P, P); mean and precisions (P,)."""
+    size = len(mean)
+    curvature = invert_positive_definite(covariance)
+    for i in range(size):
+        curvature[i, i] += other_precision[i]
+    return Subspace(mean, np.zeros((0, size)), curvature, other_precision * (other_mean - mean), np.zeros(size))
+
+
+@compiled
 def _constrained_curvature(inverse: Floats, normals: Floats, alpha: float) -> Floats:
     """(P, P) alpha times the inverse scatter within the subspace, and the spring along its normals N (D, P).
 

@@ -6,10 +6,10 @@ from harness.report.kit.markup import Markup, inline_code, join, tag
 from harness.report.kit.table import stacked_cell
 from harness.report.kit.text import to_file_name
 from harness.report.kit.verdict_badge import verdict_badge
-from harness.report.paper.verdicts import MARKS, format_difference, format_interval
+from harness.report.paper.verdicts import MARKS, format_difference, format_interval, format_kind, format_p
 from harness.results.findings import Claim, PaperExperiment, PaperFindings
 
-_HEAD = ("published statement", "published", "ours", "difference", "clips", "verdict")
+_HEAD = ("claim", "kind", "published", "measured", "difference", "clips", "verdict")
 
 
 def claims_table(findings: PaperFindings) -> Markup:
@@ -34,7 +34,11 @@ def _table(groups: Sequence[Markup]) -> Markup:
     top = tag("tr", *(tag("th", text, scope="col", role="columnheader") for text in _HEAD), role="row")
     text = (
         "Difference: mean of the paired differences over clips and its 95 % interval; positive values agree with the "
-        "paper. The text under a statement gives the reason for its verdict."
+        "paper. p: by sign flips (by Welch's test where clips do not pair), after Holm's correction for all printed "
+        "statements of the paper with the same version of the methods (as printed, ours). The text under a claim gives "
+        "the reason for its verdict. Kind: the paper prints a printed statement; a derived one follows from those or "
+        "is our interpretation of a word; a repeated one asks one more method; speed compares today's machines with "
+        "the paper's. Only printed statements count in the headline."
     )
     content = tag(
         "table", tag("thead", top, role="rowgroup"), *groups, class_="claims", role="table", aria_label="claims"
@@ -44,9 +48,11 @@ def _table(groups: Sequence[Markup]) -> Markup:
 
 def _claim(claim: Claim) -> Markup:
     why = tag("small", inline_code(claim.why)) if claim.why else None
-    difference = stacked_cell(format_difference(claim), format_interval(claim))
+    p = format_p(claim)
+    lower = ", ".join(filter(None, (format_interval(claim), f"p {p}" if p else "")))
+    difference = stacked_cell(format_difference(claim), lower)
     badge = verdict_badge(claim.verdict, MARKS[claim.verdict])
-    cells = [claim.published, claim.ours, difference, claim.clips or "", badge]
+    cells = [format_kind(claim), claim.published, claim.ours, difference, claim.clips or "", badge]
     titled = [
         tag("td", cell, data_label=name, role="cell", class_=None if cell else "empty")
         for name, cell in zip(_HEAD[1:], cells, strict=True)

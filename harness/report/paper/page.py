@@ -15,6 +15,7 @@ from harness.report.kit.text import describe_motion_source
 from harness.report.kit.verdict_badge import tally_list
 from harness.report.paper.claims import anchor, claims_table
 from harness.report.paper.figure_table import figure_table
+from harness.report.paper.side_by_side import printed_statements, statements_table
 from harness.report.paper.table import paper_table
 from harness.report.paper.verdicts import MARKS, MEANINGS, all_claims, count_verdicts, sentence, shared_differences
 from harness.results.findings import BarChart, LineChart, PaperExperiment, PaperFindings
@@ -42,8 +43,10 @@ def paper_page(content: PaperContent) -> str:
         "Motion": describe_motion_source(findings.motion),
         "Made by": f"{findings.command} (seed {findings.seed})",
     }
+    statements = printed_statements(findings)
     experiments = [(e.title, anchor(e), _experiment(content, e)) for e in findings.experiments]
     sections: list[Section] = [
+        ("Printed statements", "statements", statements_table(statements) if statements else Markup()),
         ("All claims", "claims", claims_table(findings)),
         *experiments,
         ("Differences from the paper in several experiments", "throughout", _common_differences(findings)),
@@ -57,7 +60,9 @@ def paper_page(content: PaperContent) -> str:
         facts=facts,
         missing=content.missing,
         sections=sections,
-        lead=tally_list(count_verdicts(claims), MARKS, MEANINGS) if claims else None,
+        lead=tally_list(count_verdicts([c for c in claims if c.kind == "printed"]), MARKS, MEANINGS)
+        if claims
+        else None,
     )
 
 

@@ -1,11 +1,11 @@
-"""Updates the tables of a paper in a README, which stand between two markers for each paper and motion."""
+"""Updates the table of a paper in a README, which stand between two markers for each paper and motion."""
 
 import re
 from pathlib import Path
 
 from harness.core.files import write_text
 from harness.errors import BadFile
-from harness.report.paper.text import text_tables
+from harness.report.paper.text import statements_text
 from harness.results.findings import PaperFindings
 
 _NEWLINE = "\n"
@@ -47,7 +47,7 @@ def _section(findings: PaperFindings) -> str:
     title = f"### {findings.paper}, {findings.motion}"
     changes = " with uncommitted changes" if versions.get("dirty") else ""
     made_by = f"Made by harness {versions.get('harness')}, {commit}{changes}:"
-    block = [f"    {line}".rstrip() for line in (findings.command, "", *text_tables(findings).split("\n"))]
+    block = [f"    {line}".rstrip() for line in (findings.command, "", *statements_text(findings).split("\n"))]
     return "\n".join([_escape_markers(title), "", _escape_markers(made_by), "", *map(_escape_markers, block)])
 
 

@@ -1,16 +1,26 @@
-"""The claims of a paper as text tables, for the terminal and for results/README.md."""
+"""The claims of a paper as text tables: all of them for the terminal, printed statements for results/README.md."""
 
 import textwrap
 from collections.abc import Sequence
 
+from harness.core.number_format import count_noun
 from harness.core.text_table import Table
-from harness.report.paper.verdicts import all_claims, format_difference, format_interval, sentence, shared_differences
+from harness.report.paper.side_by_side import printed_statements, statements_lines
+from harness.report.paper.verdicts import (
+    all_claims,
+    format_difference,
+    format_interval,
+    format_kind,
+    format_p,
+    sentence,
+    shared_differences,
+)
 from harness.results.findings import Claim, PaperExperiment, PaperFindings
 
 WIDTH = 160
 """Most characters of a line."""
-_HEAD = ("claim", "published", "ours", "difference", "95 % interval", "clips", "verdict")
-_SHRINKABLE = (0, 1, 2)
+_HEAD = ("claim", "kind", "published", "measured", "difference", "95 % interval", "p (Holm)", "clips", "verdict")
+_SHRINKABLE = (0, 2, 3)
 """Columns that wrap where lines would be too long."""
 _INDENT = "  "
 
@@ -30,6 +40,19 @@ def text_tables(findings: PaperFindings) -> str:
         where = "all" if in_all else ", ".join(experiment.name for experiment in experiments)
         parts.append(_wrap(f"{text} ({where})", _INDENT))
     return "\n".join(line.rstrip() for part in parts for line in part.split("\n"))
+
+
+def statements_text(findings: PaperFindings) -> str:
+    """The printed statements with the results of both readings, in lines of at most `WIDTH` characters."""
+    head = [findings.reference, f"{findings.paper} on {findings.motion}, seed {findings.seed}."]
+    lines = [_wrap(line) for line in [*head, sentence(all_claims(findings))]]
+    statements = printed_statements(findings)
+    others = [claim for claim in all_claims(findings) if claim.kind != "printed"]
+    if statements:
+        lines += ["", *statements_lines(statements, WIDTH)]
+    if others:
+        lines += ["", f"{count_noun(len(others), 'further claim')}: derived, repeated or of speed; see the page."]
+    return "\n".join(line.rstrip() for part in lines for line in part.split("\n"))
 
 
 def _experiment(experiment: PaperExperiment, differences: Sequence[str]) -> list[str]:
@@ -58,10 +81,12 @@ def _cells(claim: Claim) -> tuple[str, ...]:
     clips = str(claim.clips) if claim.clips else ""
     return (
         claim.text,
+        format_kind(claim),
         claim.published,
         claim.ours,
         format_difference(claim),
         format_interval(claim),
+        format_p(claim),
         clips,
         claim.verdict,
     )

@@ -1,26 +1,31 @@
 """Verdicts on a paper's claims: their meaning, their counts in words, and the format of differences."""
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import get_args
 
 from harness.core.number_format import count_noun, decimals_for, format_number
-from harness.results.findings import Claim, ClaimVerdict, PaperExperiment, PaperFindings
+from harness.results.findings import Claim, ClaimVerdict, PaperExperiment, PaperFindings, Reading
 
+READINGS: Mapping[Reading, str] = {"as printed": "With the methods as printed: ", "ours": "With our methods: "}
+"""Reading -> start of its sentence."""
 KINDS: tuple[ClaimVerdict, ...] = get_args(ClaimVerdict)
 """All verdicts, in the order of the tables."""
 MARKS: Mapping[ClaimVerdict, str] = {
     "reproduced": "✓",
+    "same": "=",
     "not reproduced": "✗",
     "cannot tell": "?",
     "not comparable": "≠",
     "not run": "–",
 }
 MEANINGS: Mapping[ClaimVerdict, str] = {
-    "reproduced": "the 95 % interval of the paired difference lies on the published side; or a printed value is met "
-    "(an error within 25 %)",
+    "reproduced": "the 95 % interval of the paired difference lies on the published side, and its p after Holm is at "
+    "most 0.05; or a printed value is met (an error within 25 %)",
+    "same": "the whole interval lies within the margin of `harness compare`: the difference is too small to matter",
     "not reproduced": "the interval lies on the other side; or a printed value is not met",
-    "cannot tell": "the interval contains zero, or there are fewer than 6 clips for an interval",
+    "cannot tell": "the interval contains zero, there are too few clips, or the difference is not significant among "
+    "the printed statements (Holm)",
     "not comparable": "the printed value is for other motion or conditions",
     "not run": "not measured here",
 }
@@ -37,13 +42,30 @@ def count_verdicts(claims: list[Claim]) -> dict[ClaimVerdict, int]:
     return {kind: counts[kind] for kind in KINDS if counts[kind] or kind != "not run"}
 
 
+def printed_claims(claims: Iterable[Claim], reading: Reading) -> list[Claim]:
+    """The claims of statements that the paper prints, with the methods of one reading; those of no method are of both.
+
+    A reading without any claim of its own has none.
+    """
+    found = [claim for claim in claims if claim.kind == "printed" and claim.reading in ("", reading)]
+    return found if any(claim.reading == reading for claim in found) else []
+
+
 def sentence(claims: list[Claim]) -> str:
-    """One sentence with the number of claims of each verdict."""
-    if not claims:
+    """The number of printed statements of each verdict: with the methods as printed, and with ours."""
+    readings = {reading: printed_claims(claims, reading) for reading in READINGS}
+    found = {READINGS[reading]: some for reading, some in readings.items() if some}
+    if not found and claims:
+        found = {"": [claim for claim in claims if claim.kind == "printed"] or claims}
+    if not found:
         return "No published statement was compared with a measured result."
+    return " ".join(f"{_counts(some, start)}." for start, some in found.items())
+
+
+def _counts(claims: list[Claim], start: str) -> str:
     first, *others = count_verdicts(claims).items()
-    start = f"{first[1]} of {count_noun(len(claims), 'published statement')} {first[0]}"
-    return f"{', '.join([start, *(f'{count} {kind}' for kind, count in others if count)])}."
+    counted = f"{start}{first[1]} of {count_noun(len(claims), 'printed statement')} {first[0]}"
+    return ", ".join([counted, *(f"{count} {kind}" for kind, count in others if count)])
 
 
 def shared_differences(findings: PaperFindings) -> dict[str, list[PaperExperiment]]:
@@ -53,6 +75,11 @@ def shared_differences(findings: PaperFindings) -> dict[str, list[PaperExperimen
         for text in dict.fromkeys(experiment.differences):
             experiments_of.setdefault(text, []).append(experiment)
     return {text: experiments for text, experiments in experiments_of.items() if len(experiments) > 1}
+
+
+def format_kind(claim: Claim) -> str:
+    """Kind and reading of a claim, such as "printed, ours"."""
+    return ", ".join(filter(None, (claim.kind, claim.reading)))
 
 
 def format_difference(claim: Claim) -> str:
@@ -68,6 +95,13 @@ def format_interval(claim: Claim) -> str:
     if claim.low is None or claim.high is None:
         return ""
     return f"{_format_number(claim.low, claim)} to {_format_number(claim.high, claim)}"
+
+
+def format_p(claim: Claim) -> str:
+    """The p of a printed statement after Holm's correction, such as "0.012"; "" where there is none."""
+    if claim.p_holm is None:
+        return ""
+    return "< 0.001" if claim.p_holm < 0.001 else f"{claim.p_holm:.3f}"
 
 
 def _format_number(value: float, claim: Claim) -> str:

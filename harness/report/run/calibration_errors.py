@@ -21,7 +21,7 @@ _COLUMNS = (
 """Title, error (see `Cell.calibration_errors`) and decimals."""
 _CAPTION = (
     "errors against the truth. Mounts: root mean square over stations; bone lengths: root mean square over bones; "
-    "room: its heading about the vertical and its origin"
+    "room: its heading about the vertical and its origin. known: the truth is used. none: the equation has none"
 )
 _STATISTIC_NOTE = "Mean over clips (worst clip)"
 _POSITION_NOTE = (
@@ -64,6 +64,8 @@ def section(cells: Sequence[Mapping[str, Any]]) -> Markup:
 
 def _format_error(kind: str, name: str, decimals: int, sessions: Sequence[Mapping[str, float]]) -> str:
     values = [errors[name] for errors in sessions if name in errors]
-    if not values or (name == "length_mm" and kind == "tpose"):
+    if kind == "exact" or (name == "length_mm" and kind in ("tpose", "kim2012")):
         return "known"
+    if not values:
+        return "none"
     return f"{format_fixed(float(np.mean(values)), decimals)} ({format_fixed(max(values), decimals)})"

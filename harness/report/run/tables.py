@@ -11,7 +11,7 @@ from harness.report.kit.markup import Markup, bullet_list, details, join, tag
 from harness.report.kit.table import NOT_MEASURED_CELL, count_note, html_table, stacked_cell, statistic_cell
 from harness.report.kit.text import last_line
 from harness.report.run.data import Row, RunData, Trace
-from harness.results.reported_metrics import PRIMARY_METRIC, SECONDARY_METRIC
+from harness.results.reported_metrics import MAX_FALLBACK_SHARE, PRIMARY_METRIC, SECONDARY_METRIC
 from harness.score.metrics import DEFINITIONS
 
 OPEN_METRICS = (PRIMARY_METRIC, SECONDARY_METRIC)
@@ -26,7 +26,7 @@ FOLDED_METRICS = (
     "step_p50_ms",
 )
 """Metrics whose table by behaviour is folded."""
-_FRAME_COUNTS = ("matched", "expected", "held", "lost", "not_finite")
+_FRAME_COUNTS = ("matched", "expected", "held", "lost", "fallback", "bridged", "not_finite")
 _UNRANKED_METRICS = ("jitter_m_s3", "lag_ms")
 """Metrics whose lowest value is not the best: the truth has jitter too, and a lag has a sign."""
 
@@ -70,9 +70,16 @@ def behaviour_table(run: RunData, metric: str) -> Markup:
     numbers = [count_note(counts[column]) for column in columns]
     names = [(column or "all").replace("_", " ") for column in columns]
     titles = [join(name, n) for name, n in zip(names, numbers, strict=True)]
-    rows = [[name, *(cell(name, column) for column in columns)] for name in run.series]
+    notes = {run.series_of(row): _fallback_note(row) for row in run.summary["methods"]}
+    rows = [[join(name, notes.get(name)), *(cell(name, column) for column in columns)] for name in run.series]
     caption = join(tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.")
     return html_table(Table(["method", *titles], rows), caption, label=metric)
+
+
+def _fallback_note(row: Row) -> Markup | None:
+    """Note beside a method whose model answers too few undisturbed frames."""
+    share = row["metrics"]["fallback_share"]["mean"] or 0.0
+    return tag("small", f" falls back in {format_share(share)}") if share > MAX_FALLBACK_SHARE else None
 
 
 def coverage_tables(run: RunData) -> Markup:
@@ -81,11 +88,16 @@ def coverage_tables(run: RunData) -> Markup:
     for row in run.summary["methods"]:
         share = format_share(row["coverage"], 1)
         matched, expected, *others = (f"{row[f'frames_{name}']:,}" for name in _FRAME_COUNTS)
-        rows.append([run.series_of(row), row["sequences"], matched, expected, share, *others])
-    head = ["method", "sequences", "frames matched", "expected", "share", "held", "lost", "not finite"]
+        fallback = row["metrics"]["fallback_share"]["mean"]
+        undisturbed = "–" if fallback is None else format_share(fallback, 1)
+        rows.append([run.series_of(row), row["sequences"], matched, expected, share, *others, undisturbed])
+    head = ["method", "sequences", "frames matched", "expected", "share", "held", "lost", "fallback", "bridged"]
+    head += ["not finite", "fallback, undisturbed"]
     caption = (
         "Frames after the warm-up. Held: too few readings were valid, and the estimate was carried forward. Lost: "
-        "most stations had been missing for long. Not finite: the estimate is no number and counts as not matched."
+        "most stations had been missing for long. Fallback: a simpler solution answered in place of the method's "
+        "model. Bridged: there was no reading. Not finite: the estimate is no number and counts as not matched. The "
+        "last column is the share of fallbacks where every station has reported for 0.5 s."
     )
     failures = [
         join(tag("b", cell), details(last_line(text), tag("pre", text)))

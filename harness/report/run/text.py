@@ -3,12 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from harness.core.number_format import format_mean_sd, format_share
+from harness.core.number_format import format_fixed, format_mean_sd, format_share
 from harness.core.text_table import Table
 from harness.report.kit.text import last_line
 from harness.report.run import calibration_cost, calibration_errors, expected_orders, recovery
 from harness.results.cell import varied_text
-from harness.results.reported_metrics import TABLE_COLUMNS
+from harness.results.reported_metrics import MAX_FALLBACK_SHARE, TABLE_COLUMNS
 
 _RECORDS = ("records_sent", "records_dropped")
 
@@ -30,8 +30,10 @@ def run_table(summary: Mapping[str, Any]) -> str:
         matched = f"{row['frames_matched']}/{row['frames_expected']}"
         statistics = [(row["metrics"][name], decimals) for _, name, decimals in TABLE_COLUMNS]
         figures = [format_mean_sd(s["mean"], s["sd"], decimals) for s, decimals in statistics]
-        rows.append([row["behaviour"], row["method"], *settings, str(row["sequences"]), matched, *figures])
-    head = ["behaviour", "method", *varying, "clips", "matched", *(title for title, *_ in TABLE_COLUMNS)]
+        share = _format_fallback(row["metrics"]["fallback_share"]["mean"])
+        rows.append([row["behaviour"], row["method"], *settings, str(row["sequences"]), matched, share, *figures])
+    head = ["behaviour", "method", *varying, "clips", "matched", "fallback [%]"]
+    head += [title for title, *_ in TABLE_COLUMNS]
     return "\n".join(
         [
             _setup_lines(cells),
@@ -39,6 +41,7 @@ def run_table(summary: Mapping[str, Any]) -> str:
             "",
             *Table(head, rows, text_columns=2 + len(varying)).lines(),
             "",
+            *_fallback_lines(summary["methods"]),
             *calibration_errors.text(summary),
             *calibration_cost.text(summary),
             *recovery.text(summary),
@@ -69,6 +72,24 @@ def _link_loss(cells: Sequence[Mapping[str, Any]]) -> list[str]:
     if not dropped:
         return []
     return [f"THE LINK IS TOO SLOW: {format_share(dropped / (sent + dropped))} of the records were dropped"]
+
+
+def _fallback_lines(methods: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One line for each method whose model answers too few undisturbed frames; `methods` are rows of a summary."""
+    shares: dict[str, float] = {}
+    for row in methods:
+        share = row["metrics"]["fallback_share"]["mean"] or 0.0
+        shares[row["method"]] = max(share, shares.get(row["method"], 0.0))
+    return [
+        f"{method} FALLS BACK in {format_share(share)} of the undisturbed frames: other figures than its model's"
+        for method, share in shares.items()
+        if share > MAX_FALLBACK_SHARE
+    ]
+
+
+def _format_fallback(share: float | None) -> str:
+    """Share of undisturbed frames that a fallback answered [%]; "-" where no frame is undisturbed."""
+    return "-" if share is None else format_fixed(100.0 * share, 1)
 
 
 def _varying_columns(cells: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -23,4 +23,12 @@ PAPER = Paper(
         "five_trackers": five_stations,
         "speed": partial(compare_speed, published=KIM2012),
     },
+    runs_of={
+        "sensors": ("sensors_walking", "sensors_boxing"),
+        "sparse": ("sparse_table_tennis", "sparse_walking"),
+        "extrapolation": ("extrapolation",),
+        "one_tracker": ("one_table_tennis", "sensors_boxing", "sensors_walking"),
+        "five_trackers": ("five_boxing", "five_table_tennis", "five_walking"),
+        "speed": (),
+    },
 )

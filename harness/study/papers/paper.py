@@ -1,12 +1,14 @@
 """Reproduction of a paper: its runs, then its experiments in turn, then findings.json."""
 
 import traceback
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
+from harness.compare.claims import correct_claims
 from harness.core.package_data import data_folder
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 from harness.experiment.cells import ProgressCallback, check_names, open_scenario_motion
@@ -16,6 +18,7 @@ from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.provenance import provenance_tables
+from harness.study.papers.quick_form import shorten
 
 PAPERS = ("liu2011", "kim2012")
 """Names of modules of this folder, each with a `PAPER`."""
@@ -31,6 +34,8 @@ class Paper:
     """Authors, title, venue, year."""
     experiments: Mapping[str, Callable[[PaperStudy], PaperExperiment]]
     """Name -> experiment, in the order of the report."""
+    runs_of: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Experiment -> the runs that it reads; one that is not listed reads all."""
 
     def plan(self, motion: Motion, seed: int) -> dict[str, Scenario]:
         """Name of a run -> its scenario, from the files for this motion."""
@@ -38,6 +43,19 @@ class Paper:
         files = sorted(folder.glob(f"{motion}_*.toml"))
         scenarios = {path.stem.removeprefix(f"{motion}_"): load_scenario(path) for path in files}
         return {name: replace(scenario, name=name, seed=seed) for name, scenario in scenarios.items()}
+
+    def only(self, experiments: Collection[str]) -> "Paper":
+        """The paper with these experiments alone; UnknownName."""
+        for name in experiments:
+            if name not in self.experiments:
+                raise UnknownName(f"experiment of {self.name}", name, self.experiments)
+        return replace(
+            self, experiments={name: self.experiments[name] for name in self.experiments if name in experiments}
+        )
+
+    def needs(self, run: str) -> bool:
+        """Whether one of the experiments reads this run."""
+        return any(run in self.runs_of.get(name, (run,)) for name in self.experiments)
 
 
 def load_paper(name: str) -> Paper:
@@ -55,21 +73,24 @@ def reproduce(
     library: LibraryFolders | None = None,
     seed: int = 1,
     jobs: int = 1,
+    quick: bool = False,
     command: str = "",
     progress: ProgressCallback = lambda last, done, planned: None,
 ) -> tuple[PaperFindings, Outcome]:
     """Run what is not finished, evaluate the experiments, and write findings.json into `out`.
 
-    The motion is synthetic, or that of `library`. `out` is created, or resumed when it holds the same study, else
-    refused (BadInput). The outcome is INCOMPLETE when a cell or an experiment failed, else PASS: a claim that is not
-    reproduced is a result.
+    The motion is synthetic, or that of `library`. `quick` runs the form of `quick_form`, which decides nothing.
+    `out` is created, or resumed when it holds the same study, else refused (BadInput). The outcome is INCOMPLETE when a
+    cell or an experiment failed, else PASS: a claim that is not reproduced is a result.
     """
     motion: Motion = "cmu" if library else "builtin"
-    runs = paper.plan(motion, seed)
-    if not runs:
+    plan = {name: shorten(run) if quick else run for name, run in paper.plan(motion, seed).items()}
+    if not plan:
         raise BadInput(f"{paper.name} has no runs on {motion} motion.", "Choose the other motion.")
+    runs = {name: run for name, run in plan.items() if paper.needs(name)}
     check_names(runs.values(), library)
-    title = open_scenario_motion(next(iter(runs.values())).motion, library, seed).title
+    source = open_scenario_motion(next(iter(plan.values())).motion, library, seed)
+    title = source.title + (", quick form" if quick else "")
     open_study(out, {"paper": paper.name, "motion": title, "seed": seed})
     cells = count_cells(runs)
     planned = cells + len(paper.experiments)
@@ -81,7 +102,7 @@ def reproduce(
         command=command,
         progress=lambda last, done, _: progress(last, done, planned),
     )
-    study = PaperStudy(out, motion, seed, runs, library, failures)
+    study = PaperStudy(out, motion, seed, plan, library, failures, quick)
     experiments, failed = [], False
     for done, (name, evaluate) in enumerate(paper.experiments.items()):
         progress(name, cells + done, planned)
@@ -100,12 +121,18 @@ def reproduce(
         motion=title,
         command=command,
         seed=seed,
-        experiments=tuple(experiments),
+        experiments=correct_experiments(experiments),
         circumstances=manifest.current_circumstances(),
-        tables=provenance_tables(study),
+        tables=provenance_tables(replace(study, runs=runs)),
     )
     write_findings(out / "findings.json", findings)
     return findings, Outcome.INCOMPLETE if failures or failed else Outcome.PASS
+
+
+def correct_experiments(experiments: Sequence[PaperExperiment]) -> tuple[PaperExperiment, ...]:
+    """Apply Holm's correction over the printed statements of all experiments (see `compare.claims.correct_claims`)."""
+    claims = iter(correct_claims([claim for experiment in experiments for claim in experiment.claims]))
+    return tuple(replace(each, claims=tuple(islice(claims, len(each.claims)))) for each in experiments)
 
 
 def _with_failures(experiment: PaperExperiment, study: PaperStudy) -> PaperExperiment:

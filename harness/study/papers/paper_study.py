@@ -36,6 +36,8 @@ class PaperStudy:
     """Folder of the motion library; None for synthetic motion."""
     failures: Mapping[str, str] = field(default_factory=dict)
     """"run: cell" -> traceback or message of its failure."""
+    quick: bool = False
+    """Whether this is the quick form (see `quick_form`)."""
 
     def rows(self, run: str, **where: Any) -> list[dict[str, Any]]:
         """Rows of the summary for finished cells of a run; [] where nothing ran.

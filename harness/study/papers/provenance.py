@@ -66,7 +66,7 @@ def _database_rows(study: PaperStudy, scenario: Scenario) -> Iterator[tuple[str,
         same_behaviour = motion.database == "behaviour"
         examples = [name for name in motion.examples if not same_behaviour or source.behaviour(name) == behaviour]
         frames = (round(_example_duration_s(study, scenario, name) * scenario.tracker.rate_hz) for name in examples)
-        count = motion.thin_to or sum(frames)
+        count = motion.thin_to or round(motion.example_share * sum(frames))
         yield scenario.name, behaviour, ", ".join(tested), f"{len(examples)}: {', '.join(examples)}", f"{count:,}"
 
 

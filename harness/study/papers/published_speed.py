@@ -15,6 +15,7 @@ from harness.experiment.round_robin_timing import REFERENCE_METHOD, MethodSpeed,
 from harness.results import manifest
 from harness.results.findings import BarChart, Claim, FindingsTable, PaperExperiment
 from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.quick_form import DATABASE_SHARE
 from harness.study.papers.speed_dataset import MAX_TEST_S, build_speed_dataset, missing_clips
 
 _REAL_NOTE = (
@@ -69,7 +70,9 @@ KIM2012 = PublishedSpeed(
 def compare_speed(study: PaperStudy, published: PublishedSpeed) -> PaperExperiment:
     """Compare the published speed with each database in turn; each is measured once and cached."""
     folder, speeds, absent = study.out / "measured" / "databases", dict[str, list[MethodSpeed]](), []
-    for database, frames in published.databases.items():
+    for database, published_frames in published.databases.items():
+        share = DATABASE_SHARE if study.quick else 1.0
+        frames = {behaviour: round(share * count) for behaviour, count in published_frames.items()}
         measured = study.cached_measurement(
             f"speed_{database}".replace(" ", "_"), partial(_measure, study, published, frames, folder)
         )
@@ -79,7 +82,11 @@ def compare_speed(study: PaperStudy, published: PublishedSpeed) -> PaperExperime
             speeds[database] = [MethodSpeed(**row) for row in measured["speeds"]]
     shutil.rmtree(folder, ignore_errors=True)  # the databases are no longer needed
     return make_speed_experiment(
-        published, speeds, machine=measured["machine"], real=study.library is not None, absent=absent
+        *(published, speeds),
+        machine=measured["machine"],
+        real=study.library is not None,
+        absent=absent,
+        share=DATABASE_SHARE if study.quick else 1.0,
     )
 
 
@@ -101,8 +108,9 @@ def make_speed_experiment(
     machine: str,
     real: bool,
     absent: Sequence[str] = (),
+    share: float = 1.0,
 ) -> PaperExperiment:
-    """Make the experiment of measured speeds: database -> methods."""
+    """Make the experiment of measured speeds: database -> methods; `share` is that of the paper's frames."""
     claims = [_frame_rate_claim(published, speeds, method) for method in published.paper_methods]
     if published.latency_ms is not None:
         claims += [
@@ -114,6 +122,7 @@ def make_speed_experiment(
         question=f"{published.statement} How fast are its methods here, with databases as large?",
         differences=(
             _REAL_NOTE if real else _SYNTHETIC_NOTE,
+            *((f"Quick form: databases of {share:.0%} of these frames.",) if share < 1.0 else ()),
             f"Another machine: {machine}. An absolute speed depends on the machine as much as on the method. The table "
             f"therefore also gives the speed relative to `{REFERENCE_METHOD}`, measured in the same turns.",
             "It is not known what the published figures include (device, line, drawing). Here only the step of the "
@@ -136,7 +145,7 @@ def _frame_rate_claim(published: PublishedSpeed, speeds: Mapping[str, Sequence[M
     stated, unit = f"{published.fps:g} frames/s", "frames/s"
     by_database = _speeds_of_method(speeds, method)
     if not by_database:
-        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit=unit)
+        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit=unit, kind="speed")
     database, slowest = min(by_database.items(), key=lambda item: item[1].fps)
     small = _undersized_databases(published, by_database)
     return Claim(
@@ -147,6 +156,7 @@ def _frame_rate_claim(published: PublishedSpeed, speeds: Mapping[str, Sequence[M
         why=small or ("" if slowest.fps >= published.fps else "another machine and other code"),
         difference=slowest.fps,
         unit=unit,
+        kind="speed",
     )
 
 
@@ -157,17 +167,18 @@ def _latency_claim(
     stated = f"{latency_ms:g} ms"
     by_database = _speeds_of_method(speeds, method)
     if not by_database:
-        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit="ms")
+        return Claim(text, stated, "not measured", "not run", "the library has no such motion", unit="ms", kind="speed")
     database, slowest = max(by_database.items(), key=lambda item: item[1].p99_ms)
-    small, within = _undersized_databases(published, by_database), slowest.p99_ms <= latency_ms
+    small = _undersized_databases(published, by_database)
     return Claim(
         text=text,
         published=stated,
         ours=f"p99 {slowest.p99_ms:.2f} ms, p50 {slowest.p50_ms:.2f} ms ({database}, {slowest.frames:,} frames)",
-        verdict="not comparable" if small else "reproduced" if within else "not reproduced",
-        why=small or ("" if within else "another machine and other code"),
+        verdict="not comparable",
+        why=small or "the paper's latency is that of its whole system; here a step of the method is timed",
         difference=slowest.p99_ms,
         unit="ms",
+        kind="speed",
     )
 
 
@@ -180,7 +191,7 @@ def _undersized_databases(published: PublishedSpeed, by_database: Mapping[str, M
     """Name the databases that have fewer frames than the paper's; "" where there is none."""
     wanted = {database: sum(published.databases[database].values()) for database in by_database}
     short = [f"{d} {by_database[d].frames:,} of {n:,}" for d, n in wanted.items() if by_database[d].frames < n]
-    return f"the library has fewer frames than the paper: {', '.join(short)}" if short else ""
+    return f"fewer frames than the paper: {', '.join(short)}" if short else ""
 
 
 def _speed_table(speeds: Mapping[str, Sequence[MethodSpeed]]) -> FindingsTable:

@@ -1,20 +1,20 @@
 """Comparison of sets of stations: the best of each size, and the gain of one more (Kim et al. 2012, Fig. 3)."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy import stats
 
-from harness.compare.claims import Errors, claim_lower_error
+from harness.compare.claims import Errors, claim_all, claim_decreasing, claim_lower_error, claim_noninferior
 from harness.compare.paired_statistics import (
     CONFIDENCE_LEVEL,
     MIN_CLIPS,
     PairedDifference,
     bootstrap_interval,
-    compare_paired,
 )
 from harness.results.expected_orders import METRIC
-from harness.results.findings import BarChart, Claim, ClaimVerdict, FindingsTable, LineChart
+from harness.results.findings import BarChart, Claim, ClaimKind, FindingsTable, LineChart
 from harness.study.papers.tables import CellRow, errors_by_clip, format_mean, mean_sd
 
 STATION_ABBREVIATIONS = {
@@ -25,7 +25,8 @@ STATION_ABBREVIATIONS = {
     "pelvis": "PEL",
 }
 """Station -> abbreviation, as in the paper and in its order."""
-_WORST_FIRST: tuple[ClaimVerdict, ...] = ("not reproduced", "cannot tell", "reproduced")
+_WITH_MORE = (4, 5)
+"""Sizes of the sets that a suitable set of three is compared with."""
 ErrorsBySet = Mapping[str, Errors]
 """Set of stations, such as "RH+LH+PEL" -> error by clip."""
 
@@ -77,32 +78,68 @@ def claim_better_than_average(behaviour: str, suitable: str, sets: ErrorsBySet, 
     return claim_lower_error(text, sets.get(suitable, {}), average, published="called suitable", why=why)
 
 
+def claim_suitable(behaviour: str, suitable: str, sets: ErrorsBySet, kind: ClaimKind = "printed") -> Claim:
+    """Claim that a set is suitable compared with larger ones: its error is not inferior to that of the best of these.
+
+    It must hold against the best set of four and against all five, within the margin of joint angles. The best set is
+    chosen on the tested clips, which makes the claim harder to reproduce.
+    """
+    text = (
+        f"{behaviour}: {suitable} is not inferior to the best set of four stations and to all five, within the margin"
+    )
+    best = {count: _best_of_size(sets, count) for count in _WITH_MORE}
+    parts = {
+        f"against {best[count] or f'the best of {count}'}": claim_noninferior(
+            text, sets.get(suitable, {}), sets.get(best[count], {}), published="called suitable", kind=kind
+        )
+        for count in _WITH_MORE
+    }
+    return claim_all(text, parts)
+
+
+def _best_of_size(sets: ErrorsBySet, count: int) -> str:
+    """The set of this size with the least mean error; "" if none was measured."""
+    measured = [name for name in sets if count_stations(name) == count and sets[name]]
+    return min(measured, key=lambda name: _mean_error(sets[name]), default="")
+
+
+def claim_most_movable(behaviour: str, ranges_deg: Mapping[str, float], sets: ErrorsBySet) -> Claim:
+    """Claim that the most movable joints should be tracked.
+
+    `ranges_deg` is abbreviation -> range of motion of its limb in the database. The two stations with the largest are
+    tested: sets of two and of three that have both against those of the same size that have neither, averaged over the
+    sets of a size and over both sizes.
+    """
+    pair = sorted(sorted(ranges_deg, key=lambda name: -ranges_deg[name])[:2], key=list(ranges_deg).index)
+    shown = ", ".join(f"{name} {degrees:.0f}" for name, degrees in ranges_deg.items())
+    text = f"{behaviour}: sets with {' and '.join(pair)}, the most movable, err less than sets of their size without"
+    both: list[dict[str, float]] = []
+    neither: list[dict[str, float]] = []
+    for size in (2, 3):
+        for side, count in ((both, 2), (neither, 0)):
+            chosen = {
+                name: errors
+                for name, errors in sets.items()
+                if count_stations(name) == size and len(set(pair) & set(name.split("+"))) == count
+            }
+            side.append(average_by_size(chosen).get(size, {}))
+    claim = claim_lower_error(text, _average(both), _average(neither), published="stated")
+    return replace(claim, ours=f"{claim.ours}; ranges {shown} deg" if ranges_deg else claim.ours)
+
+
+def _average(sides: Sequence[Errors]) -> dict[str, float]:
+    """Clip -> mean over several errors, for clips that all of them have."""
+    shared = set.intersection(*map(set, sides))
+    return {clip: float(np.mean([errors[clip] for errors in sides])) for clip in sorted(shared)}
+
+
 def claim_error_decreases(behaviour: str, sets: ErrorsBySet) -> Claim:
     """Claim that the error, averaged over all sets of a size, decreases with each further station.
 
     Every step must decrease; the reported difference is that of the worst step.
     """
     text = f"{behaviour}: the error, averaged over the sets of a size, decreases with each further station"
-    counts = average_by_size(sets)
-    decreases = {f"{n} to {n + 1}": compare_paired(counts[n], counts[n + 1]) for n in counts if n + 1 in counts}
-    if not decreases or any(fall.mean is None for fall in decreases.values()):
-        return Claim(text, "order", "not measured", "not run", "no clip has results for all sets", unit="deg")
-    verdicts = {fall.verdict for fall in decreases.values()}
-    verdict = next(word for word in _WORST_FIRST if word in verdicts)
-    step, least = min(decreases.items(), key=lambda each: (_WORST_FIRST.index(each[1].verdict), each[1].mean))
-    ours = ", ".join(f"{_mean_error(errors):.2f}" for errors in counts.values())
-    return Claim(
-        text=text,
-        published="order",
-        ours=f"{ours} deg with {', '.join(map(str, counts))}",
-        verdict=verdict,
-        why="" if verdict == "reproduced" else f"from {step} stations: {least.why}",
-        clips=len(least.clips),
-        difference=least.mean,
-        low=least.low,
-        high=least.high,
-        unit="deg",
-    )
+    return claim_decreasing(text, {f"{n}": errors for n, errors in average_by_size(sets).items()}, "stations")
 
 
 def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> Claim:
@@ -114,13 +151,13 @@ def claim_harder(text: str, hard: Errors, easy: Errors, why_not: str = "") -> Cl
     if fewest < MIN_CLIPS:
         why = f"too few clips: {fewest}, of at least {MIN_CLIPS}"
         return Claim(text, "order", ours, "cannot tell", why, fewest, difference, unit="deg")
-    welch = stats.ttest_ind(list(hard.values()), list(easy.values()), equal_var=False).confidence_interval(
-        CONFIDENCE_LEVEL
-    )
-    low, high = float(welch.low), float(welch.high)
+    welch = stats.ttest_ind(list(hard.values()), list(easy.values()), equal_var=False)
+    interval = welch.confidence_interval(CONFIDENCE_LEVEL)
+    low, high = float(interval.low), float(interval.high)
     result = PairedDifference(tuple(hard), difference, low, high)
     why = "" if result.verdict == "reproduced" else "; ".join(filter(None, (result.why, why_not)))
-    return Claim(text, "order", ours, result.verdict, why, fewest, difference, low, high, "deg")
+    p = float(welch.pvalue) if np.isfinite(welch.pvalue) else None  # NaN where no error differs from another
+    return Claim(text, "order", ours, result.verdict, why, fewest, difference, low, high, "deg", p=p)
 
 
 def average_by_size(sets: ErrorsBySet) -> dict[int, dict[str, float]]:
@@ -160,11 +197,20 @@ def station_count_lines(title: str, behaviours: Mapping[str, ErrorsBySet], capti
     return LineChart(title, "stations", "mean joint-angle error [deg]", tuple(map(float, sizes)), series, caption)
 
 
-def set_table(title: str, angles: ErrorsBySet, positions: ErrorsBySet, reference: str) -> FindingsTable:
-    """Table of all sets with both errors, and the ratio of the angle error to that of the `reference` set."""
+def set_table(
+    title: str, angles: ErrorsBySet, roots: ErrorsBySet, positions: ErrorsBySet, reference: str
+) -> FindingsTable:
+    """Table of all sets: mean and RMS of joint angles, joint centres, and the ratio of the angle error to that of the
+    `reference` set.
+    """
     base = _mean_error(angles.get(reference, {}))
     rows = [
-        (name, format_mean(errors), format_mean(positions.get(name, {}), 0), _ratio_text(_mean_error(errors) / base))
+        (
+            name,
+            format_mean(errors, rms=roots.get(name)),
+            format_mean(positions.get(name, {}), 0),
+            _ratio_text(_mean_error(errors) / base),
+        )
         for name, errors in sorted(angles.items(), key=lambda each: (count_stations(each[0]), _mean_error(each[1])))
     ]
     return FindingsTable(title, ("stations", "joint angles [deg]", "joint centres [mm]", "times all five"), tuple(rows))

@@ -13,6 +13,8 @@ from harness.results.findings import BarChart, FindingsTable, LineChart
 from harness.results.summary import GROUP_KEYS
 
 CellRow = Mapping[str, Any]
+RMS = "joint_angle_rms_deg"
+"""The root mean square of the hinge errors, which stands beside their mean."""
 HINGE_GROUPS = {
     "trunk": ("lowerback", "upperback", "thorax"),
     "head and neck": ("lowerneck", "upperneck", "head"),
@@ -50,20 +52,36 @@ def mean_sd(errors: Mapping[str, float]) -> tuple[float | None, float | None]:
     return float(values.mean()) if len(values) else None, float(values.std(ddof=1)) if len(values) > 1 else None
 
 
-def format_mean(errors: Mapping[str, float], decimals: int = 2) -> str:
-    """Format mean, standard deviation over clips and number of clips, such as "1.23 ± 0.45 (8)"."""
+def format_mean(errors: Mapping[str, float], decimals: int = 2, rms: Mapping[str, float] | None = None) -> str:
+    """Format mean, standard deviation over clips and number of clips, such as "1.23 ± 0.45 (8)".
+
+    With `rms` (clip -> root mean square error) its mean over clips follows: "1.23 ± 0.45, RMS 1.98 (8)".
+    """
     mean, sd = mean_sd(errors)
     if mean is None:
         return "not measured"
     spread = "" if sd is None else f" ± {sd:.{decimals}f}"
-    return f"{mean:.{decimals}f}{spread} ({len(errors)})"
+    root = f", RMS {mean_sd(rms)[0]:.{decimals}f}" if rms else ""
+    return f"{mean:.{decimals}f}{spread}{root} ({len(errors)})"
 
 
-def mean_table(title: str, first_column: str, groups: Mapping[str, Mapping[str, Mapping[str, float]]]) -> FindingsTable:
-    """Table of group -> column -> errors by clip, with a row for each group."""
+ErrorGroups = Mapping[str, Mapping[str, Mapping[str, float]]]
+"""Group -> column -> error by clip."""
+
+
+def mean_table(title: str, first_column: str, groups: ErrorGroups, rms: ErrorGroups | None = None) -> FindingsTable:
+    """Table of groups by columns, with a row for each group; `rms` has the root mean square errors."""
     columns = list(dict.fromkeys(column for each in groups.values() for column in each))
-    rows = [(group, *(format_mean(each.get(column, {})) for column in columns)) for group, each in groups.items()]
-    return FindingsTable(f"{title}: mean ± sd over clips (clips)", (first_column, *columns), tuple(rows))
+    roots: ErrorGroups = rms or {}
+    rows = [
+        (
+            group,
+            *(format_mean(each.get(column, {}), rms=roots.get(group, {}).get(column)) for column in columns),
+        )
+        for group, each in groups.items()
+    ]
+    shown = "mean ± sd, RMS" if rms else "mean ± sd"
+    return FindingsTable(f"{title}: {shown} over clips (clips)", (first_column, *columns), tuple(rows))
 
 
 def mean_bars(
@@ -110,14 +128,18 @@ def error_lines(title: str, cells: Mapping[str, Cell], metric: str = METRIC, cap
 
 
 def errors_by_joint_group(
-    cells: Iterable[Cell], groups: Mapping[str, Sequence[str]] = HINGE_GROUPS
+    cells: Iterable[Cell], groups: Mapping[str, Sequence[str]] = HINGE_GROUPS, metric: str = METRIC
 ) -> dict[str, dict[str, float]]:
-    """Group of hinges -> clip -> mean error [deg], of cells that differ only in the clip."""
+    """Group of hinges -> clip -> error [deg], of cells that differ only in the clip.
+
+    It is the mean over the hinges of the group; for the metric `RMS`, the root of the mean square.
+    """
     by_group: dict[str, dict[str, float]] = {name: {} for name in groups}
     for cell in cells:
-        errors = cell.scores.per_joint.get(METRIC, {})
+        errors = cell.scores.per_joint.get(metric, {})
         for group, bones in groups.items():
-            values = [error for hinge, error in errors.items() if hinge.partition(".")[0] in bones]
-            if values:
-                by_group[group][cell.clip] = float(np.mean(values))
+            values = np.array([error for hinge, error in errors.items() if hinge.partition(".")[0] in bones])
+            if len(values):
+                mean = np.sqrt(np.mean(values**2)) if metric == RMS else np.mean(values)
+                by_group[group][cell.clip] = float(mean)
     return by_group

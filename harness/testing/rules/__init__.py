@@ -27,6 +27,7 @@ RULES: dict[str, Rule] = {
     "examples are not modified": side_effects.preserves_examples,
     "global random generators are not used": side_effects.preserves_global_random_state,
     "the status reports lost stations": semantics.reports_tracking_loss,
+    "the method's own model answers undisturbed frames": semantics.answers_by_its_model,
     "the error recovers after a disturbance": semantics.recovers_from_disturbances,
     "the posture does not depend on position and heading": semantics.is_invariant_to_placement,
 }

@@ -3,7 +3,7 @@
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.estimate import Estimate, Status
+from harness.core.estimate import Estimate, Origin, Status
 from harness.testing.contract_case import ContractCase, Frames
 
 
@@ -19,7 +19,7 @@ def require_poses(case: ContractCase, frames: Frames) -> str:
 
 
 def require_pose(case: ContractCase, index: int, estimate: Estimate) -> None:
-    """Require a finite configuration (55,) with a unit root quaternion near the stations, and a status."""
+    """Require a finite configuration (55,) with a unit root quaternion near the stations, a status and an origin."""
     qpos = np.asarray(estimate.qpos)
     if qpos.shape != (55,) or not np.all(np.isfinite(qpos)):
         count = np.count_nonzero(~np.isfinite(qpos))
@@ -30,6 +30,8 @@ def require_pose(case: ContractCase, index: int, estimate: Estimate) -> None:
         raise RuleViolation(f"the root in frame {index} is at {np.round(qpos[:3], 2)}, far from every station")
     if not isinstance(estimate.status, Status):
         raise RuleViolation(f"the status in frame {index} is {estimate.status!r}, not a Status")
+    if not isinstance(estimate.origin, Origin):
+        raise RuleViolation(f"the origin in frame {index} is {estimate.origin!r}, not an Origin")
 
 
 def require_identical(qpos: Floats, expected_qpos: Floats, verb: str = "differ") -> str:

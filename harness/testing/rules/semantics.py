@@ -4,10 +4,12 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.estimate import Status
+from harness.core.estimate import Origin, Status
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.reconstruct.solver.status_monitor import LOST_AFTER_S
+from harness.results.reported_metrics import MAX_FALLBACK_SHARE
 from harness.score.angles import wrap_difference
+from harness.score.score import WARM_UP_S
 from harness.testing.contract_case import (
     DISTURBANCES,
     FRAMES,
@@ -52,6 +54,16 @@ def reports_tracking_loss(case: ContractCase) -> str:
                 f"the status was {status[-1].name} half a second after every station reported again; it must be SOLVED"
             )
     return "the status was HELD, LOST after 0.5 s, then SOLVED again"
+
+
+def answers_by_its_model(case: ContractCase) -> str:
+    """After 1 s, at most 5 % of the frames in which every station reports are answered by a fallback."""
+    origins = [estimate.origin for estimate in case.run(case.long_frames)][round(WARM_UP_S * RATE_HZ) :]
+    share = float(np.mean([origin is not Origin.MODEL for origin in origins]))
+    text = f"{share:.0%} of {len(origins)} undisturbed frames were not answered by the model"
+    if share > MAX_FALLBACK_SHARE:
+        raise RuleViolation(f"{text}, at most {MAX_FALLBACK_SHARE:.0%} may be")
+    return text
 
 
 def recovers_from_disturbances(case: ContractCase) -> str:

@@ -153,15 +153,14 @@ def test_the_index_is_chosen_by_size_or_by_name() -> None:
     assert isinstance(make_index("auto", ArrayVectors(paths(4000, 107))), InvertedFile)
     assert isinstance(make_index("auto", ArrayVectors(paths(4000, 60)), 800), InvertedFile)
     assert isinstance(make_index("flat", ArrayVectors(paths(4000, 107))), FlatIndex)
+    assert isinstance(make_index("graph", ArrayVectors(paths(500, 12))), NeighbourGraph)
     with pytest.raises(UnknownName, match="Did you mean 'kd_tree'"):
         make_index("kdtree", ArrayVectors(paths(10, 3)))
 
 
 def test_a_graph_follows_and_asks_for_everything_when_it_must() -> None:
     values = paths(3000, 12)
-    follows = np.append(np.ones(2999, bool), False)
-    follows[[999, 1999]] = False
-    graph = NeighbourGraph(ArrayVectors(values), follows, FlatIndex(ArrayVectors(values)))
+    graph = NeighbourGraph(ArrayVectors(values), FlatIndex(ArrayVectors(values)))
     assert graph.links.min() >= 0
     assert graph.links.max() < 3000
     session, found = graph.begin_search(), []

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from harness.core.arrays import Floats
-from harness.core.estimate import Estimate, Status
+from harness.core.estimate import Estimate, Origin, Status
 from harness.core.motion import BodyMotion
 from harness.errors import BadInput
 from harness.reconstruct.contract import Method
-from harness.reconstruct.methods.dynamic_map import LITERAL, DynamicMap
+from harness.reconstruct.methods.dynamic_map import LITERAL, DynamicMap, Prediction
+from harness.reconstruct.methods.ik import Ik
 from harness.reconstruct.methods.local_pca import LocalPca
 from harness.stream.frame import TrackerFrame
 from harness.testing.frames import drop_stations, exact_frames
@@ -38,7 +39,7 @@ def shifted(frame: TrackerFrame, station: int, by_m: float) -> TrackerFrame:
 @pytest.mark.parametrize("motion", ["walk", "boxing"])
 def test_a_take_of_the_database_comes_back(motion: str, method: Method, request: pytest.FixtureRequest) -> None:
     scene: Scene = request.getfixturevalue(motion)
-    estimates = scene.run(method)
+    estimates = scene.run(method, examples=[scene.take])
     assert angles_deg(scene, estimates, scene.take.qpos)[20:].mean() < 0.5
     assert scene.off_m(estimates, scene.take.qpos)[20:].max() < 0.005
 
@@ -53,7 +54,7 @@ def test_the_room_does_not_matter(walk: Scene, method: Method) -> None:
 
 @pytest.mark.parametrize("method", [*BOTH, LITERAL])
 def test_the_same_frames_give_the_same_bytes(walk: Scene, method: Method) -> None:
-    fitted = method.fit(walk.body, [walk.take], np.random.default_rng(0))
+    fitted = method.fit(walk.body, walk.examples, np.random.default_rng(0))
     one, two = fitted.begin(walk.calibration), fitted.begin(walk.calibration)
     for frame in walk.frames[:30]:
         assert one.step(frame).qpos.tobytes() == two.step(frame).qpos.tobytes()
@@ -99,40 +100,53 @@ def test_frames_that_are_missing_or_early(walk: Scene, method: Method) -> None:
     assert off_m[20:].mean() < 0.005
 
 
-def test_the_literal_preset_is_literal() -> None:
-    assert (LITERAL.variance_kept, LITERAL.ridge, LITERAL.width, LITERAL.spread) == (0.99, 0.0, 0.0, 1.0)
-    assert LITERAL.loss.position_scale_m == LITERAL.loss.position_sigma_m
-    assert LITERAL.start == "closest"
-
-
 def test_what_is_far_from_all_examples_is_believed_less(walk: Scene) -> None:
-    """Novelty widens every sigma by the distance of the nearest example."""
-    spreads = []
-    for novelty in (0.0, 2.0):
-        fitted = DynamicMap(novelty=novelty).fit(walk.body, [walk.take], np.random.default_rng(0))
+    """The covariance grows by 1 + (widening d^2)^2, and the prior of `ik` then counts."""
+    predictions, past = list[Prediction](), np.zeros((3, 55))
+    for widening in (0.0, 40.0):
+        fitted = DynamicMap(widening=widening).fit(walk.body, walk.examples, np.random.default_rng(0))
         session = fitted.begin(walk.calibration)
         for frame in walk.frames[:5]:
             session.step(frame)
-        session.past[:, 7:] += 0.3
-        precision = session.predict().precision
-        assert precision is not None
-        spreads.append(precision)
-    assert (spreads[1] < spreads[0]).all()
+        if not predictions:
+            past = session.past + np.append(np.zeros(7), np.full(48, 0.3))
+        session.past = past
+        predictions.append(session.predict())
+    narrow, wide = predictions
+    factor = wide.covariance[10, 10] / narrow.covariance[10, 10]
+    assert factor > 1.01
+    np.testing.assert_allclose(wide.covariance, factor * narrow.covariance, atol=1e-6)
+    assert narrow.ik_prior_weight == 0.0
+    assert wide.ik_prior_weight == pytest.approx(1.0 - 1.0 / factor, rel=1e-3)
+
+
+def test_the_answer_is_the_most_probable_posture_under_both_priors(walk: Scene) -> None:
+    """Without readings the solver's minimum is the mode of the product of both Gaussians, written out."""
+    session = DynamicMap().fit(walk.body, walk.examples, np.random.default_rng(0)).begin(walk.calibration)
+    for frame in walk.frames[:10]:
+        session.step(frame)
+    prediction = session.predict()._replace(ik_prior_weight=0.7)
+    prior, ik_prior = session.joint_prior(prediction), session.ik_prior()
+    assert ik_prior.precision is not None
+    precision = np.linalg.inv(prediction.covariance[:52, :52])
+    other, mean = np.diag([0.0] * 4 + [*(0.7 * ik_prior.precision[6:])]), np.append([0.0] * 4, ik_prior.qpos[7:])
+    mode = np.linalg.solve(precision + other, precision @ prediction.mean[:52] + other @ mean)
+    np.testing.assert_allclose(prior.mean + np.linalg.solve(prior.curvature, prior.linear), mode, atol=1e-8)
 
 
 def test_with_positions_alone_the_heading_of_the_last_answers_does_not_matter(walk: Scene) -> None:
     """A heading from the last estimate would feed its error back (docs/notes/traps.md F5)."""
     for inputs in ("pos", "pos+ori"):
-        session = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).begin(walk.calibration)
+        session = DynamicMap().fit(walk.body, walk.examples, np.random.default_rng(0)).begin(walk.calibration)
         for frame in walk.only(inputs)[:20]:
             session.step(frame)
-        before = session.predict().qpos[7:]
+        before = session.predict().mean[4:52]
         session.past = moved(session.past, 0.3, (0.0, 0.0, 0.0))
-        np.testing.assert_allclose(session.predict().qpos[7:], before, atol=1e-4)
+        np.testing.assert_allclose(session.predict().mean[4:52], before, atol=1e-4)
 
 
 def test_positions_are_asked_for_the_heading_only_where_no_orientation_and_enough_of_them_tell_it(walk: Scene) -> None:
-    regression = DynamicMap().fit(walk.body, [walk.take], np.random.default_rng(0)).regression(walk.calibration)
+    regression = DynamicMap().fit(walk.body, walk.examples, np.random.default_rng(0)).regression(walk.calibration)
     torso, count = walk.calibration.stations.index("torso"), len(walk.calibration.stations)
     positions = np.repeat([True, False], count)
     assert regression.with_usual_heading(positions).heading is not None
@@ -158,3 +172,33 @@ def test_with_positions_alone_the_anchor_may_fall_silent(walk: Scene) -> None:
     frames = [drop_stations(f, [torso]) if 40 <= i < 60 else f for i, f in enumerate(walk.only("pos"))]
     off_m = walk.off_m(walk.run(DynamicMap(neighbours=30), frames), walk.take.qpos)
     assert off_m[40:60].max() < 0.03
+
+
+@pytest.mark.parametrize("inputs", ["pos+ori", "pos"])
+def test_the_first_answers_are_those_of_the_examples_by_the_readings_alone(walk: Scene, inputs: str) -> None:
+    """There is no history yet. Inverse kinematics knows only the mean posture and errs more."""
+    frames = walk.only(inputs)[:10]
+    found, by_ik = (walk.run(method, frames) for method in (DynamicMap(), Ik()))
+    assert [estimate.origin for estimate in found] == [Origin.MODEL] * 10
+    truth = walk.take.qpos[:10]
+    first, ik_first = (angles_deg(walk, estimates, truth)[0] for estimates in (found, by_ik))
+    assert first < 0.8 * ik_first
+    assert angles_deg(walk, found, truth).max() < 4.0
+
+
+def test_a_cold_start_without_the_anchor_falls_back(walk: Scene) -> None:
+    """Readings are compared relative to the torso's station; without it inverse kinematics begins."""
+    torso = walk.calibration.stations.index("torso")
+    frames = [drop_stations(frame, [torso]) if i < 6 else frame for i, frame in enumerate(walk.frames[:12])]
+    origins = [estimate.origin for estimate in walk.run(DynamicMap(), frames)]
+    assert origins[:3] == [Origin.FALLBACK] * 3
+    assert origins[3:] == [Origin.MODEL] * 9
+
+
+def test_a_session_learns_from_the_stations_that_report_until_there_is_a_history(walk: Scene) -> None:
+    """A station that is silent in the first frame alone takes part in the search from the second on."""
+    fitted = DynamicMap().fit(walk.body, walk.examples, np.random.default_rng(1))
+    complete, late = fitted.begin(walk.calibration), fitted.begin(walk.calibration)
+    for i, frame in enumerate(walk.frames[:30]):
+        whole, part = complete.step(frame), late.step(drop_stations(frame, [0]) if i == 0 else frame)
+    np.testing.assert_allclose(part.qpos, whole.qpos, atol=1e-3)

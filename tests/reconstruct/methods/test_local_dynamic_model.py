@@ -27,7 +27,7 @@ def test_a_planted_linear_system_is_recovered(
     slope, level = rng.normal(size=(away.shape[1], 7)), rng.normal(size=7)
     found = forecast(away, away @ slope + level, weight, kept, 0.0)
     np.testing.assert_allclose(found.mean, level + _unreachable(away, weight) @ slope, atol=off)
-    assert np.max(found.variance) < off**2
+    assert np.max(found.covariance) < off**2
 
 
 def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.Generator) -> None:
@@ -37,7 +37,7 @@ def test_a_planted_linear_system_is_recovered_from_many_examples(rng: np.random.
     slope, level = rng.normal(size=(12, 7)), rng.normal(size=7)
     found = forecast(away, away @ slope + level, weight, 1.0, 0.0)
     np.testing.assert_allclose(found.mean, level, atol=1e-8)
-    assert np.max(found.variance) < 1e-7
+    assert np.max(found.covariance) < 1e-7
 
 
 @pytest.mark.parametrize("ridge", [1e-6, 1e-3, 0.1])
@@ -48,7 +48,7 @@ def test_many_examples_and_few_are_solved_alike(rng: np.random.Generator, ridge:
     primal = forecast(away, after, weight, 1.0, ridge)
     dual = forecast(np.concatenate([away, np.zeros((100, 90))], axis=1), after, weight, 1.0, ridge)
     np.testing.assert_allclose(primal.mean, dual.mean, atol=1e-9)
-    np.testing.assert_allclose(primal.variance, dual.variance, rtol=1e-6)
+    np.testing.assert_allclose(primal.covariance, dual.covariance, rtol=1e-6, atol=1e-12)
 
 
 def _unreachable(away: Floats, weight: Floats) -> Floats:
@@ -75,7 +75,7 @@ def test_dual_equals_primal(rng: np.random.Generator, kept: float) -> None:
     beta = vector @ ((vector.T @ (x.T @ (weight[:, None] * y))) / value[:, None])
     found = forecast(away, after, weight, kept, 0.0)
     np.testing.assert_allclose(found.mean, after_middle - middle @ beta, atol=1e-8)
-    np.testing.assert_allclose(found.variance, weight @ (y - x @ beta) ** 2, atol=1e-8)
+    np.testing.assert_allclose(found.covariance, (y - x @ beta).T @ (weight[:, None] * (y - x @ beta)), atol=1e-8)
 
 
 @pytest.mark.parametrize("ridge", [1e-3, 0.1])
@@ -90,7 +90,7 @@ def test_a_ridge_is_that_of_the_primal(rng: np.random.Generator, ridge: float) -
     for kept in (1.0, 1.0 - 1e-13):
         found = forecast(away, after, weight, kept, ridge)
         np.testing.assert_allclose(found.mean, after_middle - middle @ beta, atol=1e-9)
-        np.testing.assert_allclose(found.variance, weight @ (y - x @ beta) ** 2, atol=1e-9)
+        np.testing.assert_allclose(found.covariance, (y - x @ beta).T @ (weight[:, None] * (y - x @ beta)), atol=1e-9)
 
 
 def test_single_precision_is_good_enough(rng: np.random.Generator) -> None:
@@ -99,7 +99,7 @@ def test_single_precision_is_good_enough(rng: np.random.Generator) -> None:
     exact = forecast(away, after, weight, 1.0, 0.1)
     found = forecast(away.astype(np.float32), after.astype(np.float32), weight, 1.0, 0.1)
     np.testing.assert_allclose(found.mean, exact.mean, atol=1e-4)
-    np.testing.assert_allclose(found.variance, exact.variance, rtol=1e-3)
+    np.testing.assert_allclose(found.covariance, exact.covariance, rtol=1e-3, atol=1e-6)
 
 
 @pytest.mark.parametrize("spread", [1e-3, 0.01, 0.1])
@@ -113,14 +113,14 @@ def test_single_precision_is_good_enough_far_from_the_examples(rng: np.random.Ge
     exact = forecast(far.astype(float), after.astype(float), weight, 1.0, 1e-3)
     found = forecast(far, after, weight, 1.0, 1e-3)
     np.testing.assert_allclose(found.mean, exact.mean, atol=2e-3)
-    np.testing.assert_allclose(found.variance, exact.variance, rtol=0.05)
+    np.testing.assert_allclose(np.diagonal(found.covariance), np.diagonal(exact.covariance), rtol=0.05)
 
 
 def test_examples_that_are_all_the_same_answer_what_they_are() -> None:
     for kept in (0.5, 1.0):
         found = forecast(np.ones((5, 3)), np.full((5, 2), 4.0), np.full(5, 0.2), kept, 0.1)
         np.testing.assert_allclose(found.mean, 4.0, atol=1e-9)
-        np.testing.assert_allclose(found.variance, 0.0, atol=1e-12)
+        np.testing.assert_allclose(found.covariance, 0.0, atol=1e-12)
 
 
 def test_weights_are_equation_6_up_to_a_factor(rng: np.random.Generator) -> None:

@@ -1,10 +1,11 @@
 """The methods of Kim et al. 2012: common properties, and those of each."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
+from harness.core.arrays import Floats
 from harness.core.estimate import Status
 from harness.core.humanoid24 import BONES, unpack
 from harness.errors import BadInput
@@ -20,6 +21,19 @@ from harness.reconstruct.solver.anchor_frame import anchor_of
 from harness.reconstruct.solver.residuals import Loss, Residuals
 from harness.testing.frames import drop_stations, exact_frames
 from tests.reconstruct.conftest import Scene, moved
+
+
+@dataclass(frozen=True)
+class EqualBlend(LocalRegression):
+    """The mean of the neighbours, without inverse kinematics: an answer that can be worked out by hand."""
+
+    name: str = "equal"
+    summary: str = "mean of the neighbours"
+    final_ik: bool = False
+
+    def weigh(self, inputs: Floats, query: Floats, outputs: Floats) -> Floats:
+        return np.full(len(outputs), 1.0 / len(outputs))
+
 
 METHODS = [KernelCca(), WeightedBlend()]
 IDS = [method.name for method in METHODS]
@@ -44,7 +58,7 @@ def test_a_take_that_was_learnt_comes_back_wherever_it_is_performed(
 ) -> None:
     qpos = moved(walk.take.qpos, np.deg2rad(yaw_deg), (3.0, -2.0, 0.0))
     exact = replace(method, beta=0.0)
-    estimates = walk.run(exact, exact_frames(walk.body, walk.calibration, qpos))
+    estimates = walk.run(exact, exact_frames(walk.body, walk.calibration, qpos), [walk.take])
     assert angle_error_deg(walk, np.array([e.qpos for e in estimates])).mean() < 0.2
     assert walk.off_m(estimates, qpos).mean() < 0.002
 
@@ -105,12 +119,12 @@ def test_features_tell_what_trackers_read(walk: Scene) -> None:
     outlook = QueryFeatures(residuals, walk.calibration, examples, 0.2)
     for frame in walk.frames[row - 1 : row + 1]:
         residuals.read(frame)
-        view, query, trust = outlook.compute(frame, walk.take.qpos[row])
-    np.testing.assert_allclose(query, examples.gather(np.array([row]))[0], atol=5e-4)
-    assert examples.nearest(query, trust, 1).tolist() == [row]
-    inputs, asked, poses = examples.regression_data(np.array([row]), np.array([row]), query, trust)
+        query = outlook.compute(frame, walk.take.qpos[row])
+    np.testing.assert_allclose(query.features, examples.gather(np.array([row]))[0], atol=5e-4)
+    assert examples.nearest(query, 1, examples.index).tolist() == [row]
+    inputs, asked, poses = examples.regression_data(np.array([row]), np.array([row]), query.features, query.confidence)
     np.testing.assert_allclose(inputs, asked[None], atol=5e-4)
-    stood = ground_frame.qpos_from_postures(poses[0, :52], step_ground(np.array(view), poses[0, 52:]))
+    stood = ground_frame.qpos_from_postures(poses[0, :52], step_ground(np.array(query.view), poses[0, 52:]))
     np.testing.assert_allclose(stood[:3], walk.take.qpos[row, :3], atol=1e-5)
 
 
@@ -138,3 +152,27 @@ def test_neighbours_that_are_all_the_same_count_the_same(rng: np.random.Generato
     same = np.tile(rng.normal(size=4), (5, 1))
     np.testing.assert_allclose(KernelCca().weigh(same, same[0], rng.normal(size=(5, 55))), 0.2)
     np.testing.assert_allclose(KernelCca().weigh(rng.normal(size=(5, 4)), same[0], np.tile(same[:1], (5, 1))), 0.2)
+
+
+def test_the_neighbours_of_the_frame_before_take_part(walk: Scene) -> None:
+    """Each frame's nearest example is itself, so with k = 1 the answer is the mean of this frame and the last."""
+    estimates = walk.run(EqualBlend(neighbours=1, beta=0.0), examples=[walk.take])
+    truth = walk.take.qpos[:, 7:]
+    found = np.array([estimate.qpos[7:] for estimate in estimates])
+    np.testing.assert_allclose(found[0], truth[0], atol=1e-5)
+    np.testing.assert_allclose(found[1:], 0.5 * (truth[1:] + truth[:-1]), atol=1e-5)
+
+
+def test_an_answer_is_smoothed_with_the_last_two_in_their_order(walk: Scene) -> None:
+    """Eq. 6 with the paper's constants: weights 0.60 of y_t, 0.28 of the output at t-1 and 0.12 of that at t-2."""
+    plain, smoothed = (
+        np.array(
+            [estimate.qpos[7:] for estimate in walk.run(EqualBlend(neighbours=1, beta=beta), examples=[walk.take])]
+        )
+        for beta in (0.0, 0.4)
+    )
+    expected = plain.copy()
+    for t in range(2, len(expected)):
+        expected[t] = 0.60 * plain[t] + 0.28 * expected[t - 1] + 0.12 * expected[t - 2]
+    np.testing.assert_allclose(smoothed, expected, atol=1e-9)
+    assert np.abs(smoothed - plain).max() > 0.01

@@ -72,3 +72,17 @@ def test_a_solve_leaves_no_trace(walk: Scene) -> None:
     solver.solve(walk.take.qpos[20], prior)
     residuals.read(walk.frames[12])
     np.testing.assert_array_equal(solver.solve(walk.take.qpos[10], prior).qpos, once)
+
+
+@pytest.mark.parametrize(("off_m", "taken"), [(0.003, True), (0.3, False)])
+def test_a_converged_step_is_taken_only_when_it_is_short(walk: Scene, off_m: float, taken: bool) -> None:
+    """With a tolerance that every step meets, a step below 1 cm is still taken, and a longer one is not."""
+    residuals, limits = Residuals(walk.body, walk.calibration, Loss(robust=False)), HingeLimits(walk.body)
+    solver = IKSolver(residuals, limits, Stopping(step=10.0))
+    truth = walk.take.qpos[30]
+    start = np.array(truth)
+    start[0] += off_m
+    residuals.read(walk.frames[30])
+    solution = solver.solve(start, Prior(truth, precision(0.5)))
+    assert (solution.converged, solution.steps) == (True, 1)
+    assert abs(solution.qpos[0] - truth[0]) == pytest.approx(0.0 if taken else off_m, abs=1e-4)

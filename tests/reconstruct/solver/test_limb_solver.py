@@ -93,3 +93,11 @@ def test_a_limb_without_readings_stays(rng: np.random.Generator) -> None:
     )
     np.testing.assert_array_equal(out[7:][still], guess[7:][still])
     assert not np.allclose(out[7:][LIMBS & ~still], guess[7:][LIMBS & ~still])
+
+
+def test_the_pose_that_was_evaluated_before_does_not_matter(rng: np.random.Generator) -> None:
+    truth, guess = poses(rng, 0.1)
+    bench = Bench(SETS["wrists and chest"], keep=False)
+    once = bench.reached(truth, guess)
+    bench.residuals.evaluate(humanoid.tpose(BODY.skeleton))
+    np.testing.assert_allclose(bench.limbs.solve(guess), once, atol=1e-9)

@@ -39,14 +39,15 @@ def alone(folder: Path, *experiments: PaperExperiment) -> Path:
 
 def test_the_page_opens_on_the_verdict(study: Path) -> None:
     page = (study / "report.html").read_text(encoding="utf-8")
-    said = "8 of 16 published statements reproduced, 1 not reproduced, 2 cannot tell, 4 not comparable, 1 not run."
+    said = "8 of 16 printed statements reproduced, 1 not reproduced, 2 cannot tell, 4 not comparable, 1 not run."
     assert f"<h1>{said}</h1>" in page
     assert page.index("<h1>") < page.index('class="tally"') < page.index("<nav") < page.index('class="claims"')
 
 
 def test_every_claim_stands_in_the_table_with_both_figures_and_its_verdict(study: Path) -> None:
     """A verdict is shown as a word and a mark, not only by colour."""
-    rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', (study / "report.html").read_text(encoding="utf-8"))
+    page = (study / "report.html").read_text(encoding="utf-8")
+    rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', page[page.index('aria-label="claims"') :])
     claims = [claim for experiment in liu().experiments for claim in experiment.claims]
     assert len(rows) == len(claims)
     for row, claim in zip(rows, claims, strict=True):
@@ -249,3 +250,11 @@ def test_the_sentence_counts_every_claim() -> None:
         numbers = [int(number) for number in re.findall(r"\d+", sentence(some))]
         assert sum(count_verdicts(some).values()) == count
         assert numbers == [] if not count else numbers[1] == count == sum(numbers) - numbers[1]
+
+
+def test_printed_statements_have_both_readings_in_one_row(study: Path) -> None:
+    page = (study / "report.html").read_text(encoding="utf-8")
+    table = page[page.index('aria-label="printed statements"') : page.index('aria-label="claims"')]
+    rows = re.findall(r'<tr role="row"><th scope="row".*?</tr>', table)
+    assert len(rows) == len({c.text for e in liu().experiments for c in e.claims if c.kind == "printed"})
+    assert all(row.count("<td") == 3 for row in rows)

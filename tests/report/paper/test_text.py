@@ -10,8 +10,9 @@ import harness
 from harness.cli import main
 from harness.errors import BadFile
 from harness.report.paper.readme import update_readme
-from harness.report.paper.text import WIDTH, text_tables
-from harness.report.paper.verdicts import format_difference, format_interval
+from harness.report.paper.side_by_side import printed_statements
+from harness.report.paper.text import WIDTH, statements_text, text_tables
+from harness.report.paper.verdicts import format_difference, format_interval, format_p
 from harness.results.findings import Claim, PaperExperiment
 from tests.report.fabricate_paper import kim, liu, write_study
 
@@ -34,7 +35,7 @@ def test_every_claim_is_told_whole() -> None:
             claim.verdict,
         ):
             assert letters(text) in told
-    for text in ("8 of 16 published statements reproduced", "Golf has 2 clips only.", "One sequence left out"):
+    for text in ("8 of 16 printed statements reproduced", "Golf has 2 clips only.", "One sequence left out"):
         assert letters(text) in told
 
 
@@ -55,7 +56,7 @@ def test_lines_are_never_longer_than_a_terminal(repeats: int) -> None:
 def test_columns_stand_under_their_titles() -> None:
     lines = text_tables(liu()).split("\n")
     top = next(n for n, line in enumerate(lines) if line.lstrip().startswith("claim"))
-    for title in ("published", "ours", "difference", "95 % interval", "clips", "verdict"):
+    for title in ("published", "measured", "difference", "95 % interval", "clips", "verdict"):
         at = lines[top].index(title)
         assert lines[top + 1][at - 2 : at] == "  "
         assert lines[top + 1][at] != " "
@@ -64,7 +65,7 @@ def test_columns_stand_under_their_titles() -> None:
 def test_line_breaks_in_a_claim_do_not_break_the_table() -> None:
     claim = Claim("one\ntwo\t three", "a\nb", "c", "reproduced")
     told = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
-    assert "one two three  a b        c     reproduced" in told
+    assert "one two three  printed  a b        c         reproduced" in told
 
 
 @pytest.mark.parametrize(
@@ -85,6 +86,15 @@ def test_an_interval_that_does_not_hold_zero_never_reads_so(
 ) -> None:
     claim = Claim("", "", "", "cannot tell", "", 7, *values, unit)
     assert (format_difference(claim), format_interval(claim)) == told
+
+
+@pytest.mark.parametrize(("p", "told"), [(None, ""), (0.0004, "< 0.001"), (0.0312, "0.031"), (1.0, "1.000")])
+def test_p_after_holm_stands_beside_the_interval(p: float | None, told: str) -> None:
+    claim = Claim("first", "order", "1 against 2", "reproduced", "", 12, 1.0, 0.5, 1.5, "deg", p=0.0001, p_holm=p)
+    assert format_p(claim) == told
+    text = text_tables(replace(liu(), experiments=(PaperExperiment("a", "b", "", (), (claim,)),)))
+    assert ("p (Holm)" in text) == (p is not None)
+    assert told in text
 
 
 def test_a_figure_that_is_ours_already_is_not_told_twice() -> None:
@@ -111,7 +121,9 @@ def test_tables_are_put_where_those_of_the_same_paper_and_motion_stand(tmp_path:
     assert readme.read_bytes() == first.replace(kim().reference.encode(), b"Somebody else")
     for findings in studies:
         assert f"    {findings.command}\n".encode() in first
-        assert all(f"    {line}".rstrip() in first.decode().split("\n") for line in text_tables(findings).split("\n"))
+        assert all(
+            f"    {line}".rstrip() in first.decode().split("\n") for line in statements_text(findings).split("\n")
+        )
 
 
 def test_no_text_can_end_its_section(tmp_path: Path) -> None:
@@ -170,3 +182,24 @@ def test_the_results_page_has_its_markers() -> None:
     ended = re.findall(r"^<!-- end of paper (.*) -->$", RESULTS, re.MULTILINE)
     assert begun == ended
     assert len(set(begun)) == len(begun)
+
+
+def test_a_printed_statement_has_one_row_with_both_readings() -> None:
+    """Names of methods as printed are those of the paper; other kinds of claims are counted below the table."""
+    claims = (
+        Claim("a: dynamic_map:literal errs less", "order", "1 against 2 deg", "reproduced", reading="as printed"),
+        Claim("a: dynamic_map errs less", "order", "3 against 2 deg", "not reproduced", reading="ours"),
+        Claim("five modes", "99 %", "95 %", "not comparable"),
+        Claim("b: dynamic_map errs less", "order", "7 against 8 deg", "reproduced", kind="derived", reading="ours"),
+    )
+    findings = replace(liu(), experiments=(PaperExperiment("a", "b", "", (), claims),))
+    first, second = printed_statements(findings)
+    assert (first.text, first.published) == ("a: dynamic_map errs less", "order")
+    assert first.claims == {"as printed": claims[0], "ours": claims[1]}
+    assert second.claims == {"as printed": claims[2], "ours": claims[2]}
+    lines = statements_text(findings).split("\n")
+    (row,) = [line for line in lines if line.startswith("a: ")]
+    assert row.split("  ")[-1].strip() == "not reproduced"
+    assert row.index("1 against 2 deg") < row.index("reproduced") < row.index("3 against 2 deg")
+    assert lines[-1].startswith("1 further claim:")
+    assert "7 against 8" not in statements_text(findings)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from harness.report.run import calibration_cost
-from harness.report.run.calibration_errors import section, text
+from harness.report.run.calibration_errors import calibration_table, section, text
 
 FOUND = {"mount_mm": 20.0, "mount_deg": 5.0, "length_mm": 0.0, "room_heading_deg": 3.0, "room_origin_mm": 30.0}
 
@@ -74,3 +74,11 @@ def test_no_cost_is_told_without_something_to_hold_it_against() -> None:
     assert calibration_cost.cost_table([judged("poses", "a", 1.0)]) is None
     assert calibration_cost.text({"cells": [judged("exact", "a", 1.0)]}) == []
     assert calibration_cost.section([]) == ""
+
+
+def test_what_an_equation_does_not_give_is_none() -> None:
+    """Kim's maps have no mounts and no common origin; the bones are the truth."""
+    table = calibration_table([*CELLS, cell("kim2012", "a", {"room_heading_deg": 2.0})])
+    assert table is not None
+    (row,) = [row for row in table.rows if row[0] == "kim2012"]
+    assert row == ["kim2012", "1", "none", "none", "known", "2.00 (2.00)", "none"]

@@ -99,3 +99,16 @@ def test_a_stamp_near_the_tolerance_shifts_no_other(off_s: float, at: int) -> No
         out, clock = unwrap(stamp_s, chunks=chunks)
         np.testing.assert_array_equal(np.delete(out, at), np.delete(stamps_s(50), at))
         assert clock.resets == 0
+
+
+@pytest.mark.parametrize("step_s", [10.0, -0.4])
+def test_stamps_that_all_run_ahead_or_back_are_all_damaged(step_s: float) -> None:
+    """After a steady second, two stamps that each differ from the one before by far more than the host's clock."""
+    steady_s: Floats = 5.0 + 0.025 * np.arange(40, dtype=np.float64)
+    clock = ClockUnwrapper()
+    np.testing.assert_array_equal(clock.unwrap(steady_s, steady_s + 1000.0), steady_s)
+    received_s: Floats = steady_s[-1] + 1000.0 + 0.025 * np.arange(1, 3)
+    wrong_s: Floats = steady_s[-1] + step_s * np.arange(1, 3)
+    assert np.isnan(clock.unwrap(wrong_s, received_s)).all()
+    next_s: Floats = steady_s[-1] + np.array([0.075, 0.1])
+    np.testing.assert_array_equal(clock.unwrap(next_s, next_s + 1000.0), next_s)

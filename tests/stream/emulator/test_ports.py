@@ -240,3 +240,20 @@ with serve_emulator(make_samples(), pty={str(link)!r}):
 """
     process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
     assert float(process.stdout) < 0.2
+
+
+def test_an_unplugged_tcp_port_listens_again_at_the_same_address() -> None:
+    port = TcpPort("127.0.0.1", 0, log=lambda text: None)
+    port.plug()
+    name = port.name
+    address = "127.0.0.1", int(name.rpartition(":")[2])
+    port.unplug()
+    assert (port.readable(), port.read()) == ([], b"")
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(address, timeout=5.0)
+    port.plug()
+    try:
+        assert port.name == name
+        socket.create_connection(address, timeout=5.0).close()
+    finally:
+        port.close()

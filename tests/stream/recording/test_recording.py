@@ -331,3 +331,20 @@ def test_an_unusable_format_is_refused(payload: bytes, message: str) -> None:
     data = FILE_HEADER + encode_block(RecordingBlock("conf", 1.0, 2.0, payload))
     with pytest.raises(BadFile, match=message):
         _ = Recording(Path("a.rec"), data).formats
+
+
+@pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="the system does not list open files")
+def test_a_closed_recording_holds_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+
+    def is_open() -> bool:
+        return any(
+            link.is_symlink() and os.path.realpath(link) == str(path) for link in Path("/proc/self/fd").iterdir()
+        )
+
+    writer = RecordingWriter(path, {"source": "a test"})
+    writer.on_configured(FOUR, 1.1, 101.1)
+    assert is_open()
+    writer.close()
+    assert path.is_file()
+    assert not is_open()

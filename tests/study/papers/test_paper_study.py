@@ -200,3 +200,9 @@ def test_the_verb_prints_claims_and_where_the_report_lies(
     assert Path(content["report"]).is_file()
     assert main([*words, "--seed", "2"]) == 2
     assert "another study (seed: 1, not 2)" in capsys.readouterr().err
+
+
+def test_cells_are_counted_over_clips_methods_inputs_and_variants() -> None:
+    """Two clips, two methods, two kinds of inputs and three values of an option; and one clip with two methods."""
+    varied = replace(WALKS, inputs=("pos+ori", "pos"), vary={"tracker.rate_hz": [40.0, 60.0, 90.0]})
+    assert count_cells({"walks": varied, "bouts": BOUTS}) == 2 * 2 * 2 * 3 + 1 * 2

@@ -13,6 +13,8 @@ from harness.study.papers.station_sets import (
     claim_better_than_average,
     claim_error_decreases,
     claim_harder,
+    claim_most_movable,
+    claim_suitable,
     count_stations,
     errors_by_set,
     format_station_set,
@@ -55,7 +57,7 @@ def test_rows_are_put_together_by_what_is_worn() -> None:
         ((0.5, 0.7), "reproduced", "reproduced"),
         ((-0.5, 0.7), "not reproduced", "reproduced"),
         ((-0.5, -0.3), "not reproduced", "not reproduced"),
-        ((0.0, 0.7), "cannot tell", "reproduced"),
+        ((0.0, 0.7), "same", "reproduced"),
     ],
 )
 def test_a_set_is_the_best_of_as_many_trackers_or_it_is_not(
@@ -87,7 +89,7 @@ def test_few_clips_cannot_tell_and_none_were_not_run() -> None:
     [
         ((5.0, 4.0, 3.0, 2.0, 1.0), "reproduced", ""),
         ((5.0, 4.0, 4.5, 2.0, 1.0), "not reproduced", "2 to 3"),
-        ((5.0, 4.0, 3.0, 2.0, 2.0), "cannot tell", "4 to 5"),
+        ((5.0, 4.0, 3.0, 2.0, 2.0), "same", "4 to 5"),
         ((5.0, 4.0, 4.0, 2.0, 2.5), "not reproduced", "4 to 5"),
     ],
 )
@@ -98,6 +100,45 @@ def test_every_tracker_has_to_lower_the_error(by_count: tuple[float, ...], verdi
     claim = claim_error_decreases("walking", sets)
     assert claim.verdict == verdict
     assert step in claim.why
+
+
+@pytest.mark.parametrize(
+    ("four", "five", "verdict", "part"),
+    [
+        (0.05, 0.05, "reproduced", ""),  # an excess of 0.05 of about 4 deg; the margin is 2 %
+        (-1.0, -1.0, "reproduced", ""),
+        (0.05, 1.0, "not reproduced", "against RH+LH+RA+LA+PEL: "),
+        (1.0, 0.05, "not reproduced", "against RH+RA+LA+PEL: "),
+    ],
+)
+def test_three_stations_are_suitable_when_no_larger_set_is_better_by_the_margin(
+    four: float, five: float, verdict: ClaimVerdict, part: str
+) -> None:
+    larger = {"RH+RA+LA+PEL": -four, "LH+RA+LA+PEL": 3.0, "RH+LH+RA+LA+PEL": -five}
+    claim = claim_suitable("walking", "RA+LA+PEL", made(np.random.default_rng(6), {"RA+LA+PEL": 0.0, **larger}))
+    assert claim.verdict == verdict
+    assert claim.why.startswith(part)
+    assert "LH+RA+LA+PEL" not in claim.ours.replace("RH+LH+RA+LA+PEL", "")
+
+
+def test_a_suitable_set_needs_both_larger_sizes() -> None:
+    sets = made(np.random.default_rng(7), {"RA+LA+PEL": 0.0, "RH+LH+RA+LA+PEL": 1.0})
+    assert claim_suitable("walking", "RA+LA+PEL", sets).verdict == "not run"
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(1.0, "reproduced"), (-1.0, "not reproduced"), (0.0, "same")])
+def test_the_most_movable_stations_are_compared_with_the_rest_of_their_size(gain: float, verdict: ClaimVerdict) -> None:
+    """Sets with one of the two have no say, nor have sets of other sizes."""
+    ranges = {"RH": 40.0, "LH": 50.0, "RA": 70.0, "LA": 60.0, "PEL": 0.0}
+    both = {name: len({"RA", "LA"} & set(name.split("+"))) for name in ALL}
+    mean = {0: 0.0, 1: 9.0, 2: -gain}
+    means = {name: mean[both[name]] if count_stations(name) in (2, 3) else -9.0 for name in ALL}
+    claim = claim_most_movable("walking", ranges, made(np.random.default_rng(8), means))
+    assert "RA and LA" in claim.text
+    assert "RA 70" in claim.ours
+    assert claim.verdict == verdict
+    assert claim.difference == pytest.approx(gain, abs=0.02)
+    assert claim_most_movable("walking", ranges, {}).verdict == "not run"
 
 
 def test_a_set_that_is_missing_on_a_clip_takes_the_clip_from_its_number() -> None:
@@ -129,10 +170,10 @@ def test_pictures_and_tables_rank_the_sets() -> None:
     lines = station_count_lines("lines", {"walking": sets, "boxing": {}}, "")
     assert lines.x == (1.0, 2.0, 3.0, 4.0, 5.0)
     assert set(lines.series["boxing"]) == {None}
-    table = set_table("table", sets, sets, format_station_set(STATION_ABBREVIATIONS))
+    table = set_table("table", sets, sets, sets, format_station_set(STATION_ABBREVIATIONS))
     assert [count_stations(row[0]) for row in table.rows] == sorted(map(count_stations, ALL))
     assert table.rows[-1][-1] == "1.00"
-    assert set_table("table", {"PEL": sets["PEL"]}, {}, format_station_set(STATION_ABBREVIATIONS)).rows[0][2:] == (
+    assert set_table("table", {"PEL": sets["PEL"]}, {}, {}, format_station_set(STATION_ABBREVIATIONS)).rows[0][2:] == (
         "not measured",
         "not measured",
     )

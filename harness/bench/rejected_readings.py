@@ -1,0 +1,55 @@
+"""True readings that the outlier gates of methods reject: clean synthetic takes of every behaviour.
+
+All methods learn from one database and follow held-out takes, under the conditions of `benchmark_clips`. No reading is
+an outlier there, so every rejection is an error.
+"""
+
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from harness.bench.rows import BenchmarkRow
+from harness.core.calibration import Calibration
+from harness.experiment import benchmark_clips
+from harness.reconstruct.contract import Reconstructor, Session
+from harness.reconstruct.solver.outlier_gate import OutlierGate
+from harness.stream.frame import TrackerFrame
+
+GATED_METHODS = ("ik", "local_pca", "dynamic_map", "weighted_blend", "kernel_cca", "best_match+ik", "kernel_ridge+ik")
+MAX_REJECTED_SHARE = 1e-3
+FRAMES, CLIP_S = 16_000, 20.0
+"""Frames of the database, and length of every held-out take [s]."""
+
+
+def bench_rejected_readings(seed: int = 1, frames: int = FRAMES, clip_s: float = CLIP_S) -> list[BenchmarkRow]:
+    """The share of rejected positions of each method."""
+    rows = []
+    with tempfile.TemporaryDirectory(prefix="harness-bench-") as folder:
+        takes = benchmark_clips.make_take_factories(frames, seed)
+        database = benchmark_clips.build_database(Path(folder) / "examples", takes)
+        clips = benchmark_clips.generate_held_out_clips(seed, clip_s)
+        for name in GATED_METHODS:
+            fitted = benchmark_clips.fit_named_method(name, database, seed)
+            counts = [count_rejected(fitted, clip.simulation.calibration, clip.simulation.frames) for clip in clips]
+            readings, rejected = (sum(column) for column in zip(*counts, strict=True))
+            target = f"< {MAX_REJECTED_SHARE:g}"
+            found = f"{rejected} of {readings} true readings"
+            rows.append(BenchmarkRow(f"{name}, rejected true readings", rejected / readings, "", found, target))
+    return rows
+
+
+def count_rejected(fitted: Reconstructor, calibration: Calibration, frames: Iterable[TrackerFrame]) -> tuple[int, int]:
+    """Number of positions that a new session measured in these frames, and of those that its gate rejected."""
+    session = fitted.begin(calibration)
+    for frame in frames:
+        session.step(frame)
+    gate = find_gate(session)
+    return gate.readings, gate.rejected
+
+
+def find_gate(session: Session) -> OutlierGate:
+    """The outlier gate of a session; that of the final inverse kinematics where a method has one. TypeError if none."""
+    for value in vars(session).values():
+        if isinstance(value, OutlierGate):
+            return value
+    raise TypeError(f"{type(session).__name__} has no outlier gate.")

@@ -1,0 +1,125 @@
+"""Liu et al. 2011: the error against the size of the database, and one database a behaviour against one of all."""
+
+from collections.abc import Mapping
+
+from harness.compare.claims import claim_decreasing, claim_lower_error
+from harness.results.expected_orders import METRIC
+from harness.results.findings import BarChart, Claim, FindingsTable, PaperExperiment, Reading
+from harness.study.papers.leave_one_out import (
+    DYNAMIC_MAP,
+    DYNAMIC_MAP_LITERAL,
+    INPUTS,
+    LOCAL_PCA,
+    behaviour_label,
+    differences,
+)
+from harness.study.papers.paper_study import PaperStudy
+from harness.study.papers.tables import RMS, errors_by_clip, mean_bars, mean_table
+
+SIZE_RUN, ALL_RUN, KEY = "database_size", "one_database", "motion.example_share"
+METHODS = (DYNAMIC_MAP_LITERAL, DYNAMIC_MAP, LOCAL_PCA, "ik")
+OWN: Mapping[str, Reading] = {DYNAMIC_MAP_LITERAL: "as printed", DYNAMIC_MAP: "ours"}
+"""The methods that stand for the paper's own."""
+_WORDING = (
+    "The paper claims both and prints no figure. The directions that are tested are our interpretation: more examples "
+    "reduce the error, and a database of one behaviour gives a smaller error than one of all."
+)
+
+
+def database_size(study: PaperStudy) -> PaperExperiment:
+    """Error against the share of the database, in nested subsets."""
+    claims: list[Claim] = []
+    tables: list[FindingsTable] = []
+    figures: list[BarChart] = []
+    for inputs in study.runs[SIZE_RUN].inputs:
+        errors, roots = (
+            {method: _errors_by_share(study, method, inputs, metric) for method in METHODS} for metric in (METRIC, RMS)
+        )
+        for method, reading in OWN.items():
+            series, start = errors[method], f"boxing, {INPUTS[inputs]}: {method} errs less"
+            least, whole = next(iter(series)), list(series)[-1]
+            text = f"{start} with the whole database than with {least} % of it"
+            claims.append(claim_lower_error(text, series[whole], series[least], reading=reading))
+            text = f"{start} with each larger share of the database"
+            claims.append(claim_decreasing(text, series, "%", kind="derived", reading=reading))
+        shares = list(errors[DYNAMIC_MAP])
+        groups, root_groups = (
+            {f"{share} %": {method: side[method][share] for method in METHODS} for share in shares}
+            for side in (errors, roots)
+        )
+        title = f"Boxing, {INPUTS[inputs]}"
+        tables.append(mean_table(f"{title} [deg]", "share of the database", groups, root_groups))
+        caption = "Mean joint-angle error over clips. Every smaller share is a part of every larger one."
+        figures.append(mean_bars(f"{title}: error against the share of the database", "deg", groups, caption=caption))
+    return PaperExperiment(
+        name="database_size",
+        title="Error against the size of the database",
+        question=(
+            "How much does the error fall when there are more examples? The same takes of boxing are reconstructed "
+            "from 1, 3, 10, 30 and 100 % of the database. The paper's database of boxing has 31,358 frames."
+        ),
+        differences=(
+            _WORDING,
+            "Shares are drawn in pieces of 0.5 s, since the methods learn from consecutive frames. Each smaller share "
+            "is a part of every larger one. ik takes only the mean posture and the spread of each hinge from the "
+            "examples.",
+            *differences(study),
+        ),
+        claims=tuple(claims),
+        tables=tuple(tables),
+        figures=tuple(figures),
+        runs=(SIZE_RUN, _whole_run(study)),
+    )
+
+
+def one_database(study: PaperStudy) -> PaperExperiment:
+    """One database for each behaviour compared with one of all behaviours."""
+    claims: list[Claim] = []
+    sides: list[dict[str, dict[str, Mapping[str, float]]]] = []
+    behaviours = tuple(dict.fromkeys(study.runs[ALL_RUN].motion.behaviours))
+    for metric in (METRIC, RMS):
+        sides.append({})
+        for behaviour in behaviours:
+            for name, run in (("own", _whole_run(study)), ("all", ALL_RUN)):
+                where = {"behaviour": behaviour, "inputs": "pos+ori", "performer": "known"}
+                sides[-1][f"{behaviour_label(behaviour)}, database of {_DATABASES[name]}"] = {
+                    method: errors_by_clip(study.rows(run, method=method, **where), metric) for method in METHODS
+                }
+    for behaviour in behaviours:
+        label = behaviour_label(behaviour)
+        own, everything = (sides[0][f"{label}, database of {_DATABASES[name]}"] for name in ("own", "all"))
+        for method, reading in OWN.items():
+            text = f"{label}: {method} errs less with a database of the behaviour than with one of all behaviours"
+            claims.append(claim_lower_error(text, own[method], everything[method], reading=reading))
+    caption = "Mean joint-angle error over clips, positions and orientations."
+    return PaperExperiment(
+        name="one_database",
+        title="One database for each behaviour, or one of all behaviours",
+        question=(
+            "The paper has one database for each behaviour. Does a method err more when one database has all "
+            "behaviours, so that it must find the right one by itself?"
+        ),
+        differences=(_WORDING, *differences(study)),
+        claims=tuple(claims),
+        tables=(mean_table("Joint-angle error [deg]", "behaviour", *sides),),
+        figures=(mean_bars("One database or several", "deg", sides[0], caption=caption),),
+        runs=(ALL_RUN, _whole_run(study)),
+    )
+
+
+_DATABASES = {"own": "the behaviour", "all": "all behaviours"}
+
+
+def _whole_run(study: PaperStudy) -> str:
+    """The run with the whole database of the behaviour, on the same clips."""
+    return "blocks" if study.motion == "cmu" else "leave_one_out"
+
+
+def _errors_by_share(study: PaperStudy, method: str, inputs: str, metric: str) -> dict[str, dict[str, float]]:
+    """Share in percent -> clip -> error, the whole database last."""
+    where = {"method": method, "inputs": inputs, "behaviour": "boxing", "performer": "known"}
+    errors = {
+        f"{100.0 * share:g}": errors_by_clip(study.rows(SIZE_RUN, varied={KEY: share}, **where), metric)
+        for share in study.runs[SIZE_RUN].vary[KEY]
+    }
+    return {**errors, "100": errors_by_clip(study.rows(_whole_run(study), **where), metric)}

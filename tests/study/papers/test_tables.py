@@ -1,0 +1,33 @@
+"""Tables of findings: the RMS stands beside the mean, and RMS of joint groups are roots of mean squares."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from harness.study.papers.tables import RMS, errors_by_joint_group, format_mean, mean_table
+
+MEANS = {"a": 1.0, "b": 2.0}
+ROOTS = {"a": 2.0, "b": 4.0}
+
+
+def test_the_rms_follows_mean_and_spread() -> None:
+    assert format_mean(MEANS) == "1.50 ± 0.71 (2)"
+    assert format_mean(MEANS, rms=ROOTS) == "1.50 ± 0.71, RMS 3.00 (2)"
+    assert format_mean({}, rms=ROOTS) == "not measured"
+
+
+def test_a_table_says_whether_it_has_the_rms() -> None:
+    table = mean_table("Error", "walks", {"all": {"ik": MEANS, "other": {}}}, {"all": {"ik": ROOTS}})
+    assert table.title == "Error: mean ± sd, RMS over clips (clips)"
+    assert table.rows == (("all", "1.50 ± 0.71, RMS 3.00 (2)", "not measured"),)
+    assert mean_table("Error", "walks", {"all": {"ik": MEANS}}).title == "Error: mean ± sd over clips (clips)"
+
+
+def test_the_rms_of_a_group_is_the_root_of_the_mean_square_of_its_hinges() -> None:
+    hinges = {"lfoot.rx": 3.0, "rfoot.rx": 4.0, "head.rx": 100.0}
+    scores = SimpleNamespace(per_joint={"joint_angle_mean_deg": hinges, RMS: hinges})
+    cell: Any = SimpleNamespace(clip="a", scores=scores)
+    groups = {"feet": ("lfoot", "rfoot")}
+    assert errors_by_joint_group([cell], groups)["feet"]["a"] == pytest.approx(3.5)
+    assert errors_by_joint_group([cell], groups, RMS)["feet"]["a"] == pytest.approx(12.5**0.5)
