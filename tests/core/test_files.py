@@ -76,3 +76,20 @@ def test_what_is_no_toml_is_refused_in_a_line(data: bytes, complaint: str, tmp_p
 def test_no_file_is_refused_too(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match="No such file"):
         files.read_toml(tmp_path / "a.toml", "a scenario", "Write one.")
+
+
+def test_a_digest_is_the_same_on_another_processor(rng: np.random.Generator) -> None:
+    """Processors differ by less than 1e-14; rounded decimals, such as typed bone lengths, are not at an edge."""
+    values = np.append(rng.normal(scale=2.0, size=200_000), np.round(rng.normal(size=200_000), 6))
+    other = values + rng.uniform(-1e-14, 1e-14, len(values))
+    assert np.any(other != values)
+    assert files.digest(other) == files.digest(values)
+    assert files.digest(np.array([-0.0, np.nan])) == files.digest(np.array([0.0, np.nan]))
+
+
+def test_a_digest_notices_a_change_of_one_value(rng: np.random.Generator) -> None:
+    values = rng.normal(size=(100, 3))
+    changed = values.copy()
+    changed[57, 1] += 1.1e-5
+    assert files.digest(changed) != files.digest(values)
+    assert files.digest(values.reshape(300)) != files.digest(values)
