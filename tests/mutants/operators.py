@@ -212,9 +212,16 @@ def returned_default(node: ast.AST, source: Source) -> Iterator[Change]:
                     yield source.span(statement.value), text
 
 
+_COMMUTATIVE = ("min", "max", "minimum", "maximum", "logaddexp", "hypot")
+
+
 def swapped_arguments(node: ast.AST, source: Source) -> Iterator[Change]:
-    """Two positional arguments that follow each other are exchanged."""
-    if isinstance(node, ast.Call) and not any(isinstance(argument, ast.Starred) for argument in node.args):
+    """Two positional arguments that follow each other are exchanged, unless the order has no effect, as in `min`."""
+    if (
+        isinstance(node, ast.Call)
+        and not any(isinstance(argument, ast.Starred) for argument in node.args)
+        and ast.unparse(node.func).rpartition(".")[2] not in _COMMUTATIVE
+    ):
         for left, right in pairwise(node.args):
             (start, end), (second, last) = source.span(left), source.span(right)
             if ast.dump(left) != ast.dump(right):

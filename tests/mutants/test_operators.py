@@ -34,6 +34,7 @@ EXPRESSIONS = [
     ("swapped_arguments", "f(a, g(b), k=c)", ["f(g(b), a, k=c)"]),
     ("swapped_arguments", "f(a, a)", []),
     ("swapped_arguments", "f(*a, b)", []),
+    ("swapped_arguments", "min(a, b) + np.maximum(c, d)", []),
     ("plus_minus", "'µ' + µ", ["'µ' - µ"]),
 ]
 
