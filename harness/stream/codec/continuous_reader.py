@@ -61,7 +61,7 @@ class ContinuousFrameReader:
         """
         frames = self.finish()
         self._totals["sessions"] += 1
-        self._reader, self._period_s = FrameReader(wire), 1.0 / wire.rate_hz
+        self._reader, self._period_s = FrameReader(wire, now_s), 1.0 / wire.rate_hz
         self._last_byte_s, self._is_new = now_s, True
         return frames
 

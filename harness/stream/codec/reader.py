@@ -58,14 +58,15 @@ class FrameReader:
     does not.
     """
 
-    def __init__(self, wire: WireFormat) -> None:
+    def __init__(self, wire: WireFormat, zeroed_s: float | None = None) -> None:
+        """`zeroed_s` is the host time at which the device's clock was set to zero, if known [s]."""
         self.wire = wire
         self.records = 0
         self.garbage_bytes = 0
         self.replies: deque[Reply] = deque(maxlen=100)
         """The latest lines that are not data records."""
         self._decoder = Decoder(dict.fromkeys(wire.characters, wire.items), wire.settings)
-        self._clock = ClockUnwrapper()
+        self._clock = ClockUnwrapper(1.0 / wire.rate_hz, zeroed_s)
         self._plausibility = PlausibilityCheck(len(wire.stations), 1.0 / wire.rate_hz)
         self._assembler = FrameAssembler(len(wire.stations), 1.0 / wire.rate_hz)
         self._has_stamps, self._has_quality = 21 in wire.items, has_quality(wire.items)
@@ -166,7 +167,7 @@ class FrameReader:
 
     def _readings(self, table: Table, received_s: Floats) -> Readings:
         raw = decode_readings(table, received_s, self.wire.characters, self.wire.settings)
-        measured_s = self._clock.unwrap(raw.measured_s, received_s)
+        measured_s = self._clock.unwrap(raw.measured_s, received_s, raw.station)
         suspect = raw.suspect | np.isnan(measured_s) if self._has_stamps else raw.suspect
         quality = raw.quality if self._lost is None else np.where(self._lost[raw.station], 0.0, raw.quality)
         position_m, quaternion = raw.position_m, raw.tracker_from_station

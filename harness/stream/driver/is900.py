@@ -24,6 +24,10 @@ from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, N
 
 _RATE_WINDOW_FRAMES = 50
 """Number of frames over which the present frame rate is computed."""
+_TOGETHER_S = 1e-6
+"""Frames of one read get times that differ by less than this [s]."""
+_SHORTEST_RATE_WINDOW_S = 0.2
+"""Shortest time over which it is computed [s]; USB adapters deliver frames in bursts 0.016 s apart."""
 
 
 class Is900:
@@ -106,14 +110,13 @@ class Is900:
         return self._reader.counts | {"reconnects": self._reconnects}
 
     def health(self) -> dict[str, float]:
-        """Return the counts, the present frame rate [Hz] and the time since the last byte [s]."""
-        recent_s = list(self._recent_s)
-        span_s = recent_s[-1] - recent_s[0] if len(recent_s) > 1 else 0.0
-        return {
-            **self.counts,
-            "rate_hz": (len(recent_s) - 1) / span_s if span_s > 0.0 else 0.0,
-            "silent_s": self._host.monotonic_s() - self._last_byte_s,
-        }
+        """Return the counts, the present frame rate [Hz] and the time since the last byte [s].
+
+        `rate_hz` is absent until enough frames have arrived to tell it.
+        """
+        rate_hz = _arrival_rate_hz(list(self._recent_s))
+        rate = {} if rate_hz is None else {"rate_hz": rate_hz}
+        return {**self.counts, **rate, "silent_s": self._host.monotonic_s() - self._last_byte_s}
 
     def wall_s(self, received_s: float) -> float:
         """Convert a time on the host's monotonic clock to seconds since 1970."""
@@ -308,3 +311,13 @@ class Is900:
             if self._closing.is_set():
                 raise DriverClosed
             self._host.sleep(min(left_s, self._timing.poll_s))
+
+
+def _arrival_rate_hz(received_s: list[float]) -> float | None:
+    """Frames per second of frames received at these times [s]; None for too short a time.
+
+    Frames that arrived together with the first are left out: nothing tells how long they waited.
+    """
+    later = sum(1 for at_s in received_s if at_s - received_s[0] > _TOGETHER_S)
+    span_s = received_s[-1] - received_s[0] if received_s else 0.0
+    return later / span_s if span_s >= _SHORTEST_RATE_WINDOW_S else None

@@ -51,7 +51,8 @@ def record_port(
 def _progress_text(device: Is900, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
     tracked = int((frame.position_valid | frame.orientation_valid).sum())
+    rate = f", {health['rate_hz']:.1f} Hz" if "rate_hz" in health else ""
     return (
-        f"{health['frames']:.0f} frames, {health['rate_hz']:.1f} Hz, {tracked} of {len(device.stations)} stations "
+        f"{health['frames']:.0f} frames{rate}, {tracked} of {len(device.stations)} stations "
         f"tracked, {1e-3 * writer.counts[RECEIVED]:.0f} kB"
     )
