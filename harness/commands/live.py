@@ -142,6 +142,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
 @contextmanager
 def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[LineEvent]") -> "Iterator[Is900]":
     """Open and set up the tracker; BadInput when its rate is not the scenario's."""
+    from harness.stream.codec.items import position_range_m
     from harness.stream.driver import DriverConfig, Is900
 
     def happened(event: "LineEvent") -> None:
@@ -150,7 +151,9 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[L
 
     tracker = playback.tracker
     stations = tuple(playback.scenario.stations)
-    config = DriverConfig(**{"items": tracker.items, **line_options(args)}, stations=stations, rate_hz=args.rate)
+    options = {"items": tracker.items, **line_options(args)}
+    reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
+    config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
     with Is900(args.port, config, on_event=happened) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:

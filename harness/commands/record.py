@@ -102,14 +102,16 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
-        record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
-    return _print_recording(args, writer.counts)
+        line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
+    return _print_recording(args, writer.counts, line.get("out_of_range", 0))
 
 
-def _print_recording(args: argparse.Namespace, counts: Mapping[str, int]) -> Outcome:
+def _print_recording(args: argparse.Namespace, counts: Mapping[str, int], out_of_range: int = 0) -> Outcome:
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
-    content |= {"set_up": counts["conf"], "events": counts["evnt"]}
+    content |= {"set_up": counts["conf"], "events": counts["evnt"], "out_of_range": out_of_range}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
     if not args.file.exists():
         text = f"{args.file}: ended before the device was set up; nothing was recorded"
-    return print_result(args, content, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
+    text += f", {counts['evnt']} events" if counts["evnt"] else ""
+    text += f", {out_of_range} positions beyond the range of the list" if out_of_range else ""
+    return print_result(args, content, text)

@@ -40,8 +40,8 @@ class FrameAssembler:
     By the device's clock, a reading a period or more after the first of its frame belongs to the next frame. Where
     stamps are missing, the host's clock and 1.5 periods serve instead. A station number that does not increase in the
     middle of a period, or a stamp that steps back, shows a damaged record. The readings on both sides are then suspect,
-    since either may be the wrong one. A time that does not advance is removed. Where stamps are missing, a station that is silent in round after round is no
-    sign of damage. A reading that is already `suspect` stays so.
+    since either may be the wrong one. A time that does not advance is removed. Where stamps are missing, a station that
+    is silent in round after round is no sign of damage. A reading that is already `suspect` stays so.
     """
 
     def __init__(self, stations: int, period_s: float) -> None:

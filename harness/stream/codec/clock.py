@@ -85,7 +85,9 @@ class ClockUnwrapper:
         now = stamp_s + self._epoch_s, received_s
         agrees = self._rejected is not None and self._follows(self._rejected, (stamp_s, received_s))
         if self._last is None:
-            return self._accept(now, station) if agrees or self._may_be_first(now) else self._reject(stamp_s, now, station)
+            return (
+                self._accept(now, station) if agrees or self._may_be_first(now) else self._reject(stamp_s, now, station)
+            )
         if self._last[0] - CLOCK_TOLERANCE_S < now[0] < self._last[0]:
             return now[0]
         if self._follows(self._last, now, self._last_of.get(station)):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from harness.errors import BadInput
-from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, record_type
+from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, position_range_m, record_type
 from harness.stream.codec.records import RecordFormat
 
 QUALITY_ITEMS = (40, 76)
@@ -37,6 +37,8 @@ class DriverConfig:
     """Whether the heading of every station is set to zero at its present direction during configuration."""
     alignment: Alignment | Mapping[str, Alignment] | None = None
     """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
+    reach_m: float | None = None
+    """Largest coordinate of any station in the tracker's frame [m], if known. A list of a shorter range is refused."""
     quality: Literal["record", "mp"] = "record"
     """Where lost stations show: "record" in items 40 and 76, "mp" in the replies to `MP`, polled once a second."""
 
@@ -48,6 +50,14 @@ class DriverConfig:
             raise BadInput(
                 f"The output list {_join_commas(self.items)} has no item 40, so a lost station would not show.",
                 "Add 40 to it, or use quality 'mp' (--quality mp).",
+            )
+        range_m = position_range_m(self.items)
+        if range_m is not None and self.reach_m is not None and self.reach_m >= range_m:
+            raise BadInput(
+                f"The output list {_join_commas(self.items)} carries positions up to {range_m:g} m from the tracker's "
+                f"origin on each axis, but the stations reach {self.reach_m:.2f} m.",
+                f"Use a list with item 2, such as --items {_join_commas(STANDARD_LIST)} (the default). "
+                "If the line is then too slow, use fewer stations or a lower rate.",
             )
         if self.rate_hz is not None and not 0.0 < self.rate_hz <= 1000.0:
             raise BadInput(f"A rate of {self.rate_hz} Hz is not possible.", "An IS-900 runs at up to 180 Hz.")

@@ -28,7 +28,7 @@ def test_one_session_equals_its_frame_reader() -> None:
         for a, b in zip(frames, decode_frames(in_chunks(device_bytes(STAMPS_S), STAMPS_S)), strict=True)
     )
     assert reader.device_zero_s == 0.0
-    expected = {"frames": 5, "sessions": 1, "records": 20, "garbage_bytes": 0, "clock_resets": 0}
+    expected = {"frames": 5, "sessions": 1, "records": 20, "garbage_bytes": 0, "clock_resets": 0, "out_of_range": 0}
     assert reader.counts == expected
 
 

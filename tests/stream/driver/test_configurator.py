@@ -1,6 +1,7 @@
 """What the driver sends to a device before data flow, and what it refuses."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,38 @@ def test_every_unit_and_list_gives_the_same_motion(config: DriverConfig) -> None
         np.testing.assert_allclose(cosines, 1.0, atol=1e-6)
         assert frame.position_valid.all()
         assert not frame.suspect.any()
+
+
+def test_positions_beyond_the_range_of_the_list_are_not_valid_and_reported_once() -> None:
+    """The stations move out to 4.7 m and back, as walking does."""
+    near = make_samples(2)
+    far = replace(near, position_m=4.7 * near.position_m)
+    bench = Bench(EmulatedDevice(far, now_s=1000.0))
+    with bench.driver(DriverConfig(items=SHORT_LIST, stations=("head", "torso"))) as stream:
+        frames = frames_for(stream, bench, 10.0)
+        counts = stream.counts
+    expected = 0
+    for frame in frames:
+        true_m = far.position_m[round(frame.measured_s[0] * far.rate_hz) % len(far)]
+        outside = (np.abs(true_m) >= 3.0).any(axis=1)
+        expected += int(outside.sum())
+        assert not frame.position_valid[outside].any()
+        assert frame.orientation_valid.all()
+        assert not frame.suspect.any()
+        valid = frame.position_valid
+        np.testing.assert_allclose(frame.position_m[valid], true_m[valid], atol=1e-3)
+    assert expected > 500
+    assert counts["out_of_range"] >= expected
+    (event,) = (event for event in bench.events if event.kind == "out of range")
+    assert "farther than 3 m from the tracker's origin" in event.text
+    assert "40,2,11,21,1" in event.text
+
+
+def test_a_list_that_does_not_cover_the_room_is_refused() -> None:
+    DriverConfig(items=SHORT_LIST, reach_m=2.9)
+    DriverConfig(reach_m=5.0)
+    with pytest.raises(BadInput, match=r"up to 3 m .* reach 4\.71 m\. Use a list with item 2, such as .*40,2,11,21,1"):
+        DriverConfig(items=SHORT_LIST, reach_m=4.71)
 
 
 def test_a_device_left_in_any_state_is_configured() -> None:
@@ -296,7 +329,7 @@ FASTRAK_STATUS = StatusRecord(identification="FASTRAK", firmware="2.10").line()
         (
             DriverConfig(),
             {"stations": 4, "rate_hz": 120.0},
-            r"Try 2 stations, or the 22-byte list \(--items 40,18,19,21,1\), or a device .* 75",
+            r"Try 2 stations, or --items 40,18,19,21,1 \(22 bytes, range 3 m: .*\), or a device .* 75",
         ),
         (DriverConfig(baud=9600), {"baud": 9600}, r"the line carries 9600\. Try .*or a device set to 115200 baud"),
     ],

@@ -376,7 +376,7 @@ def test_health_reports_rate_and_counts() -> None:
 def test_no_rate_is_told_before_it_is_known() -> None:
     """The computer is busy at first, so the first read finds twelve frames: they give no rate, and later ones do."""
     bench = bench_of()
-    told_hz, held = [], bytearray()
+    held = bytearray()
     with bench.driver() as stream:
         free_s = bench.now_s + 0.25
 
@@ -387,8 +387,7 @@ def test_no_rate_is_told_before_it_is_known() -> None:
             return out
 
         bench.corrupt = hold
-        for _ in islice(stream, 100):
-            told_hz.append(stream.health().get("rate_hz"))
+        told_hz = [stream.health().get("rate_hz") for _ in islice(stream, 100)]
     assert told_hz[:10] == [None] * 10
     rates_hz = [rate_hz for rate_hz in told_hz if rate_hz is not None]
     assert len(rates_hz) > 50
