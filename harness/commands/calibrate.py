@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.common import (
+    LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
@@ -30,7 +31,7 @@ _SOURCES = ("recording", "live", "simulate", "sheet")
 _SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")
 _FLAGS_BY_SOURCE = {
     "recording": _SESSION_FLAGS,
-    "live": (*_SESSION_FLAGS, "port", "rate", "items", "baud", "quality", "view", "pictures"),
+    "live": (*_SESSION_FLAGS, "port", "rate", *LINE_FLAGS, "view", "pictures"),
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }
@@ -82,7 +83,7 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
     ):
         if getattr(args, name) is not None:
             users = " or ".join(source for source, names in _FLAGS_BY_SOURCE.items() if name in names)
-            raise BadInput(f"--{name} with {given[0]}.", f"It applies to {users}: leave it out.")
+            raise BadInput(f"--{name.replace('_', '-')} with {given[0]}.", f"It applies to {users}: leave it out.")
     action = {"sheet": _draw_sheet, "simulate": _measure_accuracy}.get(given[0], _calibrate_performer)
     with sigterm_as_interrupt():
         try:
@@ -165,6 +166,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
         )
         names = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
         print_status(f"{device.identification or 'an IS-900'} at {args.port}; stations {names}; Ctrl-C ends it")
+        print_status(device.setup_note)
         collector = session.collect_poses(device, print_status, displays)
     print_status("solving")
     return session.solve(collector.holds, f"the tracker at {args.port}")

@@ -16,6 +16,8 @@ from harness.errors import BadInput, Outcome
 Verbs = Any  # argparse's subparsers object has no public type
 DEFAULT_STATION_COUNT = 4
 """Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
+LINE_FLAGS = ("items", "baud", "quality", "keep_settings")
+"""Flags of `add_line_flags`."""
 Action = Callable[[argparse.Namespace], Outcome]
 
 
@@ -70,13 +72,15 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--baud", type=positive_int, help="baud rate of a serial port (default: detected)")
     text = "how lost stations are reported: in records (item 40), or in replies to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
+    text = "use the device as other programs left it: tip offset, alignment, boresight, mounting angles and filters"
+    verb.add_argument("--keep-settings", action="store_true", default=None, help=text)
 
 
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
     """The driver options that those flags give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
-    return {name: getattr(args, name) for name in ("items", "baud", "quality") if getattr(args, name) is not None}
+    return {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
 
 
 def is_whole_number(text: str) -> bool:

@@ -163,6 +163,7 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[L
             )
         names = ", ".join(f"{number} {name}" for number, name in enumerate(stations, 1))
         print_status(f"{device.identification or 'an IS-900'} at {args.port}, {tracker.rate_hz:g} Hz; stations {names}")
+        print_status(device.setup_note)
         yield device
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from harness.commands.common import (
+    LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
@@ -46,10 +47,11 @@ def run_record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
-        for name in ("items", "baud", "quality"):
+        for name in LINE_FLAGS:
             if getattr(args, name) is not None:
                 raise BadInput(
-                    f"--{name} with {args.port}.", "It is for a device; a simulated line takes it from the scenario."
+                    f"--{name.replace('_', '-')} with {args.port}.",
+                    "It is for a device; a simulated line takes it from the scenario.",
                 )
         return _record_simulation(args, args.port.removeprefix(SIMULATION_PREFIX))
     for name in ("clip", "noise", "poses", "seed"):

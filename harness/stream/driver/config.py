@@ -37,6 +37,10 @@ class DriverConfig:
     """Whether the heading of every station is set to zero at its present direction during configuration."""
     alignment: Alignment | Mapping[str, Alignment] | None = None
     """The frame to report in: one for all stations, or one for each station name. None leaves it unchanged."""
+    keep_settings: bool = False
+    """Whether the device keeps what other programs have set: tip offsets, alignments, mounting angles, filters and
+    boresight. Otherwise they are at their defaults during the session. At its end they are put back, except boresight.
+    """
     reach_m: float | None = None
     """Largest coordinate of any station in the tracker's frame [m], if known. A list of a shorter range is refused."""
     quality: Literal["record", "mp"] = "record"

@@ -16,6 +16,7 @@ from harness.stream.driver.configurator import DeviceConfigurator
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
 from harness.stream.driver.detection import DetectedDevice, NoAnswer, candidate_baud_rates, detect_device, query_status
 from harness.stream.driver.host import Host
+from harness.stream.driver.session_settings import SessionSettings, put_back, read_settings, set_defaults
 from harness.stream.driver.stations import StationSelection, restore_stations, select_stations
 from harness.stream.driver.transport import LineLost
 from harness.stream.driver.watchdog import Diagnosis, Watchdog, diagnose_reply
@@ -67,10 +68,13 @@ class Is900:
         detected = detect_device(port, candidate_baud_rates(port, self.config), self._connect, self._timing.answer_s)
         self._line, self._baud, self._status = detected.line, detected.baud, detected.status
         self._stations = StationSelection("", (), "")
+        self._found: SessionSettings | None = None
         try:
             self._stations = select_stations(port, self._line, self.config.stations)
             if self._stations.others:
                 restore_stations(port, self._line, self._stations)
+            self._found = read_settings(self._line, self._stations.characters, self._status)
+            self._report_settings(self._found)
             self._wire = self._configure(self._status, previous_hz=None)
         except LineLost as lost:
             self.close()
@@ -103,6 +107,15 @@ class Is900:
     def identification(self) -> str:
         """Name that the device reports."""
         return self._status.identification
+
+    @property
+    def setup_note(self) -> str:
+        """What a person at the device should know of its set-up, in one line."""
+        if self.config.keep_settings:
+            return "settings of other programs are kept: see the events"
+        note = f"boresight of station {', '.join(self._stations.characters)} undone: it cannot be read or put back"
+        unreadable = self._found.unreadable if self._found else ()
+        return note + (f"; nor can {', '.join(unreadable)}, now at their defaults" if unreadable else "")
 
     @property
     def counts(self) -> dict[str, int]:
@@ -148,12 +161,32 @@ class Is900:
             line = self._line
             line.closing = lambda: False
             try:
-                with contextlib.suppress(LineLost):
-                    line.stop()
-                    for station in self._stations.others:
-                        line.send(commands.switch_station(station, True))
+                try:
+                    self._leave(line)
+                except KeyboardInterrupt:  # an impatient person: the device gets its settings back all the same
+                    self._leave(line)
+                    raise
             finally:
                 line.transport.close()
+
+    def _leave(self, line: DeviceConnection) -> None:
+        """Stop the device and give it the settings and stations that it had, as far as the line still works."""
+        found, config = self._found, self.config
+        keep, aligned = config.keep_settings, config.alignment is not None
+        is_back = False
+        with contextlib.suppress(LineLost):
+            line.stop()
+            is_back = found is not None and put_back(line, found, keep, aligned, config.boresight)
+            for station in self._stations.others:
+                line.send(commands.switch_station(station, True))
+        if found is not None and (text := found.describe()) and not keep:
+            self._report("settings", f"{'put back' if is_back else 'not put back, the device is gone'}: {text}")
+
+    def _report_settings(self, found: SessionSettings) -> None:
+        """Report what other programs left in the device."""
+        if text := found.describe():
+            kept = "kept, as asked" if self.config.keep_settings else "at defaults for this session, then put back"
+            self._report("settings", f"settings of another program: {text}; {kept}")
 
     def __enter__(self) -> "Is900":
         return self
@@ -242,8 +275,13 @@ class Is900:
 
     def _configure(self, status: StatusRecord, previous_hz: float | None) -> WireFormat:
         """Configure the device. Boresight is set only the first time, when no rate is known yet."""
+        first = previous_hz is None
+        if not self.config.keep_settings:
+            characters = self._stations.characters
+            found = self._found if first and self._found else read_settings(self._line, characters, status)
+            set_defaults(self.port, self._line, found, undo_boresight=first or not self.config.boresight)
         configurator = DeviceConfigurator(self.port, self._baud, self._line, status, self.config)
-        return configurator.configure(self._stations, self.config.boresight and previous_hz is None, previous_hz)
+        return configurator.configure(self._stations, self.config.boresight and first, previous_hz)
 
     def _start(self) -> None:
         """Set the device's clock to zero, then send `C`: records between the two would carry the old clock."""

@@ -36,6 +36,7 @@ def record_port(
     with suppress(KeyboardInterrupt), Is900(port, config, observer=writer, on_event=report_event) as device:
         names = ", ".join(f"{number} {name}" for number, name in enumerate(device.stations, 1))
         log(f"{device.identification or 'a device'} at {port}; stations {names}; Ctrl-C ends the recording")
+        log(device.setup_note)
         end = threading.Timer(seconds or 0.0, device.close)
         if seconds is not None:
             end.start()
