@@ -18,6 +18,12 @@ DEFAULT_STATION_COUNT = 4
 """Default number of stations of a device: VRPN takes no more (docs/is900.md 11.1)."""
 LINE_FLAGS = ("items", "baud", "quality", "keep_settings")
 """Flags of `add_line_flags`."""
+STATION_CHARACTERS = "123456789ABC"
+"""Characters of the stations that a device may have (docs/is900.md 1)."""
+DEVICE_STATIONS_HELP = (
+    "number of the scenario's stations, or their names, in the order of the device's active stations; or names with "
+    "stations of the device: head=3,torso=1 (default: the first 4)"
+)
 Action = Callable[[argparse.Namespace], Outcome]
 
 
@@ -114,18 +120,56 @@ def parse_items(text: str) -> tuple[int, ...]:
     return tuple(map(int, codes))
 
 
-def parse_stations(args: argparse.Namespace) -> int | list[str]:
-    """The number of the scenario's stations, or their names, from `--stations`; BadInput for an empty name."""
+def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | list[str]:
+    """The number of the scenario's stations, or their names, from `--stations`; BadInput for an empty name.
+
+    With `device` the names may have stations of the device (`head=3`); they are then in the order of the device.
+    """
     from harness.experiment.scenario import load_scenario
 
     if args.stations is None:
         return min(DEFAULT_STATION_COUNT, len(load_scenario(args.scenario).worn_stations))
-    return int(args.stations) if is_whole_number(args.stations) else parse_names(args.stations)
+    if is_whole_number(args.stations):
+        return int(args.stations)
+    return parse_device_names(args.stations) if device else parse_names(args.stations)
+
+
+def parse_device_names(text: str) -> list[str]:
+    """Names of stations with or without stations of the device, in the order of the device."""
+    return list(parse_station_map(text)) if "=" in text else parse_names(text)
+
+
+def parse_station_characters(args: argparse.Namespace) -> str | None:
+    """Characters of the device's stations from `--stations head=3,torso=1`, ascending; None without them."""
+    if args.stations is None or "=" not in args.stations:
+        return None
+    return "".join(parse_station_map(args.stations).values())
+
+
+def parse_station_map(text: str) -> dict[str, str]:
+    """Names with the characters of the device's stations, in the order of the device, from `head=3,torso=1`.
+
+    BadInput for a name without a station, a station that no device has, and a name or station that occurs twice.
+    """
+    pairs = [tuple(part.strip() for part in entry.partition("=")[::2]) for entry in text.split(",")]
+    advice = "Write NAME=STATION for each, such as head=3,torso=1; stations are 1 to 9 and A to C."
+    for name, character in pairs:
+        if not name or not character:
+            raise BadInput(f"--stations {text!r}: {name or character or 'an entry'} has no counterpart.", advice)
+        if len(character) != 1 or character.upper() not in STATION_CHARACTERS:
+            raise BadInput(f"--stations {text!r}: {character!r} is no station of a device.", advice)
+    for what, values in (("name", [name for name, _ in pairs]), ("station", [c.upper() for _, c in pairs])):
+        for value in values:
+            if values.count(value) > 1:
+                raise BadInput(f"--stations {text!r}: {what} {value} occurs {values.count(value)} times.", advice)
+    return dict(sorted(((name, c.upper()) for name, c in pairs), key=lambda pair: STATION_CHARACTERS.index(pair[1])))
 
 
 def parse_names(text: str) -> list[str]:
     """Station names separated by commas; BadInput for an empty name."""
     names = [name.strip() for name in text.split(",")]
+    if "=" in text:
+        raise BadInput(f"--stations {text!r} names stations of a device.", "No device is read here: give names alone.")
     if not all(names):
         raise BadInput(f"--stations {text!r} names no station.", "Separate names by commas: head,torso.")
     return names

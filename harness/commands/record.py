@@ -12,7 +12,9 @@ from harness.commands.common import (
     add_verb,
     is_whole_number,
     line_options,
+    parse_device_names,
     parse_names,
+    parse_station_characters,
     positive_float,
     print_result,
     print_status,
@@ -31,8 +33,11 @@ def add_record(verbs: Verbs) -> None:
     verb = add_verb(verbs, "record", text, run_record, "seed", "mocap", "endless")
     verb.add_argument("port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for a simulated line")
     verb.add_argument("file", type=Path, help="the recording to write")
-    text = "names of the device's active stations, in order; with sim: names or number of the scenario's stations"
-    verb.add_argument("--stations", metavar="A,B", help=text)
+    text = (
+        "names of the device's active stations, in order, or names with stations of the device (head=3,torso=1); "
+        "with sim: names or number of the scenario's stations"
+    )
+    verb.add_argument("--stations", metavar="A,B|A=3,B=1", help=text)
     text = "frames per second, for a device that does not report its rate"
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
@@ -100,8 +105,9 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording.recorder import record_port
     from harness.stream.recording.recording import RecordingWriter
 
-    stations = None if args.stations is None else tuple(parse_names(args.stations))
-    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
+    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
+    named = {"stations": stations, "characters": parse_station_characters(args)}
+    config = DriverConfig(**named, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
         line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)

@@ -6,6 +6,7 @@ from typing import Literal
 
 from harness.errors import BadInput
 from harness.stream.codec.items import BAUD_RATES, STANDARD_LIST, position_range_m, record_type
+from harness.stream.codec.reader import WireFormat
 from harness.stream.codec.records import RecordFormat
 
 QUALITY_ITEMS = (40, 76)
@@ -28,6 +29,10 @@ class DriverConfig:
     stations: tuple[str, ...] | None = None
     """Station names: the first is the first active station of the device, and so on. None takes all, named by their
     characters.
+    """
+    characters: str | None = None
+    """Characters of the device's stations that these names belong to, ascending, such as "13". None takes the first
+    active ones.
     """
     rate_hz: float | None = None
     """Rounds per second of the device, if known. None takes the rate that the device reports, or else measures it."""
@@ -69,6 +74,9 @@ class DriverConfig:
             raise BadInput(f"{self.baud} baud is not possible.", f"An IS-900 uses {_join_commas(BAUD_RATES)}.")
         if self.stations is not None and len(set(self.stations)) < len(self.stations):
             raise BadInput(f"Stations {_join_commas(self.stations)}: a name occurs twice.", "Give each its own name.")
+
+        if self.characters is not None:
+            WireFormat(self.stations or (), 1.0, self.items, characters=self.characters.encode("ascii", "replace"))
 
     @property
     def settings(self) -> RecordFormat:

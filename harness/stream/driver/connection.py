@@ -92,24 +92,23 @@ class DeviceConnection:
 
     def ask(self, query: bytes, reply_type: type[ReplyType], timeout_s: float) -> ReplyType | None:
         """Send a query and return the first reply of this type; None when none arrives within `timeout_s` [s]."""
-        reply = self.ask_until(query, lambda reply: isinstance(reply, reply_type), timeout_s)
-        return reply if isinstance(reply, reply_type) else None
-
-    def ask_until(self, query: bytes, is_answer: Callable[[ParsedReply], bool], timeout_s: float) -> ParsedReply | None:
-        """Send a query and return the first reply that is an answer; None when none arrives within `timeout_s` [s].
-
-        An error record that quotes the query ends the wait.
-        """
         self.send(query)
         until_s = self._host.monotonic_s() + timeout_s
         while (left_s := until_s - self._host.monotonic_s()) > 0.0:
             for reply in self._replies(self.receive(left_s)):
-                if is_answer(reply):
+                if isinstance(reply, reply_type):
                     return reply
-                if isinstance(reply, DeviceError) and reply.command == query.strip().decode("latin-1"):
-                    return None
         last, self._partial = parse_reply(self._partial), b""  # very old firmware omits CR LF (docs/is900.md 6.2)
-        return last if is_answer(last) else None
+        return last if isinstance(last, reply_type) else None
+
+    def collect(self, queries: bytes, count: int) -> list[ParsedReply]:
+        """Send queries and return the next `count` replies, or fewer when no more arrive in time."""
+        self.send(queries)
+        replies: list[ParsedReply] = []
+        until_s = self._host.monotonic_s() + self.timing.answer_s
+        while len(replies) < count and (left_s := until_s - self._host.monotonic_s()) > 0.0:
+            replies += self._replies(self.receive(left_s))
+        return replies
 
     def _replies(self, data: bytes) -> list[ParsedReply]:
         *lines, partial = (self._partial + data).split(b"\n")

@@ -62,7 +62,7 @@ class Is900:
         self._frames: deque[TrackerFrame] = deque()
         self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
         self._line_lock, self._closing = threading.RLock(), threading.Event()
-        self._streaming = False
+        self._streaming = self._closed = False
         self._last_byte_s = self._tracked_s = self._zeroed_s = self._host.monotonic_s()
         self._reconnects = 0
         detected = detect_device(port, candidate_baud_rates(port, self.config), self._connect, self._timing.answer_s)
@@ -70,7 +70,7 @@ class Is900:
         self._stations = StationSelection("", (), "")
         self._found: SessionSettings | None = None
         try:
-            self._stations = select_stations(port, self._line, self.config.stations)
+            self._stations = select_stations(port, self._line, self.config.stations, self.config.characters)
             if self._stations.others:
                 restore_stations(port, self._line, self._stations)
             self._found = read_settings(self._line, self._stations.characters, self._status)
@@ -107,6 +107,11 @@ class Is900:
     def identification(self) -> str:
         """Name that the device reports."""
         return self._status.identification
+
+    @property
+    def station_list(self) -> str:
+        """Characters of the device's stations, with their names: `1 torso, 3 head`."""
+        return ", ".join(f"{c} {name}" for c, name in zip(self._stations.characters, self.stations, strict=True))
 
     @property
     def setup_note(self) -> str:
@@ -153,12 +158,15 @@ class Is900:
                 raise
 
     def close(self) -> None:
-        """Stop the device and end every iteration. May be called from any thread, and more than once."""
-        if self._closing.is_set():
-            return
+        """Stop the device, put its settings back and end every iteration.
+
+        May be called from any thread, and more than once. It returns when the device has its settings.
+        """
         self._closing.set()
         with self._line_lock:
-            line = self._line
+            if self._closed:
+                return
+            self._closed, line = True, self._line
             line.closing = lambda: False
             try:
                 try:
@@ -177,8 +185,10 @@ class Is900:
         with contextlib.suppress(LineLost):
             line.stop()
             is_back = found is not None and put_back(line, found, keep, aligned, config.boresight)
-            for station in self._stations.others:
-                line.send(commands.switch_station(station, True))
+            for station in self._stations.others + self._stations.woken:
+                line.send(commands.switch_station(station, station in self._stations.others))
+            # A port that is closed may drop bytes that have not left it, so wait until the device has answered.
+            is_back = is_back and line.ask(commands.STATUS, StatusRecord, self._timing.answer_s) is not None
         if found is not None and (text := found.describe()) and not keep:
             self._report("settings", f"{'put back' if is_back else 'not put back, the device is gone'}: {text}")
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from harness.errors import BadInput
 from harness.stream.codec import commands
-from harness.stream.codec.replies import OutputList, ParsedReply, StatusRecord, SystemRecord
+from harness.stream.codec.replies import OutputList, StatusRecord, SystemRecord
 from harness.stream.driver.connection import DeviceConnection
 from harness.stream.driver.device_settings import STATION_SETTINGS, StationSetting, Values
 
@@ -54,13 +54,10 @@ class SessionSettings:
 
 def read_settings(line: DeviceConnection, stations: str, status: StatusRecord) -> SessionSettings:
     """Read all settings that the device reports. The device must not stream."""
-    answer_s = line.timing.answer_s
-    lists = {}
-    for station in stations:
-        reply = line.ask(commands.query_output_list(station), OutputList, answer_s)
-        if reply is not None and reply.station == station:
-            lists[station] = reply.items
-    system = line.ask(commands.SYSTEM, SystemRecord, answer_s)
+    queries = b"".join(commands.query_output_list(station) for station in stations) + commands.SYSTEM
+    replies = line.collect(queries, len(stations) + 1)
+    lists = {reply.station: reply.items for reply in replies if isinstance(reply, OutputList)}
+    system = next((reply for reply in replies if isinstance(reply, SystemRecord)), None)
     return SessionSettings(stations, status, system, lists, _read_stations(line, stations, STATION_SETTINGS))
 
 
@@ -117,20 +114,19 @@ def put_back(line: DeviceConnection, found: SessionSettings, keep: bool, aligned
 
 
 def _read_stations(line: DeviceConnection, stations: str, settings: Sequence[StationSetting]) -> StationValues:
-    """Read these settings of all stations. A query that the first station does not answer is not repeated."""
+    """Read these settings of all stations. A setting that one station does not report is not asked of the next."""
     out: StationValues = {}
-    for setting in settings:
-        for station in stations:
-            values = _ask(line, setting, station)
-            if values is None:
-                break
-            out[station, setting.name] = values
+    for station in stations:
+        found = _ask(line, station, settings)
+        if missing := [setting for setting in settings if setting.name not in found]:
+            found |= _ask(line, station, missing)  # the reply may have been damaged
+        settings = [setting for setting in settings if setting.name in found]
+        out |= {(station, name): values for name, values in found.items()}
     return out
 
 
-def _ask(line: DeviceConnection, setting: StationSetting, station: str) -> Values | None:
-    def is_answer(reply: ParsedReply) -> bool:
-        return setting.values_of(reply, station) is not None
-
-    reply = line.ask_until(setting.query(station), is_answer, line.timing.answer_s)
-    return None if reply is None else setting.values_of(reply, station)
+def _ask(line: DeviceConnection, station: str, settings: Sequence[StationSetting]) -> dict[str, Values]:
+    """Query settings of a station, all at once, and return those that it reports."""
+    replies = line.collect(b"".join(setting.query(station) for setting in settings), len(settings))
+    found = {setting.name: [setting.values_of(reply, station) for reply in replies] for setting in settings}
+    return {name: next(v for v in values if v is not None) for name, values in found.items() if any(values)}

@@ -34,8 +34,8 @@ def record_port(
 
     counts: dict[str, int] = {}
     with suppress(KeyboardInterrupt), Is900(port, config, observer=writer, on_event=report_event) as device:
-        names = ", ".join(f"{number} {name}" for number, name in enumerate(device.stations, 1))
-        log(f"{device.identification or 'a device'} at {port}; stations {names}; Ctrl-C ends the recording")
+        name = device.identification or "a device"
+        log(f"{name} at {port}; stations {device.station_list}; Ctrl-C ends the recording")
         log(device.setup_note)
         end = threading.Timer(seconds or 0.0, device.close)
         if seconds is not None:

@@ -53,11 +53,10 @@ def test_a_reset_device_is_configured_again() -> None:
         assert bench.kinds == ["connected", "stalled", "reset", "connected"]
         assert "it reports in ASCII" in bench.events[2].text
         assert stream.counts["reconnects"] == 1
+        assert device_of(bench).settings.binary
     assert max(gaps_s(frames)) < 0.25 + MAX_RECOVERY_S  # the emulator takes 0.25 s to start
     assert_times_increase(frames)
-    device = device_of(bench)
-    assert device.settings.binary
-    assert not device.streaming
+    assert not device_of(bench).streaming
 
 
 def test_device_time_continues_by_the_hosts_clock_over_a_reset() -> None:
