@@ -15,7 +15,6 @@ from harness.commands.common import (
     add_verb,
     line_options,
     parse_names,
-    parse_station_characters,
     parse_stations,
     positive_float,
     positive_int,
@@ -162,8 +161,7 @@ def _calibrate_from_device(args: argparse.Namespace) -> "CalibrationOutcome":
             opened.callback(view.close)
             print_status(view.description)
             displays.append(view)
-        named = {"stations": stations, "characters": parse_station_characters(args)}
-        config = DriverConfig(**named, rate_hz=args.rate, **line_options(args))
+        config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
         device = opened.enter_context(
             Is900(args.port, config, on_event=lambda event: print_status(f"line: {event.text}"))
         )

@@ -83,10 +83,13 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
 
 
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
-    """The driver options that those flags give; BadInput for --baud without a serial port."""
+    """The driver options that those flags and `--stations head=3` give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
-    return {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
+    options = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
+    if args.stations is not None and "=" in args.stations:
+        options["characters"] = "".join(parse_station_map(args.stations).values())
+    return options
 
 
 def is_whole_number(text: str) -> bool:
@@ -137,13 +140,6 @@ def parse_stations(args: argparse.Namespace, *, device: bool = False) -> int | l
 def parse_device_names(text: str) -> list[str]:
     """Names of stations with or without stations of the device, in the order of the device."""
     return list(parse_station_map(text)) if "=" in text else parse_names(text)
-
-
-def parse_station_characters(args: argparse.Namespace) -> str | None:
-    """Characters of the device's stations from `--stations head=3,torso=1`, ascending; None without them."""
-    if args.stations is None or "=" not in args.stations:
-        return None
-    return "".join(parse_station_map(args.stations).values())
 
 
 def parse_station_map(text: str) -> dict[str, str]:

@@ -15,7 +15,6 @@ from harness.commands.common import (
     add_line_flags,
     add_verb,
     line_options,
-    parse_station_characters,
     parse_stations,
     positive_float,
     print_result,
@@ -154,8 +153,7 @@ def _open_device(args: argparse.Namespace, playback: "Playback", events: "list[L
     stations = tuple(playback.scenario.stations)
     options = {"items": tracker.items, **line_options(args)}
     reach_m = playback.reach_m if position_range_m(options["items"]) else None  # it takes a simulation
-    named = {"stations": stations, "characters": parse_station_characters(args)}
-    config = DriverConfig(**options, **named, rate_hz=args.rate, reach_m=reach_m)
+    config = DriverConfig(**options, stations=stations, rate_hz=args.rate, reach_m=reach_m)
     with Is900(args.port, config, on_event=happened) as device:
         runs_hz = device.wire.rate_hz
         if abs(runs_hz - tracker.rate_hz) > _RATE_TOLERANCE * tracker.rate_hz:

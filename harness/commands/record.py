@@ -14,7 +14,6 @@ from harness.commands.common import (
     line_options,
     parse_device_names,
     parse_names,
-    parse_station_characters,
     positive_float,
     print_result,
     print_status,
@@ -106,8 +105,7 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording.recording import RecordingWriter
 
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
-    named = {"stations": stations, "characters": parse_station_characters(args)}
-    config = DriverConfig(**named, rate_hz=args.rate, **line_options(args))
+    config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
         line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)

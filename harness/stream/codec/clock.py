@@ -24,11 +24,11 @@ _Moment = tuple[float, float]
 class ClockUnwrapper:
     """Converts stamps to seconds that continue where the clock was set back.
 
-    A stamp is damaged (NaN) when its station is ahead: since its last stamp less than a period has passed, and less by
-    the host's clock too. It is also damaged when it steps back by more than `CLOCK_TOLERANCE_S`. A damaged stamp with
-    which the next one agrees is believed. Time then goes on, or it continues by the host's clock where the device has
-    reset its own. A smaller step back is returned as it is, since the stamp before it may be the wrong one; `TimeOrder`
-    removes it.
+    A stamp is ahead when it has advanced since its station's last stamp by more than a period and by more than the
+    host's clock. A stamp that is ahead, or that steps back by more than `CLOCK_TOLERANCE_S`, is damaged (NaN), unless
+    the next stamp agrees with it. Time then goes on, or it continues by the host's clock where the device has reset its
+    own. A smaller step back is returned as it is, since the stamp before it may be the wrong one; `TimeOrder` removes
+    it.
     """
 
     def __init__(self, period_s: float, zeroed_s: float | None = None) -> None:

@@ -9,8 +9,9 @@ from types import TracebackType
 from harness.errors import BadInput
 from harness.stream.codec import commands
 from harness.stream.codec.continuous_reader import ContinuousFrameReader
+from harness.stream.codec.items import STANDARD_LIST, position_range_m
 from harness.stream.codec.reader import WireFormat
-from harness.stream.codec.replies import OutputList, StatusRecord
+from harness.stream.codec.replies import Emitter, OutputList, StatusRecord
 from harness.stream.driver.config import DriverConfig, DriverTiming
 from harness.stream.driver.configurator import DeviceConfigurator
 from harness.stream.driver.connection import DeviceConnection, DriverClosed
@@ -25,6 +26,8 @@ from harness.stream.line_events import LineEvent, LineEventKind, LineObserver, N
 
 _RATE_WINDOW_FRAMES = 50
 """Number of frames over which the present frame rate is computed."""
+MAX_EMITTERS = 200
+"""More emitters than any constellation has."""
 _TOGETHER_S = 1e-6
 """Frames of one read get times that differ by less than this [s]."""
 _SHORTEST_RATE_WINDOW_S = 0.2
@@ -76,6 +79,7 @@ class Is900:
             self._found = read_settings(self._line, self._stations.characters, self._status)
             self._report_settings(self._found)
             self._wire = self._configure(self._status, previous_hz=None)
+            self._report_room(self._wire)
         except LineLost as lost:
             self.close()
             raise NoAnswer(f"Port {port}: {lost.why} during configuration.", "Check the cable and try again.") from lost
@@ -191,6 +195,20 @@ class Is900:
             is_back = is_back and line.ask(commands.STATUS, StatusRecord, self._timing.answer_s) is not None
         if found is not None and (text := found.describe()) and not keep:
             self._report("settings", f"{'put back' if is_back else 'not put back, the device is gone'}: {text}")
+
+    def _report_room(self, wire: WireFormat) -> None:
+        """Report emitters that are farther away than the list can carry: stations below them will be, too."""
+        range_m = position_range_m(wire.items)
+        if range_m is None:
+            return
+        replies = self._line.collect(commands.EMITTERS, MAX_EMITTERS)
+        reach_m = max(
+            (abs(x) for reply in replies if isinstance(reply, Emitter) for x in reply.position_m), default=0.0
+        )
+        if reach_m >= range_m:
+            items = ",".join(map(str, STANDARD_LIST))
+            text = f"emitters are up to {reach_m:.2f} m from the tracker's origin, the list carries {range_m:g} m"
+            self._report("out of range", f"{text}: use a list with item 2, as {items}")
 
     def _report_settings(self, found: SessionSettings) -> None:
         """Report what other programs left in the device."""

@@ -118,6 +118,15 @@ def test_positions_beyond_the_range_of_the_list_are_not_valid_and_reported_once(
     assert "40,2,11,21,1" in event.text
 
 
+def test_emitters_beyond_the_range_of_the_list_are_reported_at_set_up() -> None:
+    for items, reported in ((SHORT_LIST, True), (STANDARD_LIST, False)):
+        bench = bench_of(2)
+        device_of(bench).receive(b"MCF10,3.5,0,0,0,0,1,5010\rMCe\r", bench.now_s)
+        bench.driver(DriverConfig(items=items)).close()
+        texts = [event.text for event in bench.events if event.kind == "out of range"]
+        assert ["emitters are up to 3.50 m" in text for text in texts] == [True] * reported
+
+
 def test_a_list_that_does_not_cover_the_room_is_refused() -> None:
     DriverConfig(items=SHORT_LIST, reach_m=2.9)
     DriverConfig(reach_m=5.0)

@@ -143,7 +143,8 @@ def test_a_second_ctrl_c_does_not_keep_the_settings() -> None:
     before, stream = send(bench, QUERIES), bench.driver()
     list(islice(stream, 5))
     assert bench.device is not None
-    receive, pressed = bench.device.receive, []
+    pressed: list[float] = []
+    receive = bench.device.receive
 
     def interrupted(data: bytes, now_s: float) -> None:
         receive(data, now_s)
