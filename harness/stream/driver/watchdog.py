@@ -129,7 +129,7 @@ class Watchdog:
             return []
         self._beyond.update(beyond)
         text = (
-            f"{', '.join(beyond)} farther than {position_range_m(reader.wire.items):g} m from the tracker's origin on "
+            f"station {', '.join(beyond)} is farther than {position_range_m(reader.wire.items):g} m from the tracker's origin on "
             f"an axis: such positions are not valid. Use a list with item 2, as {','.join(map(str, STANDARD_LIST))}"
         )
         return [Diagnosis("none", "out of range", text)]

@@ -161,8 +161,9 @@ def test_a_second_ctrl_c_does_not_keep_the_settings() -> None:
 
 
 def test_a_device_that_restarts_with_saved_settings_gets_its_defaults_again() -> None:
+    """The alignment was saved and then undone, so it is back after the restart only."""
     config = EmulatorConfig(faults=(Fault("reset", at_s=(12.0,)),))
-    bench = shared_bench(SHARED["alignment"][0] + b"\x0b", config)
+    bench = shared_bench(SHARED["alignment"][0] + b"\x0bR1\rR2\r", config)
     with bench.driver() as stream:
         frames = frames_for(stream, bench, 12.0)
         assert stream.counts["reconnects"] == 1
