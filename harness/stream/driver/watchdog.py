@@ -128,10 +128,9 @@ class Watchdog:
         if not beyond:
             return []
         self._beyond.update(beyond)
-        text = (
-            f"station {', '.join(beyond)} is farther than {position_range_m(reader.wire.items):g} m from the tracker's origin on "
-            f"an axis: such positions are not valid. Use a list with item 2, as {','.join(map(str, STANDARD_LIST))}"
-        )
+        range_m, items = position_range_m(reader.wire.items), ",".join(map(str, STANDARD_LIST))
+        where = f"station {', '.join(beyond)} is farther than {range_m:g} m from the tracker's origin on an axis"
+        text = f"{where}: such positions are not valid. Use a list with item 2, as {items}"
         return [Diagnosis("none", "out of range", text)]
 
     def _check_silence(self, now_s: float) -> list[Diagnosis]:
