@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from harness.commands.common import (
+    LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
     is_whole_number,
     line_options,
+    parse_device_names,
     parse_names,
     positive_float,
     print_result,
@@ -30,8 +32,11 @@ def add_record(verbs: Verbs) -> None:
     verb = add_verb(verbs, "record", text, run_record, "seed", "mocap", "endless")
     verb.add_argument("port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for a simulated line")
     verb.add_argument("file", type=Path, help="the recording to write")
-    text = "names of the device's active stations, in order; with sim: names or number of the scenario's stations"
-    verb.add_argument("--stations", metavar="A,B", help=text)
+    text = (
+        "names of the device's active stations, in order, or names with stations of the device (head=3,torso=1); "
+        "with sim: names or number of the scenario's stations"
+    )
+    verb.add_argument("--stations", metavar="A,B|A=3,B=1", help=text)
     text = "frames per second, for a device that does not report its rate"
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
@@ -46,10 +51,11 @@ def run_record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
-        for name in ("items", "baud", "quality"):
+        for name in LINE_FLAGS:
             if getattr(args, name) is not None:
                 raise BadInput(
-                    f"--{name} with {args.port}.", "It is for a device; a simulated line takes it from the scenario."
+                    f"--{name.replace('_', '-')} with {args.port}.",
+                    "It is for a device; a simulated line takes it from the scenario.",
                 )
         return _record_simulation(args, args.port.removeprefix(SIMULATION_PREFIX))
     for name in ("clip", "noise", "poses", "seed"):
@@ -98,18 +104,20 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     from harness.stream.recording.recorder import record_port
     from harness.stream.recording.recording import RecordingWriter
 
-    stations = None if args.stations is None else tuple(parse_names(args.stations))
+    stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
     with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
-        record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
-    return _print_recording(args, writer.counts)
+        line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
+    return _print_recording(args, writer.counts, line.get("out_of_range", 0))
 
 
-def _print_recording(args: argparse.Namespace, counts: Mapping[str, int]) -> Outcome:
+def _print_recording(args: argparse.Namespace, counts: Mapping[str, int], out_of_range: int = 0) -> Outcome:
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
-    content |= {"set_up": counts["conf"], "events": counts["evnt"]}
+    content |= {"set_up": counts["conf"], "events": counts["evnt"], "out_of_range": out_of_range}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
     if not args.file.exists():
         text = f"{args.file}: ended before the device was set up; nothing was recorded"
-    return print_result(args, content, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
+    text += f", {counts['evnt']} events" if counts["evnt"] else ""
+    text += f", {out_of_range} positions beyond the range of the list" if out_of_range else ""
+    return print_result(args, content, text)

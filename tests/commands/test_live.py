@@ -143,6 +143,7 @@ def test_it_ends_after_its_time_and_says_how_it_went(tmp_path: Path, rehearsal: 
         (["--seconds", "soon"], "not a positive number"),
         (["--items", "40;2"], "not a list such as"),
         (["--items", "2,11,21,1"], "(--quality mp)"),
+        (["--clip", "walking_p1_01", "--items", "40,18,19,21,1"], "carries positions up to 3 m"),
         (["--quality", "best"], "invalid choice"),
         (["--port", "tcp://127.0.0.1:1", "--baud", "9600"], "--baud with tcp://127.0.0.1:1"),
         (["--stations", ""], "names no station"),
