@@ -35,6 +35,7 @@ from harness.experiment.simulated_calibration import (
 from harness.mocap.sources import MotionSource
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
+from harness.reconstruct.source_files import source_hash
 from harness.results import manifest, storage
 from harness.score.metrics import VERSIONS
 from harness.score.score import WARM_UP_S
@@ -409,7 +410,7 @@ class ClipEvaluation:
     def key(self, method: Method, name: str, inputs: str, varied: Mapping[str, object]) -> str:
         """Key of a cell. It includes the varied values and the scenario's name, because the cell states both."""
         if name not in self._method_hashes:
-            self._method_hashes[name] = registry.source_hash(method)
+            self._method_hashes[name] = source_hash(method)
         described = {"name": name, "options": repr(method), "source": self._method_hashes[name]}
         content = {**self.conditions_of(method, inputs), "varied": varied, "scenario": self.scenario.name}
         return storage.cell_key(content, described, manifest.source_hash())

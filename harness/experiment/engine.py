@@ -34,6 +34,7 @@ from harness.experiment.scenario import Scenario, dotted_keys, expand_clips
 from harness.experiment.sweep_config import Sweep
 from harness.mocap.library import LibraryFolders
 from harness.reconstruct import registry
+from harness.reconstruct.source_files import source_hash as method_hash
 from harness.results import storage
 from harness.results.index import CellIndex
 from harness.results.lock import folder_lock
@@ -257,4 +258,4 @@ def _session_id() -> str:
 def _source_hash(tasks: Sequence[ClipTask]) -> str:
     """Hash of the source of the package and of all methods."""
     names = sorted({name for task in tasks for name in task.scenario.methods})
-    return content_key([source_hash(), [registry.source_hash(registry.resolve(name)) for name in names]])
+    return content_key([source_hash(), [method_hash(registry.resolve(name)) for name in names]])
