@@ -3,23 +3,18 @@
 Requests and answers are numbers and texts (`core.messages`), so that an answer cannot carry code into this program.
 """
 
-import os
 import signal
-import subprocess
-import sys
 from contextlib import suppress
 from threading import Timer
-from typing import BinaryIO, cast
 
 from harness import errors
 from harness.core.messages import MessageError, read_message, write_message
-from harness.core.package_data import PACKAGE_FOLDER
 from harness.errors import HarnessError, Outcome
 from harness.experiment.file_audit import UndeclaredFile
 from harness.experiment.isolation import Isolation
 from harness.experiment.method_messages import MAX_TEXT, Arrays, Header, Message
+from harness.experiment.worker_process import WorkerProcess, close_worker, start_worker, wait_for
 
-_START = "import sys; sys.path.insert(0, sys.argv[1]); from harness.experiment.method_worker import main; main()"
 _TAINTED = UndeclaredFile.__name__
 _EXIT_S = 5.0
 """Time that a process has to end after its answers ended [s]; then it is killed."""
@@ -35,39 +30,37 @@ class MethodFailure(HarnessError):
 class MethodProcess:
     """The process of one method, started when it is first needed, and again after it ended."""
 
-    def __init__(self, name: str, isolation: Isolation) -> None:
-        self.name, self.isolation = name, isolation
-        self._process: subprocess.Popen[bytes] | None = None
+    def __init__(self, name: str, isolation: Isolation, worker: str = "harness.experiment.method_worker") -> None:
+        """The process runs `main` of the module `worker`."""
+        self.name, self.isolation, self._worker = name, isolation, worker
+        self._process: WorkerProcess | None = None
         self.starts = 0
         """Number of times that the process was started. What it was sent before is lost with each."""
         self._requests = 0
 
-    def start(self) -> "subprocess.Popen[bytes]":
+    def start(self) -> WorkerProcess:
         """Start the process unless it runs; it gets ready on its own."""
         if self._process is None or self._process.poll() is not None:
             self.close()
-            command = [sys.executable, "-B", "-P", "-c", _START, str(PACKAGE_FOLDER.parent)]
-            pipe = subprocess.PIPE
-            self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, start_new_session=True)
+            self._process = start_worker(self._worker)
             self.starts += 1
         return self._process
 
     def request(self, header: Header, arrays: Arrays, max_bytes: float) -> Message:
         """Send a request and return the answer; MethodFailure, and the errors of the package that the method raises."""
         process, limit_s, expired = self.start(), self.isolation.time_limit_s, list[float]()
-        requests, answers = cast(BinaryIO, process.stdin), cast(BinaryIO, process.stdout)
 
         def expire() -> None:
             expired.append(limit_s)
-            _kill(process)
+            process.kill()
 
         timer = Timer(limit_s, expire)
         timer.daemon = True
         timer.start()
         try:
             self._requests += 1
-            write_message(requests, {**header, "request": self._requests, "limit_s": limit_s + _EXIT_S}, arrays)
-            answer = read_message(answers, max_bytes)
+            write_message(process.requests, {**header, "request": self._requests, "limit_s": limit_s + _EXIT_S}, arrays)
+            answer = read_message(process.answers, max_bytes)
             if answer[0].pop("request", None) != self._requests:
                 raise MessageError("the answer to another request")
         except (OSError, MessageError) as error:
@@ -87,17 +80,11 @@ class MethodProcess:
         """End the process and those that it started."""
         process, self._process = self._process, None
         if process is not None:
-            _kill(process)
-            process.wait()
-            for stream in (process.stdin, process.stdout):
-                with suppress(OSError):
-                    cast(BinaryIO, stream).close()
+            close_worker(process)
 
-    def _describe_end(self, process: "subprocess.Popen[bytes]", expired: bool, error: Exception) -> str:
+    def _describe_end(self, process: WorkerProcess, expired: bool, error: Exception) -> str:
         """Why there is no answer, in one line."""
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(_EXIT_S)
-        code = process.poll()
+        code = wait_for(process, _EXIT_S)
         self.close()
         if expired:
             return f"{self.name} gave no answer within {self.isolation.time_limit_s:g} s. Raise --time-limit."
@@ -108,15 +95,6 @@ class MethodProcess:
             memory = " The machine may be out of memory." if code == -9 else ""
             return f"The process of {self.name} was killed by {names.get(-code, f'signal {-code}')}.{memory}"
         return f"The process of {self.name} ended with exit code {code}."
-
-
-def _kill(process: "subprocess.Popen[bytes]") -> None:
-    """Kill a process and those that it started."""
-    with suppress(ProcessLookupError, PermissionError):
-        if sys.platform != "win32":
-            os.killpg(process.pid, signal.SIGKILL)
-        else:
-            process.kill()
 
 
 def _to_exception(header: Header, isolation: Isolation) -> Exception:

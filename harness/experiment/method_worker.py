@@ -1,7 +1,7 @@
 """The process of one method: it makes the method, trains it and runs it, and sees no truth and no other method.
 
-It reads requests from its standard input and answers on its standard output (`core.messages`). What the method prints
-goes to stderr. The process ends with the process that started it. Only `method_process` starts it.
+It reads requests and writes answers (`core.messages`). What the method prints goes to stderr. The process ends with
+the program that started it (`worker_process`).
 """
 
 import os
@@ -35,21 +35,14 @@ class MethodWorker:
 
     def __init__(self) -> None:
         self._audit = FileAudit()
-        self._method: Method | None = None
+        self.method: Method | None = None
         self._fits: dict[int, Reconstructor] = {}
         self._sessions: dict[int, Session] = {}
 
     def answer(self, header: Header, arrays: Arrays) -> Message:
         """The answer to a request; whatever the method raises, SystemExit and KeyboardInterrupt too, is an answer."""
-        operations: dict[str, Callable[[Header, Arrays], Message]] = {
-            "describe": self._describe,
-            "fit": self._fit,
-            "run": self._run,
-            "begin": self._begin,
-            "step": self._step,
-        }
         try:
-            answer = operations[header["operation"]](header, arrays)
+            answer = self.operations()[header["operation"]](header, arrays)
             if self._audit.violation is not None:
                 raise self._audit.violation
         except BaseException as error:
@@ -59,13 +52,23 @@ class MethodWorker:
             return {"error": type(error).__name__, "text": text, "message": str(error), "fields": fields}, {}
         return answer
 
+    def operations(self) -> dict[str, Callable[[Header, Arrays], Message]]:
+        """Name -> the function that answers a request of that name."""
+        return {
+            "describe": self._describe,
+            "fit": self._fit,
+            "run": self._run,
+            "begin": self._begin,
+            "step": self._step,
+        }
+
     def _describe(self, header: Header, arrays: Arrays) -> Message:
         sys.path[:] = header["path"]
         _limit_memory(header["memory_bytes"])
         method = registry.resolve(header["name"])
         files = source_files(method, tuple(sys.modules.values()))
         self._audit.cover(files)
-        self._method = method
+        self.method = method
         return {
             "summary": str(method.summary),
             "needs_examples": bool(method.needs_examples),
@@ -74,11 +77,11 @@ class MethodWorker:
         }, {}
 
     def _fit(self, header: Header, arrays: Arrays) -> Message:
-        if self._method is None:
+        if self.method is None:
             raise RuntimeError("the method was not described")
         for number in sorted(self._fits)[: max(len(self._fits) + 1 - _KEPT_FITS, 0)]:
             del self._fits[number]
-        self._fits[header["fit"]] = self._method.fit(*decode_training(header, arrays))
+        self._fits[header["fit"]] = self.method.fit(*decode_training(header, arrays))
         return {}, {}
 
     def _run(self, header: Header, arrays: Arrays) -> Message:
@@ -101,18 +104,21 @@ class MethodWorker:
         return {"status": status, "origin": origin}, {"qpos": np.asarray(estimate.qpos, dtype=np.float64)}
 
 
-def main() -> None:
-    """Answer requests until the standard input ends."""
-    requests, replies = _take_streams()
+def serve(worker: MethodWorker, *descriptors: str) -> None:
+    """Answer requests until they end; without the descriptors of both streams, on standard input and output."""
+    requests, replies = _open_streams(*map(int, descriptors)) if descriptors else _take_streams()
     inbox = SimpleQueue[tuple[dict[str, Any], Any]]()
     Thread(target=_receive, args=(requests, inbox), daemon=True).start()
-    worker = MethodWorker()
     while True:
         header, arrays = inbox.get()
         _limit_time(header["limit_s"])
         answer = worker.answer(header, arrays)
         _limit_time(0.0)
         write_message(replies, {**answer[0], "request": header["request"]}, answer[1])
+
+
+def _open_streams(requests: int, replies: int) -> tuple[BinaryIO, BinaryIO]:
+    return os.fdopen(requests, "rb"), os.fdopen(replies, "wb")
 
 
 def _take_streams() -> tuple[BinaryIO, BinaryIO]:
@@ -150,5 +156,6 @@ def _limit_memory(limit_bytes: int) -> None:
         resource.setrlimit(resource.RLIMIT_DATA, (limit_bytes, limit_bytes))
 
 
-if __name__ == "__main__":
-    main()
+def main(*descriptors: str) -> None:
+    """Serve a method to a run."""
+    serve(MethodWorker(), *descriptors)

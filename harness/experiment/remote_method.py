@@ -33,6 +33,7 @@ from harness.experiment.method_messages import (
 )
 from harness.experiment.method_process import MethodFailure, MethodProcess
 from harness.experiment.method_run import MethodAnswers, run_method
+from harness.experiment.worker_process import close_fork_server
 from harness.reconstruct import registry
 from harness.reconstruct.contract import Method, Reconstructor
 from harness.reconstruct.source_files import source_hash
@@ -213,6 +214,7 @@ def close_methods() -> None:
     """End the processes of all methods."""
     while _remote_methods:
         _remote_methods.popitem()[1].process.close()
+    close_fork_server()
 
 
 def hash_method(method: Method) -> str:
