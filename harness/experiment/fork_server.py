@@ -6,6 +6,7 @@ started it.
 
 import gc
 import os
+import signal
 import socket
 import sys
 from contextlib import suppress
@@ -25,10 +26,18 @@ def main(number: str) -> None:
         if word == "fork":
             server.send(str(_fork(server, argument, descriptors)).encode())
         elif word == "poll":
-            pid, status = os.waitpid(int(argument), os.WNOHANG)
-            server.send(str(os.waitstatus_to_exitcode(status) if pid else "running").encode())
+            server.send(_poll(int(argument)).encode())
         else:
             os._exit(0)
+
+
+def _poll(pid: int) -> str:
+    """The exit code of a worker, or `running`."""
+    try:
+        ended, status = os.waitpid(pid, os.WNOHANG)
+    except ChildProcessError:  # it was asked before
+        return str(-signal.SIGKILL)
+    return str(os.waitstatus_to_exitcode(status)) if ended else "running"
 
 
 def _fork(server: socket.socket, module: str, descriptors: list[int]) -> int:

@@ -5,7 +5,7 @@ Requests and answers are numbers and texts (`core.messages`), so that an answer 
 
 import signal
 from contextlib import suppress
-from threading import Timer
+from threading import Lock, Timer
 
 from harness import errors
 from harness.core.messages import MessageError, read_message, write_message
@@ -37,6 +37,8 @@ class MethodProcess:
         self.starts = 0
         """Number of times that the process was started. What it was sent before is lost with each."""
         self._requests = 0
+        self._lock = Lock()
+        """Held during a request: sessions in several threads share the process."""
 
     def start(self) -> WorkerProcess:
         """Start the process unless it runs; it gets ready on its own."""
@@ -48,6 +50,10 @@ class MethodProcess:
 
     def request(self, header: Header, arrays: Arrays, max_bytes: float) -> Message:
         """Send a request and return the answer; MethodFailure, and the errors of the package that the method raises."""
+        with self._lock:
+            return self._request(header, arrays, max_bytes)
+
+    def _request(self, header: Header, arrays: Arrays, max_bytes: float) -> Message:
         process, limit_s, expired = self.start(), self.isolation.time_limit_s, list[float]()
 
         def expire() -> None:

@@ -68,7 +68,7 @@ def close_worker(process: WorkerProcess) -> None:
 
 
 def _command(module: str, *arguments: str) -> list[str]:
-    return [sys.executable, "-B", "-P", "-c", _START, str(PACKAGE_FOLDER.parent), module, *arguments]
+    return [sys.executable, "-B", "-P", "-u", "-c", _START, str(PACKAGE_FOLDER.parent), module, *arguments]
 
 
 class _SpawnedWorker:
