@@ -2,6 +2,7 @@
 
 import io
 import json
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ ARRAYS = {
 }
 
 
-def written(header: dict[str, object]) -> bytes:
+def written(header: Mapping[str, object]) -> bytes:
     file = io.BytesIO()
     write_message(file, header, ARRAYS)
     return file.getvalue()
