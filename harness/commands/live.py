@@ -86,11 +86,12 @@ def run_live(args: argparse.Namespace) -> Outcome:
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
     from harness.calibrate.calibration_file import read_calibration
+    from harness.experiment.isolation import DEFAULT_ISOLATION
     from harness.experiment.playback import prepare_playback
+    from harness.experiment.remote_method import resolve_method
     from harness.live import summary
     from harness.live.scheduling_jitter import JitterProbe
     from harness.live.session import LiveOptions, run_session, warm_up
-    from harness.reconstruct import registry
 
     options = {"clip": args.clip, "rate_hz": args.rate, "seed": args.seed, "folder": args.mocap}
     playback = prepare_playback(args.scenario, stations=parse_stations(args, device=True), **options)
@@ -98,7 +99,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         if not Path(args.calibration).suffix:
             raise UnknownName("file or kind of calibration", args.calibration, _CALIBRATION_KINDS)
         playback = playback.with_calibration(read_calibration(args.calibration))
-    method = registry.resolve(args.method)
+    method = resolve_method(args.method, DEFAULT_ISOLATION)
     events: list[LineEvent] = []
     if args.calibration == "poses":
         playback = playback.with_calibration(_calibrate_by_poses(args, playback, events))

@@ -7,6 +7,7 @@ from contextlib import redirect_stdout
 from pathlib import Path
 
 from harness.commands.common import Verbs, add_verb, print_result, this_command
+from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -17,6 +18,7 @@ def add_run(verbs: Verbs) -> None:
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     text = "methods instead of the scenario's, such as ik,best_match+ik,my_module:MyMethod[option=3]"
     verb.add_argument("--methods", metavar="A,B", help=text)
+    add_isolation_flags(verb)
     verb.add_argument("--movie", action="store_true", help="also write an mp4 of the worst cell of each method")
     verb.add_argument("--no-report", dest="report", action="store_false", help="write no report.html and no plots")
 
@@ -38,7 +40,15 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
     with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
-        outcome = engine.run(scenario, out, folder=args.mocap, jobs=args.jobs, command=this_command(), progress=bar)
+        outcome = engine.run(
+            scenario,
+            out,
+            folder=args.mocap,
+            jobs=args.jobs,
+            command=this_command(),
+            progress=bar,
+            isolation=read_isolation(args),
+        )
     page = None
     if args.report:
         from harness.report.run.writer import write_run_page
