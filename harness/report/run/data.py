@@ -11,7 +11,8 @@ import numpy as np
 from harness.core.arrays import Bools, Floats, Ints
 from harness.core.humanoid24 import standard_skeleton
 from harness.report.kit.style import STYLES
-from harness.results.cell import Cell, cell_folder, varied_text
+from harness.results.cell import Cell, as_row, cell_folder, varied_text
+from harness.results.integrity import SUMMARY, check_folder, check_row
 from harness.results.manifest import Manifest
 from harness.results.storage import read_cell, read_summary
 from harness.results.summary import GROUP_KEYS
@@ -125,11 +126,18 @@ class RunData:
 
 
 def read_run(out: Path) -> RunData:
-    """Read the run in `out` one cell at a time; BadFile if the folder holds no run or a damaged one."""
+    """Read the run in `out` one cell at a time; BadFile if the folder holds no run, or a damaged or edited one."""
+    check_folder(out)
     manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
     run = RunData(out, manifest, _last_varied(summary), (), summary)
-    keys = [str(row["key"]) for row in run.cells]
-    return replace(run, traces=tuple(_trace(run, run.cell(key)) for key in keys))
+    return replace(run, traces=tuple(_trace(run, _cell_of_row(run, row)) for row in run.cells))
+
+
+def _cell_of_row(run: RunData, row: Row) -> Cell:
+    """The cell of a row of the summary; BadFile when they differ."""
+    cell = run.cell(str(row["key"]))
+    check_row(run.out / SUMMARY, row, as_row(cell))
+    return cell
 
 
 def _last_varied(summary: Row) -> Row:

@@ -11,6 +11,7 @@ from harness.core.arrays import Ints
 from harness.report.sweep.data import METRICS, SweepData, VariedKey
 from harness.results.cell import varied_text
 from harness.results.index import CellIndex
+from harness.results.integrity import check_folder
 
 _GROUP_COLUMNS = ("inputs", "split", "performer")
 """Columns that are never pooled: each combination of them is a series of its own. The performer must be last."""
@@ -18,7 +19,11 @@ _COLUMNS = ("scenario", "clip", "method", *_GROUP_COLUMNS, "varied", *METRICS)
 
 
 def read_sweep(out: Path) -> SweepData:
-    """The finished cells of the sweep in `out`, also while it runs; BadFile if `out` holds no sweep."""
+    """The finished cells of the sweep in `out`, also while it runs.
+
+    BadFile if `out` holds no sweep, or a damaged or edited one.
+    """
+    check_folder(out)
     with CellIndex(out, read_only=True) as index:
         counts, failures, facts = index.counts(), index.failures(), index.facts()
         return collect_cells(
