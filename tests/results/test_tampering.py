@@ -113,7 +113,7 @@ OF_CELLS: dict[str, tuple[Change, str]] = {
     "metric negative": (cell(lambda f: edit(f, r'("mpjpe_mm": )', r"\1-")), "cell.json"),
     "metric not finite": (cell(lambda f: edit(f, r'("mpjpe_mm": )[\d.]+', r"\1NaN")), "cell.json"),
     "metric removed": (cell(lambda f: edit(f, r' *"mpjpe_mm": [\d.]+,\n', "")), "cell.json"),
-    "joint halved": (cell(lambda f: edit(f, r'("lowerback.rx": )[\d.]+\', r"\g<1>0.5")), "cell.json"),
+    "joint halved": (cell(lambda f: edit(f, r'("lowerback.rx": )[\d.]+', r"\g<1>0.5")), "cell.json"),
     "condition changed": (cell(lambda f: edit(f, '"defined_by": {', '"defined_by": {"rate": 1,')), "cell.json"),
     "method renamed": (cell(lambda f: edit(f, '"method": "', '"method": "my_')), "cell.json"),
     "blank added": (cell(lambda f: edit(f, "\n}\n", "\n }\n")), "cell.json"),
