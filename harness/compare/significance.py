@@ -4,16 +4,18 @@ If A and B were equally good, the difference of each clip could equally have the
 share of all sign flips whose mean is at least as far from zero as the observed mean (Fisher's randomisation test). It
 is exact for up to 16 clips; for more it uses 20,000 draws of a named generator. Holm 1979 corrects for the number of
 gated lines. A line whose sides agree on every clip can never differ significantly and is not counted (Tarone 1990).
+Nor is a line of fewer than `MIN_CLIPS` clips. Such a line can still be shown to be *same*, since equivalence needs an
+interval within the margin and no p.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
-from harness.compare.paired_statistics import MIN_CLIPS, bootstrap_interval, round_to_grid
+from harness.compare.paired_statistics import MIN_CLIPS, mean_interval, round_to_grid
 from harness.core.arrays import Floats
 from harness.core.seeds import generator
 
@@ -29,33 +31,48 @@ class SignificanceResult:
     verdict: Verdict
     why: str
     low: float | None = None
-    """Lower end of the 95 % interval of the mean; this and the following are None with fewer than `MIN_CLIPS` clips."""
+    """Lower end of the 95 % interval of the mean; None with fewer than two clips, unless they have no difference."""
     high: float | None = None
     p: float | None = None
+    """None, as `p_holm`, with fewer than `MIN_CLIPS` clips."""
     p_holm: float | None = None
     """`p` corrected for the number of lines."""
 
 
-def decide_verdicts(lines: Sequence[Floats], margins: Sequence[float]) -> list[SignificanceResult]:
+def decide_verdicts(
+    lines: Sequence[Floats], margins: Sequence[float], decided: Collection[int] | None = None
+) -> list[SignificanceResult]:
     """Decide on lines that are tested together; each has (clips,) differences and a margin; an increase is worse.
 
     *Worse* and *better*: p after Holm is at most 0.05, the interval excludes zero, and the mean exceeds the margin.
-    *Same*: the whole interval lies within the margin. Anything else is undecided ("cannot tell").
+    *Same*: the whole interval lies within the margin, or no clip differs. Anything else is undecided ("cannot tell").
+    `decided` names the lines whose results are needed, by default all; the others count in the correction alone.
     """
     tested = [at for at, line in enumerate(lines) if len(line) >= MIN_CLIPS]
     p = {at: sign_flip_p(lines[at]) for at in tested}
     counted = [at for at in tested if np.any(lines[at])]
     corrected = dict(zip(counted, holm([p[at] for at in counted]), strict=True))
     results = []
-    for at, (line, margin) in enumerate(zip(lines, margins, strict=True)):
+    for at in range(len(lines)) if decided is None else decided:
+        line, margin = lines[at], margins[at]
         if at not in p:
-            results.append(SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}"))
+            results.append(_decide_on_few_clips(line, margin))
             continue
-        low, high = bootstrap_interval(line)
+        low, high = mean_interval(line)
         p_holm = corrected.get(at, 1.0)
         verdict = _verdict(line, low, high, p_holm, margin, len(counted))
         results.append(SignificanceResult(*verdict, low, high, p[at], p_holm))
     return results
+
+
+def _decide_on_few_clips(line: Floats, margin: float) -> SignificanceResult:
+    """*Same* or undecided: no p of fewer than `MIN_CLIPS` clips is small enough for a difference."""
+    if len(line) and not np.any(line):
+        return SignificanceResult("same", "no clip differs", 0.0, 0.0)
+    low, high = mean_interval(line) if len(line) > 1 else (None, None)
+    if low is not None and high is not None and -margin <= low and high <= margin:
+        return SignificanceResult("same", "the whole interval lies within the margin", low, high)
+    return SignificanceResult("cannot tell", f"too few clips: {len(line)}, of at least {MIN_CLIPS}", low, high)
 
 
 def _verdict(line: Floats, low: float, high: float, p: float, margin: float, lines: int) -> tuple[Verdict, str]:

@@ -103,12 +103,41 @@ def told(difference: Floats, margin: float, beside: int = 0) -> SignificanceResu
         (0.5 * SCATTER, "cannot tell", "contains zero"),
         (0.5 + 0.01 * SCATTER[:5], "cannot tell", "too few clips: 5, of at least 6"),
         (np.zeros(0), "cannot tell", "too few clips: 0"),
+        (np.zeros(5), "same", "no clip differs"),
+        (np.zeros(1), "same", "no clip differs"),
+        (np.array([1e-9]), "cannot tell", "too few clips: 1"),
+        (0.02 * SCATTER[:5], "same", "within the margin"),
+        (0.1 + 0.01 * SCATTER[:3], "same", "within the margin"),
+        (0.5 * SCATTER[:5], "cannot tell", "too few clips: 5"),
+        (np.array([0.1999, 0.1998]), "cannot tell", "too few clips: 2"),
     ],
 )
 def test_verdicts(difference: Floats, verdict: str, why: str) -> None:
     found = told(difference, margin=0.2)
     assert (found.verdict, found.p is None) == (verdict, len(difference) < 6)
     assert why in found.why
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_few_clips_are_seldom_called_the_same_when_the_true_difference_is_the_margin(count: int) -> None:
+    """The interval is exact for normal differences, so that 2.5 % of them lie below a true mean at the margin."""
+    draws = generator(1, "few clips", count).normal(1.0, 0.2, (4_000, count))
+    same = [result.verdict == "same" for result in decide_verdicts(list(draws), [1.0] * len(draws))]
+    assert np.mean(same) == pytest.approx(0.025, abs=4.0 * np.sqrt(0.025 * 0.975 / len(draws)))
+
+
+def test_the_interval_of_few_clips_by_hand() -> None:
+    """Mean 2, standard deviation 1, three values: t = 4.302653 (tables), so 2 -+ 4.302653 / sqrt(3)."""
+    found = told(np.array([1.0, 2.0, 3.0]), 9.0)
+    assert (found.low, found.high) == pytest.approx((2.0 - 2.484138, 2.0 + 2.484138), abs=1e-5)
+
+
+def test_lines_that_are_not_decided_count_in_the_correction() -> None:
+    clear: Floats = 1.0 + 0.01 * np.arange(8.0)
+    lines = [clear, *[np.array([1.0, -1.0] * 4)] * 9]
+    (alone,), (among,) = decide_verdicts([clear], [0.1]), decide_verdicts(lines, [0.1] * 10, [0])
+    assert (alone.verdict, among.verdict) == ("worse", "cannot tell")
+    assert among == decide_verdicts(lines, [0.1] * 10)[0]
 
 
 def test_six_clips_can_show_nothing_among_many_lines() -> None:

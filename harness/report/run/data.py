@@ -111,15 +111,7 @@ class RunData:
 
     def series_of(self, row: Row) -> str:
         """The series that a row of the summary belongs to."""
-        rows = self.full_summary["methods"]
-        parts = []
-        if len({r["inputs"] for r in rows}) > 1:
-            parts.append(str(row["inputs"]))
-        if len({r["split"] for r in rows if r["method"] == row["method"]}) > 1:
-            parts.append(f"split {row['split']}")
-        if len({r["performer"] for r in rows}) > 1:
-            parts.append(f"{row['performer'] or 'no'} performer")
-        return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+        return series_name(row, self.full_summary["methods"])
 
     def cell(self, key: str) -> Cell:
         return read_cell(cell_folder(self.out, key))
@@ -129,7 +121,7 @@ def read_run(out: Path) -> RunData:
     """Read the run in `out` one cell at a time; BadFile if the folder holds no run, or a damaged or edited one."""
     check_folder(out)
     manifest, summary = Manifest.read(out / "manifest.json"), read_summary(out)
-    run = RunData(out, manifest, _last_varied(summary), (), summary)
+    run = RunData(out, manifest, last_varied(summary), (), summary)
     return replace(run, traces=tuple(_trace(run, _cell_of_row(run, row)) for row in run.cells))
 
 
@@ -140,7 +132,19 @@ def _cell_of_row(run: RunData, row: Row) -> Cell:
     return cell
 
 
-def _last_varied(summary: Row) -> Row:
+def series_name(row: Row, rows: Sequence[Row]) -> str:
+    """Name of the series of a row: its method, qualified by what varies among `rows`, the methods of the summary."""
+    parts = []
+    if len({r["inputs"] for r in rows}) > 1:
+        parts.append(str(row["inputs"]))
+    if len({r["split"] for r in rows if r["method"] == row["method"]}) > 1:
+        parts.append(f"split {row['split']}")
+    if len({r["performer"] for r in rows}) > 1:
+        parts.append(f"{row['performer'] or 'no'} performer")
+    return str(row["method"]) + (f" ({', '.join(parts)})" if parts else "")
+
+
+def last_varied(summary: Row) -> Row:
     """The part of a summary with the last combination of varied values."""
     if not summary["cells"]:
         return summary
