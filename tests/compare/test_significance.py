@@ -126,6 +126,27 @@ def test_few_clips_are_seldom_called_the_same_when_the_true_difference_is_the_ma
     assert np.mean(same) == pytest.approx(0.025, abs=4.0 * np.sqrt(0.025 * 0.975 / len(draws)))
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "least", "most"),
+    [("normal", 0.02, 0.03), ("t3", 0.01, 0.03), ("worse tail", 0.06, 0.13), ("better tail", 0.0, 0.02)],
+)
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_how_often_few_clips_are_called_the_same_at_the_margin(
+    name: str, least: float, most: float, count: int
+) -> None:
+    """The table of docs/studies.md; the standard deviation is a tenth of the margin."""
+    rng, shape = generator(1, "at the margin", name, count), (20_000, count)
+    draws = {
+        "normal": rng.normal(size=shape),
+        "t3": rng.standard_t(3, size=shape) / np.sqrt(3.0),
+        "worse tail": rng.exponential(size=shape) - 1.0,
+        "better tail": 1.0 - rng.exponential(size=shape),
+    }[name]
+    results = decide_verdicts(list(1.0 + 0.1 * draws), [1.0] * len(draws))
+    assert least <= np.mean([result.verdict == "same" for result in results]) <= most
+
+
 def test_the_interval_of_few_clips_by_hand() -> None:
     """Mean 2, standard deviation 1, three values: t = 4.302653 (tables), so 2 -+ 4.302653 / sqrt(3)."""
     found = told(np.array([1.0, 2.0, 3.0]), 9.0)
