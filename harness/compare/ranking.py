@@ -66,7 +66,7 @@ def rank_methods(values: Mapping[str, ClipValues], metric: str) -> Ranking | Non
     pairs = [(name, each) for each in metrics for name in others]
     lines = [_paired(measured[name], measured[lowest], each) for name, each in pairs]
     kept = [(line, margin) for line, margin in lines if len(line)]
-    results = decide_verdicts(*zip(*kept, strict=True), range(len(others))) if others else []
+    results = decide_verdicts([line for line, _ in kept], [margin for _, margin in kept], range(len(others)))
     ordered = {name: columns[name] for name in (lowest, *others)}
     return Ranking(metric, clips, ordered, dict(zip(others, results, strict=True)))
 
