@@ -8,8 +8,8 @@ from harness.compare.ranking import Ranking
 from harness.core.number_format import count_noun, format_share
 from harness.report.kit.text import list_first
 
-BOLD_NOTE = "Bold: better than every other method, as `harness compare` decides."
-"""Caption of tables with bold cells."""
+BOLD_NOTE = " Bold: better than every other method, by the rules of harness compare."
+"""End of the caption of a table with bold cells."""
 _MOST_NAMED = 4
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.core.number_format import count_noun, format_share
-from harness.report.kit.text import describe_motion_source
+from harness.report.kit.text import describe_motion_source, name_motion
 from harness.report.run.data import RunData
 from harness.report.run.ranking import describe_rankings
 from harness.results.cell import varied_text
@@ -42,7 +42,8 @@ def build_headline(run: RunData) -> Headline:
         "Not measured": _unmeasured(run),
     }
     facts = {title: text for title, text in facts.items() if text}
-    rankings = describe_rankings(run.full_summary, _source(run))
+    source = str(run.manifest.inputs.get("motion_source", "unknown source"))
+    rankings = describe_rankings(run.full_summary, name_motion(source))
     if not rankings:
         return Headline(f"Nothing was measured: {_progress(run)}.", None, facts)
     sentences = [text for ranking, lowest in rankings for text in (ranking, *_positions(run, lowest))]
@@ -70,11 +71,6 @@ def _by_sequence(run: RunData, series: str, metric: str) -> dict[SequenceKey, fl
         for row in run.cells
         if run.series_of(row) == series and row[metric] is not None
     }
-
-
-def _source(run: RunData) -> str:
-    source = str(run.manifest.inputs.get("motion_source", "unknown source"))
-    return "built-in motion" if "built-in" in source else f"motion from {source}"
 
 
 def _motion(run: RunData) -> str:

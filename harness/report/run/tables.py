@@ -74,7 +74,8 @@ def behaviour_table(run: RunData, metric: str, values: Mapping[str | None, Value
     notes = {run.series_of(row): _fallback_note(row) for row in run.summary["methods"]}
     rows = [[join(name, notes.get(name)), *(cell(name, column) for column in values)] for name in run.series]
     caption = join(
-        tag("b", f"{metric} [{unit}]"), f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences. {BOLD_NOTE}"
+        tag("b", f"{metric} [{unit}]"),
+        f": {DEFINITIONS[metric].text}. Mean ± sd over n sequences.{BOLD_NOTE if any(best.values()) else ''}",
     )
     return html_table(Table(["method", *titles], rows), caption, label=metric)
 

@@ -63,7 +63,9 @@ def _grid(
         for at, (name, row) in enumerate(zip(names, statistics, strict=True))
     ]
     definition = DEFINITIONS[metric]
-    caption = join(tag("b", f"{metric} [{definition.unit}]"), f": {definition.text}. Mean {over}. {BOLD_NOTE}")
+    caption = join(
+        tag("b", f"{metric} [{definition.unit}]"), f": {definition.text}. Mean {over}.{BOLD_NOTE if any(best) else ''}"
+    )
     return html_table(Table(head, rows), caption, label=metric)
 
 

@@ -49,6 +49,7 @@ def test_the_page_opens_on_the_verdict(run_folder: Path) -> None:
     others = "ik, best_match, mean_pose"
     assert f"Cannot tell whether it is better than {others}: too few clips: 2, of at least 6." in heading[1]
     assert "<td><strong>" not in page
+    assert "Bold: " not in page
 
 
 def test_the_verdicts_numbers_are_those_of_the_summary(run_folder: Path) -> None:
@@ -82,6 +83,7 @@ def test_headline_bold_cells_terminal_and_comparison_agree(ten_clips: Path) -> N
     bold = re.findall(r"<td><strong>([\d.]+)", page)
     assert f"{errors['good']:.2f}" in bold
     assert f"{errors['poor']:.2f}" not in bold
+    assert "Mean ± sd over n sequences. Bold: better than every other method" in page
 
 
 def test_methods_that_cannot_be_told_apart_are_not_ranked(ten_clips: Path) -> None:
