@@ -1,7 +1,7 @@
 """Checks the files of a run or sweep against their digests before anything is read from them.
 
-The index has the digest of summary.json, which has those of manifest.json and summary.csv. Cells are checked when they
-are read (`cell.read_content`).
+The index has the digests of manifest.json, summary.json and summary.csv. Cells are checked when they are read
+(`cell.read_content`).
 """
 
 from collections.abc import Mapping
@@ -10,13 +10,13 @@ from typing import Any
 
 from harness.errors import BadFile
 from harness.results.cell import cell_folder
-from harness.results.digests import check_file, read_result_json
+from harness.results.digests import check_file, file_digest, read_result_json
 from harness.results.index import CellIndex
 from harness.results.manifest import Manifest
 
 SUMMARY = "summary.json"
-DIGESTED_FILES = ("manifest.json", "summary.csv")
-"""Files whose digests stand in summary.json."""
+DIGESTED_FILES = ("manifest.json", SUMMARY, "summary.csv")
+"""Files of a run or sweep whose digests stand in the index."""
 _ADVICE = "Give the command of the run again; finished cells are kept."
 
 
@@ -39,19 +39,16 @@ def check_index(out: Path) -> None:
             expected = f"{index.counts().finished} finished cells"
             raise BadFile(cell_folder(out, missing[0]), "no such folder", expected, _ADVICE)
         try:
-            _check_summary(out, digests or {})
+            for name, digest in (digests or {}).items():
+                check_file(out / name, digest, f"the {name} that the index names", _ADVICE)
         except BadFile:
             if index.check_digest() == digests:  # otherwise another process began to write meanwhile
                 raise
 
 
-def _check_summary(out: Path, digests: Mapping[str, str]) -> None:
-    if SUMMARY not in digests:
-        return
-    content = read_summary_json(out)
-    check_file(out / SUMMARY, digests[SUMMARY], "the summary that the index names", _ADVICE)
-    for name in DIGESTED_FILES:
-        check_file(out / name, content["digests"][name], f"the {name} that the summary names", _ADVICE)
+def compute_digests(out: Path) -> dict[str, str]:
+    """The digests of `DIGESTED_FILES`; BadFile when one cannot be read."""
+    return {name: file_digest(out / name, "a file of a run or sweep", _ADVICE) for name in DIGESTED_FILES}
 
 
 def check_row(path: Path, row: Mapping[str, Any], cell: Mapping[str, Any]) -> None:

@@ -13,10 +13,10 @@ from typing import Any
 from harness.core.files import TEMPORARY, content_key, digest
 from harness.errors import BadFile, BadInput, Outcome
 from harness.results.cell import Cell, as_row, cell_folder, has_cell, read_cell, write_cell
-from harness.results.digests import file_digest, write_result_json
+from harness.results.digests import write_result_json
 from harness.results.expected_orders import ExpectedOrder, evaluate_orders
 from harness.results.index import CellIndex
-from harness.results.integrity import DIGESTED_FILES, SUMMARY, check_folder, check_row, read_summary_json
+from harness.results.integrity import SUMMARY, check_folder, check_row, compute_digests, read_summary_json
 from harness.results.manifest import Manifest
 from harness.results.plausibility import find_impossible_metric, find_impossible_statistic
 from harness.results.recovery import RecoveryCollector
@@ -40,7 +40,6 @@ __all__ = [
 ]
 
 
-_ADVICE = "Give the command of the run again."
 _SUMMARY_KEYS = ("outcome", "cells_finished", "cells_planned", "failures", "methods", "behaviours", "cells")
 
 
@@ -136,7 +135,7 @@ def write_summary(
     (see `table.compute_group_statistics`). With `orders`, as a run has them, it also has statistics over frames, for
     which every cell is read: methods and behaviours (see `SummaryStatistics.rows`), recovery (see
     `RecoveryCollector.rows`; empty unless the scenario varies a disturbance), expected_orders (see `evaluate_orders`)
-    and cells (the rows). `digests` has the SHA-256 of manifest.json and summary.csv. The index then gets its digest.
+    and cells (the rows). The index then gets the digests of the files and its own.
     """
     counts = index.counts()
     measured = any(value is not None for (value,) in index.columns("joint_angle_mean_deg"))
@@ -152,9 +151,8 @@ def write_summary(
     if orders is not None:
         content |= _frame_statistics(index, out, orders)
     write_table(index, out / "summary.csv")
-    content["digests"] = {name: file_digest(out / name, "a file of a run", _ADVICE) for name in DIGESTED_FILES}
     write_result_json(out / SUMMARY, content)
-    index.write_digest({SUMMARY: file_digest(out / SUMMARY, "the summary of a run", _ADVICE)})
+    index.write_digest(compute_digests(out))
     return content
 
 

@@ -11,7 +11,7 @@ from harness.core.seeds import generator
 from harness.results.cell import IDENTITY, TRAILING_COLUMNS
 from harness.results.digests import file_digest, insert_digest
 from harness.results.index import CellIndex
-from harness.results.integrity import DIGESTED_FILES
+from harness.results.integrity import compute_digests
 from harness.results.manifest import Manifest
 from harness.results.reader import CellResult, ResultSet
 from harness.score.metrics import DEFINITIONS, VERSIONS
@@ -88,8 +88,8 @@ def write_run(out: Path, judged: ResultSet) -> Path:
         index.note(kind="run")
         _write(out / "manifest.json", judged.manifest.as_dict())
         (out / "summary.csv").write_text("")
-        _write(out / "summary.json", _summary(out, judged, rows))
-        index.write_digest({"summary.json": file_digest(out / "summary.json", "", "")})
+        _write(out / "summary.json", _summary(judged, rows))
+        index.write_digest(compute_digests(out))
     return out
 
 
@@ -105,7 +105,7 @@ def write_cell_files(folder: Path, row: Mapping[str, Any], cell: CellResult) -> 
     )
 
 
-def _summary(out: Path, judged: ResultSet, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _summary(judged: ResultSet, rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     return {
         "outcome": "incomplete" if judged.failed else "pass",
         "cells_finished": len(rows),
@@ -114,7 +114,6 @@ def _summary(out: Path, judged: ResultSet, rows: Sequence[Mapping[str, Any]]) ->
         "methods": [],
         "behaviours": [],
         "cells": rows,
-        "digests": {name: file_digest(out / name, "", "") for name in DIGESTED_FILES},
     }
 
 

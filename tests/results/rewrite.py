@@ -4,9 +4,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from harness.results.digests import file_digest, insert_digest
+from harness.results.digests import insert_digest
 from harness.results.index import CellIndex
-from harness.results.integrity import SUMMARY
+from harness.results.integrity import compute_digests
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -26,8 +26,6 @@ def rewrite_json(path: Path, **changes: Any) -> None:
 
 
 def rewrite_digests(out: Path) -> None:
-    """Make the digests in the summary and in the index of a run fit its files."""
-    content = read_json(out / SUMMARY)
-    rewrite_json(out / SUMMARY, digests={name: file_digest(out / name, "", "") for name in content["digests"]})
+    """Make the digests in the index of a run fit its files."""
     with CellIndex(out) as index:
-        index.write_digest({SUMMARY: file_digest(out / SUMMARY, "", "")})
+        index.write_digest(compute_digests(out))
