@@ -8,7 +8,7 @@ Nor is a line of fewer than `MIN_CLIPS` clips. Such a line can still be shown to
 interval within the margin and no p.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
@@ -22,6 +22,8 @@ from harness.core.seeds import generator
 Verdict = Literal["better", "same", "worse", "cannot tell"]
 SIGNIFICANCE = 0.05
 _EXACT_CLIPS, _DRAWS = 16, 20_000
+_MAX_CACHED_CLIPS, _DRAWS_AT_ONCE = 64, 500
+"""Flips of more clips are drawn anew, a part at a time, so that thousands of clips fit into memory."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,8 @@ def sign_flip_p(difference: Floats) -> float:
     if not np.any(difference):
         return 1.0
     values = round_to_grid(difference)
-    extreme = int(np.count_nonzero(np.abs(_sign_flips(len(values)) @ values) >= abs(values.sum())))
+    least = abs(values.sum())
+    extreme = sum(int(np.count_nonzero(np.abs(flips @ values) >= least)) for flips in _sign_flips(len(values)))
     if len(values) <= _EXACT_CLIPS:
         return extreme / float(2 ** (len(values) - 1))
     return (1 + extreme) / (1 + _DRAWS)  # the observed signs are one of the flips
@@ -106,14 +109,24 @@ def smallest_possible_p(difference: Floats) -> float:
     return sign_flip_p(np.abs(difference))
 
 
+def _sign_flips(count: int) -> Iterable[Floats]:
+    """All flips or `_DRAWS` of them, as arrays (F, count) of signs -1 and 1."""
+    return (_cached_sign_flips(count),) if count <= _MAX_CACHED_CLIPS else _drawn_sign_flips(count)
+
+
 @lru_cache(maxsize=32)
-def _sign_flips(count: int) -> Floats:
-    """(F, count) signs -1 and 1. Where all are enumerated, the last is never flipped; the other half is symmetric."""
-    if count <= _EXACT_CLIPS:
-        flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1
-    else:
-        flips = generator(0, "sign flips", count).integers(0, 2, (_DRAWS, count))
+def _cached_sign_flips(count: int) -> Floats:
+    """(F, count) signs. Where all are enumerated, the last is never flipped; the other half is symmetric."""
+    if count > _EXACT_CLIPS:
+        return np.concatenate(list(_drawn_sign_flips(count)))
+    flips = np.arange(2 ** (count - 1))[:, None] >> np.arange(count) & 1
     return 1.0 - 2.0 * flips.astype(float)
+
+
+def _drawn_sign_flips(count: int) -> Iterator[Floats]:
+    rng = generator(0, "sign flips", count)
+    for _ in range(_DRAWS // _DRAWS_AT_ONCE):
+        yield 1.0 - 2.0 * rng.integers(0, 2, (_DRAWS_AT_ONCE, count)).astype(float)
 
 
 def holm(p: Sequence[float]) -> list[float]:

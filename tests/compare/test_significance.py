@@ -53,11 +53,21 @@ def test_many_clips_are_drawn_as_exactly_as_few_are_counted(
     lines = [rng.normal(shift, 1.0, 15) for shift in (0.1, 0.4, 0.7)]
     exact = [sign_flip_p(line) for line in lines]
     monkeypatch.setattr(significance, "_EXACT_CLIPS", 10)
-    significance._sign_flips.cache_clear()
+    significance._cached_sign_flips.cache_clear()
     drawn = [sign_flip_p(line) for line in lines]
-    significance._sign_flips.cache_clear()
+    significance._cached_sign_flips.cache_clear()
     np.testing.assert_allclose(drawn, exact, atol=4.0 * np.sqrt(0.25 / 20_000))
     assert sign_flip_p(np.ones(40)) == 1 / 20_001
+
+
+def test_flips_that_are_drawn_in_parts_are_those_that_are_drawn_at_once(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    line = rng.normal(0.2, 1.0, 80)
+    flips = 1.0 - 2.0 * generator(0, "sign flips", 80).integers(0, 2, (20_000, 80))
+    at_least = np.count_nonzero(np.abs(flips @ line) >= abs(line.sum()))
+    assert sign_flip_p(line) == pytest.approx((1 + at_least) / 20_001, abs=1e-12)
+    np.testing.assert_array_equal(np.concatenate(list(significance._sign_flips(80))), flips)
 
 
 def test_least_p_is_that_of_all_on_one_side(rng: np.random.Generator) -> None:

@@ -1,6 +1,6 @@
 """The finished cells of a sweep as columns, so that statistics of 100,000 cells are fast."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -92,9 +92,9 @@ class SweepData:
             means: Floats = sums / counts
         return means
 
-    def clip_values(self, selected: Bools, metric: str) -> ClipValues:
-        """Metric -> clip -> mean over the selected cells, for `metric` and the gated metrics."""
-        means = {name: self.by_clip(name, selected) for name in (metric, *GATED_METRICS)}
+    def clip_values(self, selected: Bools, metrics: Iterable[str]) -> ClipValues:
+        """Metric -> clip -> mean over the selected cells."""
+        means = {name: self.by_clip(name, selected) for name in metrics}
         return {
             name: {self.clips[n]: float(values[n]) for n in np.flatnonzero(np.isfinite(values))}
             for name, values in means.items()

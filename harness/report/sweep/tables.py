@@ -1,9 +1,10 @@
 """Tables of a sweep's page: methods by scenario, methods by the values of a key, and failed cells."""
 
 import shlex
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from harness.compare.ranking import ClipValues, find_best
+from harness.compare.margins import GATED_METRICS
+from harness.compare.ranking import find_best
 from harness.core.arrays import Bools
 from harness.core.number_format import count_noun, format_number
 from harness.core.text_table import Table
@@ -96,10 +97,16 @@ def _best_rows(sweep: SweepData, metric: str, rows: Iterable[tuple[int, Bools]])
     """The rows that are better than every other one, for each kind of performer; a row is a series and its cells."""
     if DEFINITIONS[metric].unit not in _LOWER_IS_BETTER:
         return set()
-    groups: dict[str, dict[str, ClipValues]] = {}
+    groups: dict[str, dict[int, Bools]] = {}
     for n, (series, selected) in enumerate(rows):
-        groups.setdefault(sweep.performers[series], {})[str(n)] = sweep.clip_values(selected, metric)
-    return {int(best) for values in groups.values() if (best := find_best(values, metric))}
+        groups.setdefault(sweep.performers[series], {})[n] = selected
+
+    def best(cells: Mapping[int, Bools], metrics: Sequence[str]) -> str | None:
+        return find_best({str(n): sweep.clip_values(selected, metrics) for n, selected in cells.items()}, metric)
+
+    # The gated metrics are read only where the lines of this metric alone leave a best row.
+    candidates = [cells for cells in groups.values() if best(cells, (metric,))]
+    return {int(row) for cells in candidates if (row := best(cells, (metric, *GATED_METRICS)))}
 
 
 def _cell(statistic: Statistic, metric: str, best: bool, column_clips: int) -> Markup:

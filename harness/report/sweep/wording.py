@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.compare.margins import GATED_METRICS
 from harness.compare.ranking import ClipValues, rank_methods
 from harness.core.arrays import Floats
 from harness.core.number_format import count_noun, format_change_percent, format_number
@@ -43,7 +44,7 @@ def _best(sweep: SweepData) -> str:
     """The sentences on the best series, separately for known and new performers, which have different clips."""
     groups: dict[str, dict[str, ClipValues]] = {}
     for n, (name, performer) in enumerate(zip(sweep.series, sweep.performers, strict=True)):
-        values = sweep.clip_values(sweep.select(series=n), PRIMARY_METRIC)
+        values = sweep.clip_values(sweep.select(series=n), GATED_METRICS)
         if values[PRIMARY_METRIC]:
             groups.setdefault(performer, {})[name] = values
     if not groups:
