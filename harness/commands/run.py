@@ -1,7 +1,6 @@
 """The verb `run`: run a scenario and write its report."""
 
 import argparse
-import json
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
@@ -30,6 +29,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
     from harness.experiment import engine
     from harness.experiment.scenario import check_scenario, load_scenario
     from harness.report.run.text import run_table
+    from harness.results.storage import read_summary
 
     scenario = load_scenario(args.scenario)
     if args.seed is not None:
@@ -56,7 +56,7 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         print("writing the report", file=sys.stderr)
         with ProgressBar("movies") as bar:
             page = write_run_page(out, movie=args.movie, progress=bar)
-    summary = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    summary = read_summary(out)
     content = {**summary, "out": str(out), "report": page and str(page)}
     return print_result(
         args, content, run_table(summary), f"report: {page}" if page else f"results: {out}", outcome=outcome

@@ -30,13 +30,13 @@ def add_sweep(verbs: Verbs) -> None:
 
 
 def run_sweep(args: argparse.Namespace) -> Outcome:
-    from harness.core.files import read_json
     from harness.experiment.engine import run_sweep as run
     from harness.experiment.executors import dask_executor, process_executor
     from harness.experiment.sweep_config import expand_sweep, load_sweep
     from harness.report.sweep.page import write_sweep_page
     from harness.report.sweep.reader import read_sweep
     from harness.report.sweep.text import text
+    from harness.results.integrity import read_summary_json
 
     if args.dask and args.jobs and args.dask != "local":
         raise BadInput("--jobs with --dask.", "The scheduler has workers of its own: leave --jobs out.")
@@ -61,7 +61,7 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
             progress=bar,
             isolation=read_isolation(args),
         )
-    summary = read_json(out / "summary.json", "the summary of a sweep")
+    summary = read_summary_json(out)
     if args.cell in summary["failures"]:
         print(summary["failures"][args.cell], file=sys.stderr)
     page = write_sweep_page(out)

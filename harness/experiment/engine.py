@@ -136,6 +136,7 @@ def run_cells(
         outcomes = _run_tasks(index, names, tasks, out, executor, progress)
         keys = [outcomes[name].key for name in names if name in outcomes and not outcomes[name].failure]
         failures = {name: outcomes[name].failure for name in names if name in outcomes and outcomes[name].failure}
+        index.write_digest({})
         return CellResults(tuple(index.rows_of(keys)), failures, len(names))
 
 
