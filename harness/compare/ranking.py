@@ -47,7 +47,7 @@ class Ranking:
         return self.lowest if self.results and not self.others("same", "cannot tell", "worse") else None
 
     def others(self, *verdicts: str) -> list[str]:
-        """The other methods with these verdicts."""
+        """Names of the other methods that have one of these verdicts."""
         return [name for name, result in self.results.items() if result.verdict in verdicts]
 
 
