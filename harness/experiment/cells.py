@@ -108,7 +108,7 @@ class CellOutcome:
 def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[CellOutcome]:
     """Run the cells of one task in order, and yield each outcome; it ends early once the file `stop` exists.
 
-    BadInput on a computer that does not see the folder `out`. ExampleLeak, which ends the whole run, when a test clip is
+    BadInput on a computer that does not see the folder `out`. ExampleLeak, which ends the run, when a test clip is
     among its own examples. Workers clear their caches for each new `session`.
     """
     if not (out / "cells").is_dir():

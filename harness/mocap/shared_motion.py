@@ -58,7 +58,7 @@ def find_shared_motion(
 
 
 def least_difference(first: Clip, first_runs: Sequence[range], second: Clip, second_runs: Sequence[range]) -> float:
-    """Least difference of two clips over a moving second of the second one, as `SAME_MOTION` bounds it; inf if large."""
+    """Least difference of two clips over a second that moves, as `SAME_MOTION` bounds it; inf if it is large."""
     comparisons = _compare(first, first_runs, second, second_runs)
     return min((float(c.difference[c.moving].min(initial=np.inf)) for c in comparisons), default=np.inf)
 
