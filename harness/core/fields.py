@@ -4,8 +4,9 @@ import dataclasses
 import math
 import types
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
+from harness.core.ranges import Range
 from harness.errors import HarnessError, RenamedKey, UnknownName
 
 if TYPE_CHECKING:
@@ -20,11 +21,12 @@ NONE = "none"
 def build(kind: type[T], content: Any, where: str) -> T:
     """Build a dataclass from a mapping by its annotations.
 
-    `where` names the place in messages. Raises UnknownName and RenamedKey for keys, TypeError for values.
+    `where` names the place in messages. Raises UnknownName and RenamedKey for keys, TypeError for values, and
+    ValueError for numbers outside the range of their field (`core.ranges`).
     """
     if not isinstance(content, Mapping):
         raise TypeError(f"{where}: expected a table, found {content!r}")
-    hints = get_type_hints(kind)
+    hints = get_type_hints(kind, include_extras=True)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     _refuse_unknown_keys(kind, content, fields, where)
     missing = [
@@ -40,9 +42,10 @@ def build(kind: type[T], content: Any, where: str) -> T:
 def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite: bool = False) -> T:
     """A copy of a dataclass with some fields replaced, checked as by `build`.
 
-    Mappings change nested records and tables field by field. `infinite` allows infinite numbers.
+    Mappings change nested records and tables field by field. `infinite` allows infinite numbers, where no range forbids
+    them.
     """
-    hints = get_type_hints(type(instance))
+    hints = get_type_hints(type(instance), include_extras=True)
     fields = [f.name for f in dataclasses.fields(instance) if f.init]
     _refuse_unknown_keys(type(instance), content, fields, where)
     values: dict[str, Any] = {}
@@ -52,7 +55,7 @@ def replace_fields(instance: T, content: Mapping[str, Any], where: str, infinite
             values[key] = replace_fields(now, value, f"{where}.{key}", infinite)
         elif isinstance(now, Mapping) and isinstance(value, Mapping):
             values[key] = {**now, **dict(_replace_entries(now, value, hints[key], f"{where}.{key}", infinite))}
-        elif infinite and hints[key] is float and isinstance(value, float) and math.isinf(value):
+        elif infinite and isinstance(value, float) and math.isinf(value) and _may_be_infinite(hints[key], value):
             values[key] = value
         else:
             values[key] = convert(hints[key], value, f"{where}.{key}")
@@ -85,10 +88,12 @@ def _replace_entries(
 
 
 def convert(hint: Any, value: Any, where: str) -> Any:
-    """Convert a value to the type of an annotation; TypeError names the place and what was expected."""
+    """Convert a value to the type of an annotation; TypeError and ValueError name the place and what was expected."""
     origin, args = get_origin(hint), get_args(hint)
     if hint is Any:
         return value
+    if origin is Annotated:
+        return _require_range(convert(args[0], value, where), args[1:], where)
     if origin in (Union, types.UnionType):
         return _convert_union(args, value, where)
     if origin is Literal:
@@ -118,6 +123,19 @@ def convert(hint: Any, value: Any, where: str) -> Any:
     return value
 
 
+def _require_range(value: Any, extras: tuple[Any, ...], where: str) -> Any:
+    for allowed in extras:
+        if isinstance(allowed, Range) and not allowed.accepts(value):
+            raise ValueError(f"{where} = {value} is outside its range: {allowed}")
+    return value
+
+
+def _may_be_infinite(hint: Any, value: float) -> bool:
+    if get_origin(hint) is not Annotated:
+        return hint is float
+    return get_args(hint)[0] is float and all(e.accepts(value) for e in get_args(hint)[1:] if isinstance(e, Range))
+
+
 def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
     if type(None) in kinds and value in (None, NONE):
         return None
@@ -126,6 +144,6 @@ def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:
         if kind is not type(None):
             try:
                 return convert(kind, value, where)
-            except (TypeError, HarnessError) as error:
+            except (TypeError, ValueError, HarnessError) as error:
                 errors.append(error)
     raise errors[0]

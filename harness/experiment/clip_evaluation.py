@@ -69,7 +69,7 @@ def noise_of(scenario: Scenario) -> Noise:
     """The noise preset with the scenario's changes to single components; UnknownName, BadInput."""
     try:
         return replace_fields(noises.noise_preset(scenario.noise), scenario.components, "components")
-    except TypeError as error:
+    except (TypeError, ValueError) as error:
         raise BadInput(f"{error}.", "`harness.simulate.noise` says what each component takes.") from error
 
 

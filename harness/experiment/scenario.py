@@ -6,12 +6,13 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from harness.core.fields import NONE, build, replace_fields
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
+from harness.core.ranges import Range, check_ranges
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import open_motion_source
@@ -19,7 +20,6 @@ from harness.results.cell import varied_text
 from harness.results.expected_orders import ExpectedOrder
 from harness.simulate.disturbance import Disturbance
 from harness.simulate.link import TrackerConfig
-from harness.simulate.parameter_ranges import require_ranges
 from harness.stream.emulator.faults import Fault
 
 SCHEMA = 1
@@ -47,10 +47,10 @@ class ScenarioMotion:
     withheld: tuple[str, ...] = ()
     """Clips and parts of clips that are no examples under any split, with 1 s around them: for example the test clips
     of the tables, while constants are chosen on other clips."""
-    thin_to: int = 0
+    thin_to: Annotated[int, Range(0, 100_000_000)] = 0
     """Number of frames that all examples together keep, evenly spaced, for a sparse database (Kim et al. 2012); 0 keeps
     all."""
-    example_share: float = 1.0
+    example_share: Annotated[float, Range(1e-06, 1.0)] = 1.0
     """Share of the frames of all examples that is kept, in pieces of 0.5 s drawn by the scenario's seed; smaller
     shares are subsets of larger ones (see `harness.experiment.example_subset`)."""
     database: Literal["all", "behaviour"] = "all"
@@ -61,10 +61,13 @@ class ScenarioMotion:
     """Body of the test: `own` has the performer's proportions, the others are the mean skeleton. On `standard` the
     bones point as the performer's do; on `common` the recorded angles are kept and the root's path is scaled by the
     legs."""
-    longest_s: float = 0.0
+    longest_s: Annotated[float, Range(0.0, 1e5)] = 0.0
     """Length of each test clip that is used, from its start [s]; 0 is all of it."""
-    rate_hz: float = 0.0
+    rate_hz: Annotated[float, Range(0.0, 1e4)] = 0.0
     """Frame rate of files that record none and that no index lists [Hz]; 0 refuses such files."""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -73,30 +76,33 @@ class Station:
 
     bone: str
     """Name of the bone that carries the station."""
-    along: float = 0.5
+    along: Annotated[float, Range(0.0, 1.0)] = 0.5
     """Position along the bone, 0 at its joint to 1 at its far end."""
-    around_deg: float = 0.0
+    around_deg: Annotated[float, Range(-360.0, 360.0)] = 0.0
     """Angle around the bone [deg]."""
-    stand_off_m: float = 0.01
+    stand_off_m: Annotated[float, Range(0.0, 0.5)] = 0.01
     """Distance of the station's origin from the skin [m]."""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
 class CalibrationSettings:
     """Errors of a simulated performer who holds calibration poses, and of the true mounts."""
 
-    miss_deg: float = 2.5
+    miss_deg: Annotated[float, Range(0.0, 45.0)] = 2.5
     """Standard deviation of each hinge, and of the body's lean, from each pose [deg]."""
-    hold_s: float = 3.0
+    hold_s: Annotated[float, Range(2.0, 60.0)] = 3.0
     """Time that each pose is held [s]."""
-    beside_m: float = 0.0
+    beside_m: Annotated[float, Range(0.0, 1.0)] = 0.0
     """Standard deviation of the stations' positions from their nominal mounts, along each axis [m]. It is part of the
     simulated world: the calibration `exact` knows it, the others estimate it."""
-    turned_deg: float = 0.0
+    turned_deg: Annotated[float, Range(0.0, 360.0)] = 0.0
     """Standard deviation of the stations' orientations about each axis [deg]; 180 is nearly random."""
 
     def __post_init__(self) -> None:
-        require_ranges(self, miss_deg=(0.0, 45.0), hold_s=(2.0, 60.0), beside_m=(0.0, 1.0), turned_deg=(0.0, 360.0))
+        check_ranges(self)
 
 
 @dataclass(frozen=True)
@@ -112,7 +118,7 @@ class Scenario:
     methods: tuple[str, ...]
     """Methods by name, with options and alternatives in brackets (see `harness.core.options`)."""
     schema: int = SCHEMA
-    seed: int = 1
+    seed: Annotated[int, Range(0, 2**63 - 1)] = 1
     inputs: tuple[str, ...] = ("pos+ori",)
     """Which of position and orientation each station delivers; every method runs with each choice."""
     worn: tuple[str, ...] = ()
@@ -145,6 +151,9 @@ class Scenario:
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
     """Faults of the line when an emulator plays the scenario (see `harness.stream.emulator`); runs ignore them."""
+
+    def __post_init__(self) -> None:
+        check_ranges(self)
 
     @property
     def worn_stations(self) -> dict[str, Station]:
@@ -342,18 +351,6 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
     for name in scenario.worn:
         if name not in scenario.stations:
             refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")
-    if not 1.0 <= scenario.tracker.rate_hz <= 1000.0:
-        refuse(f"tracker.rate_hz = {scenario.tracker.rate_hz}", "1 to 1000", "An IS-900 delivers up to 180 Hz.")
-    if not 0.0 < scenario.motion.example_share <= 1.0:
-        refuse(f"motion.example_share = {scenario.motion.example_share}", "above 0, at most 1", "1 keeps all frames.")
-    for key, value in (("longest_s", scenario.motion.longest_s), ("rate_hz", scenario.motion.rate_hz)):
-        if value < 0.0:
-            refuse(f"motion.{key} = {value}", "0 or more", "0 uses the whole clip, or the rate in the file.")
-    for name, station in scenario.stations.items():
-        if not 0.0 <= station.along <= 1.0:
-            refuse(f"stations.{name}.along = {station.along}", "0 to 1", "0 is the bone's joint, 1 its far end.")
-        if station.stand_off_m < 0.0:
-            refuse(f"stations.{name}.stand_off_m = {station.stand_off_m}", "0 or more", "Stations sit on the skin.")
 
 
 def check_expected_orders(path: Path, scenario: Scenario) -> None:

@@ -3,12 +3,13 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from harness.core.fields import build
 from harness.core.files import read_toml
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
+from harness.core.ranges import Range
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.experiment.scenario import (
     SCHEMA,
@@ -36,7 +37,7 @@ class Sweep:
     inputs: tuple[str, ...] = ()
     clips: tuple[str, ...] = ()
     """Subset of the scenarios' test clips, () for all."""
-    seeds: tuple[int, ...] = ()
+    seeds: Annotated[tuple[int, ...], Range(0, 2**63 - 1)] = ()
     vary: dict[str, Any] = field(default_factory=dict)
     """Varied keys as in a scenario, in addition to those that the scenarios vary."""
 
