@@ -6,7 +6,8 @@ import types
 from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
-from harness.core.ranges import Range
+from harness.core.names import excerpt
+from harness.core.ranges import constraints_of
 from harness.errors import HarnessError, RenamedKey, UnknownName
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ def build(kind: type[T], content: Any, where: str) -> T:
     ValueError for numbers outside the range of their field (`core.ranges`).
     """
     if not isinstance(content, Mapping):
-        raise TypeError(f"{where}: expected a table, found {content!r}")
+        raise TypeError(f"{where}: expected a table, found {excerpt(repr(content), 60)}")
     hints = get_type_hints(kind, include_extras=True)
     fields = {f.name: f for f in dataclasses.fields(kind) if f.init}
     _refuse_unknown_keys(kind, content, fields, where)
@@ -93,7 +94,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
     if hint is Any:
         return value
     if origin is Annotated:
-        return _require_range(convert(args[0], value, where), args[1:], where)
+        return _require(hint, convert(args[0], value, where), where)
     if origin in (Union, types.UnionType):
         return _convert_union(args, value, where)
     if origin is Literal:
@@ -102,7 +103,7 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return value
     if origin is tuple:
         if not isinstance(value, list):
-            raise TypeError(f"{where}: expected a list, found {value!r}")
+            raise TypeError(f"{where}: expected a list, found {excerpt(repr(value), 60)}")
         if args[-1] is not Ellipsis and len(args) != len(value):
             raise TypeError(f"{where}: expected {len(args)} values, found {len(value)}")
         kinds = [args[0]] * len(value) if args[-1] is Ellipsis else args
@@ -110,30 +111,33 @@ def convert(hint: Any, value: Any, where: str) -> Any:
         return tuple(convert(kind, item, f"{where}[{i}]") for i, (kind, item) in pairs)
     if origin is dict:
         if not isinstance(value, Mapping):
-            raise TypeError(f"{where}: expected a table, found {value!r}")
-        return {str(key): convert(args[1], item, f"{where}.{key}") for key, item in value.items()}
+            raise TypeError(f"{where}: expected a table, found {excerpt(repr(value), 60)}")
+        return {
+            convert(args[0], str(key), where): convert(args[1], item, f"{where}.{excerpt(key, 60)}")
+            for key, item in value.items()
+        }
     if dataclasses.is_dataclass(hint):
         return build(cast("type[DataclassInstance]", hint), value, where)
     if hint is float and isinstance(value, int) and not isinstance(value, bool):
         return float(value)
     if not isinstance(value, hint) or (isinstance(value, bool) and hint is not bool):
-        raise TypeError(f"{where}: expected {hint.__name__}, found {value!r}")
+        raise TypeError(f"{where}: expected {hint.__name__}, found {excerpt(repr(value), 60)}")
     if isinstance(value, float) and not math.isfinite(value):
         raise TypeError(f"{where}: expected a finite number, found {value}")
     return value
 
 
-def _require_range(value: Any, extras: tuple[Any, ...], where: str) -> Any:
-    for allowed in extras:
-        if isinstance(allowed, Range) and not allowed.accepts(value):
-            raise ValueError(f"{where} = {value} is outside its range: {allowed}")
+def _require(hint: Any, value: Any, where: str) -> Any:
+    """The value, if it obeys the rules of an annotation; ValueError."""
+    for rule in constraints_of(hint):
+        if not rule.accepts(value):
+            raise ValueError(f"{where} = {excerpt(repr(value), 60)} must be {rule}")
     return value
 
 
 def _may_be_infinite(hint: Any, value: float) -> bool:
-    if get_origin(hint) is not Annotated:
-        return hint is float
-    return get_args(hint)[0] is float and all(e.accepts(value) for e in get_args(hint)[1:] if isinstance(e, Range))
+    kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    return kind is float and all(rule.accepts(value) for rule in constraints_of(hint))
 
 
 def _convert_union(kinds: tuple[Any, ...], value: Any, where: str) -> Any:

@@ -5,14 +5,17 @@ import itertools
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
 from harness.core.fields import NONE, build, replace_fields
 from harness.core.files import read_toml
+from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
+from harness.core.split import ClipPart
 from harness.errors import BadFile, BadInput, UnknownName
 from harness.mocap.library import LibraryFolders
 from harness.mocap.sources import open_motion_source
@@ -38,13 +41,13 @@ class ScenarioMotion:
 
     source: Literal["builtin", "cmu"]
     """`builtin` is the motion generator; `cmu` is the library that --mocap or HARNESS_MOCAP names."""
-    test: tuple[str, ...]
+    test: tuple[Name, ...]
     """Test clips by name; "13_17@0.20-0.40" is that part of the take (for split `block`)."""
-    behaviours: tuple[str, ...]
+    behaviours: tuple[Name, ...]
     """Behaviour of the test clips: one word for all of them, or one word for each."""
-    examples: tuple[str, ...] = ()
+    examples: tuple[Name, ...] = ()
     """Clips that methods may learn from, except those that the split forbids for a test clip."""
-    withheld: tuple[str, ...] = ()
+    withheld: tuple[Name, ...] = ()
     """Clips and parts of clips that are no examples under any split, with 1 s around them: for example the test clips
     of the tables, while constants are chosen on other clips."""
     thin_to: Annotated[int, Range(0, 100_000_000)] = 0
@@ -67,7 +70,7 @@ class ScenarioMotion:
     """Frame rate of files that record none and that no index lists [Hz]; 0 refuses such files."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -84,7 +87,7 @@ class Station:
     """Distance of the station's origin from the skin [m]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ class CalibrationSettings:
     """Standard deviation of the stations' orientations about each axis [deg]; 180 is nearly random."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -111,17 +114,17 @@ class Scenario:
 
     RENAMED_KEYS: ClassVar[Mapping[str, str]] = {"order": "expected_order"}
 
-    name: str
+    name: FileName
     motion: ScenarioMotion
-    stations: dict[str, Station]
+    stations: dict[Name, Station]
     """The stations by name; in a file also the name of a set, such as "liu2011" (see `expand_station_set`)."""
-    methods: tuple[str, ...]
+    methods: tuple[MethodName, ...]
     """Methods by name, with options and alternatives in brackets (see `harness.core.options`)."""
     schema: int = SCHEMA
     seed: Annotated[int, Range(0, 2**63 - 1)] = 1
-    inputs: tuple[str, ...] = ("pos+ori",)
+    inputs: tuple[MethodName, ...] = ("pos+ori",)
     """Which of position and orientation each station delivers; every method runs with each choice."""
-    worn: tuple[str, ...] = ()
+    worn: tuple[Name, ...] = ()
     """Names of the stations that are worn; all of them if empty. Vary "worn" to compare sets of stations. The stream
     has no other stations, so that a station that is not worn is not a lost one."""
     calibration: Literal["exact", "tpose", "poses", "liu2011", "kim2012"] = "exact"
@@ -130,30 +133,30 @@ class Scenario:
     the papers' equations as printed: eight poses, and a T-pose. Vary it to measure the cost of calibration."""
     calibrating: CalibrationSettings = field(default_factory=CalibrationSettings)
     """Errors of the simulated calibration."""
-    mount: str = "tibia"
+    mount: Text = "tibia"
     """Name of the mounting in tables, such as tibia or foot: the place of the ankle stations."""
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
     """The device and its line."""
     noise: Literal["clean", "noise", "default"] = "default"
     """Noise preset."""
-    profile: str = ""
+    profile: Text = ""
     """Name of changed noise in tables; without it the preset's name and an asterisk."""
     components: dict[str, Any] = field(default_factory=dict)
     """Changes to the noise preset (see `harness.simulate.noise.Noise`), such as components.echo.share = 0.05."""
     disturbance: Disturbance = field(default_factory=Disturbance)
     """A fault that ends; vary "disturbance.kind" to measure how methods recover (see `harness.results.recovery`)."""
-    vary: dict[str, Any] = field(default_factory=dict)
+    vary: dict[Text, Any] = field(default_factory=dict)
     """Scenario key -> list of values, such as "components.echo.share" = [0.0, 0.05]. Everything runs with each value,
     or with each combination of values when there are several keys."""
     expected_order: tuple[ExpectedOrder, ...] = ()
     """Rankings that papers state (see `harness.results.expected_orders`)."""
-    left_out: dict[str, str] = field(default_factory=dict)
+    left_out: dict[Text, Text] = field(default_factory=dict)
     """Clips, behaviours or experiments that a reader might miss -> the reason why they are left out."""
     fault: tuple[Fault, ...] = ()
     """Faults of the line when an emulator plays the scenario (see `harness.stream.emulator`); runs ignore them."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     @property
     def worn_stations(self) -> dict[str, Station]:
@@ -295,6 +298,7 @@ def dotted_keys(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[st
 def find_scenario(path: Path | str) -> Path:
     """The path of a scenario: a file, or a shipped scenario by its bare name. UnknownName, BadFile."""
     given = Path(path)
+    check_words(given)
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_scenarios()}
@@ -326,8 +330,6 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
         refuse("no methods", "names in methods", "`harness list` names them.")
     if not scenario.inputs:
         refuse("no inputs", "names in inputs", "`harness list` names them.")
-    if scenario.name != Path(scenario.name).name:
-        refuse(f"name = {scenario.name!r}", "a plain name", "Results are written to a folder of that name.")
     counted = not any(map(_is_pattern, scenario.motion.test))  # else `expand_clips` checks it
     if counted and len(scenario.motion.behaviours) not in (1, len(scenario.motion.test)):
         refuse(
@@ -348,6 +350,10 @@ def check_scenario(path: Path, scenario: Scenario) -> None:
     ):
         if len(set(repeated)) < len(repeated):
             refuse(f"{what} names something twice", "each name once", "Remove the second.")
+    parts = sorted(map(ClipPart.parse, scenario.motion.test), key=lambda part: (part.clip, part.start))
+    for one, other in pairwise(parts):
+        if one.clip == other.clip and other.start < one.end:
+            refuse(f"motion.test has {one} and {other}, which overlap", "parts without common frames", "Shorten one.")
     for name in scenario.worn:
         if name not in scenario.stations:
             refuse(f"worn names {name!r}", "names of [stations]", f"They are: {', '.join(scenario.stations)}.")

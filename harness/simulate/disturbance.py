@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.errors import UnknownName
 from harness.simulate.components.lost_station import LostStation
 from harness.simulate.components.orientation_offset import OrientationOffset
@@ -44,7 +44,7 @@ class Disturbance:
     """Position error of `start_off` [m]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     @property
     def begins_s(self) -> float:

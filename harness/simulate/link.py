@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Bools, Floats
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.errors import BadInput
 from harness.stream.codec.items import BITS_PER_BYTE, STANDARD_LIST, record_size
 
@@ -32,7 +32,7 @@ class TrackerConfig:
     """Origin of the tracker's frame in the world [m]; the default is under the ceiling."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
         if 21 not in self.items:
             raise BadInput("The output list has no item 21 (time).", "Frames are matched with the truth by it: add it.")
 

@@ -312,3 +312,28 @@ def test_behaviours_are_counted_when_patterns_are_expanded(tmp_path: Path) -> No
     text = MINIMAL.replace("walking_p1_01", "walking_p1_*").replace('["walking"]', '["walking", "boxing"]')
     with pytest.raises(BadFile, match="2 behaviours for 6 test clips"):
         expand_clips(load_scenario(written(tmp_path, text)), None)
+
+
+@pytest.mark.parametrize(
+    ("parts", "overlaps"),
+    [
+        (("13_17@0.40-0.60", "13_17@0.50-0.70"), True),
+        (("13_17@0.40-0.60", "13_17"), True),
+        (("13_*@0.40-0.60", "13_*@0.10-0.45"), True),
+        (("13_17@0.40-0.60", "13_17@0.60-0.70"), False),
+        (("13_17@0.40-0.60", "13_30@0.50-0.70"), False),
+    ],
+)
+def test_test_parts_of_one_take_do_not_overlap(tmp_path: Path, parts: tuple[str, str], overlaps: bool) -> None:
+    text = MINIMAL.replace('["walking_p1_01"]', f'["{parts[0]}", "{parts[1]}"]').replace("builtin", "cmu")
+    if overlaps:
+        with pytest.raises(BadFile, match="overlap"):
+            load_scenario(written(tmp_path, text))
+    else:
+        assert load_scenario(written(tmp_path, text)).motion.test == parts
+
+
+def test_a_pattern_and_a_clip_do_not_overlap_once_it_is_expanded(tmp_path: Path) -> None:
+    text = MINIMAL.replace('["walking_p1_01"]', '["walking_p1_0*@0.40-0.60", "walking_p1_02@0.50-0.70"]')
+    with pytest.raises(BadFile, match=r"walking_p1_02@0\.40-0\.60 and walking_p1_02@0\.50-0\.70, which overlap"):
+        expand_clips(load_scenario(written(tmp_path, text)), None)

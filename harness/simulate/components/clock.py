@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -20,7 +20,7 @@ class Clock:
     """Rate error; positive runs faster [1e-6]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         readings.device_s = self.offset_s + (1.0 + 1e-6 * self.drift_ppm) * readings.time_s

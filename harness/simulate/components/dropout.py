@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import GRAVITY_M_S2, SimulatedReadings
 
 
@@ -28,7 +28,7 @@ class Dropout:
     """Tilt error while coasting [rad]: the RMS of pitch and roll."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         lost = np.zeros(readings.time_s.shape, bool)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.components.excursion import direction
 from harness.simulate.readings import SimulatedReadings
 
@@ -29,7 +29,7 @@ class Echo:
     """Smallest and largest displacement [m]; uniform."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = np.zeros(readings.time_s.shape, bool)

@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -28,7 +28,7 @@ class Excursion:
     """Length of the rise and of the return [s]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = np.zeros(readings.time_s.shape, bool)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -23,7 +23,7 @@ class LostStation:
     """Time before `from_s` in which quality falls, as ranges become fewer (docs/is900.md 13.3) [s] [choice]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self, to_s=Range(self.from_s, math.inf))
+        check_fields(self, to_s=Range(self.from_s, math.inf))
 
     def apply(self, readings: SimulatedReadings) -> None:
         lost = readings.mask((self.station,), self.from_s, self.to_s)

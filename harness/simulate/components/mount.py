@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core import rotations
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.errors import UnknownName
 from harness.simulate.readings import SimulatedReadings
 
@@ -22,7 +22,7 @@ class MountOffset:
     """Standard deviation about each axis of the station [rad]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         for row, station in enumerate(readings.stations):
@@ -47,7 +47,7 @@ class MountSlip:
     """Final distance along the bone, towards its far end [m]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         if self.station not in readings.stations:

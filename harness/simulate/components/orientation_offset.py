@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -27,7 +27,7 @@ class OrientationOffset:
     """Angle about the tracker's z axis [rad]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self, to_s=Range(self.from_s, math.inf))
+        check_fields(self, to_s=Range(self.from_s, math.inf))
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = readings.mask(self.stations, self.from_s, self.to_s)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -22,7 +22,7 @@ class PositionOffset:
     """Offset in the tracker's axes [m]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self, to_s=Range(self.from_s, math.inf))
+        check_fields(self, to_s=Range(self.from_s, math.inf))
 
     def apply(self, readings: SimulatedReadings) -> None:
         hit = readings.mask(self.stations, self.from_s, self.to_s)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from harness.core import rotations
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -21,7 +21,7 @@ class SessionBias:
     """Standard deviation of the offset on each axis of a station [m]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         for row, station in enumerate(readings.stations):

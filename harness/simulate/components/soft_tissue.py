@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.core import rotations
 from harness.core.arrays import Floats
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 _FASTER_INWARD = 2.0
@@ -37,7 +37,7 @@ class SoftTissueArtefact:
     """Tissue thickness to which `frequency_hz` refers [m]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         frequency_hz = self.frequency_hz * np.sqrt(self.reference_tissue_m / readings.tissue_m)

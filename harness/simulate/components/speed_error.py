@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -18,7 +18,7 @@ class SpeedError:
     """Time by which positions run ahead of the record's time stamp [s]; negative lags."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         readings.move(self.ahead_s * readings.velocity_m_s)

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.components.mount import MountSlip
 from harness.simulate.readings import SimulatedReadings
 
@@ -27,7 +27,7 @@ class StrapSlip:
     """Duration of a slip [s]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         begin_s, end_s = float(readings.time_s.min()), float(readings.time_s.max())

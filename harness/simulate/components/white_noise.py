@@ -6,7 +6,7 @@ from typing import Annotated
 import numpy as np
 
 from harness.core.arrays import Floats
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.simulate.readings import SimulatedReadings
 
 
@@ -20,7 +20,7 @@ class WhiteNoise:
     """Standard deviation about each axis [rad]."""
 
     def __post_init__(self) -> None:
-        check_ranges(self)
+        check_fields(self)
 
     def apply(self, readings: SimulatedReadings) -> None:
         draws = [readings.take_rng("white", s).normal(size=(len(readings.time_s), 6)) for s in readings.stations]

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, get_args
 
 import numpy as np
 
-from harness.core.ranges import Range, check_ranges
+from harness.core.ranges import Range, check_fields
 from harness.core.seeds import generator
 from harness.errors import BadInput
 
@@ -72,7 +72,7 @@ class Fault:
         for name, (is_set, allowed) in keys.items():
             if is_set and not allowed:
                 raise BadInput(f"fault {self.kind!r} has no {name}.", "Omit it.")
-        check_ranges(self)
+        check_fields(self)
         if self.kind in FAULT_EPISODE_KINDS and self.kind not in _INSTANT_KINDS and self.lasts_s == 0.0:
             raise BadInput(f"fault {self.kind!r} has no duration.", "Give lasts_s.")
         if not (self.share or self.at_s or self.per_minute or self.firmware):

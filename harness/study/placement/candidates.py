@@ -24,6 +24,7 @@ from typing import Annotated, Literal
 
 from harness.body.mounts import Mount, locate_mount
 from harness.core.humanoid24 import standard_skeleton
+from harness.core.names import Name
 from harness.core.ranges import Range
 from harness.core.skeleton import Skeleton
 from harness.errors import BadInput, HarnessError
@@ -42,8 +43,8 @@ _SIDE_BY_PREFIX: dict[str, Literal["left", "right"]] = {"l": "left", "r": "right
 class Candidate:
     """One [[candidate]] of a study."""
 
-    name: str
-    bone: str
+    name: Name
+    bone: Name
     along: Annotated[float, Range(0.0, 1.0)] = 0.5
     """Position along the bone, 0 at its joint to 1 at its far end."""
     around_deg: Annotated[float, Range(-360.0, 360.0)] = 0.0

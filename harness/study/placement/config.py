@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from harness.compare.margins import MARGINS
 from harness.core.fields import build, replace_fields
 from harness.core.files import read_toml
+from harness.core.names import FileName, MethodName, Name, Text, check_words
 from harness.core.options import expand_alternatives
 from harness.core.package_data import data_folder
 from harness.core.ranges import Range
@@ -85,7 +86,7 @@ class RefineOptions:
 class ConditionOptions:
     """A further condition under which the same sets are measured."""
 
-    name: str
+    name: Name
     scenario: str = ""
     """Another scenario, without the study's `changes`; by default the study's scenario with its `changes`."""
     methods: tuple[str, ...] = ()
@@ -113,18 +114,18 @@ class PublishedClaim:
 class PlacementStudy:
     """The configuration that `harness placement` reads."""
 
-    name: str
+    name: FileName
     kind: Literal["placement"]
-    title: str
+    title: Text
     scenario: str
     """A file in the folder of the study (without `.toml`), or a shipped scenario. It defines motion, body, calibration,
     noise, tracker and seed; its stations, methods, inputs and varied values are not used."""
-    methods: tuple[str, ...]
+    methods: tuple[MethodName, ...]
     """Methods; the mean of their errors is minimised."""
     schema: int = SCHEMA
     metric: str = "joint_angle_mean_deg"
-    inputs: str = "pos+ori"
-    held_out: tuple[str, ...] = ()
+    inputs: MethodName = "pos+ori"
+    held_out: tuple[Name, ...] = ()
     """Held-out clips: sets that were chosen on the scenario's test clips are tested on these."""
     link: bool = False
     """Limit the rate of each set to what the serial line carries, at most the scenario's rate."""
@@ -151,6 +152,7 @@ class PlacementStudy:
 def find_placement_study(path: Path | str) -> Path:
     """Find a study by path, or a shipped one by name; BadFile, UnknownName."""
     given = Path(path)
+    check_words(given)
     if given.is_file():
         return given
     shipped = {file.stem: file for file in shipped_placements()}
@@ -193,8 +195,6 @@ def _find_fault(study: PlacementStudy) -> tuple[str, str, str] | None:
     """Check what types cannot express; returns what was found, what is expected and advice."""
     if study.schema != SCHEMA:
         return f"schema {study.schema}", f"schema {SCHEMA}", "This version of the harness reads only that schema."
-    if study.name != Path(study.name).name:
-        return f"name = {study.name!r}", "a plain name", "Results are written to a folder of that name."
     if not study.methods:
         return "no methods", "names in methods", "`harness list` names them."
     if study.metric not in DEFINITIONS:
