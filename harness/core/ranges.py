@@ -53,7 +53,8 @@ def constraints_of(hint: Any) -> tuple[Constraint, ...]:
 
 def check_fields(record: object, **more: Range) -> None:
     """BadInput unless each field of a dataclass obeys its annotation; `more` has further ranges by name."""
-    for name, hint in _hints(type(record)).items():
+    kind: type = type(record)
+    for name, hint in _hints(kind).items():
         for value, broken in _violations(hint, getattr(record, name)):
             raise _error(record, name, value, broken)
     for name, allowed in more.items():

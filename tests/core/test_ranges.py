@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, make_dataclass, replace
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import pytest
@@ -43,11 +43,11 @@ def records(kinds: Iterator[type], found: dict[type, None]) -> dict[type, None]:
 
 RECORDS = list(records(iter([Scenario, Sweep, PlacementStudy, Noise, *sorted(METHODS, key=str)]), {}))
 NUMBERS = [
-    (kind, field.name, hint)
+    (kind, f.name, hint)
     for kind in RECORDS
-    for field in fields(kind)
-    if field.init and field.name not in NOT_CHOSEN
-    for hint in [get_type_hints(kind, include_extras=True)[field.name]]
+    for f in fields(kind)
+    if f.init and f.name not in NOT_CHOSEN
+    for hint in [get_type_hints(kind, include_extras=True)[f.name]]
     if {int, float} & set(types_in(hint))
 ]
 
@@ -81,18 +81,15 @@ def test_a_number_without_meaning_is_refused(kind: type, name: str, hint: Any) -
             value = 2**63
         given = [value] * (2 if Ellipsis in get_args(shape) else count) if get_origin(shape) is tuple else value
         with pytest.raises((TypeError, ValueError, HarnessError)) as caught:
-            replace_fields(_Holder.of(kind, name, hint), {name: given}, "here", infinite=True)
+            replace_fields(holder(name, hint), {name: given}, "here", infinite=True)
         assert f"here.{name}" in str(caught.value)
         if math.isfinite(bad):
             assert str(allowed) in str(caught.value)
 
 
-class _Holder:
+def holder(name: str, hint: Any) -> Any:
     """A record with one field of the tested annotation: most records have fields that must be given."""
-
-    @staticmethod
-    def of(kind: type, name: str, hint: Any) -> Any:
-        return dataclass(frozen=True)(type("Holder", (), {"__annotations__": {name: hint}, name: None}))()
+    return make_dataclass("Holder", [(name, hint, field(default=None))], frozen=True)()
 
 
 @dataclass(frozen=True)
