@@ -1,8 +1,45 @@
 """`python -m harness` is the command `harness`."""
 
+import os
 import sys
+import time
+from threading import Thread
 
-from harness.cli import main
+from harness.core.interrupts import hold_interrupts, ignore_interrupts
+from harness.core.standard_streams import repair_streams
+
+END_S = 60.0
+"""Time within which the program ends after its last line, although a thread of a method may hang [s, choice]."""
+
+
+def main() -> int:
+    """Run the command line. Signals are handled from here on, also while the program starts and while it ends."""
+    with hold_interrupts():
+        repair_streams()
+        try:
+            code = _run_command_line()
+        except SystemExit as ended:  # of argparse
+            code = int(ended.code or 0)
+        ignore_interrupts()
+        Thread(target=_end_in_time, args=(code,), daemon=True).start()
+        return code
+
+
+def _run_command_line() -> int:
+    try:
+        from harness.cli import main as run
+    except Exception as error:  # a broken installation
+        from harness.commands.ending import describe_ending, print_last
+
+        outcome, _ = describe_ending(sys.argv[1:], error)
+        return print_last(f"{outcome.word}\n", outcome)
+    return run()
+
+
+def _end_in_time(code: int) -> None:
+    time.sleep(END_S)
+    os._exit(code)
+
 
 if __name__ == "__main__":
     sys.exit(main())

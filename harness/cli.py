@@ -18,6 +18,7 @@ from harness.commands.compare import add_compare
 from harness.commands.demo import add_demo
 from harness.commands.doctor import add_doctor
 from harness.commands.emulate import add_emulate
+from harness.commands.ending import describe_ending, print_last
 from harness.commands.export import add_export
 from harness.commands.inspect import add_inspect
 from harness.commands.list import add_list
@@ -31,9 +32,10 @@ from harness.commands.report import add_report
 from harness.commands.run import add_run
 from harness.commands.status import add_status
 from harness.commands.sweep import add_sweep
-from harness.core.names import check_command_line, check_words, excerpt
+from harness.core.interrupts import accept_interrupts, hold_interrupts
+from harness.core.names import check_command_line, check_words
 from harness.core.package_data import VERSION
-from harness.errors import HarnessError, Outcome, was_interrupted
+from harness.errors import Outcome, SystemFault
 
 _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
     "first steps": (add_demo, add_list, add_doctor, add_mocap, add_inspect),
@@ -56,48 +58,42 @@ _VERB_GROUPS: dict[str, tuple[Callable[[Any], None], ...]] = {
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb and return its exit code (see `harness.errors.Outcome`)."""
-    try:
-        args = build_parser().parse_args(argv)
-    except SystemExit as ended:  # argparse has printed the help or its complaint
-        if ended.code:
-            word = Outcome.REFUSED.word
-            print(json.dumps({"outcome": word}) if "--json" in (argv or sys.argv) else word)
-        raise
+    words, content = list(sys.argv[1:] if argv is None else argv), None
+    as_json = "--json" in words
+    with hold_interrupts():
+        try:
+            with accept_interrupts():
+                args = build_parser().parse_args(words)
+                as_json = args.json
+                outcome = _run_verb(words, args)
+        except SystemExit as ended:  # argparse has printed the help or its complaint
+            outcome = Outcome.REFUSED if ended.code else Outcome.PASS
+            text = json.dumps({"outcome": outcome.word}) if as_json else outcome.word
+            sys.exit(print_last(text + "\n" if ended.code else "", outcome))
+        except (KeyboardInterrupt, Exception) as error:
+            outcome, content = describe_ending(words, error)
+        if not as_json:
+            return print_last(f"{outcome.word}\n", outcome)
+        ended_early = content is not None  # else the verb has printed its JSON
+        return print_last(
+            json.dumps({"outcome": outcome.word, **(content or {})}) + "\n" if ended_early else "", outcome
+        )
+
+
+def _run_verb(words: Sequence[str], args: argparse.Namespace) -> Outcome:
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(variable, "1")  # before numpy is imported: times are of one core, --jobs uses the others
-    sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
     try:
-        check_command_line(sys.argv[1:] if argv is None else argv)
+        sys.path.append(os.getcwd())  # a user's own method, as module:Class, may lie in the working directory
+    except OSError as error:
+        raise SystemFault("The working directory no longer exists.", "Change to a folder that exists.") from error
+    try:
+        check_command_line(words)
         check_words(list(vars(args).values()))
         outcome: Outcome = args.action(args)
-        sys.stdout.flush()
-    except HarnessError as error:
-        print(f"harness: {excerpt(error)}", file=sys.stderr)
-        outcome = error.outcome
-        if args.json:
-            print(json.dumps({"outcome": outcome.word, "error": excerpt(error)}))
-    except BrokenPipeError:  # the reader of stdout went away, as `| head` does
-        _discard_stdout()
-        return Outcome.PASS.exit_code
-    except (KeyboardInterrupt, Exception) as error:
-        if not was_interrupted(error):
-            raise
-        outcome = Outcome.PASS if args.endless else Outcome.INTERRUPTED
-        advice = "" if args.endless else "; finished work is kept, and the same command resumes"
-        print(f"harness: stopped{advice}", file=sys.stderr)
-        if args.json:
-            print(json.dumps({"outcome": outcome.word}))
-    if not args.json:
-        try:
-            print(outcome.word, flush=True)
-        except BrokenPipeError:
-            _discard_stdout()
-    return outcome.exit_code
-
-
-def _discard_stdout() -> None:
-    """Send later output to the null device: Python flushes stdout once more when it exits."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except SystemExit as ended:  # of a method or a library: its code is none of ours
+        raise RuntimeError(f"a part of the program asked to exit with {ended.code!r}") from ended
+    return outcome
 
 
 @dataclass

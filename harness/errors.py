@@ -17,6 +17,7 @@ class Outcome(Enum):
     REFUSED = ("refused", 2)
     NOT_COMPARABLE = ("not comparable", 3)
     INCOMPLETE = ("incomplete", 4)
+    FAILED = ("failed", 5)
     INTERRUPTED = ("interrupted", 130)
 
     @property
@@ -41,6 +42,19 @@ class HarnessError(Exception):
     """Base class of the errors that the package raises on purpose; the command line prints them without a traceback."""
 
     outcome = Outcome.REFUSED
+
+
+class SystemFault(HarnessError):
+    """A fault of the system that stopped the work: a full disk, a folder that vanished or cannot be written."""
+
+    outcome = Outcome.FAILED
+
+    def __init__(self, what: str, advice: str) -> None:
+        super().__init__(what, advice)
+        self.what, self.advice = self.args
+
+    def __str__(self) -> str:
+        return f"{self.what} {self.advice}"
 
 
 class UnknownName(HarnessError):

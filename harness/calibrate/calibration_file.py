@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from harness.core.calibration import Calibration
+from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
 from harness.core.files import read_toml, write_bytes
 from harness.core.humanoid24 import BONES, standard_skeleton
@@ -114,6 +115,8 @@ def write_calibration(path: Path, content: CalibrationFile, *, force: bool = Fal
     try:
         write_bytes(target, text.encode("utf-8", errors="replace"))
     except OSError as error:
+        if is_system_fault(error):
+            raise
         raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Choose another.") from error
 
 

@@ -20,7 +20,6 @@ from harness.commands.common import (
     positive_int,
     print_result,
     print_status,
-    sigterm_as_interrupt,
 )
 from harness.errors import BadInput, Outcome, was_interrupted
 
@@ -86,13 +85,12 @@ def run_calibrate(args: argparse.Namespace) -> Outcome:
             users = " or ".join(source for source, names in _FLAGS_BY_SOURCE.items() if name in names)
             raise BadInput(f"--{name.replace('_', '-')} with {given[0]}.", f"It applies to {users}: leave it out.")
     action = {"sheet": _draw_sheet, "simulate": _measure_accuracy}.get(given[0], _calibrate_performer)
-    with sigterm_as_interrupt():
-        try:
-            return action(args)
-        except (KeyboardInterrupt, Exception) as error:
-            if not was_interrupted(error):
-                raise
-            return print_result(args, {}, "stopped; nothing was calibrated", outcome=Outcome.INTERRUPTED)
+    try:
+        return action(args)
+    except (KeyboardInterrupt, Exception) as error:
+        if not was_interrupted(error):
+            raise
+        return print_result(args, {}, "stopped; nothing was calibrated", outcome=Outcome.INTERRUPTED)
 
 
 def _draw_sheet(args: argparse.Namespace) -> Outcome:

@@ -3,14 +3,14 @@
 import argparse
 import json
 import shlex
-import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from types import FrameType
 from typing import Any
 
+from harness.commands.ending import print_data
+from harness.core.interrupts import refuse_interrupts
 from harness.errors import BadInput, Outcome
 
 Verbs = Any  # argparse's subparsers object has no public type
@@ -28,12 +28,9 @@ Action = Callable[[argparse.Namespace], Outcome]
 
 
 def add_verb(verbs: Verbs, name: str, text: str, action: Action, *flags: str) -> argparse.ArgumentParser:
-    """Add a verb with flags that other verbs share: any of "seed", "out", "jobs" and "mocap".
-
-    "endless" is no flag: it marks a verb that runs until Ctrl-C, which is then the normal end.
-    """
+    """Add a verb with flags that other verbs share: any of "seed", "out", "jobs" and "mocap"."""
     verb: argparse.ArgumentParser = verbs.add_parser(name, help=text, description=text[0].upper() + text[1:] + ".")
-    verb.set_defaults(action=action, endless="endless" in flags)
+    verb.set_defaults(action=action)
     verb.add_argument("--json", action="store_true", help="print JSON instead of text")
     if "seed" in flags:
         verb.add_argument("--seed", type=int, help="seed instead of the scenario's")
@@ -171,6 +168,28 @@ def parse_names(text: str) -> list[str]:
     return names
 
 
+@contextmanager
+def progress_note(out: Path) -> Iterator[None]:
+    """Add to a fault or an interrupt that leaves the block how much of the work in `out` is kept."""
+    try:
+        yield
+    except (KeyboardInterrupt, Exception) as error:
+        error.add_note(_describe_progress(out))
+        raise
+
+
+def _describe_progress(out: Path) -> str:
+    from harness.experiment.status import read_status
+
+    if not out.is_dir():
+        return f"Nothing is kept in {out}."
+    try:
+        found = read_status(out)
+    except Exception:  # no work has begun, or the fault concerns the index too
+        return f"The finished cells in {out} are kept."
+    return f"{found.finished:,} of {found.planned:,} cells in {out} are finished and kept."
+
+
 def print_status(line: str) -> None:
     """Print a line to stderr, over the line of `show_progress`; stdout is for data."""
     print(f"\r{line}\033[K" if sys.stderr.isatty() else line, file=sys.stderr, flush=True)
@@ -182,25 +201,15 @@ def show_progress(line: str) -> None:
         print(f"\r{line}\033[K", end="", file=sys.stderr, flush=True)
 
 
-@contextmanager
-def sigterm_as_interrupt() -> Iterator[None]:
-    """Treat SIGTERM as Ctrl-C in the block."""
-
-    def interrupt(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGTERM, interrupt)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before)
-
-
 def print_result(
     args: argparse.Namespace, content: Mapping[str, Any], *lines: str, outcome: Outcome = Outcome.PASS
 ) -> Outcome:
-    """Print the lines, or with --json the content and the outcome's word; returns the outcome."""
-    print(json.dumps({**content, "outcome": outcome.word}) if args.json else "\n".join(lines))
+    """Print the lines, or with --json the content and the outcome's word; returns the outcome.
+
+    It is the last thing that a verb does: signals that come later change nothing.
+    """
+    refuse_interrupts()
+    print_data((json.dumps({**content, "outcome": outcome.word}) if args.json else "\n".join(lines)) + "\n")
     return outcome
 
 

@@ -1,7 +1,7 @@
 """The verb `emulate`: play a scenario as an IS-900."""
 
 import argparse
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,8 @@ from harness.commands.common import (
     positive_int,
     print_result,
     print_status,
-    sigterm_as_interrupt,
 )
+from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 def add_emulate(verbs: Verbs) -> None:
     text = "play a scenario as an IS-900 in real time, at a pseudo terminal or a TCP port, until Ctrl-C"
-    verb = add_verb(verbs, "emulate", text, run_emulate, "seed", "mocap", "endless")
+    verb = add_verb(verbs, "emulate", text, run_emulate, "seed", "mocap")
     verb.add_argument("scenario", help="a TOML file, or the name of a shipped one (see `harness list`)")
     where = verb.add_mutually_exclusive_group(required=True)
     text = "open a pseudo terminal, and link to it under this name"
@@ -85,8 +85,10 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
     if not (args.unpaced or args.overload):
         items = args.items or tracker.items
         check_capacity(len(scenario.stations), tracker.rate_hz, items, config.baud, playback.reach_m)
-    port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
-    with closing(port), sigterm_as_interrupt():
+    with ExitStack() as opened:
+        with defer_interrupts():
+            port = open_port(args.pty, args.tcp, anywhere=args.anywhere, log=print_status)
+            opened.enter_context(closing(port))
         names = ", ".join(f"{number} {name}" for number, name in enumerate(samples.stations, 1))
         pace = f"{config.baud} baud" if config.paced else "unpaced"
         played = (

@@ -19,8 +19,8 @@ from harness.commands.common import (
     positive_float,
     print_result,
     print_status,
-    sigterm_as_interrupt,
 )
+from harness.core.interrupts import defer_interrupts
 from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ _RATE_TOLERANCE = 0.02
 
 def add_live(verbs: Verbs) -> None:
     text = "reconstruct from a tracker in real time, to a viewer, VMC, LSL or BVH, until Ctrl-C"
-    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap", "endless")
+    verb = add_verb(verbs, "live", text, run_live, "seed", "mocap")
     verb.add_argument(
         "--port", required=True, help="/dev/ttyUSB0, COM3, the link of an emulated pseudo terminal, tcp://HOST:PORT"
     )
@@ -75,13 +75,12 @@ def add_live(verbs: Verbs) -> None:
 
 
 def run_live(args: argparse.Namespace) -> Outcome:
-    with sigterm_as_interrupt():
-        try:
-            return _reconstruct_live(args)
-        except (KeyboardInterrupt, Exception) as error:
-            if not was_interrupted(error):
-                raise
-            return print_result(args, {"poses": 0}, "stopped before the first pose")
+    try:
+        return _reconstruct_live(args)
+    except (KeyboardInterrupt, Exception) as error:
+        if not was_interrupted(error):
+            raise
+        return print_result(args, {"poses": 0}, "stopped before the first pose")
 
 
 def _reconstruct_live(args: argparse.Namespace) -> Outcome:
@@ -112,7 +111,8 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         with redirect_stdout(sys.stderr):  # a method may print; stdout is for data
             reconstructor = playback.clip_evaluation.fit_method(method, args.method)
             warm_up(reconstructor, playback.calibration, playback.simulation.frames[:_WARM_UP_FRAMES])
-            floor = opened.enter_context(JitterProbe())
+            with defer_interrupts():
+                floor = opened.enter_context(JitterProbe())
             print_status("Ctrl-C ends it")
             plan = LiveOptions(rate_hz, args.deadline and 1e-3 * args.deadline, args.seconds)
             done = run_session(
@@ -136,7 +136,7 @@ def _reconstruct_live(args: argparse.Namespace) -> Outcome:
         }
     kinds = Counter(event.kind for event in events)
     line = [f"{name} {count}" for name, count in (device.counts | kinds).items()]
-    outcome = Outcome.PASS if done.poses and not done.failed else Outcome.INCOMPLETE
+    outcome = Outcome.PASS if (done.poses or done.stopped) and not done.failed else Outcome.INCOMPLETE
     return print_result(args, content, *summary.lines(done, beside), f"line: {', '.join(line)}", outcome=outcome)
 
 
@@ -192,8 +192,9 @@ def _open_outputs(args: argparse.Namespace, playback: "Playback", opened: ExitSt
     outputs: list[Output] = []
     for name, make in config.items():
         if getattr(args, name) is not None:
-            outputs.append(make())
-            opened.callback(outputs[-1].close)
+            with defer_interrupts():
+                outputs.append(make())
+                opened.callback(outputs[-1].close)
             print_status(outputs[-1].description)
     return outputs
 

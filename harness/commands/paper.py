@@ -5,7 +5,15 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_mocap_flag, add_verb, positive_int, print_result, this_command
+from harness.commands.common import (
+    Verbs,
+    add_mocap_flag,
+    add_verb,
+    positive_int,
+    print_result,
+    progress_note,
+    this_command,
+)
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -37,7 +45,11 @@ def run_paper(args: argparse.Namespace) -> Outcome:
     paper = paper.only(args.only) if args.only else paper
     form = ("_cmu" if args.mocap else "") + ("_quick" if args.quick else "")
     out = args.out or Path("results") / (args.paper + form)
-    with ProgressBar("steps") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
+    with (
+        progress_note(out),
+        ProgressBar("steps") as bar,
+        redirect_stdout(sys.stderr),
+    ):  # a method may print; stdout is for data
         findings, outcome = reproduce(
             paper,
             out,

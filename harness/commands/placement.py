@@ -5,7 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, positive_int, print_result, this_command
+from harness.commands.common import Verbs, add_verb, positive_int, print_result, progress_note, this_command
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
 
@@ -29,6 +29,7 @@ def run_placement(args: argparse.Namespace) -> Outcome:
 
     out = args.out or Path("results") / f"placement_{Path(args.study).stem.removeprefix('placement_')}"
     with (
+        progress_note(out),
         ProgressBar("cells") as bar,
         redirect_stdout(sys.stderr),  # a method may print; stdout is for data
         process_executor(args.jobs) as each,

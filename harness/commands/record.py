@@ -18,7 +18,6 @@ from harness.commands.common import (
     print_result,
     print_status,
     show_progress,
-    sigterm_as_interrupt,
 )
 from harness.core.package_data import VERSION
 from harness.errors import BadInput, Outcome
@@ -29,7 +28,7 @@ SIMULATION_PREFIX = "sim:"
 
 def add_record(verbs: Verbs) -> None:
     text = "record both directions of a device's line until Ctrl-C; appends to a recording in the same file"
-    verb = add_verb(verbs, "record", text, run_record, "seed", "mocap", "endless")
+    verb = add_verb(verbs, "record", text, run_record, "seed", "mocap")
     verb.add_argument("port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for a simulated line")
     verb.add_argument("file", type=Path, help="the recording to write")
     text = (
@@ -107,7 +106,7 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     stations = None if args.stations is None else tuple(parse_device_names(args.stations))
     config = DriverConfig(stations=stations, rate_hz=args.rate, **line_options(args))
     note = {"source": "port", "port": args.port, "harness": VERSION}
-    with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
+    with RecordingWriter(args.file, note) as writer:
         line = record_port(args.port, config, writer, seconds=args.seconds, log=print_status, progress=show_progress)
     return _print_recording(args, writer.counts, line.get("out_of_range", 0))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.common import Verbs, add_verb, print_result
+from harness.commands.ending import print_data
 from harness.errors import Outcome
 
 if TYPE_CHECKING:
@@ -52,13 +53,14 @@ def _print_frames(args: argparse.Namespace, stream: "RecordingStream") -> Outcom
 
     summary = StreamSummary(stream.stations)
     if args.frames and not args.json:
-        print(",".join(FRAME_COLUMNS))
+        print_data(",".join(FRAME_COLUMNS) + "\n")
     for frame in stream:
         summary.add(frame)
-        for row in frame_rows(frame, stream.stations, stream.wall_s(frame.received_s)) if args.frames else ():
-            print(json.dumps(row) if args.json else format_csv_row(row))
         if args.frames:
-            sys.stdout.flush()
+            rows = frame_rows(frame, stream.stations, stream.wall_s(frame.received_s))
+            texts = [json.dumps(row) if args.json else format_csv_row(row) for row in rows]
+            if not print_data("".join(f"{text}\n" for text in texts)):
+                return Outcome.PASS
     recording = stream.recording
     content = {**summary.as_dict(), **stream.counts, "lost": recording.damage, "events": recording.events}
     lines = [

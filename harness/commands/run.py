@@ -5,7 +5,7 @@ import sys
 from contextlib import redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, print_result, this_command
+from harness.commands.common import Verbs, add_verb, print_result, progress_note, this_command
 from harness.commands.isolation_flags import add_isolation_flags, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import Outcome
@@ -39,7 +39,11 @@ def run_scenario(args: argparse.Namespace) -> Outcome:
         scenario = replace(scenario, methods=tuple(named))
         check_scenario(args.scenario, scenario)
     out = args.out or Path("results") / scenario.name
-    with ProgressBar("cells") as bar, redirect_stdout(sys.stderr):  # a method may print; stdout is for data
+    with (
+        progress_note(out),
+        ProgressBar("cells") as bar,
+        redirect_stdout(sys.stderr),  # a method may print; stdout is for data
+    ):
         outcome = engine.run(
             scenario,
             out,

@@ -7,7 +7,7 @@ import sys
 from contextlib import ExitStack, redirect_stdout
 from pathlib import Path
 
-from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, sigterm_as_interrupt
+from harness.commands.common import Verbs, add_verb, mocap_words, positive_int, print_result, progress_note
 from harness.commands.isolation_flags import add_isolation_flags, isolation_words, read_isolation
 from harness.core.progress import ProgressBar
 from harness.errors import BadInput, Outcome
@@ -44,7 +44,7 @@ def run_sweep(args: argparse.Namespace) -> Outcome:
     scenarios = expand_sweep(sweep, path, args.seed, args.mocap)
     out = args.out or Path("results") / sweep.name
     with ExitStack() as stack:
-        stack.enter_context(sigterm_as_interrupt())
+        stack.enter_context(progress_note(out))
         bar = stack.enter_context(ProgressBar("cells"))
         stack.enter_context(redirect_stdout(sys.stderr))  # a method may print; stdout is for data
         workers = args.jobs or {None: 1, "local": os.cpu_count() or 1}.get(args.dask, _DEFAULT_CLUSTER_WORKERS)

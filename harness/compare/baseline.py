@@ -22,6 +22,7 @@ from typing import Any
 from harness.compare.margins import MARGINS
 from harness.compare.matching import PAIRING_KEYS
 from harness.core.files import content_key, move_into_place, temporary_path, to_json, to_json_types, write_text
+from harness.core.interrupts import defer_interrupts
 from harness.core.names import excerpt
 from harness.errors import BadInput
 from harness.results.digests import file_digest, insert_digest, write_result_json
@@ -65,18 +66,35 @@ def write_baseline(run: Path, name: str, folder: Path = BASELINES, force: bool =
         raise BadInput(f"Baseline {name} exists ({target}).", "Choose another name, or replace it with --force.")
     temporary = temporary_path(target)
     shutil.rmtree(temporary, ignore_errors=True)
-    temporary.mkdir(parents=True)
-    summary = read_summary_json(run)
-    write_result_json(temporary / "manifest.json", results.manifest.as_dict())
-    write_result_json(temporary / "summary.json", {kind: summary[kind] for kind in _SUMMARY_KEYS if kind in summary})
-    digests = {file: file_digest(temporary / file, "a file of a baseline", "Save it again.") for file in BASELINE_FILES}
-    write_text(temporary / CELLS_FILE, insert_digest(_cells_json(results, digests)))
-    previous = temporary.with_name(f"{temporary.name}-before")
-    if target.exists():
-        os.rename(target, previous)
-    move_into_place(temporary, target)
-    shutil.rmtree(previous, ignore_errors=True)
+    try:
+        temporary.mkdir(parents=True)
+        summary = read_summary_json(run)
+        write_result_json(temporary / "manifest.json", results.manifest.as_dict())
+        kept = {kind: summary[kind] for kind in _SUMMARY_KEYS if kind in summary}
+        write_result_json(temporary / "summary.json", kept)
+        advice = "Save it again."
+        digests = {file: file_digest(temporary / file, "a file of a baseline", advice) for file in BASELINE_FILES}
+        write_text(temporary / CELLS_FILE, insert_digest(_cells_json(results, digests)))
+        _replace_folder(temporary, target)
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
     return target
+
+
+def _replace_folder(new: Path, target: Path) -> None:
+    """Move a folder to `target`; an earlier one is put back when that fails."""
+    previous = new.with_name(f"{new.name}-before")
+    with defer_interrupts():
+        if target.exists():
+            os.rename(target, previous)
+        try:
+            move_into_place(new, target)
+        except OSError:
+            if previous.exists() and not target.exists():
+                os.rename(previous, target)
+            raise
+        finally:
+            shutil.rmtree(previous, ignore_errors=True)
 
 
 def _cells_json(results: ResultSet, digests: Mapping[str, str]) -> str:

@@ -64,6 +64,11 @@ class _ModuleCache(_FunctionCache):  # type: ignore[misc]  # its base is Any: nu
             self.flush()
             return None
 
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save machine code; a folder that cannot be written costs the next process a compilation, and no more."""
+        with suppress(OSError):
+            super().save_overload(sig, data)
+
 
 def module_stamp(namespace: Mapping[str, Any]) -> str:
     """Hexadecimal digest of everything that the machine code of a module depends on, from the module's globals."""

@@ -1,16 +1,18 @@
-"""Worker processes that end with the process that started them, and never see Ctrl-C themselves."""
+"""Worker processes that end with the process that started them, and never see a signal themselves."""
 
 import os
 import signal
 import sys
+import tempfile
 from collections import deque
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from threading import Thread, current_thread, main_thread
+from threading import Thread
 from typing import Any, TypeVar
+
+from harness.core.interrupts import SIGNALS, shield_children
 
 R = TypeVar("R")
 
@@ -58,18 +60,18 @@ class Pool:
         for process in self._processes:
             process.pool.shutdown(wait=False)
         for process in self._processes:
-            process.pool.shutdown()
+            if not process.broken:
+                process.pool.shutdown()
         self._stop()
 
     def _begin(self) -> None:
-        self._worker_end, self._own_end = get_context("spawn").Pipe(duplex=False)
-        self._processes = [_WorkerProcess(self._worker_end) for _ in range(self._workers)]
+        self._processes = [_WorkerProcess() for _ in range(self._workers)]
 
     def _stop(self) -> None:
-        self._own_end.close()
         for process in self._processes:
-            process.pool.shutdown(cancel_futures=True)
-        self._worker_end.close()
+            process.leave()
+        for process in self._processes:
+            process.end()
 
 
 def schedule_tasks(
@@ -105,53 +107,67 @@ def schedule_tasks(
 class _WorkerProcess:
     """A worker process, started when needed and again after it died: a pool of one, so that no other breaks with it."""
 
-    def __init__(self, alive: Connection) -> None:
-        self._alive = alive
+    def __init__(self) -> None:
         self._last: Future[Any] | None = None
-        self.pool = self._fresh()
+        self._renew()
 
     @property
     def idle(self) -> bool:
         return self._last is None or self._last.done()
 
+    @property
+    def broken(self) -> bool:
+        """Whether the last task broke the pool: its process died, or its answer could not be read."""
+        return self._last is not None and self._last.done() and isinstance(self._last.exception(), BrokenExecutor)
+
     def submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         try:
             future = self._submit(function, *task)
         except BrokenExecutor:  # the worker died in its last task or while idle
-            self.pool.shutdown()
-            self.pool, self._last = self._fresh(), None
+            self.end()
+            self._last = None
+            self._renew()
             future = self._submit(function, *task)
         self._last = future
         return future
 
+    def leave(self) -> None:
+        """Let the process end at once: it watches the pipe that is closed here."""
+        self._own_end.close()
+
+    def end(self) -> None:
+        """End the process at once, and wait until it has ended."""
+        self.leave()
+        self.pool.shutdown(cancel_futures=True)
+        self._worker_end.close()
+        self._temporary.cleanup()
+
     def _submit(self, function: Callable[..., R], *task: Any) -> Future[R]:
         if self._last is not None:
             return self.pool.submit(function, *task)
-        with ignore_sigint():  # inherited by the process, so that it ignores Ctrl-C even while it imports
+        with shield_children():
             return self.pool.submit(function, *task)
 
-    def _fresh(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, (self._alive,))
+    def _renew(self) -> None:
+        with shield_children():  # the pool may start the process that tracks its semaphores
+            self._temporary = tempfile.TemporaryDirectory(prefix="harness-worker-", ignore_cleanup_errors=True)
+            self._worker_end, self._own_end = get_context("spawn").Pipe(duplex=False)
+            given = (self._worker_end, self._temporary.name)
+            self.pool = ProcessPoolExecutor(1, get_context("spawn"), _initialise_worker, given)
 
 
-def _initialise_worker(alive: Connection) -> None:
+def _initialise_worker(alive: Connection, temporary: str) -> None:
+    for number in SIGNALS:  # they are blocked already, but not on Windows
+        signal.signal(number, signal.SIG_IGN)
+    if hasattr(os, "setpgid"):
+        os.setpgid(0, 0)  # a group of its own, which ends with it: processes that the task starts
+    tempfile.tempdir = os.environ["TMPDIR"] = temporary  # a process that is stopped at once leaves files behind
     sys.stdout = sys.stderr
     Thread(target=_exit_with_parent, args=(alive,), daemon=True).start()
 
 
 def _exit_with_parent(alive: Connection) -> None:
     alive.poll(None)  # nothing is ever sent; this returns when the other end closes
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
     os._exit(1)
-
-
-@contextmanager
-def ignore_sigint() -> Iterator[None]:
-    """Processes started in the block ignore Ctrl-C."""
-    if current_thread() is not main_thread():  # only the main thread may set signal handlers
-        yield
-        return
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)

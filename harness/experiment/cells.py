@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from harness.body.mounts import locate_mount
+from harness.core.fault_report import named_folder_fault
 from harness.core.humanoid24 import standard_skeleton
 from harness.core.split import ClipPart, ExampleLeak
-from harness.errors import BadInput, HarnessError, was_interrupted
+from harness.errors import BadInput, HarnessError, SystemFault, was_interrupted
 from harness.experiment.clip_evaluation import ClipEvaluation, mounts_of, noise_of
 from harness.experiment.isolation import DEFAULT_ISOLATION, Isolation
 from harness.experiment.method_process import MethodFailure
@@ -125,8 +126,10 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
                 yield CellOutcome(str(cell), key, row=read_row(cell_folder(out, key)))
                 continue
             evaluated = evaluate_cell(evaluation, method, cell, key, task.command)
-            storage.write_cell(out, evaluated)
+            _write_cell(out, evaluated)
             yield CellOutcome(str(cell), key, row=as_row(evaluated), seconds=time.perf_counter() - start)
+        except SystemFault:
+            raise
         except MethodFailure as error:
             yield CellOutcome(str(cell), failure=str(error))
         except ExampleLeak:
@@ -137,6 +140,14 @@ def run_task(session: str, task: ClipTask, out: Path, stop: Path) -> Iterator[Ce
             if was_interrupted(error):
                 raise KeyboardInterrupt from error
             yield CellOutcome(str(cell), failure=traceback.format_exc())
+
+
+def _write_cell(out: Path, cell: storage.Cell) -> None:
+    """Write a cell; SystemFault when the system refuses, which is no failure of the cell: all others would fail too."""
+    with named_folder_fault(out):
+        if not out.is_dir():  # it would be made anew, for one cell
+            raise FileNotFoundError(out)
+        storage.write_cell(out, cell)
 
 
 @cache

@@ -16,6 +16,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from harness.core.fault_report import named_folder_fault
 from harness.core.files import TEMPORARY, content_key
 from harness.errors import BadInput, HarnessError, Outcome
 from harness.experiment.cells import (
@@ -127,12 +128,12 @@ def run_cells(
 ) -> CellResults:
     """Run the cells of scenarios that the existing folder `out` does not have yet, and return the results of all.
 
-    A search calls this again and again in one folder; cells of earlier calls stay in the index. Tasks are planned for
-    `workers` workers, by default one per core. BadInput when two cells have the same name.
+    A search calls this again and again in one folder, whose lock it holds; cells of earlier calls stay in the index.
+    Tasks are planned for `workers` workers, by default one per core. BadInput when two cells have the same name.
     """
     names = [name for scenario in scenarios for name in cell_names(scenario)]
     tasks = plan_tasks(scenarios, folder, command, workers or os.cpu_count() or 1)
-    with folder_lock(out), CellIndex(out) as index:
+    with named_folder_fault(out), CellIndex(out) as index:
         outcomes = _run_tasks(index, names, tasks, out, executor, progress)
         keys = [outcomes[name].key for name in names if name in outcomes and not outcomes[name].failure]
         failures = {name: outcomes[name].failure for name in names if name in outcomes and outcomes[name].failure}
@@ -168,7 +169,7 @@ def _run_folder(
             hint = f" Did you mean {near[0]!r}?" if near else ""
             raise BadInput(f"No cell is called {only!r}.{hint}", f"`harness status {out}` names those that failed.")
     storage.open_run(out, _describe(content, scenarios, folder, command, isolation))
-    with folder_lock(out), CellIndex(out) as index:
+    with folder_lock(out), named_folder_fault(out), CellIndex(out) as index:
         index.add_from_folders()
         index.plan(names)
         index.note(kind=kind, name=name, command=command)
@@ -251,7 +252,9 @@ def _run_tasks(
                         record(cell)
                 except BrokenExecutor:
                     broken.append(tasks[which])
-                except HarnessError:
+                except HarnessError as error:
+                    if not out.is_dir():  # a worker calls it a folder that it does not see
+                        raise FileNotFoundError(str(error)) from error
                     raise
                 except Exception:  # the task could not be sent or answered: its cells fail, the others go on
                     failure = traceback.format_exc()
@@ -260,11 +263,14 @@ def _run_tasks(
                             record(CellOutcome(str(planned), failure=failure))
         return broken
 
-    with graceful_stop(stop):
-        broken = attempt(tasks)
-        # One cell of a task may be to blame for the worker's death: the cells are tried one by one.
-        for task in attempt([single for whole in broken for single in split_task(whole)]):
-            record(CellOutcome(str(task.cells()[0]), failure="a worker process died"))
+    try:
+        with graceful_stop(stop):
+            broken = attempt(tasks)
+            # One cell of a task may be to blame for the worker's death: the cells are tried one by one.
+            for task in attempt([single for whole in broken for single in split_task(whole)]):
+                record(CellOutcome(str(task.cells()[0]), failure="a worker process died"))
+    finally:
+        storage.remove_leftovers(out)  # of workers that were stopped at once
     return outcomes
 
 

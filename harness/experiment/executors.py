@@ -16,10 +16,12 @@ from concurrent.futures import BrokenExecutor, CancelledError, Future
 from contextlib import contextmanager, redirect_stdout
 from functools import partial
 from importlib.util import find_spec
+from tempfile import TemporaryDirectory
 from threading import Lock
 from typing import Any, Protocol, TypeVar
 
-from harness.core.workers import Pool, ignore_sigint, schedule_tasks
+from harness.core.interrupts import shield_children
+from harness.core.workers import Pool, schedule_tasks
 from harness.errors import BadInput, MissingExtra
 from harness.results.manifest import source_hash
 
@@ -35,11 +37,9 @@ LOCAL_CLUSTER_CONFIG = {
     "distributed.worker.http.routes": [],
     "distributed.worker.profile.enabled": False,  # it would slow the steps that are timed
     "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
-    "distributed.nanny.pre-spawn-environ": dict.fromkeys(
-        ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), 1
-    ),
 }
 """Dask settings of a local cluster."""
+_WORKER_ENVIRONMENT = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), 1)
 
 
 class TaskExecutor(Protocol):
@@ -114,8 +114,12 @@ def _connect_scheduler(address: str, workers: int | None) -> Iterator[Any]:
     from dask import config
     from distributed import LocalCluster
 
-    with config.set(LOCAL_CLUSTER_CONFIG):
-        with ignore_sigint():
+    with (
+        TemporaryDirectory(prefix="harness-dask-", ignore_cleanup_errors=True) as folder,
+        config.set({**LOCAL_CLUSTER_CONFIG, "temporary-directory": folder}),
+        config.set({"distributed.nanny.pre-spawn-environ": {**_WORKER_ENVIRONMENT, "TMPDIR": folder}}),
+    ):
+        with shield_children():
             cluster = LocalCluster(
                 n_workers=workers or os.cpu_count() or 1,
                 threads_per_worker=1,

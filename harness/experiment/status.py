@@ -16,7 +16,7 @@ class RunStatus:
     """Progress of one folder."""
 
     kind: str
-    """`run`, `sweep`, `placement` or `paper`."""
+    """`run`, `sweep`, `placement` or `paper`; `study` of one of the last two that has no cells yet."""
     name: str
     command: str
     """Command that resumes the work."""
@@ -43,12 +43,15 @@ def read_status(out: Path) -> RunStatus:
     if (out / INDEX_FILE).is_file() or (out / "manifest.json").is_file():
         return _read_index_status(out)
     runs = [_read_index_status(file.parent) for file in sorted(out.glob(f"*/{INDEX_FILE}"))]
+    running = is_running(out) or any(run.running for run in runs)
+    if not runs and running:  # it has just begun
+        return RunStatus("study", out.name, "", 0, 0, {}, running)
     if not runs:
         found = "no such folder" if not out.is_dir() else f"neither {INDEX_FILE} nor manifest.json"
         raise BadFile(out, found, "a folder of `harness sweep` or `harness run`", "Name the one given as --out.")
     failures = {f"{run.name}: {cell}": text for run in runs for cell, text in run.failures.items()}
     planned, finished = sum(run.planned for run in runs), sum(run.finished for run in runs)
-    return RunStatus("paper", out.name, runs[0].command, planned, finished, failures, any(run.running for run in runs))
+    return RunStatus("paper", out.name, runs[0].command, planned, finished, failures, running)
 
 
 def _read_index_status(out: Path) -> RunStatus:

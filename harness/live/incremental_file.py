@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 from typing import BinaryIO
 
+from harness.core.fault_report import is_system_fault
 from harness.errors import BadFile
 
 _SAVE_PERIOD_S = 1.0
@@ -27,6 +28,8 @@ class IncrementalFile:
             advice = "Name another, or replace it with --force."
             raise BadFile(path, "it exists", "no such file yet", advice) from error
         except OSError as error:
+            if is_system_fault(error):
+                raise
             raise BadFile(path, f"it cannot be written ({error.strerror})", "a file", "Name another.") from error
         self._file.write(head)
         self._saved_s: float | None = None

@@ -46,19 +46,17 @@ def main() -> None:
 
 
 class JitterProbe:
-    """Runs the measurement from its creation until `finish`; its context manager ends the process."""
+    """Runs the measurement until `finish`; a context manager, which starts and ends the process."""
 
-    def __init__(self) -> None:
+    def __enter__(self) -> "JitterProbe":
         self._process = subprocess.Popen(
             [sys.executable, "-m", "harness.live.scheduling_jitter"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            start_new_session=True,  # Ctrl-C must not reach it
+            start_new_session=True,  # no signal to this process's group reaches it
         )
-
-    def __enter__(self) -> "JitterProbe":
         return self
 
     def __exit__(self, *raised: object) -> None:

@@ -7,7 +7,7 @@ drops its oldest frames, solves and sends. The caller's thread waits, and Ctrl-C
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from threading import Event, Thread
 
 from harness.body.humanoid import Body
@@ -67,6 +67,8 @@ class LiveResult:
     stages: StageLatencies
     failed: dict[str, str]
     """Error of each output that failed, by its name."""
+    stopped: bool = False
+    """Whether Ctrl-C or another signal ended the session."""
 
     @property
     def poses(self) -> int:
@@ -100,6 +102,7 @@ def run_session(
     capture = CaptureThread(stream, queue, clock)
     solver = _SolverThread(queue, body, reconstructor, calibration, outputs, options, say, clock)
     thread = Thread(target=solver.run, name="reconstruct")
+    stopped = False
     try:
         with low_latency_mode():
             solver.prepare()
@@ -109,6 +112,7 @@ def run_session(
                 if options.seconds is not None and clock() - solver.start_s >= options.seconds:
                     break
     except KeyboardInterrupt:
+        stopped = True
         say("stopped")
     finally:
         capture.stop()
@@ -118,7 +122,7 @@ def run_session(
         solver.close()
     if error := solver.error or capture.error:
         raise error
-    return solver.result(capture.frames)
+    return replace(solver.result(capture.frames), stopped=stopped)
 
 
 class _SolverThread:

@@ -13,8 +13,8 @@ from typing import Any
 
 from harness.calibrate.guided_calibration import GuidedPose
 from harness.core.arrays import Floats
+from harness.core.interrupts import shield_children
 from harness.core.skeleton import Skeleton
-from harness.core.workers import ignore_sigint
 from harness.errors import BadFile, BadInput, MissingExtra
 from harness.live.pose import LivePose
 from harness.live.shared_pose import READY, SharedPose, ViewerConfig, ViewerKind
@@ -44,25 +44,33 @@ class ViewerOutput:
             raise BadInput("--view window: there is no screen (DISPLAY is not set).", "Use --view frames --out DIR.")
         if kind == "frames":
             _prepare_folder(out, force)
-        context = get_context("spawn")
-        self._shared = SharedPose(context)
-        self._pipe, viewer_pipe = context.Pipe()
         config = ViewerConfig(kind, skeleton.bone_m, str(out or ""), _RATE_HZ[kind])
-        self._process = context.Process(
-            target=_run_viewer_process, args=(config, self._shared, viewer_pipe), name="view", daemon=True
-        )
-        with ignore_sigint():  # Ctrl-C ends the session, and the session ends the viewer
+        with shield_children():  # a signal ends the session, and the session ends the viewer
+            context = get_context("spawn")
+            self._shared = SharedPose(context)
+            self._pipe, viewer_pipe = context.Pipe()
+            self._process = context.Process(
+                target=_run_viewer_process, args=(config, self._shared, viewer_pipe), name="view", daemon=True
+            )
             self._process.start()
-        viewer_pipe.close()
+            viewer_pipe.close()
         try:
-            message = self._pipe.recv() if self._pipe.poll(_START_TIMEOUT_S) else "it does not answer"
-        except EOFError:
-            self._process.join(_END_TIMEOUT_S)
-            message = f"its process ended with exit code {self._process.exitcode}"
+            message = self._wait_for_start()
+        except BaseException:
+            self.close()
+            raise
         if message != READY:
             self.close()
             advice = "Check that this computer has OpenGL, or leave the option out."
             raise BadInput(f"{self.name} cannot be drawn: {message}.", advice)
+
+    def _wait_for_start(self) -> str:
+        """The viewer's first message, or why there is none."""
+        try:
+            return str(self._pipe.recv()) if self._pipe.poll(_START_TIMEOUT_S) else "it does not answer"
+        except EOFError:
+            self._process.join(_END_TIMEOUT_S)
+            return f"its process ended with exit code {self._process.exitcode}"
 
     def send(self, pose: LivePose) -> None:
         """Show a pose; OSError when the viewer's process has ended."""

@@ -167,7 +167,6 @@ def write_cell(out: Path, cell: Cell) -> Path:
     folder = cell_folder(out, cell.key)
     beside = temporary_path(folder)
     shutil.rmtree(beside, ignore_errors=True)
-    beside.mkdir(parents=True)
     content = {name: getattr(cell, name) for name in _TEXTS}
     content |= {"metrics": cell.scores.metrics, "per_joint": cell.scores.per_joint, "metric_versions": VERSIONS}
     columns = {name: getattr(cell, name) for name in (*_FLOATS, *_INTS, *_BOOLS)}
@@ -178,16 +177,18 @@ def write_cell(out: Path, cell: Cell) -> Path:
     frames = _npz_bytes(columns)
     content["frames_sha256"] = hashlib.sha256(frames).hexdigest()
     files = {"cell.json": insert_digest(to_json(content)).encode(), "frames.npz": frames}
-    for name, data in files.items():
-        (beside / name).write_bytes(data)
-    for name in files:  # after both writes, so that most data reach the disk in one flush
-        flush(beside / name)
     try:
+        beside.mkdir(parents=True)
+        for name, data in files.items():
+            (beside / name).write_bytes(data)
+        for name in files:  # after both writes, so that most data reach the disk in one flush
+            flush(beside / name)
         move_into_place(beside, folder)
     except OSError:
-        if not folder.is_dir():
+        if not folder.is_dir():  # else another process finished the same cell first
             raise
-        shutil.rmtree(beside)  # another process finished the same cell first
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
     return folder
 
 

@@ -36,6 +36,8 @@ _VERSION = int(content_key([_COLUMNS, list(_TABLES)])[:7], 16)
 """Version number in the file. An index with other columns or tables is rebuilt."""
 _ADVICE = "Give its command again; finished cells are kept."
 _PLAN_COLUMNS = "place INTEGER PRIMARY KEY, cell TEXT UNIQUE, key TEXT, failure TEXT"
+_STORAGE_ERRORS = ("SQLITE_FULL", "SQLITE_IOERR", "SQLITE_READONLY", "SQLITE_CANTOPEN")
+"""Beginnings of the names of errors that lie in the disk or the folder and not in the file."""
 _KEYS_PER_QUERY = 500
 """Number of keys in one SQL query."""
 
@@ -60,7 +62,9 @@ class CellIndex:
         else:
             try:
                 self._db = self._open()
-            except sqlite3.DatabaseError:  # damaged, edited or of another version: it is rebuilt
+            except sqlite3.DatabaseError as error:  # damaged, edited or of another version: it is rebuilt
+                if getattr(error, "sqlite_errorname", "").startswith(_STORAGE_ERRORS):
+                    raise
                 self._remove()
                 self._db = self._open()
 
@@ -237,7 +241,9 @@ class CellIndex:
         expected = "the index of a run or sweep of this version of the harness"
         if not self.path.is_file():
             raise BadFile(self.path, "no such file", expected, _ADVICE)
-        db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro", uri=True, timeout=30.0)
+        # Of a folder that cannot be written, SQLite reads the file alone; nobody can be writing there.
+        alone = "" if os.access(self.path.parent, os.W_OK) or self._has_log() else "&immutable=1"
+        db = sqlite3.connect(f"{self.path.absolute().as_uri()}?mode=ro{alone}", uri=True, timeout=30.0)
         try:
             version = db.execute("PRAGMA user_version").fetchone()[0]
         except sqlite3.DatabaseError as error:
@@ -247,6 +253,10 @@ class CellIndex:
             db.close()
             raise BadFile(self.path, "another version", expected, _ADVICE)
         return db
+
+    def _has_log(self) -> bool:
+        """Whether changes lie beside the file, as while another process writes."""
+        return self.path.with_name(f"{INDEX_FILE}-wal").exists()
 
     def _remove(self) -> None:
         for path in self.path.parent.glob(f"{INDEX_FILE}*"):

@@ -31,3 +31,5 @@ def is_running(out: Path) -> bool:
             return False
     except Timeout:
         return True
+    except OSError:  # a folder that cannot be written: nobody works there
+        return False

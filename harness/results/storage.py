@@ -55,7 +55,7 @@ def open_folder(
     """Create a results folder and its `identity_file`, or open it to resume.
 
     `difference` says in what an existing identity file differs, "" if it does not. BadInput when it differs, when the
-    folder holds other files, and when it cannot be written.
+    folder holds other files, and when its name is no folder's.
     """
     check_words(out)
     advice = "Name another folder with --out, or delete this one."
@@ -69,9 +69,9 @@ def open_folder(
         raise BadInput(f"{out} holds files that are no {kind} ({', '.join(sorted(names)[:3])}).", advice)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        write_result_json(out / identity_file, identity)  # first: it tells later that the folder is ours
-    except OSError as error:
-        raise BadInput(f"{out} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
+    except (NotADirectoryError, FileExistsError) as error:  # the name of a folder in it is a file's
+        raise BadInput(f"{out} cannot be made ({error.strerror}).", "Name another folder with --out.") from error
+    write_result_json(out / identity_file, identity)  # first: it tells later that the folder is ours
 
 
 def open_run(out: Path, manifest: Manifest) -> None:
@@ -181,4 +181,4 @@ def remove_leftovers(out: Path) -> None:
         if path.is_dir():
             shutil.rmtree(path, ignore_errors=True)  # a worker of another computer may still write there
         else:
-            path.unlink()
+            path.unlink(missing_ok=True)

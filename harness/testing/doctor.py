@@ -117,7 +117,8 @@ def _rendering_problem() -> str:
     standing, bone_m = humanoid.tpose(standard_skeleton())[None], standard_skeleton().bone_m
     with TemporaryDirectory(prefix="harness-doctor-") as folder:
         file = Path(folder) / "picture.png"
-        return RenderProcess([RenderJob(file, bone_m, bone_m, standing, standing)]).finish()
+        with RenderProcess([RenderJob(file, bone_m, bone_m, standing, standing)]) as rendering:
+            return rendering.finish()
 
 
 def _check_library(folder: LibraryFolders | None) -> InstallationCheck:

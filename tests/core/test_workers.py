@@ -2,6 +2,9 @@
 
 import os
 import signal
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from concurrent.futures import BrokenExecutor
@@ -10,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from harness.core.interrupts import SIGNALS
 from harness.core.workers import Pool, run_in_workers
 
 
@@ -60,7 +64,7 @@ def test_a_worker_that_dies_takes_nothing_with_it_but_its_task_which_is_begun_on
     assert isinstance(came[1].exception(), BrokenExecutor)
 
 
-def _call(function: Callable[..., str], *task: Any) -> str:
+def _call(function: Callable[..., Any], *task: Any) -> Any:
     return function(*task)
 
 
@@ -75,6 +79,66 @@ def test_a_pool_keeps_its_workers_for_the_next_call_and_starts_no_more_than_it_n
     ((_, anew),) = pool(os.getpid, [()])
     assert anew.result() != first.result()
     pool.close()
+
+
+def starts_a_child(mark: Path) -> None:
+    """Write a temporary file, start a process, and wait."""
+    descriptor, path = tempfile.mkstemp()
+    os.close(descriptor)
+    child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+    mark.with_suffix(".new").write_text(f"{child.pid} {path}")
+    mark.with_suffix(".new").rename(mark)
+    time.sleep(600)
+
+
+@pytest.mark.skipif(not hasattr(os, "killpg"), reason="Windows has no process groups")
+def test_a_worker_that_is_stopped_leaves_no_process_and_no_file(tmp_path: Path) -> None:
+    mark = tmp_path / "mark"
+    calls = run_in_workers(_call, [(time.sleep, 0.0), (starts_a_child, mark)], 2)
+    assert next(calls)[0] == 0
+    while not mark.exists():
+        time.sleep(0.01)
+    child, temporary = mark.read_text().split()
+    assert Path(temporary).exists()
+    calls.close()
+    assert not Path(temporary).parent.exists()
+    end_s = time.monotonic() + 20.0
+    while _is_running(int(child)) and time.monotonic() < end_s:
+        time.sleep(0.01)
+    assert not _is_running(int(child))
+
+
+def _is_running(pid: int) -> bool:
+    try:
+        return "State:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    except OSError:
+        return False
+
+
+class Unreadable:
+    """An answer that its process can send and this one cannot read."""
+
+    def __reduce__(self) -> tuple[Callable[[str], object], tuple[str]]:
+        return int, ("no number",)
+
+
+def test_an_answer_that_cannot_be_read_breaks_its_own_task_alone() -> None:
+    begin_s = time.monotonic()
+    ended = dict(run_in_workers(_call, [(Unreadable,), (abs, -1)], 1))
+    assert isinstance(ended[0].exception(), BrokenExecutor)
+    assert ended[1].result() == 1
+    assert time.monotonic() - begin_s < 60.0
+
+
+def signals_of_this_process() -> set[int]:
+    """Signals that are blocked or ignored here."""
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, [])
+    return {number for number in SIGNALS if number in blocked or signal.getsignal(number) is signal.SIG_IGN}
+
+
+def test_a_worker_sees_no_signal() -> None:
+    ((_, future),) = run_in_workers(signals_of_this_process, [()], 1)
+    assert future.result() == set(SIGNALS)
 
 
 def test_stopping_early_stops_what_runs() -> None:

@@ -48,6 +48,8 @@ def kept(out: Path) -> dict[str, str]:
         assert not folder.name.startswith(TEMPORARY)
         content = json.loads((folder / "cell.json").read_text())
         del content["reproduce"]  # names the folder
+        for name in ("sha256", "frames_sha256"):  # of the times too
+            del content[name]
         content["metrics"] = {k: v for k, v in content["metrics"].items() if not k.startswith(TIMED)}
         state = blake2b(json.dumps(content).encode())
         with np.load(folder / "frames.npz") as frames:

@@ -116,7 +116,8 @@ def test_a_slow_method_gets_the_newest_and_capture_never_waits() -> None:
 
 def test_it_ends_after_its_time() -> None:
     stream = Paced(frames(3), ends=False)
-    assert performed(stream, Counting(), plan=LiveOptions(100.0, seconds=0.3)).captured == 3
+    done = performed(stream, Counting(), plan=LiveOptions(100.0, seconds=0.3))
+    assert (done.captured, done.stopped) == (3, False)
     assert stream.closed.is_set()
 
 
@@ -132,6 +133,7 @@ def test_ctrl_c_is_a_normal_end() -> None:
 
     done = run_session(stream, BODY, method, WORN, [output], LiveOptions(100.0, seconds=60.0), clock=clock)
     assert done.captured == 3
+    assert done.stopped
     assert output.closed == 1
     assert stream.closed.is_set()
 

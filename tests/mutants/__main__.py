@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.commands.common import positive_int, sigterm_as_interrupt
+from harness.commands.common import positive_int
+from harness.core.interrupts import accept_interrupts
 from harness.errors import Outcome
 from tests.mutants.campaign import RedReference, Result, run_campaign, share_caught
 from tests.mutants.checkout_copy import TIMEOUT
@@ -27,7 +28,7 @@ LEAST_SHARE = 0.9
 def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
-        with sigterm_as_interrupt():
+        with accept_interrupts():
             return _test_draw(options)
     except KeyboardInterrupt:
         print("Interrupted.", file=sys.stderr)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
+from harness.core.fault_report import is_system_fault
 from harness.core.files import move_into_place, temporary_path
 from harness.errors import BadInput, UnknownName
 from harness.mocap.write.bvh import bvh_files
@@ -42,6 +43,8 @@ def export(cells: Iterable[ExportableCell], fmt: str, folder: Path, *, force: bo
         for path, unfinished in ready.items():
             move_into_place(unfinished, path)
     except OSError as error:
+        if is_system_fault(error):
+            raise
         raise BadInput(f"{folder} cannot be written ({error.strerror}).", "Name another folder with --out.") from error
     finally:
         for unfinished in folder.glob(temporary_path(folder / "*").name):

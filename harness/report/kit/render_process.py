@@ -10,11 +10,13 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Self
 
 import numpy as np
 
 from harness.core.arrays import Floats
 from harness.core.files import TEMPORARY
+from harness.core.interrupts import shield_children
 from harness.errors import MissingExtra
 
 _STARTUP_TIMEOUT_S, _FRAME_TIMEOUT_S = 60.0, 2.0
@@ -45,17 +47,23 @@ class RenderJob:
 
 
 class RenderProcess:
-    """Renders jobs in the background; `finish` waits for them."""
+    """Renders jobs in the background; a context manager, which starts and ends the process. `finish` waits for it."""
 
     def __init__(self, jobs: Sequence[RenderJob]) -> None:
         self._jobs = jobs
         self._reason = _missing_package(jobs)
-        self._folder = TemporaryDirectory(prefix="harness-report-")
         self._process: subprocess.Popen[str] | None = None
-        for job in jobs:
+
+    def __enter__(self) -> Self:
+        self._folder = TemporaryDirectory(prefix="harness-report-")
+        for job in self._jobs:
             job.output.unlink(missing_ok=True)
-        if jobs and not self._reason:
+        if self._jobs and not self._reason:
             self._process = self._start()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self._close()
 
     def finish(self, progress: ProgressCallback = lambda last, done, planned: None) -> str:
         """Wait for the renderer; returns the reason why pictures are missing, "" if none is.
@@ -78,10 +86,9 @@ class RenderProcess:
                 self._reason = "the renderer did not finish in time"
             else:
                 self._reason = "" if self._process.returncode == 0 else describe_exit(self._process.returncode, stderr)
-        self.close()
         return self._reason
 
-    def close(self) -> None:
+    def _close(self) -> None:
         """Kill a renderer that still runs, and remove unfinished and temporary files."""
         if self._process is not None and self._process.poll() is None:
             self._process.kill()
@@ -114,7 +121,10 @@ def start_renderer(module: str, arguments: Sequence[str]) -> "subprocess.Popen[s
     if sys.platform == "linux" and not environment.get("DISPLAY"):
         environment.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
     command, devnull = [sys.executable, "-m", module, *arguments], subprocess.DEVNULL
-    return subprocess.Popen(command, env=environment, stdin=devnull, stdout=devnull, stderr=subprocess.PIPE, text=True)
+    with shield_children():  # a signal ends this process, which ends the renderer
+        return subprocess.Popen(
+            command, env=environment, stdin=devnull, stdout=devnull, stderr=subprocess.PIPE, text=True
+        )
 
 
 def _missing_package(jobs: Sequence[RenderJob]) -> str:

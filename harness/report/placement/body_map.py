@@ -6,6 +6,7 @@ rendered in a separate process. Labels, lines and colour bar are drawn around it
 
 import subprocess
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from harness.core.arrays import Floats
+from harness.core.interrupts import defer_interrupts
 from harness.errors import MissingExtra
 from harness.report.kit.chart import draw_chart, spread_positions
 from harness.report.kit.render_process import describe_exit, start_renderer
@@ -94,19 +96,24 @@ def _render(
             colour=colormaps[_COLOURS](shares)[:, :3],
             known=np.array([value is not None for value in contributions]),
         )
-        process = start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)])
-        try:
-            _, stderr = process.communicate(timeout=_TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            return None, "the renderer did not finish in time"
-        finally:
-            if process.poll() is None:
-                process.kill()
-                process.communicate()
+        with ExitStack() as after:
+            with defer_interrupts():
+                process = start_renderer("harness.report.placement.body_map_worker", [str(job), str(output)])
+                after.callback(_end, process)
+            try:
+                _, stderr = process.communicate(timeout=_TIMEOUT_S)
+            except subprocess.TimeoutExpired:
+                return None, "the renderer did not finish in time"
         if process.returncode != 0 or not output.exists():
             return None, describe_exit(process.returncode, stderr)
         with np.load(output, allow_pickle=False) as content:
             return {name: content[name] for name in content.files}, ""
+
+
+def _end(process: "subprocess.Popen[str]") -> None:
+    if process.poll() is None:
+        process.kill()
+        process.communicate()
 
 
 def _chart(

@@ -48,8 +48,8 @@ def write_run_page(
     reader = cache(run.cell)
     leading = [window for (series, _), window in windows.items() if series == headline.lowest]
     strips = [_strip(run, group, plots) for group in group_overlapping(leading)]
-    rendering = RenderProcess([_strip_job(reader(s.windows[0].key), run, s) for s in strips] if rendered else [])
-    try:
+    strip_jobs = [_strip_job(reader(s.windows[0].key), run, s) for s in strips] if rendered else []
+    with RenderProcess(strip_jobs) as rendering:
         measured = [name for name in run.behaviours if any(t.scored.any() for t in run.traces if t.behaviour == name)]
         curves = parameter_effects.effect_charts(run)
         over_time = [charts.error_over_time(run, behaviour) for behaviour in measured]
@@ -57,8 +57,6 @@ def write_run_page(
         distribution = charts.error_distribution(run) if measured else None
         player, no_player = _player(run, windows, headline.lowest, reader)
         reason = rendering.finish() if rendered else "rendering was turned off"
-    finally:
-        rendering.close()
     missing = []
     if windows and not strips:
         missing.append("Rendered pictures of the worst two seconds: no method has the lowest error")
@@ -152,11 +150,8 @@ def _movies(run: RunData, reader: Callable[[str], Cell], progress: ProgressCallb
         if rows:
             worst = max(rows, key=lambda row: float(row[PRIMARY_METRIC]))
             jobs.append(_movie_job(reader(str(worst["key"])), series, run.out))
-    rendering = RenderProcess(jobs)
-    try:
+    with RenderProcess(jobs) as rendering:
         reason = rendering.finish(progress)
-    finally:
-        rendering.close()
     return [job.output for job in jobs if job.output.is_file()], reason
 
 

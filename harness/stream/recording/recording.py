@@ -22,8 +22,10 @@ from threading import Lock
 from types import TracebackType
 from typing import Any
 
+from harness.core.fault_report import is_system_fault
 from harness.core.fields import build
-from harness.errors import BadFile, HarnessError
+from harness.core.interrupts import defer_interrupts
+from harness.errors import BadFile, HarnessError, SystemFault
 from harness.stream.codec.blocks import (
     CONFIGURED,
     EVENT,
@@ -232,7 +234,7 @@ class RecordingWriter:
         self._append(RecordingBlock(kind, now_s, then_s, json.dumps(content, default=str).encode()))
 
     def _append(self, block: RecordingBlock) -> None:
-        with self._lock:
+        with defer_interrupts(), self._lock:  # a block is written whole
             if self._closed:
                 return
             try:
@@ -244,6 +246,9 @@ class RecordingWriter:
                     _write_all(self._file, encode_block(note))
                 _write_all(self._file, encode_block(block))
             except OSError as error:
+                if is_system_fault(error):
+                    kept = "Blocks that were recorded before are kept; free some space and record into another file."
+                    raise SystemFault(f"{self.path} cannot be written ({error.strerror}).", kept) from error
                 raise _file_error(self.path, error) from error
 
     def _open_file(self) -> int:

@@ -10,12 +10,13 @@ from typing import Literal
 
 from harness.compare.claims import correct_claims
 from harness.core.package_data import data_folder
-from harness.errors import BadInput, Outcome, UnknownName, was_interrupted
+from harness.errors import BadInput, Outcome, SystemFault, UnknownName, was_interrupted
 from harness.experiment.cells import ProgressCallback, check_names, open_scenario_motion
 from harness.experiment.scenario import Scenario, load_scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import PaperExperiment, PaperFindings, write_findings
+from harness.results.lock import folder_lock
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
 from harness.study.papers.provenance import provenance_tables
 from harness.study.papers.quick_form import shorten
@@ -80,8 +81,9 @@ def reproduce(
     """Run what is not finished, evaluate the experiments, and write findings.json into `out`.
 
     The motion is synthetic, or that of `library`. `quick` runs the form of `quick_form`, which decides nothing.
-    `out` is created, or resumed when it holds the same study, else refused (BadInput). The outcome is INCOMPLETE when a
-    cell or an experiment failed, else PASS: a claim that is not reproduced is a result.
+    `out` is created, or resumed when it holds the same study, else refused (BadInput). Its lock is held meanwhile.
+    The outcome is INCOMPLETE when a cell or an experiment failed, else PASS: a claim that is not reproduced is a
+    result.
     """
     motion: Motion = "cmu" if library else "builtin"
     plan = {name: shorten(run) if quick else run for name, run in paper.plan(motion, seed).items()}
@@ -92,41 +94,44 @@ def reproduce(
     source = open_scenario_motion(next(iter(plan.values())).motion, library, seed)
     title = source.title + (", quick form" if quick else "")
     open_study(out, {"paper": paper.name, "motion": title, "seed": seed})
-    cells = count_cells(runs)
-    planned = cells + len(paper.experiments)
-    failures = run_scenarios(
-        runs,
-        out,
-        folder=library,
-        jobs=jobs,
-        command=command,
-        progress=lambda last, done, _: progress(last, done, planned),
-    )
-    study = PaperStudy(out, motion, seed, plan, library, failures, quick)
-    experiments, failed = [], False
-    for done, (name, evaluate) in enumerate(paper.experiments.items()):
-        progress(name, cells + done, planned)
-        try:
-            experiments.append(_with_failures(evaluate(study), study))
-        except Exception as error:  # the other experiments are still evaluated
-            if was_interrupted(error):
+    with folder_lock(out):
+        cells = count_cells(runs)
+        planned = cells + len(paper.experiments)
+        failures = run_scenarios(
+            runs,
+            out,
+            folder=library,
+            jobs=jobs,
+            command=command,
+            progress=lambda last, done, _: progress(last, done, planned),
+        )
+        study = PaperStudy(out, motion, seed, plan, library, failures, quick)
+        experiments, failed = [], False
+        for done, (name, evaluate) in enumerate(paper.experiments.items()):
+            progress(name, cells + done, planned)
+            try:
+                experiments.append(_with_failures(evaluate(study), study))
+            except (OSError, SystemFault):
                 raise
-            failed = True
-            last = traceback.format_exc().strip().splitlines()[-1]
-            experiments.append(PaperExperiment(name, name, "", (), notes=(f"This experiment failed: {last}",)))
-    progress("findings", planned, planned)
-    findings = PaperFindings(
-        paper=paper.name,
-        reference=paper.reference,
-        motion=title,
-        command=command,
-        seed=seed,
-        experiments=correct_experiments(experiments),
-        circumstances=manifest.current_circumstances(),
-        tables=provenance_tables(replace(study, runs=runs)),
-    )
-    write_findings(out / "findings.json", findings)
-    return findings, Outcome.INCOMPLETE if failures or failed else Outcome.PASS
+            except Exception as error:  # the other experiments are still evaluated
+                if was_interrupted(error):
+                    raise
+                failed = True
+                last = traceback.format_exc().strip().splitlines()[-1]
+                experiments.append(PaperExperiment(name, name, "", (), notes=(f"This experiment failed: {last}",)))
+        progress("findings", planned, planned)
+        findings = PaperFindings(
+            paper=paper.name,
+            reference=paper.reference,
+            motion=title,
+            command=command,
+            seed=seed,
+            experiments=correct_experiments(experiments),
+            circumstances=manifest.current_circumstances(),
+            tables=provenance_tables(replace(study, runs=runs)),
+        )
+        write_findings(out / "findings.json", findings)
+        return findings, Outcome.INCOMPLETE if failures or failed else Outcome.PASS
 
 
 def correct_experiments(experiments: Sequence[PaperExperiment]) -> tuple[PaperExperiment, ...]:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.core.files import to_json_types
-from harness.errors import HarnessError, was_interrupted
+from harness.errors import HarnessError, SystemFault, was_interrupted
 from harness.experiment import engine
 from harness.experiment.cells import ProgressCallback
 from harness.experiment.scenario import Scenario, variants
@@ -111,6 +111,8 @@ def run_scenarios(
         run_folder = out / name
         try:
             engine.run(scenario, run_folder, folder=folder, jobs=jobs, command=command, progress=report)
+        except (OSError, SystemFault):
+            raise
         except HarnessError as error:
             failures[name] = str(error)
         except Exception as error:

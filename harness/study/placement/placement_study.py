@@ -19,6 +19,7 @@ from harness.experiment.scenario import Scenario
 from harness.mocap.library import LibraryFolders
 from harness.results import manifest
 from harness.results.findings import Claim
+from harness.results.lock import folder_lock
 from harness.results.placement_findings import (
     BestSet,
     PlacementFindings,
@@ -52,16 +53,18 @@ def run_placement(
 ) -> tuple[PlacementFindings, Outcome]:
     """Run the study in a TOML file, and write findings.json into `out`.
 
-    `out` is created, or resumed when it holds this study, else refused (BadInput). Modes and claims are not part of the
-    identity of a study: they may change while its cells are kept. The outcome is INCOMPLETE when a cell failed,
-    NOT_COMPARABLE when nothing was measured, else PASS: a claim that is not reproduced is a result.
+    `out` is created, or resumed when it holds this study, else refused (BadInput). Its lock is held meanwhile. Modes
+    and claims are not part of the identity of a study: they may change while its cells are kept. The outcome is
+    INCOMPLETE when a cell failed, NOT_COMPARABLE when nothing was measured, else PASS: a claim that is not reproduced
+    is a result.
     """
     clear_caches()  # files may have changed since the last run
     plan = plan_placement(path, folder)
     open_study(out, {"placement": plan.study.name, "motion": plan.motion, "seed": plan.scenario.seed})
-    (out / "cells").mkdir(exist_ok=True)
-    findings = _PlacementRun(plan, CellCache(out, folder, executor, command, progress)).findings(command)
-    write_placement(out / FINDINGS, findings)
+    with folder_lock(out):
+        (out / "cells").mkdir(exist_ok=True)
+        findings = _PlacementRun(plan, CellCache(out, folder, executor, command, progress)).findings(command)
+        write_placement(out / FINDINGS, findings)
     if findings.failures:
         return findings, Outcome.INCOMPLETE
     return findings, Outcome.PASS if findings.best else Outcome.NOT_COMPARABLE

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.errors import BadFile
+from harness.errors import BadFile, SystemFault
 from harness.stream.codec.blocks import (
     BLOCK_MARKER,
     FILE_HEADER,
@@ -275,7 +275,7 @@ def test_a_full_disk_is_reported() -> None:
         pytest.skip("no /dev/full to simulate a full disk")
     writer = RecordingWriter("unused")
     writer._file = os.open("/dev/full", os.O_WRONLY)
-    with pytest.raises(BadFile, match="No space left"):
+    with pytest.raises(SystemFault, match="No space left"):
         writer.on_sent(b"c", 1.0, 2.0)
     os.close(writer._file)
 

@@ -1,6 +1,7 @@
 """A study measures, resumes after a kill, refuses another's folder, survives failures, and is read back as it was."""
 
 import json
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 from harness.cli import main
 from harness.core.files import TEMPORARY
 from harness.errors import BadInput, Outcome, UnknownName
+from harness.experiment.status import read_status
 from harness.results.findings import BarChart, LineChart, PaperExperiment, read_findings
 from harness.study.papers.paper import Paper, reproduce
 from harness.study.papers.paper_study import PaperStudy, count_cells, open_study, run_scenarios
@@ -115,6 +117,28 @@ def test_ctrl_c_ends_with_130_and_says_how_to_go_on(tmp_path: Path) -> None:
     assert "the same command resumes" in said
     assert said.splitlines()[-1] == "interrupted"
     assert "Traceback" not in said
+
+
+def test_a_paper_is_running_while_its_experiments_are_evaluated(finished: Path, tmp_path: Path) -> None:
+    out, seen = shutil.copytree(finished, tmp_path / "copy"), []
+
+    def look(study: PaperStudy) -> PaperExperiment:
+        seen.append(read_status(study.out).running)
+        return PaperExperiment("look", "", "", ())
+
+    reproduce(replace(TINY, experiments={"look": look}), out)
+    assert seen == [True]
+    assert not read_status(out).running
+
+
+def test_a_full_disk_is_no_failed_experiment(finished: Path, tmp_path: Path) -> None:
+    out = shutil.copytree(finished, tmp_path / "copy")
+
+    def fail(study: PaperStudy) -> PaperExperiment:
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(OSError, match="No space"):
+        reproduce(replace(TINY, experiments={"fail": fail}), out)
 
 
 def test_a_folder_of_another_study_is_refused(finished: Path, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import sys
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from harness.cli import main
+from harness.__main__ import main
 from harness.compare.claims import claim_lower_error
 from harness.experiment.scenario import Scenario, ScenarioMotion, load_scenario
 from harness.results.findings import PaperExperiment
@@ -73,4 +73,5 @@ TINY = Tiny("tiny", "Nobody: Nothing, 1900", {"walks": walks, "bouts": bouts})
 
 if __name__ == "__main__":
     papers.load_paper = lambda name: TINY
-    sys.exit(main(["paper", "liu2011", "--jobs", "1", *sys.argv[1:]]))
+    sys.argv[1:1] = ["paper", "liu2011", "--jobs", "1"]
+    sys.exit(main())

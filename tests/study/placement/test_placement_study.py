@@ -12,9 +12,11 @@ import harness
 from harness.cli import main
 from harness.errors import BadFile, BadInput, HarnessError, Outcome, UnknownName
 from harness.experiment.scenario import load_scenario
-from harness.results.placement_findings import PlacementFindings, read_placement
+from harness.experiment.status import read_status
+from harness.results.placement_findings import PlacementFindings, read_placement, write_placement
 from harness.simulate.link import TrackerConfig
 from harness.study.papers.paper_study import open_study
+from harness.study.placement import placement_study
 from harness.study.placement.cell_cache import link_rate_hz
 from harness.study.placement.config import load_placement_study, shipped_placements
 from harness.study.placement.placement_study import FINDINGS, run_placement
@@ -153,6 +155,25 @@ def test_a_study_that_was_killed_goes_on_to_the_same_findings(done: tuple[Path, 
     assert outcome is Outcome.PASS
     assert sorted((out / "cells").iterdir()) == cells
     assert replace(again, circumstances={}) == replace(findings, circumstances={})
+
+
+def test_a_study_is_running_until_its_findings_are_written(
+    done: tuple[Path, Path, PlacementFindings], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also between two of its searches, when no cell is computed; and no second process may work there."""
+    path, out, _ = done
+    seen = []
+
+    def write(file: Path, findings: PlacementFindings) -> None:
+        seen.append(read_status(file.parent).running)
+        with pytest.raises(BadInput, match="Another process uses"):
+            run_placement(path, out)
+        write_placement(file, findings)
+
+    monkeypatch.setattr(placement_study, "write_placement", write)
+    run_placement(path, out)
+    assert seen == [True]
+    assert not read_status(out).running
 
 
 def test_a_set_that_does_not_suffice_is_said_so(done: tuple[Path, Path, PlacementFindings]) -> None:

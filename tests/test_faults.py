@@ -1,0 +1,309 @@
+"""Faults of the system and of the program: exit code 5, one line, a traceback in a file, and nothing that lies."""
+
+import json
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from harness.cli import main
+from harness.commands import ending
+from harness.errors import Outcome
+from tests.report.fabricate import Plan, fabricate
+from tests.short_demo import short_demo
+
+PLAN = Plan(behaviours=("walking",), methods={"ik": 1.5, "mean_pose": 14.0}, takes=2, duration_s=1.5)
+PROGRAM = [sys.executable, "-m", "harness"]
+
+
+def run(
+    *words: str,
+    cwd: Path,
+    stdout: int | None = subprocess.PIPE,
+    prepare: Callable[[], None] | None = None,
+    temporary: Path | None = None,
+) -> subprocess.CompletedProcess[str]:
+    """The real program, with a temporary folder of its own."""
+    folder = temporary or cwd / "temporary"
+    folder.mkdir(exist_ok=True)
+    kept = {name: value for name, value in os.environ.items() if name != "HARNESS_MOCAP"}
+    return subprocess.run(
+        [*PROGRAM, *words],
+        cwd=cwd,
+        env={**kept, "TMPDIR": str(folder)},
+        stdout=stdout,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=prepare,
+    )
+
+
+def limit_files(size: int) -> Callable[[], None]:
+    """No file of the program may grow beyond so many bytes, as on a disk that is nearly full."""
+    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def assert_failed(ended: subprocess.CompletedProcess[str], cause: str) -> str:
+    """The one line of a fault, after looking at all that is promised of it."""
+    (line,) = [line for line in ended.stderr.splitlines() if line.startswith("harness:")]
+    assert ended.returncode == 5, ended.stderr
+    assert "Traceback" not in ended.stderr
+    assert line.startswith("harness: failed: ")
+    assert cause in line
+    found = re.search(r"\(traceback: (.+)\)$", line)
+    assert found, line
+    assert "Traceback (most recent call last)" in Path(found.group(1)).read_text()
+    return line
+
+
+def test_the_word_and_the_code_of_a_fault_are_no_verdict() -> None:
+    assert (Outcome.FAILED.exit_code, Outcome.FAILED.word) == (5, "failed")
+    assert [outcome for outcome in Outcome if outcome.exit_code == 1] == [Outcome.REGRESSED]
+
+
+@pytest.mark.parametrize("words", [["list"], ["list", "--json"], ["--help"]])
+def test_a_result_that_cannot_be_printed_is_a_fault(words: list[str], tmp_path: Path) -> None:
+    with open("/dev/full", "w") as full:
+        ended = run(*words, cwd=tmp_path, stdout=full.fileno())
+    assert_failed(ended, "The result cannot be printed (No space left on device)")
+
+
+def test_messages_that_nobody_can_read_stop_nothing(tmp_path: Path) -> None:
+    command = [*PROGRAM, "lst"]
+    with open("/dev/full", "w") as full:
+        ended = subprocess.run(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=full, text=True)
+    assert (ended.returncode, ended.stdout) == (2, "refused\n")
+
+
+def test_a_closed_stdout_is_no_fault(tmp_path: Path) -> None:
+    ended = run("list", cwd=tmp_path, stdout=None, prepare=lambda: os.close(1))
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_a_reader_who_leaves_does_not_change_the_exit_code(tmp_path: Path) -> None:
+    """`harness status DIR | head -1`: quiet, and still `incomplete`."""
+    out = fabricate(tmp_path / "run", Plan(**{**vars(PLAN), "failing": ("ik",)}))
+    reader, writer = os.pipe()
+    os.close(reader)
+    ended = run("status", str(out), cwd=tmp_path, stdout=writer)
+    os.close(writer)
+    assert (ended.returncode, ended.stderr) == (4, "")
+
+
+def test_a_working_folder_that_is_gone_is_a_fault(tmp_path: Path) -> None:
+    gone = tmp_path / "gone"
+    gone.mkdir()
+
+    def leave() -> None:
+        os.chdir(gone)
+        gone.rmdir()
+
+    ended = run("list", "--json", cwd=tmp_path, prepare=leave)
+    line = assert_failed(ended, "The working directory no longer exists")
+    content = json.loads(ended.stdout)
+    assert content["outcome"] == "failed"
+    assert content["error"] in line
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_a_full_disk_ends_a_run_which_goes_on_later(jobs: str, tmp_path: Path) -> None:
+    short_demo(tmp_path / "short.toml")
+    words = ("run", "short.toml", "--methods", "mean_pose", "--no-report", "--out", "out", "--jobs", jobs)
+    ended = run(*words, cwd=tmp_path, prepare=limit_files(90_000))  # the frames of a cell are larger
+    line = assert_failed(ended, "cannot be written (File too large). ")
+    assert ended.stdout == "failed\n"
+    assert "0 of 5 cells in out are finished and kept. Free some disk space, then give the same command again." in line
+    assert not list((tmp_path / "out").rglob(".unfinished-*"))
+    again = run(*words, cwd=tmp_path)
+    assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "pass"), again.stderr
+
+
+def test_a_folder_that_cannot_be_written_is_a_fault_and_a_file_in_its_place_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    short_demo(tmp_path / "short.toml")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    words = ["run", "short.toml", "--methods", "mean_pose", "--no-report", "--out"]
+    assert main([*words, "file"]) == 2
+    assert main([*words, "file/below"]) == 2
+    capsys.readouterr()
+
+    def refuse(path: Path, *given: object, **named: object) -> None:
+        raise OSError(30, "Read-only file system", str(path))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    assert main([*words, "new"]) == 5
+    said = capsys.readouterr()
+    assert said.out == "failed\n"
+    assert "Read-only file system (new)" in said.err
+    assert "Name a place that can be written" in said.err
+
+
+def test_a_folder_that_vanishes_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A method takes it away between two of its clips."""
+    short_demo(tmp_path / "short.toml")
+    (tmp_path / "taking.py").write_text(
+        "import shutil\n"
+        "from dataclasses import dataclass\n"
+        "from harness.reconstruct.methods.mean_pose import MeanPose\n"
+        "@dataclass(frozen=True)\n"
+        "class Taking(MeanPose):\n"
+        "    def fit(self, body, examples, rng):\n"
+        f"        shutil.rmtree({str(tmp_path / 'out')!r})\n"
+        "        return super().fit(body, examples, rng)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert main(["run", "short.toml", "--methods", "taking:Taking", "--no-report", "--out", "out"]) == 5
+    said = capfd.readouterr()
+    assert said.out == "failed\n"
+    assert "The folder out vanished. Nothing is kept in out. Something was removed" in said.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_defect_of_the_program_is_a_fault(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    def fail() -> None:
+        raise TypeError("two\nlines " + 1000 * "x")
+
+    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    assert main(["list", "--json"]) == 5
+    said = capsys.readouterr()
+    assert json.loads(said.out)["outcome"] == "failed"
+    assert said.err.count("\n") == 1
+    assert "a defect of the program (TypeError: two lines xxx" in said.err
+    assert len(said.err) < 700
+    (saved,) = tmp_path.glob("harness-traceback-*.txt")
+    assert str(saved) in said.err
+    assert "TypeError: two\nlines" in saved.read_text()
+
+
+def test_a_part_that_asks_to_exit_does_not_choose_the_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def leave() -> None:
+        sys.exit(1)
+
+    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", leave)
+    assert main(["list"]) == 5
+    assert "asked to exit with 1" in capsys.readouterr().err
+
+
+def test_a_traceback_that_cannot_be_saved_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(*given: object, **named: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
+    monkeypatch.setattr(tempfile, "mkstemp", fail)
+    assert main(["list"]) == 5
+    assert "(the traceback could not be saved (No space left on device))" in capsys.readouterr().err
+
+
+def test_a_broken_pipe_inside_the_program_is_no_reader_who_left(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail() -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr("harness.commands.catalogue.build_catalogue", fail)
+    assert main(["list"]) == 5
+    assert "Broken pipe" in capsys.readouterr().err
+
+
+def test_a_full_disk_ends_a_recording_and_keeps_what_came_before(tmp_path: Path) -> None:
+    short_demo(tmp_path / "short.toml")
+    ended = run("record", "sim:short.toml", "out.is900", cwd=tmp_path, prepare=limit_files(10_000))
+    line = assert_failed(ended, "out.is900 cannot be written (File too large)")
+    assert "Blocks that were recorded before are kept" in line
+    assert run("replay", "out.is900", "--speed", "max", cwd=tmp_path).returncode == 0
+
+
+def test_a_baseline_that_cannot_be_moved_leaves_the_old_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from harness.compare import baseline
+
+    fabricate(tmp_path / "run", PLAN)
+    monkeypatch.chdir(tmp_path)
+    assert main(["baseline", "save", "one", "run"]) == 0
+    folder = tmp_path / "results" / "baselines"
+    before = {path.name: path.read_bytes() for path in (folder / "one").iterdir()}
+
+    def fail(*given: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(baseline, "move_into_place", fail)
+    assert main(["baseline", "save", "one", "run", "--force"]) == 5
+    assert {path.name: path.read_bytes() for path in (folder / "one").iterdir()} == before
+    assert [path.name for path in folder.iterdir()] == ["one"]
+    assert "Free some disk space" in capsys.readouterr().err
+
+
+def test_a_folder_that_is_read_only_can_be_looked_at(tmp_path: Path) -> None:
+    """A mount is needed, because the superuser writes where permissions forbid it."""
+    out = fabricate(tmp_path / "run", PLAN)
+    mount = shutil.which("mount")
+    bind = mount and subprocess.run([mount, "--bind", out, out], capture_output=True).returncode == 0
+    if not bind or not mount:
+        pytest.skip("this process may not mount")
+    try:
+        subprocess.run([mount, "-o", "remount,bind,ro", out], check=True)
+        seen = run("status", "run", cwd=tmp_path)
+        assert (seen.returncode, seen.stdout.splitlines()[-1]) == (0, "pass"), seen.stderr
+        assert_failed(run("report", "run", cwd=tmp_path), "Read-only file system")
+    finally:
+        subprocess.run(["umount", out], check=True)  # noqa: S607
+
+
+def test_data_are_printed_whole(capsys: pytest.CaptureFixture[str]) -> None:
+    assert ending.print_data("a\n")
+    assert capsys.readouterr().out == "a\n"
+
+
+def test_a_thread_that_hangs_does_not_keep_the_program(tmp_path: Path) -> None:
+    """Signals are ignored after the last line, so nothing else could end it."""
+    code = (
+        "import sys, threading, time\n"
+        "import harness.__main__ as program\n"
+        "program.END_S = 0.5\n"
+        "threading.Thread(target=time.sleep, args=(600.0,)).start()\n"
+        "sys.argv = ['harness', 'lst']\n"
+        "sys.exit(program.main())\n"
+    )
+    ended = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=120.0)
+    assert (ended.returncode, ended.stdout) == (2, "refused\n")
+
+
+def test_a_broken_installation_is_a_fault(tmp_path: Path) -> None:
+    code = (
+        "import sys\n"
+        "import harness.__main__ as program\n"
+        "sys.modules['harness.cli'] = None\n"
+        "sys.argv = ['harness', 'list']\n"
+        "sys.exit(program.main())\n"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        capture_output=True,
+        text=True,
+    )
+    assert_failed(ended, "a defect of the program (ModuleNotFoundError")
+    assert ended.stdout == "failed\n"
