@@ -56,6 +56,8 @@ def add_emulate(verbs: Verbs) -> None:
     verb.add_argument("--check-baud", action="store_true", help=text)
     verb.add_argument("--firmware", metavar="VERSION", help="firmware version (default 4.2301; 4.1105 has no item 40)")
     verb.add_argument("--restart", type=float, metavar="S", help="seconds of silence after a restart (default 0.25)")
+    text = "buttons and joystick: cycle moves all of them in turn, still none (default cycle)"
+    verb.add_argument("--controls", choices=["cycle", "still"], help=text)
     verb.add_argument("--no-faults", dest="faults", action="store_false", help="leave the scenario's faults out")
 
 
@@ -99,7 +101,7 @@ def run_emulate(args: argparse.Namespace) -> Outcome:
 def _config(args: argparse.Namespace, scenario: "Scenario") -> "EmulatorConfig":
     from harness.stream.emulator.config import EmulatorConfig
 
-    options = {"firmware": args.firmware, "restart_s": args.restart}
+    options = {"firmware": args.firmware, "restart_s": args.restart, "controls": args.controls}
     return EmulatorConfig(
         **{name: value for name, value in options.items() if value is not None},
         baud=args.baud or scenario.tracker.baud,

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from harness.errors import BadInput
+from harness.stream.emulator.controls import check_control_pattern
 from harness.stream.emulator.faults import Fault, check_firmware
 
 SUPPORTED_BAUD_RATES = (300, 1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
@@ -33,6 +34,8 @@ class EmulatorConfig:
     """Silence after a restart [s]; clients wait 10 to 20 s for a real device (docs/is900.md 4.1)."""
     check_baud: bool = False
     """On a pty: corrupt both directions while the client has set another baud rate than the device."""
+    controls: str = "cycle"
+    """Pattern of buttons and joystick, one of `CONTROL_PATTERNS`: "cycle" moves all of them, "still" none."""
     faults: tuple[Fault, ...] = ()
     """Faults that are injected."""
     seed: int = 1
@@ -40,6 +43,7 @@ class EmulatorConfig:
 
     def __post_init__(self) -> None:
         check_firmware(self.firmware)
+        check_control_pattern(self.controls)
         if not (self.identification.isascii() and self.identification.isprintable() and len(self.identification) < 32):
             raise BadInput(
                 f"identification {self.identification!r} is not possible.", "Give up to 31 ASCII characters."

@@ -29,7 +29,7 @@ class DeviceState:
         """Switch the device on at `now_s` [s]."""
         self.samples, self.config = samples, config or EmulatorConfig()
         self.firmware = self.config.firmware
-        self.rounds = RoundEncoder(SamplePlayer(samples, now_s))
+        self.rounds = RoundEncoder(SamplePlayer(samples, now_s), self.config.controls)
         self.streaming = self.suspended = False
         self.command_count = self.refused_count = 0
         """Numbers of all commands and of the rejected ones."""

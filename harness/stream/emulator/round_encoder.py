@@ -7,6 +7,7 @@ import numpy as np
 from harness.core.arrays import Floats
 from harness.stream.codec.records import RecordFormat, RecordValues, encode_records, to_bytes
 from harness.stream.emulator import geometry
+from harness.stream.emulator.controls import CONTROL_PATTERNS
 from harness.stream.emulator.player import SamplePlayer
 from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings
 
@@ -16,8 +17,9 @@ _INCH_M, _CENTIMETRE_M = 0.0254, 0.01
 class RoundEncoder:
     """Encodes the records of one round of stations at a time, once."""
 
-    def __init__(self, player: SamplePlayer) -> None:
-        self.player = player
+    def __init__(self, player: SamplePlayer, controls: str = "cycle") -> None:
+        """`controls` names the pattern of buttons and joystick."""
+        self.player, self._pattern = player, CONTROL_PATTERNS[controls]
         self._lost: frozenset[str] = frozenset()
         self._cache: tuple[int, DeviceSettings, tuple[float, float], dict[str, bytes]] | None = None
         """Round number, settings and epoch of the latest encoding, and its records by station."""
@@ -56,6 +58,8 @@ class RoundEncoder:
         samples, instant, stamps_s = self.player.samples, self.player.instant_of(number), self.player.stamps_s(number)
         position_m, orientation = samples.position_m[instant].copy(), samples.tracker_from_station[instant].copy()
         quality = samples.quality[instant].copy()
+        # Each station is a second ahead of the one before, so that a client that mixes them up shows it.
+        buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations)))
         rows_of: dict[tuple[int, ...], list[int]] = {}
         for row, (name, station) in enumerate(zip(self.plugged, settings.stations, strict=False)):
             if not station.plain:
@@ -67,7 +71,9 @@ class RoundEncoder:
             rows_of.setdefault(station.items, []).append(row)
         out, number_format = {}, record_format(settings)
         for items, rows in rows_of.items():
-            values = RecordValues(stamps_s[rows], position_m[rows], orientation[rows], quality[rows])
+            values = RecordValues(
+                stamps_s[rows], position_m[rows], orientation[rows], quality[rows], buttons[rows], joystick[rows]
+            )
             characters = np.array([ord(STATION_NAMES[row]) for row in rows], np.uint8)
             table = encode_records(items, characters, values, number_format)
             for index, row in enumerate(rows):
