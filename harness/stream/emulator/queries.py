@@ -17,7 +17,7 @@ from harness.stream.codec.replies import (
 )
 from harness.stream.emulator import geometry
 from harness.stream.emulator.argument import OUT_OF_RANGE, CommandArgument, CommandError
-from harness.stream.emulator.settings import STATION_NAMES, DeviceSettings, StationSettings
+from harness.stream.emulator.settings import DeviceSettings, StationSettings
 
 Query = Callable[[DeviceSettings, CommandArgument], Iterable[ParsedReply]]
 _INERTIA_CUBES, NO_INERTIA_CUBE = "1234", -1

@@ -16,6 +16,7 @@ import numpy as np
 from harness.core.seeds import generator
 from harness.errors import BadInput
 from harness.stream.codec.samples import DeviceSamples
+from harness.stream.emulator.addresses import parse_address
 from harness.stream.emulator.config import EmulatorConfig
 from harness.stream.emulator.emulator import Emulator
 from harness.stream.emulator.message import SentMessage
@@ -212,7 +213,4 @@ def open_port(
         from harness.stream.emulator.pty_port import PtyPort
 
         return PtyPort(pty)
-    host, colon, number = (tcp or "").rpartition(":")
-    if not colon or not (number.isascii() and number.isdecimal()) or int(number) > 65535:
-        raise BadInput(f"{tcp!r} is no HOST:PORT.", "An example is 127.0.0.1:5005; port 0 takes a free one.")
-    return TcpPort(host.strip("[]"), int(number), anywhere=anywhere, log=log)
+    return TcpPort(*parse_address(tcp or ""), anywhere=anywhere, log=log)
