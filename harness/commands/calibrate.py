@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from harness.commands.common import (
+    LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
@@ -30,7 +31,7 @@ _SOURCES = ("recording", "live", "simulate", "sheet")
 _SESSION_FLAGS = ("scenario", "stations", "kind", "clip", "out")
 _FLAGS_BY_SOURCE = {
     "recording": _SESSION_FLAGS,
-    "live": (*_SESSION_FLAGS, "port", "rate", "items", "baud", "quality", "view", "pictures"),
+    "live": (*_SESSION_FLAGS, "port", "rate", *LINE_FLAGS, "view", "pictures"),
     "simulate": ("miss", "noise", "seed"),
     "sheet": (),
 }

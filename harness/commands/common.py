@@ -59,6 +59,10 @@ def mocap_words(folders: Path | Sequence[Path] | None) -> list[str]:
     return [word for folder in several for word in ("--mocap", str(folder))]
 
 
+LINE_FLAGS = ("items", "baud", "quality", "boresight", "alignment")
+"""Flags of a verb that opens a device's line, as attributes of the parsed command line."""
+
+
 def add_line_flags(verb: argparse.ArgumentParser) -> None:
     """Add the flags of a verb that opens a device's line; `line_options` reads them."""
     verb.add_argument(
@@ -67,13 +71,17 @@ def add_line_flags(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("--baud", type=positive_int, help="baud rate of a serial port (default: detected)")
     text = "how lost stations are reported: in records (item 40), or in replies to MP, for firmware before 4.13"
     verb.add_argument("--quality", choices=["record", "mp"], help=text + " (default record)")
+    text = "set the heading of every station to zero at its present direction, when the device is set up"
+    verb.add_argument("--boresight", action="store_true", default=None, help=text)
+    text = "frame to report in: its origin, a point on +X and a point on +Y, nine numbers in the present frame [m]"
+    verb.add_argument("--alignment", type=parse_alignment, metavar="X,Y,Z,X,Y,Z,X,Y,Z", help=text)
 
 
 def line_options(args: argparse.Namespace) -> dict[str, Any]:
     """The driver options that those flags give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
-    return {name: getattr(args, name) for name in ("items", "baud", "quality") if getattr(args, name) is not None}
+    return {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
 
 
 def is_whole_number(text: str) -> bool:
@@ -105,6 +113,17 @@ def parse_items(text: str) -> tuple[int, ...]:
     if not all(is_whole_number(code.strip()) for code in codes):
         raise argparse.ArgumentTypeError(f"{text!r} is not a list such as 40,2,11,21,1")
     return tuple(map(int, codes))
+
+
+def parse_alignment(text: str) -> tuple[tuple[float, ...], ...]:
+    """Three points of an alignment frame, such as 0,0,0,1,0,0,0,1,0 [m]."""
+    try:
+        values = [float(number) for number in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 9 or not all(abs(value) < float("inf") for value in values):
+        raise argparse.ArgumentTypeError(f"{text!r} is not nine numbers such as 0,0,0,1,0,0,0,1,0")
+    return tuple(tuple(values[k : k + 3]) for k in (0, 3, 6))
 
 
 def parse_stations(args: argparse.Namespace) -> int | list[str]:

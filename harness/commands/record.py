@@ -2,10 +2,12 @@
 
 import argparse
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from harness.commands.common import (
+    LINE_FLAGS,
     Verbs,
     add_line_flags,
     add_verb,
@@ -36,6 +38,13 @@ def add_record(verbs: Verbs) -> None:
     verb.add_argument("--rate", type=positive_float, metavar="HZ", help=text)
     add_line_flags(verb)
     verb.add_argument("--seconds", type=float, metavar="N", help="stop after N seconds")
+    text = (
+        "send this command and print its answer, instead of setting the device up; may be repeated. ^K is a control "
+        "character. If C is the last one, what it streams is recorded"
+    )
+    verb.add_argument("--send", action="append", metavar="CMD", help=text)
+    text = "allow --send of commands that write the device's memory, restart it, or are in no source"
+    verb.add_argument("--allow-writes", action="store_true", help=text)
     verb.add_argument("--clip", metavar="CLIP", help="with sim: clip to play (default: the scenario's first)")
     verb.add_argument("--noise", metavar="PRESET", help="with sim: clean, noise or default (default: the scenario's)")
     text = "with sim: play the calibration poses of `harness calibrate` instead of the clip"
@@ -46,7 +55,7 @@ def run_record(args: argparse.Namespace) -> Outcome:
     if args.seconds is not None and not 0.0 < args.seconds < math.inf:
         raise BadInput(f"--seconds {args.seconds:g}.", "Give a positive number.")
     if args.port.startswith(SIMULATION_PREFIX):
-        for name in ("items", "baud", "quality"):
+        for name in (*LINE_FLAGS, "send"):
             if getattr(args, name) is not None:
                 raise BadInput(
                     f"--{name} with {args.port}.", "It is for a device; a simulated line takes it from the scenario."
@@ -55,7 +64,9 @@ def run_record(args: argparse.Namespace) -> Outcome:
     for name in ("clip", "noise", "poses", "seed"):
         if getattr(args, name) is not None:
             raise BadInput(f"--{name} with {args.port}.", f"It is for {SIMULATION_PREFIX}SCENARIO: leave it out.")
-    return _record_port(args)
+    if args.allow_writes and args.send is None:
+        raise BadInput("--allow-writes without --send.", "It is for commands that --send names: leave it out.")
+    return _record_port(args) if args.send is None else _record_commands(args)
 
 
 def _record_simulation(args: argparse.Namespace, scenario: str) -> Outcome:
@@ -106,10 +117,35 @@ def _record_port(args: argparse.Namespace) -> Outcome:
     return _print_recording(args, writer.counts)
 
 
-def _print_recording(args: argparse.Namespace, counts: Mapping[str, int]) -> Outcome:
+def _record_commands(args: argparse.Namespace) -> Outcome:
+    from harness.stream.driver import DriverConfig
+    from harness.stream.recording.command_recording import check_commands, record_commands
+    from harness.stream.recording.exchange_text import format_exchanges
+    from harness.stream.recording.recording import RecordingWriter
+
+    for name in ("stations", *LINE_FLAGS):
+        if name != "baud" and getattr(args, name) is not None:
+            raise BadInput(f"--{name} with --send.", "--send sets nothing but what it names: leave it out.")
+    check_commands(args.send, args.allow_writes)
+    config = DriverConfig(rate_hz=args.rate, **line_options(args))
+    note = {"source": "commands", "port": args.port, "harness": VERSION}
+    with RecordingWriter(args.file, note) as writer, sigterm_as_interrupt():
+        exchanges = record_commands(
+            args.port, args.send, config, writer, seconds=args.seconds, log=print_status, progress=show_progress
+        )
+    content = [exchange.as_dict() for exchange in exchanges]
+    return _print_recording(args, writer.counts, {"exchanges": content}, format_exchanges(content))
+
+
+def _print_recording(
+    args: argparse.Namespace,
+    counts: Mapping[str, int],
+    more: Mapping[str, Any] | None = None,
+    lines: Sequence[str] = (),
+) -> Outcome:
     content = {"file": str(args.file), "received_bytes": counts["recv"], "sent_bytes": counts["sent"]}
-    content |= {"set_up": counts["conf"], "events": counts["evnt"]}
+    content |= {"set_up": counts["conf"], "events": counts["evnt"], **(more or {})}
     text = f"{args.file}: {counts['recv']} bytes received, {counts['sent']} sent, set up {counts['conf']} times"
     if not args.file.exists():
         text = f"{args.file}: ended before the device was set up; nothing was recorded"
-    return print_result(args, content, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
+    return print_result(args, content, *lines, text + (f", {counts['evnt']} events" if counts["evnt"] else ""))
