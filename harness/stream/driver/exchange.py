@@ -125,7 +125,7 @@ def _decode_reply(line: bytes) -> Answer:
 def _decode_records(run: RecordRun, wire: WireFormat) -> list[Answer]:
     """Decode data records: time [s], position [m], unit quaternion, quality 0 to 1, buttons and joystick as sent."""
     readings = decode_readings(run.table, np.zeros(len(run.table)), wire.characters, wire.settings)
-    answers = []
+    names, answers = run.table.dtype.names or (), []
     for row, record in enumerate(run.table):
         columns = {
             "measured_s": readings.measured_s[row],
@@ -134,6 +134,8 @@ def _decode_records(run: RecordRun, wire: WireFormat) -> list[Answer]:
             "quality": readings.quality[row] if {40, 76} & set(wire.items) else np.nan,
         }
         values = {name: np.round(value, 9).tolist() for name, value in columns.items() if np.all(np.isfinite(value))}
-        controls = {name: record[name].tolist() for name in ("buttons", "joystick") if name in run.table.dtype.names}
+        controls = {
+            name: record[name].tolist() for name in ("buttons", "joystick") if name in (run.table.dtype.names or ())
+        }
         answers.append({"kind": "record", "station": chr(record["station"]), **values, **controls})
     return answers

@@ -59,7 +59,7 @@ class RoundEncoder:
         position_m, orientation = samples.position_m[instant].copy(), samples.tracker_from_station[instant].copy()
         quality = samples.quality[instant].copy()
         # Each station is a second ahead of the one before, so that a client that mixes them up shows it.
-        buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations)))
+        buttons, joystick = self._pattern(number / samples.rate_hz + np.arange(len(samples.stations), dtype=float))
         rows_of: dict[tuple[int, ...], list[int]] = {}
         for row, (name, station) in enumerate(zip(self.plugged, settings.stations, strict=False)):
             if not station.plain:

@@ -15,7 +15,7 @@ def read_controls(session: DeviceSession, at_s: float) -> list[tuple[int, int, i
     """Buttons and joystick of each station at this time after power-on [s]."""
     session.send(b"", after_s=at_s - session.now_s)
     table = np.frombuffer(session.send(b"P"), record_type(CONTROL_LIST))
-    return [(int(row["buttons"]), *map(int, row["joystick"])) for row in table]
+    return [(int(row["buttons"]), int(row["joystick"][0]), int(row["joystick"][1])) for row in table]
 
 
 def open_session(controls: str | None = None) -> DeviceSession:
