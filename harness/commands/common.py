@@ -81,7 +81,10 @@ def line_options(args: argparse.Namespace) -> dict[str, Any]:
     """The driver options that those flags give; BadInput for --baud without a serial port."""
     if args.baud is not None and "://" in args.port:
         raise BadInput(f"--baud with {args.port}.", "It is for a serial port: leave it out.")
-    return {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
+    given = {name: getattr(args, name) for name in LINE_FLAGS if getattr(args, name) is not None}
+    if given and args.port.startswith("udp:"):
+        raise BadInput(f"--{min(given)} with {args.port}.", "It needs commands, and UDP carries none: leave it out.")
+    return given
 
 
 def is_whole_number(text: str) -> bool:

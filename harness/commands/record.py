@@ -30,7 +30,9 @@ SIMULATION_PREFIX = "sim:"
 def add_record(verbs: Verbs) -> None:
     text = "record both directions of a device's line until Ctrl-C; appends to a recording in the same file"
     verb = add_verb(verbs, "record", text, run_record, "seed", "mocap", "endless")
-    verb.add_argument("port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, or sim:SCENARIO for a simulated line")
+    verb.add_argument(
+        "port", help="/dev/ttyUSB0, COM3, tcp://HOST:PORT, udp://HOST:PORT, or sim:SCENARIO for a simulated line"
+    )
     verb.add_argument("file", type=Path, help="the recording to write")
     text = "names of the device's active stations, in order; with sim: names or number of the scenario's stations"
     verb.add_argument("--stations", metavar="A,B", help=text)
@@ -126,6 +128,8 @@ def _record_commands(args: argparse.Namespace) -> Outcome:
     for name in ("stations", *LINE_FLAGS):
         if name != "baud" and getattr(args, name) is not None:
             raise BadInput(f"--{name} with --send.", "--send sets nothing but what it names: leave it out.")
+    if args.port.startswith("udp:"):
+        raise BadInput(f"--send with {args.port}.", "UDP carries no commands: name the serial line.")
     check_commands(args.send, args.allow_writes)
     config = DriverConfig(rate_hz=args.rate, **line_options(args))
     note = {"source": "commands", "port": args.port, "harness": VERSION}

@@ -55,6 +55,11 @@ class RecordValues:
     joystick: Ints | int = 127
     """(N, 2) left to right and rear to front, 0 to 255, centre 127 (item 23)."""
 
+    def rows(self, rows: list[int]) -> "RecordValues":
+        """Return the values of these records."""
+        columns = (getattr(self, name) for name in self.__dataclass_fields__)
+        return RecordValues(*(column if isinstance(column, int) else column[rows] for column in columns))
+
 
 def encode_records(
     items: tuple[int, ...], stations: NDArray[np.uint8], values: RecordValues, settings: RecordFormat

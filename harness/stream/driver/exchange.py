@@ -134,8 +134,6 @@ def _decode_records(run: RecordRun, wire: WireFormat) -> list[Answer]:
             "quality": readings.quality[row] if {40, 76} & set(wire.items) else np.nan,
         }
         values = {name: np.round(value, 9).tolist() for name, value in columns.items() if np.all(np.isfinite(value))}
-        controls = {
-            name: record[name].tolist() for name in ("buttons", "joystick") if name in (run.table.dtype.names or ())
-        }
+        controls = {name: record[name].tolist() for name in ("buttons", "joystick") if name in names}
         answers.append({"kind": "record", "station": chr(record["station"]), **values, **controls})
     return answers

@@ -37,7 +37,9 @@ class DeviceState:
         self.log: deque[str] = deque(maxlen=_LOG_LENGTH)
         """Commands, while the command log is open."""
         stations = tuple(StationSettings(active=name in self.rounds.plugged) for name in STATION_NAMES)
-        self._factory = DeviceSettings(stations, baud=self.config.baud)
+        self._factory = DeviceSettings(
+            stations, baud=self.config.baud, udp=self.config.udp, udp_port=self.config.udp_port
+        )
         self.settings: DeviceSettings = self._factory
         self._saved = self._factory
         self._next = 0, 0

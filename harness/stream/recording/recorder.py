@@ -5,7 +5,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from harness.stream.codec.blocks import RECEIVED
-from harness.stream.driver import DriverConfig, Is900, LineEvent
+from harness.stream.driver import DriverConfig, LineEvent, Tracker, open_tracker
 from harness.stream.frame import TrackerFrame
 from harness.stream.recording.recording import RecordingWriter
 
@@ -31,7 +31,7 @@ def record_port(
     def report_event(event: LineEvent) -> None:
         log(event.text)
 
-    with suppress(KeyboardInterrupt), Is900(port, config, observer=writer, on_event=report_event) as device:
+    with suppress(KeyboardInterrupt), open_tracker(port, config, observer=writer, on_event=report_event) as device:
         names = ", ".join(f"{number} {name}" for number, name in enumerate(device.stations, 1))
         log(f"{device.identification or 'a device'} at {port}; stations {names}; Ctrl-C ends the recording")
         end = threading.Timer(seconds or 0.0, device.close)
@@ -48,7 +48,7 @@ def record_port(
             progress("")
 
 
-def _progress_text(device: Is900, frame: TrackerFrame, writer: RecordingWriter) -> str:
+def _progress_text(device: Tracker, frame: TrackerFrame, writer: RecordingWriter) -> str:
     health = device.health()
     tracked = int((frame.position_valid | frame.orientation_valid).sum())
     return (

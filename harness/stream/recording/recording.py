@@ -199,6 +199,8 @@ class RecordingWriter:
             )
         self._stations = wire.stations
         content = asdict(wire) | {"characters": wire.characters.decode("latin-1")}
+        if not wire.datagrams:
+            del content["datagrams"]  # earlier versions refuse a key that they do not know
         self._append_json(CONFIGURED, content, monotonic_s, wall_s)
         self.counts[CONFIGURED] += 1
 
