@@ -11,6 +11,7 @@ DATAGRAM_LIST = (40, 2, 4, 22, 23, 21)
 """The content of a packet as an output list: quality, position, angles, buttons, joystick, time."""
 DATAGRAM_FORMAT = RecordFormat(metres_per_unit=1.0, seconds_per_tick=1.0)
 """Packets are in metres and seconds, whatever the device is set to (docs/is900.md 9)."""
+_STATION_NUMBERS = range(1, 1 + len(STATION_CHARACTERS))
 PACKET_BYTES = (44, 40)
 """Length of a packet with the time and without it [bytes]."""
 
@@ -69,11 +70,12 @@ def split_packets(data: bytes) -> list[Datagram]:
 
 def _find_packet(data: bytes, begin: int) -> tuple[int, Datagram | None]:
     """Return the end of the packet at this offset, and the packet; without one, the start of the next, and None."""
-    for size in PACKET_BYTES:
-        end = begin + size
-        if end == len(data) or data[end : end + 1] == DATAGRAM_START[:1]:
-            packet = parse_datagram(data[begin:end])
-            if packet is not None and 1 <= packet.station <= len(STATION_CHARACTERS):
-                return end, packet
+    found = [(begin + size, parse_datagram(data[begin : begin + size])) for size in PACKET_BYTES]
+    sound = [(end, packet) for end, packet in found if packet is not None and packet.station in _STATION_NUMBERS]
+    for end, packet in sound:
+        if end == len(data) or data.startswith(DATAGRAM_START, end):
+            return end, packet
+    if sound:  # what follows is damaged
+        return sound[0]
     following = data.find(DATAGRAM_START, begin + 1)
     return (following if following >= 0 else len(data)), None

@@ -51,9 +51,7 @@ class Is900Broadcast:
         self._timing, self._host = timing or DriverTiming(), host or Host()
         self._observer, self._on_event = observer or NullLineObserver(), on_event
         if self.config.boresight or self.config.alignment is not None:
-            raise BadInput(
-                f"Port {port}: packets carry no commands.", "Set boresight and alignment by the serial line."
-            )
+            raise BadInput(f"Port {port}: packets carry no commands.", "Set boresight and alignment by a line.")
         self._wall_ahead_s = self._host.wall_s() - self._host.monotonic_s()
         self._reader = ContinuousFrameReader()
         self._frames: deque[TrackerFrame] = deque()
@@ -134,22 +132,26 @@ class Is900Broadcast:
 
     def _step(self) -> None:
         """Wait once for packets and process them."""
-        data, now_s = self._line.receive(self._timing.poll_s), self._host.monotonic_s()
-        if data:
-            self._last_byte_s = now_s
-            frames = self._reader.feed(data, now_s)
-        else:
-            frames = self._reader.expire(now_s)
-            if frames:
+        received, now_s = self._line.receive(self._timing.poll_s), self._host.monotonic_s()
+        if not received:
+            overdue = self._reader.expire(now_s)
+            if overdue:
                 self._observer.on_received(b"", now_s, self._host.wall_s())
+            self._add_frames(overdue)
+        self._report_trouble(now_s)
+
+    def _on_data(self, data: bytes, now_s: float) -> None:
+        self._last_byte_s = now_s
+        self._add_frames(self._reader.feed(data, now_s))
+
+    def _add_frames(self, frames: list[TrackerFrame]) -> None:
         self._frames.extend(frames)
         self._recent_s.extend(frame.received_s for frame in frames)
-        self._report_trouble(bool(frames), now_s)
 
-    def _report_trouble(self, has_frames: bool, now_s: float) -> None:
+    def _report_trouble(self, now_s: float) -> None:
         """Report silence once, and the return of packets."""
         silent_s = now_s - self._last_byte_s
-        if has_frames and self._trouble is not None:
+        if self._frames and self._trouble is not None:
             self._trouble = None
             self._report("connected", f"packets arrive: {len(self.stations)} stations at {self._wire.rate_hz:g} Hz")
         elif self._trouble is None and silent_s > self._timing.stalled_s:
@@ -167,6 +169,7 @@ class Is900Broadcast:
     def _begin_session(self) -> None:
         self._observer.on_configured(self._wire)
         self._reader.begin_session(self._wire, self._host.monotonic_s())
+        self._line.on_data = self._on_data
 
     def _read_wire_format(self) -> WireFormat:
         """Listen for a while, and find the stations, the rate and whether packets have a time."""

@@ -24,7 +24,7 @@ def unknown_scheme_error(port: str) -> BadInput:
 
 
 def parse_network_address(port: str) -> tuple[str, int]:
-    """Split `tcp://host:port` or `udp://host:port` into host and port number. Raises BadInput when either is missing."""
+    """Split `tcp://host:port` or `udp://host:port` into host and port number. Raises BadInput when one is missing."""
     example = "udp://HOST:PORT, such as udp://127.0.0.1:5001" if port.startswith("udp:") else _TCP_EXAMPLE
     try:
         parts = urlsplit(port)

@@ -71,7 +71,7 @@ class EmulatorServer:
     ) -> None:
         """`udp_host` is the address to which the device broadcasts while `MEthUdp` is on."""
         self.emulator, self.port, self.counts = emulator, port, ServerCounts()
-        self._broadcast, self._udp = UdpBroadcast(emulator.device), UdpPort(udp_host)
+        self._broadcast, self._udp = UdpBroadcast(emulator.device, time.monotonic()), UdpPort(udp_host)
         self._on_sent = on_sent
         self._woken, self._waker = socket.socketpair()
         self._stopped = False

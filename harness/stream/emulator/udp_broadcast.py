@@ -16,7 +16,8 @@ class UdpBroadcast:
     counts all packets.
     """
 
-    def __init__(self, device: DeviceState) -> None:
+    def __init__(self, device: DeviceState, now_s: float) -> None:
+        """Begin to broadcast if the device is set to it."""
         self._device = device
         self._sequence = 0
         self._next: tuple[int, int] | None = None
@@ -25,6 +26,7 @@ class UdpBroadcast:
         """When the motion began in which that round is counted [s]."""
         self._values: tuple[int, RecordValues] | None = None
         """The latest round and its values."""
+        self._follow_device(now_s)
 
     @property
     def next_s(self) -> float:
@@ -35,19 +37,22 @@ class UdpBroadcast:
 
     def packets(self, now_s: float) -> list[bytes]:
         """Return the packets that are due by now."""
-        device, player = self._device, self._device.rounds.player
-        if not device.settings.udp:
-            self._next = None
-            return []
-        if self._next is None or self._began_s != player.epoch[0]:
-            self._next, self._began_s = (player.first_from(now_s), 0), player.epoch[0]
-        packets = []
-        while self.next_s <= now_s:
+        self._follow_device(now_s)
+        device, packets = self._device, list[bytes]()
+        while self._next is not None and self.next_s <= now_s:
             number, row = self._next
             if device.settings.stations[row].active:
                 packets.append(self._packet(number, row))
             self._next = (number, row + 1) if row + 1 < len(device.rounds.plugged) else (number + 1, 0)
         return packets
+
+    def _follow_device(self, now_s: float) -> None:
+        """Start, stop, or begin anew where the device has restarted its motion."""
+        player = self._device.rounds.player
+        if not self._device.settings.udp:
+            self._next = None
+        elif self._next is None or self._began_s != player.epoch[0]:
+            self._next, self._began_s = (player.first_from(now_s), 0), player.epoch[0]
 
     def _packet(self, number: int, row: int) -> bytes:
         values = self._round_values(number)
