@@ -17,7 +17,7 @@ import pytest
 from harness.cli import main
 from harness.errors import BadInput
 from harness.experiment.playback import prepare_playback
-from harness.stream.codec.datagram import parse_datagram
+from harness.stream.codec.datagram import Datagram, parse_datagram
 from harness.stream.codec.samples import DeviceSamples
 from harness.stream.driver import DriverConfig, DriverTiming, Is900Broadcast, LineEvent, open_tracker
 from harness.stream.driver.transport import open_transport
@@ -208,7 +208,7 @@ def test_a_device_without_time_stamps_is_read_by_the_hosts_clock(monkeypatch: py
     """The time may be absent or constant where it was not requested (docs/is900.md 9)."""
     from harness.stream.emulator import udp_broadcast
 
-    original = udp_broadcast.Datagram
+    original = Datagram
     for time_s in (None, 0.0):
         monkeypatch.setattr(
             udp_broadcast, "Datagram", lambda sent=time_s, **values: replace(original(**values), time_s=sent)

@@ -57,8 +57,14 @@ class RecordValues:
 
     def rows(self, rows: list[int]) -> "RecordValues":
         """Return the values of these records."""
-        columns = (getattr(self, name) for name in self.__dataclass_fields__)
-        return RecordValues(*(column if isinstance(column, int) else column[rows] for column in columns))
+        return RecordValues(
+            self.measured_s[rows],
+            self.position_m[rows],
+            self.tracker_from_station[rows],
+            self.quality[rows],
+            self.buttons if isinstance(self.buttons, int) else self.buttons[rows],
+            self.joystick if isinstance(self.joystick, int) else self.joystick[rows],
+        )
 
 
 def encode_records(

@@ -25,6 +25,7 @@ from harness.stream.driver.connection import DeviceConnection
 
 Answer = dict[str, Any]
 """A decoded answer: its kind and its values."""
+_CONTROLS = ("buttons", "joystick")
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,8 @@ def _decode_reply(line: bytes) -> Answer:
 def _decode_records(run: RecordRun, wire: WireFormat) -> list[Answer]:
     """Decode data records: time [s], position [m], unit quaternion, quality 0 to 1, buttons and joystick as sent."""
     readings = decode_readings(run.table, np.zeros(len(run.table)), wire.characters, wire.settings)
-    names, answers = run.table.dtype.names or (), []
+    names: tuple[str, ...] = run.table.dtype.names or ()
+    answers: list[Answer] = []
     for row, record in enumerate(run.table):
         columns = {
             "measured_s": readings.measured_s[row],
@@ -134,6 +136,6 @@ def _decode_records(run: RecordRun, wire: WireFormat) -> list[Answer]:
             "quality": readings.quality[row] if {40, 76} & set(wire.items) else np.nan,
         }
         values = {name: np.round(value, 9).tolist() for name, value in columns.items() if np.all(np.isfinite(value))}
-        controls = {name: record[name].tolist() for name in ("buttons", "joystick") if name in names}
+        controls: Answer = {name: record[name].tolist() for name in _CONTROLS if name in names}
         answers.append({"kind": "record", "station": chr(record["station"]), **values, **controls})
     return answers

@@ -20,5 +20,6 @@ def open_tracker(
     on_event: Callable[[LineEvent], None] = lambda event: None,
 ) -> Tracker:
     """Open and set up a tracker; `udp://host:port` listens to a broadcast. Raises BadInput."""
-    opener: type[Tracker] = Is900Broadcast if port.startswith(UDP_SCHEME) else Is900
-    return opener(port, config, observer=observer, on_event=on_event)
+    if port.startswith(UDP_SCHEME):
+        return Is900Broadcast(port, config, observer=observer, on_event=on_event)
+    return Is900(port, config, observer=observer, on_event=on_event)

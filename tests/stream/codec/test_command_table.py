@@ -15,7 +15,8 @@ from tests.stream.emulator.played import DeviceSession
 
 PAGE = (Path(__file__).parents[3] / "docs" / "is900.md").read_text(encoding="utf-8")
 FASTRAK = PAGE.partition("### 4.1")[2].partition("### 4.2")[0]
-INTERSENSE = PAGE.partition("### 4.2")[2].partition("## 5")[0]
+INTERSENSE = PAGE.partition("### 4.2")[2].partition("### 4.3")[0]
+AS_BUILT = PAGE.partition("### 4.3")[2].partition("## 5")[0]
 
 EXAMPLES = {
     "P": "P", "C": "C", "c": "c", "F": "F", "f": "f", "U": "U", "u": "u", "S": "S", "W": "W",
@@ -126,3 +127,15 @@ def test_the_driver_sends_the_commands_that_the_list_names() -> None:
         form = {"^Q": "\x11", "l*": r"l\*"}.get(name, name)
         values = r"[1-9A-C],.+" if "," in EXAMPLES[written] else "[1-9A-C]" if "{st}" in written else ""
         assert any(re.fullmatch(form + values, line) for line in lines) or EXAMPLES[written] in lines, written
+
+
+def test_the_page_says_who_sends_what() -> None:
+    """Its first row names what the driver sends; its last two what needs permission."""
+    rows = [line for line in AS_BUILT.splitlines() if line.startswith("| ")][1:]
+    driver, _, permission, others = ({*re.findall(r"`([A-Za-z0-9]+)", row.split(" | ")[0])} for row in rows)
+    names = {re.match(r"[A-Za-z]+", EXAMPLES[written]) for written in SENT_BY_THE_DRIVER - {"^Q"}}
+    assert driver == {name[0] for name in names if name}
+    dangerous = {name for name, command in DEVICE_COMMANDS.items() if command.danger or command.set_danger}
+    reasons = {"MEthIp", "MEthUdp", "MEthUdpPort", "MConfigLockMode"}
+    assert permission | others | reasons == dangerous - {"^K", "^Y"}
+    assert "`MEthIp`, `MEthUdp`, `MEthUdpPort` and `MConfigLockMode` with a value" in AS_BUILT

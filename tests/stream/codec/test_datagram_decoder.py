@@ -48,7 +48,7 @@ def test_frames_are_those_of_a_serial_line_with_the_same_content() -> None:
     frames = read(received)
     number, station = np.repeat(np.arange(20), 3), np.tile(np.arange(1, 4), 20)
     values = RecordValues(
-        np.array([stamp_s(n, s) for n, s in zip(number, station, strict=True)]),
+        np.array([stamp_s(int(n), int(s)) for n, s in zip(number, station, strict=True)]),
         np.stack([1.0 + 0.01 * number, 0.25 * station, np.full(60, 1.5)], axis=1),
         from_yaw_pitch_roll_deg(np.stack([10.0 * station, np.full(60, -10.0), np.full(60, 5.5)], axis=1)),
         np.ones(60),
