@@ -136,6 +136,6 @@ def test_the_page_says_who_sends_what() -> None:
     names = {re.match(r"[A-Za-z]+", EXAMPLES[written]) for written in SENT_BY_THE_DRIVER - {"^Q"}}
     assert driver == {name[0] for name in names if name}
     dangerous = {name for name, command in DEVICE_COMMANDS.items() if command.danger or command.set_danger}
-    reasons = {"MEthIp", "MEthUdp", "MEthUdpPort", "MConfigLockMode"}
-    assert permission | others | reasons == dangerous - {"^K", "^Y"}
+    with_value = {"MEthIp", "MEthUdp", "MEthUdpPort", "MConfigLockMode"}
+    assert permission | others | with_value == dangerous - {"^K", "^Y"}
     assert "`MEthIp`, `MEthUdp`, `MEthUdpPort` and `MConfigLockMode` with a value" in AS_BUILT
