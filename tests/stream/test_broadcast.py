@@ -93,6 +93,35 @@ def test_a_recording_of_a_broadcast_replays_as_it_was_live(tmp_path: Path) -> No
         assert len(replayed) >= 20
 
 
+def test_packets_that_waited_before_the_iteration_are_dropped() -> None:
+    """They would all seem to arrive at one moment, while the device's clock says otherwise."""
+    with broadcast() as (_, port), open_tracker(port) as tracker:
+        time.sleep(1.0)
+        began_s = time.monotonic()
+        frames = list(islice(tracker, 10))
+        assert frames[0].received_s > began_s
+        assert frames[-1].received_s - frames[1].received_s > 0.5
+        assert tracker.counts["clock_resets"] == 0
+        assert not any(frame.suspect.any() for frame in frames)
+
+
+def test_two_recordings_in_one_file_have_the_frames_of_their_sessions_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    live = []
+    with broadcast() as (_, port):
+        for _ in range(2):
+            with RecordingWriter(path) as writer, open_tracker(port, observer=writer) as tracker:
+                live.append(list(islice(tracker, 8)))
+    stream = RecordingStream(path)
+    replayed = list(stream)
+    assert stream.counts["sessions"] == 2
+    received_s = [frame.received_s for frame in replayed]
+    first, second = ([frame.received_s for frame in part] for part in live)
+    assert received_s[:8] == first
+    assert set(second) <= set(received_s)
+    assert not [moment for moment in received_s if first[-1] + 1.0 / RATE_HZ < moment < second[0]]
+
+
 def test_a_command_switches_the_broadcast_on_and_off() -> None:
     """It is off after power-on, goes to this computer, and needs no stream on the line."""
     with (

@@ -57,16 +57,17 @@ class Is900Broadcast:
         self._frames: deque[TrackerFrame] = deque()
         self._recent_s: deque[float] = deque(maxlen=_RATE_WINDOW_FRAMES)
         self._closing = threading.Event()
-        self._line = DeviceConnection(self._host.open(port, 0), self._host, self._observer, self._timing)
-        self._line.closing = self._closing.is_set
+        self._transport = self._host.open(port, 0)
         try:
+            # These packets belong to no session, so the observer does not see them.
+            self._line = self._connect(NullLineObserver())
             self._wire = self._read_wire_format()
         except BaseException:
             self.close()
             raise
         self._trouble: LineEventKind | None = "stalled"
         self._last_byte_s = self._host.monotonic_s()
-        self._begin_session()
+        self._streaming = False
 
     @property
     def stations(self) -> tuple[str, ...]:
@@ -120,7 +121,7 @@ class Is900Broadcast:
         if not self._closing.is_set():
             self._closing.set()
             with contextlib.suppress(LineLost):
-                self._line.transport.close()
+                self._transport.close()
 
     def __enter__(self) -> "Is900Broadcast":
         return self
@@ -132,6 +133,8 @@ class Is900Broadcast:
 
     def _step(self) -> None:
         """Wait once for packets and process them."""
+        if not self._streaming:
+            self._start()
         received, now_s = self._line.receive(self._timing.poll_s), self._host.monotonic_s()
         if not received:
             overdue = self._reader.expire(now_s)
@@ -166,10 +169,19 @@ class Is900Broadcast:
         self._observer.on_event(event)
         self._on_event(event)
 
-    def _begin_session(self) -> None:
+    def _connect(self, observer: LineObserver) -> DeviceConnection:
+        line = DeviceConnection(self._transport, self._host, observer, self._timing)
+        line.closing = self._closing.is_set
+        return line
+
+    def _start(self) -> None:
+        """Begin a session. Packets that waited since the set-up are dropped, because nobody knows when they arrived."""
+        while self._transport.read(0.0):
+            pass
+        self._line = self._connect(self._observer)
         self._observer.on_configured(self._wire)
         self._reader.begin_session(self._wire, self._host.monotonic_s())
-        self._line.on_data = self._on_data
+        self._line.on_data, self._streaming = self._on_data, True
 
     def _read_wire_format(self) -> WireFormat:
         """Listen for a while, and find the stations, the rate and whether packets have a time."""
