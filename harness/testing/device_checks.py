@@ -59,7 +59,7 @@ def _describe_port(device: str) -> str:
 
 
 def _heights_m() -> Floats:
-    return 0.1 * np.arange(len(_STATIONS))
+    return np.arange(len(_STATIONS), dtype=float) / 10.0
 
 
 def _make_samples() -> DeviceSamples:

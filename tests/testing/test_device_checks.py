@@ -4,6 +4,7 @@ from collections import namedtuple
 from pathlib import Path
 
 import pytest
+from serial.tools import list_ports
 
 from harness.stream.emulator import EmulatorConfig
 from harness.testing import device_checks
@@ -35,7 +36,7 @@ def test_a_device_that_does_not_answer_is_a_failure(monkeypatch: pytest.MonkeyPa
 
 
 def test_serial_ports_are_listed_with_permission_and_latency(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(device_checks.list_ports, "comports", lambda: [])
+    monkeypatch.setattr(list_ports, "comports", lambda: [])
     assert describe_serial_ports() == "none found"
     usable = tmp_path / "ttyUSB0"
     usable.touch()
@@ -44,7 +45,7 @@ def test_serial_ports_are_listed_with_permission_and_latency(tmp_path: Path, mon
     timer.write_text("16\n")
     monkeypatch.setattr(device_checks, "LATENCY_FOLDER", tmp_path / "sys")
     ports = [FakePort(str(usable)), FakePort(str(tmp_path / "ttyS9"))]
-    monkeypatch.setattr(device_checks.list_ports, "comports", lambda: ports)
+    monkeypatch.setattr(list_ports, "comports", lambda: ports)
     text = describe_serial_ports()
     assert f"{usable} (latency timer 16 ms)" in text
     assert f"{tmp_path / 'ttyS9'} (may not be opened by this user)" in text
