@@ -94,6 +94,16 @@ def test_intersense_reads_and_sets_stations_while_data_flow(tmp_path: Path, vers
         client.close()
 
 
+def test_intersense_reads_a_device_with_more_stations_than_inertia_cubes(tmp_path: Path) -> None:
+    """It gives up at an answer to `MCI` above 4."""
+    with run_device(tmp_path, stations=6, rate_hz=30.0) as device:
+        client = InterSenseClient(device.port, "2.09")
+        assert client.open()
+        assert all(client.read_station(number) for number in range(1, 9))
+        assert [station.cube_number for station in client.stations] == [1, 2, 3, 4, -1, -1, -1, -1]
+        client.close()
+
+
 def test_intersense_looks_for_another_product_first(tmp_path: Path) -> None:
     """Its other probes are joined to the first `MS`, which gets an error record."""
     with run_device(tmp_path) as device:
