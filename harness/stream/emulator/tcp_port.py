@@ -1,6 +1,7 @@
 """A TCP port of the emulator: it carries the same bytes as the serial line (docs/is900.md 9)."""
 
 import socket
+import time
 from collections.abc import Callable
 
 from harness.errors import BadInput
@@ -11,19 +12,34 @@ LogCallback = Callable[[str], None]
 """Receives one line of text for the user."""
 MAX_CLIENTS = 32
 """Further clients are turned away."""
+IDLE_S = 5.0
+"""A client keeps the device until it has sent and received nothing for this long [s] [choice]."""
 
 
 class TcpPort:
-    """A TCP port. All clients share the device's line: each may send commands, and each receives all that it sends.
+    """A TCP port. Of its clients, the one that sends a command gets the device, until it leaves or is idle.
 
-    An idle client takes nothing from the others. One that does not read is dropped when its queue is full.
+    An idle client keeps nobody out. Another that sends a command meanwhile is turned away, so that two programs do not
+    change each other's settings. A client that does not read is dropped when its queue is full.
     """
 
-    def __init__(self, host: str, port: int, *, anywhere: bool = False, log: LogCallback = lambda line: None) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        *,
+        anywhere: bool = False,
+        log: LogCallback = lambda line: None,
+        idle_s: float = IDLE_S,
+    ) -> None:
         """Listen at this address. Raises BadInput when it is taken, or reachable by others without `anywhere`."""
         check_loopback(host, anywhere, "anyone who reaches the port can then command the emulator")
-        self._log = log
+        self._log, self._idle_s = log, idle_s
         self._clients: list[TcpClient] = []
+        self._user: TcpClient | None = None
+        """The client that has the device."""
+        self._used_s = float("-inf")
+        """When that client last sent or received something [s]."""
         self._server: socket.socket | None = None
         self._address = host, port
         self.plug()
@@ -43,16 +59,19 @@ class TcpPort:
     def read(self) -> bytes:
         for client in self._clients:
             client.flush()
-        data = b"".join(client.read() for client in self._clients)
+        user_first = sorted(self._clients, key=lambda client: client is not self._user)  # it may have left
+        data = b"".join(self._read_from(client) for client in user_first)
         self._drop_clients()  # before others are accepted: the same client may be reconnecting
         self._accept_clients()
         return data
 
     def write(self, data: bytes) -> bool:
-        for client in self._clients:
-            client.write(data)
+        if self._user is None:
+            return False
+        self._user.write(data)
+        self._used_s = time.monotonic()
         self._drop_clients()
-        return bool(self._clients)
+        return self._user is not None
 
     def baud(self) -> int | None:
         return None
@@ -80,6 +99,20 @@ class TcpPort:
     def close(self) -> None:
         self.unplug()
 
+    def _read_from(self, client: TcpClient) -> bytes:
+        """Return the commands of a client if the device is free for it; turn it away if not."""
+        data, now_s = client.read(), time.monotonic()
+        if not client.open and self._user is client:
+            self._user = None
+        if not data:
+            return b""
+        if self._user not in (None, client) and now_s < self._used_s + self._idle_s:
+            client.open = False
+            self._log(f"turned away {client.name}: another client has the device")
+            return b""
+        self._user, self._used_s = client, now_s
+        return data
+
     def _accept_clients(self) -> None:
         while self._server is not None:
             try:
@@ -99,6 +132,7 @@ class TcpPort:
             if client.open and client.unread_bytes <= MAX_UNREAD_BYTES:
                 continue
             self._clients.remove(client)
+            self._user = None if self._user is client else self._user
             client.close()
             reason = f"dropped: it left {client.unread_bytes} bytes unread" if client.open else "gone"
             self._log(f"client {client.name} {reason}")
