@@ -4,6 +4,8 @@ import re
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from harness.errors import BadInput
 from harness.stream.codec.command_table import DEVICE_COMMANDS, find_danger, parse_command
@@ -139,3 +141,15 @@ def test_the_page_says_who_sends_what() -> None:
     with_value = {"MEthIp", "MEthUdp", "MEthUdpPort", "MConfigLockMode"}
     assert permission | others | with_value == dangerous - {"^K", "^Y"}
     assert "`MEthIp`, `MEthUdp`, `MEthUdpPort` and `MConfigLockMode` with a value" in AS_BUILT
+
+
+@given(st.one_of(st.text(max_size=300), st.from_regex(r"\^?[A-Za-z]{1,4}[0-9A-C*,. -]{0,8}", fullmatch=True)))
+def test_any_text_is_refused_or_exactly_one_command(text: str) -> None:
+    try:
+        command = parse_command(text)
+    except BadInput:
+        return
+    sent = CommandReader().feed(command.encode())
+    assert [one.line for one in sent] == [command.line]
+    dangerous = {0x0B, 0x19, ord("W")}
+    assert find_danger(command) or not dangerous & set(command.line[:1])

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from harness.stream.codec.capture import ByteCapture
 from harness.stream.codec.datagram import Datagram
@@ -108,3 +110,14 @@ def test_packets_without_a_time_are_placed_by_the_hosts_clock() -> None:
     frames = read(parts, WITHOUT_TIME)
     assert len(frames) == 6
     assert all(np.isnan(frame.measured_s).all() and frame.position_valid.all() for frame in frames)
+
+
+@given(st.lists(st.one_of(st.binary(max_size=60), st.sampled_from([packet(1, 1.0), packet(2, None)])), max_size=8))
+def test_any_bytes_are_packets_or_garbage(parts: list[bytes]) -> None:
+    data = b"".join(parts)
+    events = DatagramDecoder(DATAGRAM_LIST, b"123456789ABC").feed(data)
+    offset = 0
+    for event in events:
+        assert event.offset == offset
+        offset += event.nbytes if isinstance(event, RecordRun) else event.size if isinstance(event, Garbage) else 0
+    assert offset == len(data)
